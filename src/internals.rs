@@ -2,9 +2,9 @@
 
 pub mod ask {
     pub use crate::ask::{
-        Access, AskError, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message,
-        Model, Parameters, Prompts, Query, Quota, Random, Reach, Remote, Script, Secret, Sending,
-        SettingsOrigin, Temperature, Thinking, TokenField, WireSetting,
+        Access, AskError, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model, Parameters,
+        Prompts, Query, Quota, Random, Reach, Remote, Script, Secret, Sending, SettingsOrigin, Temperature, Thinking,
+        TokenField, WireSetting,
     };
 }
 

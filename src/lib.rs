@@ -1,15 +1,18 @@
 //! Measures how well a vision-language model sees in the dark.
 //!
-//! From well-lit indoor frames it makes low-light versions (levels L0–L5 or any exposure drop, each by exposure drop alone and with the
-//! noise of a sensor; or as a camera with automatic exposure takes them, or blurred by its motion), enhances them with any low-light model given as ONNX, asks OpenAI-compatible endpoints questions about each
-//! image, scores the replies, and compares all of it.
+//! From well-lit indoor frames it makes low-light versions (levels L0–L5 or any exposure drop, each by exposure drop
+//! alone and with the noise of a sensor; or as a camera with automatic exposure takes them, or blurred by its motion),
+//! enhances them with any low-light model given as ONNX, asks OpenAI-compatible endpoints questions about each image,
+//! scores the replies, and compares all of it.
 //!
 //! # The library
 //!
-//! The program `darkqa-eval` does all of this from the command line. The library has the pieces that other programs use:
-//! [`synthesis`], [`enhance`], [`questions`], [`score::choice`] and [`StoredRun`]; their vocabulary is at the root.
+//! The program `darkqa-eval` does all of this from the command line. The library has the pieces that other programs
+//! use: [`synthesis`], [`enhance`], [`questions`], [`score::choice`] and [`StoredRun`]; their vocabulary is at the
+//! root.
 //!
-//! Degrade a frame. The noise follows from the seed and the name of the frame, so that the same call gives the same image:
+//! Degrade a frame. The noise follows from the seed and the name of the frame, so that the same call gives the same
+//! image:
 //!
 //! ```
 //! use darkqa_eval::synthesis::{NoiseKey, Synthesis, degrade};
@@ -41,7 +44,8 @@
 //! # Ok::<(), darkqa_eval::Error>(())
 //! ```
 //!
-//! Read a reply and score it. The strict parsing takes the exact words of a choice alone, the lenient one finds them in a sentence:
+//! Read a reply and score it. The strict parsing takes the exact words of a choice alone, the lenient one finds them in
+//! a sentence:
 //!
 //! ```
 //! use darkqa_eval::score::choice::readings;
@@ -77,8 +81,8 @@
 //!
 //! # The map
 //!
-//! Twelve rooms, in the order of the data. A room is a folder of `src`; a folder with a `Cargo.toml` is a crate of its own, because it
-//! needs nothing of this one and then builds beside it:
+//! Twelve rooms, in the order of the data. A room is a folder of `src`; a folder with a `Cargo.toml` is a crate of its
+//! own, because it needs nothing of this one and then builds beside it:
 //!
 //! ```text
 //! base ─┬─ pictures ─┬─ data ──────────┐
@@ -105,26 +109,29 @@
 //!
 //! A [`Frame`] is seen, a [`Question`] is asked, a [`Degradation`] is what was done to a frame, a [`Condition`] is a
 //! degradation with or without an enhancer, a [`Reply`] is what a model sent, and a `Record` is the result
-//! of one trial: one question to one model in one condition. `internals` is what benchmarks and tests of this repository use besides.
+//! of one trial: one question to one model in one condition. `internals` is what benchmarks and tests of this
+//! repository use besides.
 //!
 //! # Where to add what
 //!
-//! `CONTRIBUTING.md` has a checklist for each kind of change: a flag, a format to import, a kind of degradation, an API or a vendor of
-//! endpoints, a rule of reading replies, a statistic, an experiment and others.
+//! `CONTRIBUTING.md` has a checklist for each kind of change: a flag, a format to import, a kind of degradation, an API
+//! or a vendor of endpoints, a rule of reading replies, a statistic, an experiment and others.
 //!
 //! # What must hold
 //!
-//! - The same inputs and seed give the same bytes, whatever the threads, order, shard or resume: a random draw is a function of where
-//!   it is used, never of when.
+//! - The same inputs and seed give the same bytes, whatever the threads, order, shard or resume: a random draw is a
+//!   function of where it is used, never of when.
 //! - What was paid for is on disk before anything else happens, and is never asked again.
 //! - No reply is guessed at: what cannot be read is counted apart, what failed is not scored.
 //! - A key reaches no log, no file and no message.
-//! - What decides a reply is in the key of its trial; a run's identity holds only what all trials share and no column tells apart.
+//! - What decides a reply is in the key of its trial; a run's identity holds only what all trials share and no column
+//!   tells apart.
 //!
 //! # Who may import whom
 //!
-//! `tests/program/architecture/` reads this table and fails on a breach. No file of `commands` but the command line uses another
-//! command's, and files import each other in no circles but those that `tests/program/architecture/mod.rs` lists with a reason.
+//! `tests/program/architecture/` reads this table and fails on a breach. No file of `commands` but the command line
+//! uses another command's, and files import each other in no circles but those that `tests/program/architecture/mod.rs`
+//! lists with a reason.
 //!
 //! | room | may use |
 //! |---|---|
@@ -166,23 +173,20 @@ pub use error::{Error, Result};
 pub use runs::record_table::{Records, RunRecord, StoredRun};
 pub use types::degradations::Kind;
 pub use types::{
-    Answer, Choices, Condition, Degradation, DepthKind, Digest, Family, Frame, FrameId, Intrinsics,
-    Label, Labels, Question, QuestionId, Reply, Rgb, Segmentation, Severity, UnreadReason,
+    Answer, Choices, Condition, Degradation, DepthKind, Digest, Family, Frame, FrameId, Intrinsics, Label, Labels,
+    Question, QuestionId, Reply, Rgb, Segmentation, Severity, UnreadReason,
 };
 
 /// Degraded versions of a clean frame, as a camera would take it in less light.
 pub mod synthesis {
     pub use darkqa_light::{
-        Amplify, CameraModel, CameraState, NoiseKey, NoiseProfile, Sampling, Synthesis, degrade,
-        develop_with_state,
+        Amplify, CameraModel, CameraState, NoiseKey, NoiseProfile, Sampling, Synthesis, degrade, develop_with_state,
     };
 }
 
 /// Enhancement of degraded images by an ONNX model.
 pub mod enhance {
-    pub use darkqa_enhance::{
-        Enhancer, Install, MemoryLimit, ModelFile, Runtime, RuntimeSearch, Tiling, TimeLimit,
-    };
+    pub use darkqa_enhance::{Enhancer, Install, MemoryLimit, ModelFile, Runtime, RuntimeSearch, Tiling, TimeLimit};
 }
 
 /// Questions about a frame from its maps, by rule.

@@ -4,10 +4,7 @@ use std::process::ExitCode;
 
 use darkqa_eval::cli;
 
-#[expect(
-    unsafe_code,
-    reason = "a switch that ONNX Runtime reads from the environment alone"
-)]
+#[expect(unsafe_code, reason = "a switch that ONNX Runtime reads from the environment alone")]
 fn main() -> ExitCode {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     limit_heaps();
@@ -16,8 +13,8 @@ fn main() -> ExitCode {
     cli::main(std::env::args_os())
 }
 
-/// Limits glibc to one heap per core. By default it opens up to eight heaps per core, and each keeps the memory of images that it once
-/// held. With the default, 48 frames on two cores take 680 MB; with two heaps they take 330 MB.
+/// Limits glibc to one heap per core. By default it opens up to eight heaps per core, and each keeps the memory of
+/// images that it once held. With the default, 48 frames on two cores take 680 MB; with two heaps they take 330 MB.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 #[expect(unsafe_code, reason = "a switch of the C library")]
 fn limit_heaps() {

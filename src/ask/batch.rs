@@ -1,10 +1,9 @@
-//! Lines of Batch API files: [`Model::batch_line`](super::Model::batch_line) writes input lines, [`BatchLine`] reads output lines.
+//! Lines of Batch API files: [`Model::batch_line`](super::Model::batch_line) writes input lines, [`BatchLine`] reads
+//! output lines.
 
 use serde_json::Value;
 
-use super::failures::{
-    ApiError, Refusal, ReplyError, implied_status, is_moderated, is_out_of_tokens,
-};
+use super::failures::{ApiError, Refusal, ReplyError, implied_status, is_moderated, is_out_of_tokens};
 use super::replies::bounded_json::parse;
 use super::requests::Constrain;
 use super::requests::constraint::constrained_letter;
@@ -12,7 +11,8 @@ use super::secrets::{Scrub, without_secrets};
 use super::wire::{batch_reply, body_usage};
 use crate::types::{Failure, FailureKind, LostAttempts, Reply, Usage};
 
-/// Writes a line of an input file, with a line end: `{"custom_id", "method", "url", "body"}`, with the body of a single request.
+/// Writes a line of an input file, with a line end: `{"custom_id", "method", "url", "body"}`, with the body of a single
+/// request.
 pub(super) fn input_line(id: &str, url: &str, body: &[u8]) -> Result<Vec<u8>, serde_json::Error> {
     let (id, url) = (serde_json::to_string(id)?, serde_json::to_string(url)?);
     let head = format!("{{\"custom_id\":{id},\"method\":\"POST\",\"url\":{url},\"body\":");
@@ -26,26 +26,22 @@ pub(crate) struct BatchLine {
     pub id: String,
     /// The reply or the failure.
     pub result: Result<Reply, Failure>,
-    /// Status and body of a refused request; `None` for a reply and for other failures. They are only classified and not stored, so
-    /// secrets are not removed.
+    /// Status and body of a refused request; `None` for a reply and for other failures. They are only classified and
+    /// not stored, so secrets are not removed.
     pub refusal: Option<(u16, String)>,
     /// Tokens charged for a failure; `None` for a reply, or if the server does not report them.
     pub charged: Option<Usage>,
 }
 
 impl BatchLine {
-    /// Parses a line of the user's own file; `None` if it has another form, as input files and the results of other interfaces have. No key
-    /// is known without a server, so no secret is removed. For lines from a server use
+    /// Parses a line of the user's own file; `None` if it has another form, as input files and the results of other
+    /// interfaces have. No key is known without a server, so no secret is removed. For lines from a server use
     /// [`BatchServer::line`](super::batch_api::BatchServer::line).
     #[must_use]
     pub(crate) fn read(line: &str) -> Option<Self> {
         let line = parse(line.trim_start_matches('\u{feff}')).ok()?;
-        let has_result = ["response", "error"]
-            .iter()
-            .any(|field| line.get(field).is_some());
-        has_result
-            .then(|| Self::from_json(&line, &Scrub::default()))
-            .flatten()
+        let has_result = ["response", "error"].iter().any(|field| line.get(field).is_some());
+        has_result.then(|| Self::from_json(&line, &Scrub::default())).flatten()
     }
 
     /// Parses a line, and removes secrets from the reply or the failure; `None` if the line has another form.
@@ -57,19 +53,11 @@ impl BatchLine {
         let id = line.get("custom_id")?.as_str()?.to_owned();
         let result = result(line, scrub).map(|reply| without_secrets(reply, scrub));
         let is_failure = result.is_err();
-        let charged = match line
-            .get("response")
-            .and_then(|response| response.get("body"))
-        {
+        let charged = match line.get("response").and_then(|response| response.get("body")) {
             Some(body) if result.is_err() => body_usage(&body_text(body)),
             _ => None,
         };
-        Some(Self {
-            id,
-            charged,
-            result,
-            refusal: refusal(line).filter(|_| is_failure),
-        })
+        Some(Self { id, charged, result, refusal: refusal(line).filter(|_| is_failure) })
     }
 }
 
@@ -95,15 +83,13 @@ fn is_empty(error: &Value) -> bool {
 
 /// A body as JSON text. Some servers write the body of a failed request as a string, not as an object.
 fn body_text(body: &Value) -> String {
-    body.as_str()
-        .map_or_else(|| body.to_string(), str::to_owned)
+    body.as_str().map_or_else(|| body.to_string(), str::to_owned)
 }
 
 /// The reply or the failure in a line.
 fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
     let response = line.get("response").filter(|response| !response.is_null());
-    let status =
-        response.and_then(|response| u16::try_from(response.get("status_code")?.as_u64()?).ok());
+    let status = response.and_then(|response| u16::try_from(response.get("status_code")?.as_u64()?).ok());
     let error = line.get("error").filter(|error| !is_empty(error));
     let refused = |status: u16, api_error: &ApiError, usage: Option<Usage>| {
         let words = scrub.line(&api_error.message);
@@ -113,8 +99,7 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
             return Some(Reply::empty_truncated(usage));
         }
         lost.add(usage);
-        is_moderated(status, api_error)
-            .then(|| Refusal::new(status, code.as_deref(), words).into_reply(1, lost))
+        is_moderated(status, api_error).then(|| Refusal::new(status, code.as_deref(), words).into_reply(1, lost))
     };
     let fail = |kind, text: &str| {
         let text = scrub.line(text);
@@ -138,21 +123,14 @@ fn result(line: &Value, scrub: &Scrub) -> Result<Reply, Failure> {
         return fail(kind, format!("{code} {}", api_error.message).trim());
     }
     let Some(body) = response.and_then(|response| response.get("body")) else {
-        return fail(
-            FailureKind::Response,
-            "a line with neither a response nor an error",
-        );
+        return fail(FailureKind::Response, "a line with neither a response nor an error");
     };
     let text = body_text(body);
     match status {
         None | Some(200..300) => batch_reply(&text).or_else(|error| match error {
-            ReplyError::Api(api_error) => {
-                refused(implied_status(&api_error), &api_error, body_usage(&text))
-                    .map_or_else(|| fail(FailureKind::Server, &api_error.message), Ok)
-            }
-            ReplyError::Unreadable(unreadable) => {
-                fail(FailureKind::Response, &unreadable.description)
-            }
+            ReplyError::Api(api_error) => refused(implied_status(&api_error), &api_error, body_usage(&text))
+                .map_or_else(|| fail(FailureKind::Server, &api_error.message), Ok),
+            ReplyError::Unreadable(unreadable) => fail(FailureKind::Response, &unreadable.description),
         }),
         Some(code) => {
             let api_error = ApiError::from_body(&text);
@@ -190,8 +168,7 @@ mod tests {
     fn keys_are_removed_from_replies_and_failures() {
         const KEY: &str = "sk-0123456789abcdef";
         let scrub = Scrub::new([KEY.to_owned()]);
-        let choice =
-            r#"{"message":{"content":"B, KEY","refusal":"no KEY"},"finish_reason":"KEY is over"}"#;
+        let choice = r#"{"message":{"content":"B, KEY","refusal":"no KEY"},"finish_reason":"KEY is over"}"#;
         let answered = format!(
             r#"{{"custom_id":"k","response":{{"status_code":200,"body":{{"model":"m-KEY","choices":[{choice}]}}}}}}"#
         );
@@ -251,11 +228,7 @@ mod tests {
                 FailureKind::Response,
                 "no choices",
             ),
-            (
-                r#"{"custom_id":"k","response":null}"#,
-                FailureKind::Response,
-                "neither",
-            ),
+            (r#"{"custom_id":"k","response":null}"#, FailureKind::Response, "neither"),
         ] {
             let failure = read_line(line).result.unwrap_err();
             assert_eq!(failure.kind, kind, "{line}");

@@ -34,33 +34,26 @@ impl BatchInterface {
 
     /// Purpose under which files are uploaded.
     pub(crate) fn purpose(self) -> &'static str {
-        self.entry()
-            .and_then(|entry| entry.purpose.as_deref())
-            .unwrap_or(PURPOSE)
+        self.entry().and_then(|entry| entry.purpose.as_deref()).unwrap_or(PURPOSE)
     }
 
     /// Maximum size of a file, in MB.
     pub(crate) fn file_size(self) -> NonZeroU64 {
-        self.entry()
-            .and_then(|entry| entry.file_size)
-            .unwrap_or(MAX_FILE_SIZE)
+        self.entry().and_then(|entry| entry.file_size).unwrap_or(MAX_FILE_SIZE)
     }
 
     /// Maximum number of requests in a file.
     pub(crate) fn requests(self) -> NonZeroUsize {
-        self.entry()
-            .and_then(|entry| entry.requests)
-            .unwrap_or(MAX_REQUESTS)
+        self.entry().and_then(|entry| entry.requests).unwrap_or(MAX_REQUESTS)
     }
 
-    /// Path in the lines of a file, for requests with OpenAI's path `default`. Some vendors have another path for chat completions.
+    /// Path in the lines of a file, for requests with OpenAI's path `default`. Some vendors have another path for chat
+    /// completions.
     pub(crate) fn url(self, default: &str) -> &str {
         if !default.ends_with("/chat/completions") {
             return default;
         }
-        self.entry()
-            .and_then(|entry| entry.url.as_deref())
-            .unwrap_or(default)
+        self.entry().and_then(|entry| entry.url.as_deref()).unwrap_or(default)
     }
 
     /// Checks that batches can be submitted as files.
@@ -89,15 +82,9 @@ mod tests {
     #[test]
     fn the_address_decides_the_batch_api() {
         let together = BatchInterface::at("https://api.together.xyz/v1");
-        assert_eq!(
-            (together.purpose(), together.file_size().get()),
-            ("batch-api", 100)
-        );
+        assert_eq!((together.purpose(), together.file_size().get()), ("batch-api", 100));
         let unknown = BatchInterface::at("http://127.0.0.1:8000/v1");
-        assert_eq!(
-            (unknown.purpose(), unknown.file_size().get()),
-            ("batch", 200)
-        );
+        assert_eq!((unknown.purpose(), unknown.file_size().get()), ("batch", 200));
         assert_eq!(unknown.requests().get(), 50_000);
         let azure = BatchInterface::at("https://r.openai.azure.com/openai/v1");
         assert_eq!(azure.url("/v1/chat/completions"), "/chat/completions");

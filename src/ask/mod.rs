@@ -1,11 +1,11 @@
-//! Stage 4, ask: sends a prompt and an image to a model and receives a [`Reply`](crate::types::Reply). The only asynchronous
-//! stage.
+//! Stage 4, ask: sends a prompt and an image to a model and receives a [`Reply`](crate::types::Reply). The only
+//! asynchronous stage.
 //!
-//! Before this stage, [`Prompts`] turn a question into text and [`Payload`](crate::pictures::Payload) encodes an image as a data URL; both
-//! are CPU work. A [`Model`] receives them as the [`Message`] of a [`Call`]. [`Remote`] is a model at an [`Endpoint`]. An endpoint is one
-//! server with one or several replicas, each with its own address, key, connections and rate limiter; all models at the server share it.
-//! The table `vendors.toml` has the properties of vendors. A [`Wire`](wire_kind::Wire) is an API; `wire/` has the form of its requests
-//! and replies.
+//! Before this stage, [`Prompts`] turn a question into text and [`Payload`](crate::pictures::Payload) encodes an image
+//! as a data URL; both are CPU work. A [`Model`] receives them as the [`Message`] of a [`Call`]. [`Remote`] is a model
+//! at an [`Endpoint`]. An endpoint is one server with one or several replicas, each with its own address, key,
+//! connections and rate limiter; all models at the server share it. The table `vendors.toml` has the properties of
+//! vendors. A [`Wire`](wire_kind::Wire) is an API; `wire/` has the form of its requests and replies.
 
 pub(crate) mod batch;
 pub(crate) mod batch_api;
@@ -25,8 +25,8 @@ mod wire_kind;
 
 pub(crate) use batch_interface::BatchInterface;
 pub(crate) use costs::{
-    ChargeRatios, ImageTokenCheck, Price, PricedRequest, Prices, ReplyExcess, Reservation,
-    Spending, TokenBound, Unpriced, scaling_image_tokens, stated_charge,
+    ChargeRatios, ImageTokenCheck, Price, PricedRequest, Prices, ReplyExcess, Reservation, Spending, TokenBound,
+    Unpriced, scaling_image_tokens, stated_charge,
 };
 pub use endpoints::{Access, BaseUrl, Endpoint, Sending};
 pub(crate) use endpoints::{AccessArgs, OPENAI_KEY, Server, sleep_running, vendor_variables};
@@ -40,8 +40,8 @@ pub use pace::Quota;
 pub(crate) use pace::{ConcurrencyBounds, HeldBack};
 pub use prompts::Prompts;
 pub use requests::{
-    Call, Constrain, ExtraFields, ImageDetail, Message, Parameters, Query, SettingsOrigin,
-    Temperature, Thinking, TokenField,
+    Call, Constrain, ExtraFields, ImageDetail, Message, Parameters, Query, SettingsOrigin, Temperature, Thinking,
+    TokenField,
 };
 pub(crate) use requests::{ChangedSetting, ImageLimit, ImagePlaces, RequestArgs, by_flag};
 pub use secrets::Secret;

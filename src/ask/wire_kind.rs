@@ -68,7 +68,8 @@ impl WireSetting {
         }
     }
 
-    /// Name in the content of a model: a streamed reply equals an unstreamed one, and the API that `auto` selects is not known in advance.
+    /// Name in the content of a model: a streamed reply equals an unstreamed one, and the API that `auto` selects is
+    /// not known in advance.
     pub(super) fn content(self) -> &'static str {
         match self {
             Self::Auto | Self::Chat | Self::ChatStream => "chat",

@@ -1,7 +1,7 @@
 //! The one error type of the crate.
 //!
-//! Each variant names the cause and the place; its message ends with the remedy. There is no `From<io::Error>`: an error of
-//! the operating system is useless without its path.
+//! Each variant names the cause and the place; its message ends with the remedy. There is no `From<io::Error>`: an
+//! error of the operating system is useless without its path.
 
 use std::fmt::Display;
 use std::path::{Path, PathBuf};
@@ -115,41 +115,26 @@ fn shorten_lines(text: &str) -> String {
 impl Error {
     /// An error about a flag, variable or configuration line.
     pub fn usage(origin: impl Into<String>, problem: impl Display) -> Self {
-        Self::Usage {
-            origin: origin.into(),
-            problem: problem.to_string(),
-        }
+        Self::Usage { origin: origin.into(), problem: problem.to_string() }
     }
 
     /// An error of the operating system about a path.
     pub fn file(path: impl Into<PathBuf>, action: &'static str, source: std::io::Error) -> Self {
-        Self::File {
-            path: path.into(),
-            action,
-            source,
-        }
+        Self::File { path: path.into(), action, source }
     }
 
     /// An error in a data file; `place` is its path, with the line or frame if known.
     pub fn data(place: impl Display, problem: impl Display) -> Self {
-        Self::Data {
-            place: shorten_lines(&place.to_string()),
-            problem: shorten_lines(&problem.to_string()),
-        }
+        Self::Data { place: shorten_lines(&place.to_string()), problem: shorten_lines(&problem.to_string()) }
     }
 
-    /// Returns the error with another origin: the parser of a value does not know which flag or file the value came from.
+    /// Returns the error with another origin: the parser of a value does not know which flag or file the value came
+    /// from.
     #[must_use]
     pub fn at(self, origin: impl Into<String>) -> Self {
         match self {
-            Self::Usage { problem, .. } => Self::Usage {
-                origin: origin.into(),
-                problem,
-            },
-            Self::Data { problem, .. } => Self::Data {
-                place: origin.into(),
-                problem,
-            },
+            Self::Usage { problem, .. } => Self::Usage { origin: origin.into(), problem },
+            Self::Data { problem, .. } => Self::Data { place: origin.into(), problem },
             other => other,
         }
     }
@@ -167,9 +152,7 @@ impl Error {
     #[must_use]
     pub fn json_line(path: &Path, line: usize, error: &serde_json::Error) -> Self {
         let text = error.to_string();
-        let problem = text
-            .rsplit_once(" at line ")
-            .map_or(&*text, |(problem, _)| problem);
+        let problem = text.rsplit_once(" at line ").map_or(&*text, |(problem, _)| problem);
         Self::line(path, line, problem)
     }
 

@@ -26,10 +26,6 @@ pub(crate) struct CacheArgs {
 /// # Errors
 /// If the folder is not an image store or cannot be read, or a file cannot be removed.
 pub(crate) fn cache(args: &CacheArgs) -> Result<Outcome> {
-    let text = if args.clear {
-        clear(&args.folder)?
-    } else {
-        listing(&args.folder)?
-    };
+    let text = if args.clear { clear(&args.folder)? } else { listing(&args.folder)? };
     Ok(Outcome::text(Status::Complete, text))
 }

@@ -24,9 +24,7 @@ use self::conversion::{conversion, not_a_bag};
 use crate::data::FolderArgs;
 use crate::data::frame_folder::{self, FrameOutput};
 use crate::data::import::keyframes::{KeyFrameArgs, choose};
-use crate::data::import::{
-    Adapter, DataSetKind, FrameMaps, ListedFrame, MapArgs, open_all, unread_files,
-};
+use crate::data::import::{Adapter, DataSetKind, FrameMaps, ListedFrame, MapArgs, open_all, unread_files};
 use crate::engine::images::frames::InputTally;
 use crate::engine::images::progress::Progress;
 use crate::engine::images::workers::{ThreadArgs, pool};
@@ -40,7 +38,8 @@ use crate::types::manifests::Status;
 use crate::types::text::counted;
 use crate::types::{Decides, FrameId, InputNote, Rgb};
 
-/// Plausible typical depths of indoor frames, in millimetres (chosen). Outside this range, the depth scale is probably wrong.
+/// Plausible typical depths of indoor frames, in millimetres (chosen). Outside this range, the depth scale is probably
+/// wrong.
 const ROOM_DEPTHS: std::ops::RangeInclusive<u32> = 300..=15_000;
 
 /// The script that renders HM3D with habitat-sim in the layout that `import habitat` reads.
@@ -92,8 +91,8 @@ struct ImportArgs {
     /// The kind of data set in --src
     #[arg(value_name = "KIND", value_enum, add = Decides::Pixels)]
     kind: DataSetKind,
-    /// The data set, laid out as src/docs/importing.md shows; repeatable: several folders are joined, each scene with its folder's number
-    /// if two have one of its name
+    /// The data set, laid out as src/docs/importing.md shows; repeatable: several folders are joined, each scene with
+    /// its folder's number if two have one of its name
     #[arg(long, value_name = "DIR", required = true, add = Decides::Pixels)]
     src: Vec<PathBuf>,
     /// Where the frames go, in the common interface
@@ -122,8 +121,8 @@ struct ImportArgs {
 /// Imports frames, or prints the script that makes them.
 ///
 /// # Errors
-/// If there are no frames, the folder holds frames already, the typical depth is not that of a room, or no frame could be
-/// read; or if the kind has no script.
+/// If there are no frames, the folder holds frames already, the typical depth is not that of a room, or no frame could
+/// be read; or if the kind has no script.
 pub(crate) fn import(command: &ImportCommand, progress: &Progress) -> Result<Outcome> {
     match (&command.form, &command.import) {
         (Some(ImportForm::Script { kind }), _) => print_script(*kind),
@@ -144,8 +143,8 @@ fn print_script(kind: DataSetKind) -> Result<Outcome> {
     Ok(Outcome::text(Status::Complete, HM3D_SCRIPT.to_owned()))
 }
 
-/// The error that explains how to convert a bag. Bags of ROS 1 are not read directly, because the crate rosbag (0.6.3) maps whole files into
-/// memory and needs bzip2 and lz4 in C.
+/// The error that explains how to convert a bag. Bags of ROS 1 are not read directly, because the crate rosbag (0.6.3)
+/// maps whole files into memory and needs bzip2 and lz4 in C.
 ///
 /// # Errors
 /// If the file cannot be read.
@@ -162,16 +161,11 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let (src, out) = (&args.src, &args.out);
     let list = out.join("frames.jsonl");
     if !args.force && list.exists() {
-        let problem =
-            "the folder has frames already; --force overwrites them, another --out keeps both";
+        let problem = "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(list.display(), problem));
     }
     let adapter = open_all(args.kind, src, &args.map_args, &args.folders.root.data_root)?;
-    let frames = choose(
-        &adapter.listing().frames,
-        args.key_frames.selection(),
-        args.key_frames.fps,
-    )?;
+    let frames = choose(&adapter.listing().frames, args.key_frames.selection(), args.key_frames.fps)?;
     let workers = pool(args.threads.threads)?;
     let (bar, tally) = (progress.bar("frames", frames.len()), InputTally::default());
     let written: Vec<Option<WrittenFrame>> = workers.install(|| {
@@ -180,9 +174,7 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
             .map(|frame| {
                 let written = write_frame(args, out, &*adapter, frame, &tally);
                 bar.inc();
-                written
-                    .map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame))
-                    .ok()
+                written.map_err(|e| tracing::error!("{}/{}: {e}", frame.scene, frame.frame)).ok()
             })
             .collect()
     });
@@ -191,14 +183,8 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
     let failed = written.iter().filter(|written| written.is_none()).count();
     let written: Vec<WrittenFrame> = written.into_iter().flatten().collect();
     if written.is_empty() {
-        let folders: Vec<String> = src
-            .iter()
-            .map(|folder| folder.display().to_string())
-            .collect();
-        return Err(Error::data(
-            folders.join(", "),
-            "no frame of it could be read",
-        ));
+        let folders: Vec<String> = src.iter().map(|folder| folder.display().to_string()).collect();
+        return Err(Error::data(folders.join(", "), "no frame of it could be read"));
     }
     if adapter.assumes_metres() {
         check_unit(&written)?;
@@ -233,23 +219,11 @@ fn import_frames(args: &ImportArgs, progress: &Progress) -> Result<Outcome> {
         out.display(),
         counted(written.len(), "frame"),
         counted(scenes.len(), "scene"),
-        if listed == frames.len() {
-            String::new()
-        } else {
-            format!(", chosen from {listed}")
-        },
-        if failed == 0 {
-            String::new()
-        } else {
-            format!(", {failed} failed")
-        }
+        if listed == frames.len() { String::new() } else { format!(", chosen from {listed}") },
+        if failed == 0 { String::new() } else { format!(", {failed} failed") }
     );
     output.push_str(&unlisted_note(&listing.unlisted));
-    Ok(Outcome::wrote(
-        out,
-        Outcome::complete_if(failed == 0),
-        output,
-    ))
+    Ok(Outcome::wrote(out, Outcome::complete_if(failed == 0), output))
 }
 
 /// A frame that was written.
@@ -264,8 +238,8 @@ struct WrittenFrame {
     depth_folder: Option<&'static str>,
 }
 
-/// The image of a frame with its maps. An image with maps keeps its stored orientation, which the maps have; an image without maps is
-/// turned as its file states.
+/// The image of a frame with its maps. An image with maps keeps its stored orientation, which the maps have; an image
+/// without maps is turned as its file states.
 struct ImportedImage {
     file: ImageFile,
     rgb: Rgb,
@@ -304,11 +278,7 @@ fn write_frame(
     let ImportedImage { file, rgb, maps } = ImportedImage::read(args, adapter, frame)?;
     let note = file.note();
     tally.add(&FrameId(frame.rgb.display().to_string()), &note);
-    let output = FrameOutput {
-        out,
-        scene: &frame.scene,
-        frame: &frame.frame,
-    };
+    let output = FrameOutput { out, scene: &frame.scene, frame: &frame.frame };
     let mut line = output.line(rgb.width(), rgb.height());
     let source = frame.rgb.file_name().map(|name| name.to_string_lossy());
     line.insert("source".to_owned(), json!(source));
@@ -319,12 +289,7 @@ fn write_frame(
         output.write("rgb", file.extension(), file.bytes())?
     };
     line.insert("rgb".to_owned(), json!(image));
-    let FrameMaps {
-        depth,
-        semantic,
-        segments,
-        room,
-    } = maps;
+    let FrameMaps { depth, semantic, segments, room } = maps;
     let median = depth.as_ref().and_then(median);
     let farthest = depth.iter().flatten().copied().max().unwrap_or(0);
     let depth_folder = adapter.depth_folder(frame);
@@ -351,12 +316,7 @@ fn write_frame(
             line.insert(key.to_owned(), value);
         }
     }
-    Ok(WrittenFrame {
-        line,
-        depth: median,
-        farthest,
-        depth_folder,
-    })
+    Ok(WrittenFrame { line, depth: median, farthest, depth_folder })
 }
 
 /// The median of all depths above 0, in millimetres; `None` if no depth is above 0.
@@ -366,8 +326,8 @@ fn median(depth: &Array2<u32>) -> Option<u32> {
     Some(*depths.select_nth_unstable(middle).1)
 }
 
-/// Checks that depth without a stated unit is not normalised: values of 0..1 in all frames, as habitat-lab gives them by default, are
-/// either a share of the sensor's range or a scene of which nothing is farther than a metre.
+/// Checks that depth without a stated unit is not normalised: values of 0..1 in all frames, as habitat-lab gives them
+/// by default, are either a share of the sensor's range or a scene of which nothing is farther than a metre.
 ///
 /// # Errors
 /// If no depth is above 1.
@@ -413,15 +373,8 @@ fn metres(depth: u32) -> f64 {
 /// The note about frames without a map, for each kind of map that only some frames have, and about missing class maps.
 fn missing_maps_note(written: &[WrittenFrame]) -> String {
     let mut note = String::new();
-    for (key, noun) in [
-        ("depth", "depth"),
-        ("sem", "class map"),
-        ("over", "segments"),
-    ] {
-        let lacking = written
-            .iter()
-            .filter(|written| !written.line.contains_key(key))
-            .count();
+    for (key, noun) in [("depth", "depth"), ("sem", "class map"), ("over", "segments")] {
+        let lacking = written.iter().filter(|written| !written.line.contains_key(key)).count();
         if lacking == written.len() && key == "sem" {
             note += "no class maps: there will be no questions by rule\n";
         } else if lacking > 0 && lacking < written.len() {
@@ -438,17 +391,11 @@ fn depth_folders_note(written: &[WrittenFrame]) -> String {
     for folder in written.iter().filter_map(|written| written.depth_folder) {
         *counts.entry(folder).or_insert(0_usize) += 1;
     }
-    let counts: Vec<String> = counts
-        .iter()
-        .map(|(folder, count)| format!("{folder} {count}"))
-        .collect();
+    let counts: Vec<String> = counts.iter().map(|(folder, count)| format!("{folder} {count}")).collect();
     if counts.is_empty() {
         return String::new();
     }
-    format!(
-        "frames by the folder of their depth: {}\n",
-        counts.join(", ")
-    )
+    format!("frames by the folder of their depth: {}\n", counts.join(", "))
 }
 
 /// The note about words for which no table has a class; empty if there are none.
@@ -458,12 +405,6 @@ fn unlisted_note(unlisted: &BTreeMap<String, usize>) -> String {
     }
     let mut list: Vec<(&String, &usize)> = unlisted.iter().collect();
     list.sort_by_key(|(word, count)| (std::cmp::Reverse(**count), *word));
-    let named: Vec<String> = list
-        .iter()
-        .map(|(word, count)| format!("{word:?} {count}"))
-        .collect();
-    format!(
-        "without a class of mpcat40, taken as misc: {}\n",
-        first_names(&named, MAX_NAMED)
-    )
+    let named: Vec<String> = list.iter().map(|(word, count)| format!("{word:?} {count}")).collect();
+    format!("without a class of mpcat40, taken as misc: {}\n", first_names(&named, MAX_NAMED))
 }

@@ -71,11 +71,7 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     if args.frames.is_none() {
         files.extend(ROOM_FILES);
     }
-    if let Some(exists) = files
-        .iter()
-        .map(|name| folder.join(name))
-        .find(|path| path.exists())
-    {
+    if let Some(exists) = files.iter().map(|name| folder.join(name)).find(|path| path.exists()) {
         return Err(Error::data(exists.display(), EXISTS));
     }
     let rows = match &args.frames {
@@ -83,31 +79,16 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         None => room_rows(&args.folder, progress)?,
     };
     let mut table = csv::Writer::from_writer(Vec::new());
-    let header = [
-        "image", "question", "A", "B", "C", "D", "answer", "category",
-    ];
-    table
-        .write_record(header)
-        .map_err(|e| Error::data("questions.csv", e))?;
+    let header = ["image", "question", "A", "B", "C", "D", "answer", "category"];
+    table.write_record(header).map_err(|e| Error::data("questions.csv", e))?;
     for row in &rows {
-        table
-            .write_record(row)
-            .map_err(|e| Error::data("questions.csv", e))?;
+        table.write_record(row).map_err(|e| Error::data("questions.csv", e))?;
     }
-    let table = table
-        .into_inner()
-        .map_err(|e| Error::data("questions.csv", e))?;
+    let table = table.into_inner().map_err(|e| Error::data("questions.csv", e))?;
     write(&folder.join("questions.csv"), &table)?;
-    let name = args
-        .folder
-        .file_name()
-        .unwrap_or_default()
-        .to_string_lossy();
+    let name = args.folder.file_name().unwrap_or_default().to_string_lossy();
     let info = json!({"schema": "darkqa.dataset/1", "name": name});
-    write(
-        &folder.join("dataset.json"),
-        format!("{info:#}\n").as_bytes(),
-    )?;
+    write(&folder.join("dataset.json"), format!("{info:#}\n").as_bytes())?;
     write(&folder.join("README.txt"), README.as_bytes())?;
     let folder = args.folder.display().to_string();
     let data = shell_word(&folder);
@@ -138,21 +119,10 @@ fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
     let rooms = ROOMS.parse().map_err(|e: String| Error::data("rooms", e))?;
     let (place, rules) = (DataPlace::Rooms(rooms), Rules::built_in()?);
     let (set, selection) = (SetArgs::default(), SelectionArgs::default());
-    let dataset = open_data(
-        &place,
-        &SceneArgs::default(),
-        &set,
-        &selection,
-        &rules,
-        DecodeRule::default(),
-        progress,
-    )?;
+    let dataset = open_data(&place, &SceneArgs::default(), &set, &selection, &rules, DecodeRule::default(), progress)?;
     let mut rows = Vec::new();
     for (number, (frame, name)) in dataset.frames().zip(ROOM_FILES).enumerate() {
-        write(
-            &folder.join(name),
-            &png(&dataset.picture(frame)?.decode()?)?,
-        )?;
+        write(&folder.join(name), &png(&dataset.picture(frame)?.decode()?)?)?;
         let mut by_family: BTreeMap<&str, &Question> = BTreeMap::new();
         for question in dataset
             .questions()
@@ -163,25 +133,21 @@ fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
         }
         let questions: Vec<&Question> = by_family.into_values().collect();
         let start = number.min(questions.len().saturating_sub(QUESTIONS_PER_IMAGE));
-        rows.extend(
-            questions[start..]
-                .iter()
-                .take(QUESTIONS_PER_IMAGE)
-                .map(|question| {
-                    row(
-                        name,
-                        &question.text,
-                        question.choices.texts(),
-                        question.choices.truth().unwrap_or_default(),
-                        question.family.name(),
-                    )
-                }),
-        );
+        rows.extend(questions[start..].iter().take(QUESTIONS_PER_IMAGE).map(|question| {
+            row(
+                name,
+                &question.text,
+                question.choices.texts(),
+                question.choices.truth().unwrap_or_default(),
+                question.family.name(),
+            )
+        }));
     }
     Ok(rows)
 }
 
-/// Copies images of a folder, and returns rows with questions about their colours and shape, which can be asked about any image.
+/// Copies images of a folder, and returns rows with questions about their colours and shape, which can be asked about
+/// any image.
 fn image_rows(frames: &Path, folder: &Path) -> Result<Vec<Row>> {
     let dataset = Dataset::from_images(frames, &[])?;
     let copies: Vec<(&FrameId, &Path, PathBuf)> = dataset
@@ -194,9 +160,9 @@ fn image_rows(frames: &Path, folder: &Path) -> Result<Vec<Row>> {
         })
         .collect();
     // The images may already be in the folder.
-    if let Some((_, _, copy)) = copies.iter().find(|(_, path, copy)| {
-        copy.exists() && path.canonicalize().ok() != copy.canonicalize().ok()
-    }) {
+    if let Some((_, _, copy)) =
+        copies.iter().find(|(_, path, copy)| copy.exists() && path.canonicalize().ok() != copy.canonicalize().ok())
+    {
         return Err(Error::data(copy.display(), EXISTS));
     }
     let (mut rows, yes_no) = (Vec::new(), ["yes".to_owned(), "no".to_owned()]);

@@ -39,10 +39,12 @@ pub(crate) struct MergeArgs {
     pub show: ShowArgs,
 }
 
-/// Merges shards into one run, with all records in the order of the questions and the report that a single run would have written.
+/// Merges shards into one run, with all records in the order of the questions and the report that a single run would
+/// have written.
 ///
 /// # Errors
-/// If a folder has no shard, the shards belong to different runs or have different images, or shards are missing without `--partial`.
+/// If a folder has no shard, the shards belong to different runs or have different images, or shards are missing
+/// without `--partial`.
 pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     let folders = run_folders(&args.runs)?;
     match common_kind(&folders)? {
@@ -56,20 +58,13 @@ fn merge_all<D: Detail>(
     folders: &[PathBuf],
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let missing = if args.partial {
-        MissingShards::Accept
-    } else {
-        MissingShards::Refuse
-    };
+    let missing = if args.partial { MissingShards::Accept } else { MissingShards::Refuse };
     let shards = ShardedRun::<D>::read(folders, missing)?;
     FolderAccess::new(args.shared).create(&args.out)?;
     let mut store = Store::<D>::open(&args.out, &shards.manifest, AddressChange::Refused)?;
     let folders = shards.folders();
     shards.questions.write(&store, &folders)?;
-    let records = shards
-        .trials
-        .iter()
-        .map(|trial| (trial.key(), trial.text()));
+    let records = shards.trials.iter().map(|trial| (trial.key(), trial.text()));
     append_records(&mut store, &shards.manifest, &shards.manifests(), records)?;
     store.sync()?;
     let wanted = MissingThumbnails::new(shards.questions.frames(), Vec::new());

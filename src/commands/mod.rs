@@ -1,5 +1,5 @@
-//! One folder or file per command. Shared code is in [`engine`](crate::engine), [`report`](crate::report) or below; no command
-//! uses the folder of another.
+//! One folder or file per command. Shared code is in [`engine`](crate::engine), [`report`](crate::report) or below; no
+//! command uses the folder of another.
 
 pub(crate) mod batch;
 pub(crate) mod bundle;

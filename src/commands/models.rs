@@ -28,7 +28,8 @@ pub(crate) struct ModelsArgs {
     /// One key of one model, which overrides the file; repeatable; default: none
     #[arg(long, value_name = "NAME.KEY=VALUE", help_heading = "Model", add = Decides::Reply)]
     pub set: Vec<String>,
-    /// Trust the file of models although the working directory is not in its folder: with --check it may then name any variable and file
+    /// Trust the file of models although the working directory is not in its folder: with --check it may then name any
+    /// variable and file
     #[arg(long, help_heading = "Model", add = Decides::Nothing)]
     pub trust_models: bool,
     /// Send one small request to each model, with a red image if it is asked with images, and print the replies
@@ -39,8 +40,8 @@ pub(crate) struct ModelsArgs {
 /// Prints endpoint, source of the key, request and digest of each model in a file. Sends nothing without `--check`.
 ///
 /// # Errors
-/// If the file is invalid, a key that `--check` needs is missing, or the file is not trusted and names variables or files outside of its
-/// folder.
+/// If the file is invalid, a key that `--check` needs is missing, or the file is not trusted and names variables or
+/// files outside of its folder.
 pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> {
     let named = ModelArgs {
         models: Some(args.file.clone()),
@@ -53,11 +54,7 @@ pub(crate) fn models(args: &ModelsArgs, progress: &Progress) -> Result<Outcome> 
         typed: &BTreeSet::new(),
         shard: Shard::WHOLE,
         workers: None,
-        keys: if args.check {
-            KeyUse::Needed
-        } else {
-            KeyUse::NotNeeded
-        },
+        keys: if args.check { KeyUse::Needed } else { KeyUse::NotNeeded },
         // The data are unknown here, but may be next to the models file. Without requests, nothing can leak.
         data: args.check.then_some(args.file.as_path()),
         text_baseline: TextBaseline::default(),

@@ -36,15 +36,15 @@ pub(crate) struct RoomsArgs {
     pub threads: ThreadArgs,
 }
 
-/// Writes the rooms as a folder of frames, in the program's common dataset format. Each thread keeps one frame in memory.
+/// Writes the rooms as a folder of frames, in the program's common dataset format. Each thread keeps one frame in
+/// memory.
 ///
 /// # Errors
 /// If the folder has frames already and `--force` is not set, a room cannot be rendered, or a file cannot be written.
 pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     let frames_file = args.out.join(FRAMES);
     if !args.force && frames_file.exists() {
-        let problem =
-            "the folder has frames already; --force overwrites them, another --out keeps both";
+        let problem = "the folder has frames already; --force overwrites them, another --out keeps both";
         return Err(Error::data(frames_file.display(), problem));
     }
     let workers = pool(args.threads.threads)?;
@@ -64,10 +64,7 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     })?;
     drop(bar);
     // The frames of a scene share one file of segment names: write it once, after the threads have finished.
-    let names_by_scene: BTreeMap<_, _> = frames
-        .iter()
-        .map(|frame| (&*frame.scene, &frame.names))
-        .collect();
+    let names_by_scene: BTreeMap<_, _> = frames.iter().map(|frame| (&*frame.scene, &frame.names)).collect();
     for (scene, names) in names_by_scene {
         frame_folder::write_segment_names(&args.out, scene, names)?;
     }
@@ -83,11 +80,7 @@ pub(crate) fn rooms(args: &RoomsArgs, progress: &Progress) -> Result<Outcome> {
     Ok(Outcome::wrote(
         &args.out,
         Status::Complete,
-        format!(
-            "{}: {}\n",
-            args.out.display(),
-            counted(frames.len(), "frame")
-        ),
+        format!("{}: {}\n", args.out.display(), counted(frames.len(), "frame")),
     ))
 }
 
@@ -103,11 +96,7 @@ struct WrittenFrame {
 /// Renders a room and writes its files.
 fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     let frame = room.frame()?;
-    let output = FrameOutput {
-        out: &args.out,
-        scene: &frame.scene,
-        frame: room.view(),
-    };
+    let output = FrameOutput { out: &args.out, scene: &frame.scene, frame: room.view() };
     let mut line = output.line(frame.rgb.width(), frame.rgb.height());
     let png_file = output.write("rgb", "png", &png(&frame.rgb)?)?;
     // A room with linear light is read from its EXR file; its PNG file is only a preview.
@@ -128,9 +117,5 @@ fn write_frame(args: &RoomsArgs, room: &Room) -> Result<WrittenFrame> {
     line.insert("intrinsics".to_owned(), json!(frame.intrinsics));
     line.insert("pose".to_owned(), json!(room.pose()));
     line.insert("room_gt".to_owned(), json!(frame.room));
-    Ok(WrittenFrame {
-        line,
-        scene: frame.scene.clone(),
-        names: Arc::clone(&frame.names),
-    })
+    Ok(WrittenFrame { line, scene: frame.scene.clone(), names: Arc::clone(&frame.names) })
 }

@@ -37,11 +37,7 @@ pub(crate) struct SiteArgs {
 pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
     check_distinct(&args.runs)?;
     check_target(&args.out)?;
-    let runs = args
-        .runs
-        .iter()
-        .map(|folder| open_any_run(folder))
-        .collect::<Result<_>>()?;
+    let runs = args.runs.iter().map(|folder| open_any_run(folder)).collect::<Result<_>>()?;
     let site = joined::site(runs)?;
     let mut output = String::new();
     for (run, why) in &site.others {
@@ -54,17 +50,10 @@ pub(crate) fn site(args: &SiteArgs) -> Result<Outcome> {
         files::write(&args.out.join(name), &content)?;
     }
     for page in stale_pages(&args.out, &names)? {
-        let _ = writeln!(
-            output,
-            "{page}: this page belongs to no run of this site; it can be deleted"
-        );
+        let _ = writeln!(output, "{page}: this page belongs to no run of this site; it can be deleted");
     }
     let index = args.out.join("index.html");
-    let _ = writeln!(
-        output,
-        "site: {} (runs: {runs}, tables: {tables})",
-        index.display()
-    );
+    let _ = writeln!(output, "site: {} (runs: {runs}, tables: {tables})", index.display());
     Ok(Outcome::wrote(index, Status::Complete, output))
 }
 
@@ -87,8 +76,7 @@ fn check_target(out: &Path) -> Result<()> {
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(()),
         entries => entries.map_err(|e| Error::file(out, "read", e))?,
     };
-    let is_empty =
-        entries.all(|entry| entry.is_ok_and(|entry| files::is_unfinished(&entry.file_name())));
+    let is_empty = entries.all(|entry| entry.is_ok_and(|entry| files::is_unfinished(&entry.file_name())));
     if is_empty {
         return Ok(());
     }
@@ -101,12 +89,8 @@ fn check_target(out: &Path) -> Result<()> {
         return Err(Error::data(out.display(), problem));
     }
     let pages = out.join(PAGES);
-    if pages
-        .symlink_metadata()
-        .is_ok_and(|pages| pages.is_symlink())
-    {
-        let problem =
-            "a link; its folder would be written to. Delete the link, or name another --out";
+    if pages.symlink_metadata().is_ok_and(|pages| pages.is_symlink()) {
+        let problem = "a link; its folder would be written to. Delete the link, or name another --out";
         return Err(Error::data(pages.display(), problem));
     }
     Ok(())
@@ -117,9 +101,7 @@ fn stale_pages(out: &Path, names: &BTreeSet<String>) -> Result<Vec<String>> {
     let pages = out.join(PAGES);
     let mut stale = Vec::new();
     for entry in fs::read_dir(&pages).map_err(|e| Error::file(&pages, "read", e))? {
-        let name = entry
-            .map_err(|e| Error::file(&pages, "read", e))?
-            .file_name();
+        let name = entry.map_err(|e| Error::file(&pages, "read", e))?.file_name();
         let name = format!("{PAGES}/{}", name.to_string_lossy());
         if !names.contains(&name) {
             stale.push(name);

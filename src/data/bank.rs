@@ -1,7 +1,8 @@
-//! Questions without known answers, asked about every photograph: [`Bank`], and its file or built-in name: [`BankPlace`].
+//! Questions without known answers, asked about every photograph: [`Bank`], and its file or built-in name:
+//! [`BankPlace`].
 //!
-//! Each line is `{"id", "question", "choices", "family"}`; `family` is optional. A line has no image, because its question is asked
-//! about all images, and no answer, so replies are never scored as right or wrong.
+//! Each line is `{"id", "question", "choices", "family"}`; `family` is optional. A line has no image, because its
+//! question is asked about all images, and no answer, so replies are never scored as right or wrong.
 
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -101,10 +102,7 @@ impl Bank {
             BankPlace::Home(opt_out) => Self::parse(HOME, Path::new("home"), *opt_out),
             BankPlace::File(path) if !path.exists() => Err(Error::usage(
                 "--ask",
-                format_args!(
-                    "{}: no such file; home and home:uncertain are built in",
-                    path.display()
-                ),
+                format_args!("{}: no such file; home and home:uncertain are built in", path.display()),
             )),
             BankPlace::File(path) => Self::parse(&text(path)?, path, OptOut::None),
         }
@@ -118,15 +116,12 @@ impl Bank {
                 continue;
             }
             let question = parse_line(line, opt_out, path, number)?;
-            for (known, name, value) in [
-                (&mut ids, "id", question.id.clone()),
-                (&mut texts, "question", question.text.clone()),
-            ] {
+            for (known, name, value) in
+                [(&mut ids, "id", question.id.clone()), (&mut texts, "question", question.text.clone())]
+            {
                 if let Some(first) = known.insert(value.clone(), number) {
-                    let problem = format_args!(
-                        "line {first} has the same {name}, {:?}; each needs its own",
-                        excerpt(&value, 60)
-                    );
+                    let problem =
+                        format_args!("line {first} has the same {name}, {:?}; each needs its own", excerpt(&value, 60));
                     return Err(Error::line(path, number, problem));
                 }
             }
@@ -146,14 +141,7 @@ impl Bank {
         let lines: Vec<Value> = self
             .questions
             .iter()
-            .map(|question| {
-                json!([
-                    question.id,
-                    question.text,
-                    question.choices.texts(),
-                    question.family
-                ])
-            })
+            .map(|question| json!([question.id, question.text, question.choices.texts(), question.family]))
             .collect();
         Digest::canonical("darkqa.bank/1", &lines)
     }
@@ -165,8 +153,9 @@ impl Bank {
 
     /// Combines every photograph with every question, photograph by photograph in the order of the bank.
     ///
-    /// `per_image` limits the questions about each photograph to those with the lowest digest of the photograph's name and the question.
-    /// The rank of two questions therefore does not depend on other photographs, other questions or the order of the bank.
+    /// `per_image` limits the questions about each photograph to those with the lowest digest of the photograph's name
+    /// and the question. The rank of two questions therefore does not depend on other photographs, other questions or
+    /// the order of the bank.
     pub(crate) fn questions_about<'f>(
         &self,
         frames: impl IntoIterator<Item = &'f FrameId>,
@@ -185,9 +174,7 @@ impl Bank {
                     drawn.truncate(limit);
                     drawn.sort_unstable();
                 }
-                drawn
-                    .into_iter()
-                    .map(move |index| self.questions[index].about(frame))
+                drawn.into_iter().map(move |index| self.questions[index].about(frame))
             })
             .collect()
     }
@@ -210,29 +197,18 @@ impl BankQuestion {
 
 /// Parses and checks one line; `number` is its line number.
 fn parse_line(line: &str, opt_out: OptOut, path: &Path, number: usize) -> Result<BankQuestion> {
-    let value: Value =
-        serde_json::from_str(line).map_err(|e| Error::json_line(path, number, &e))?;
+    let value: Value = serde_json::from_str(line).map_err(|e| Error::json_line(path, number, &e))?;
     for (field, instead) in [
-        (
-            "answer",
-            "--questions FILE asks questions whose answers are known",
-        ),
-        (
-            "image",
-            "each question is asked about every image of --data",
-        ),
-        (
-            "frame",
-            "each question is asked about every image of --data",
-        ),
+        ("answer", "--questions FILE asks questions whose answers are known"),
+        ("image", "each question is asked about every image of --data"),
+        ("frame", "each question is asked about every image of --data"),
     ] {
         if value.get(field).is_some() {
             let problem = format!("a question of --ask has no {field:?}: {instead}");
             return Err(Error::line(path, number, problem));
         }
     }
-    let mut line: BankLine =
-        serde_json::from_value(value).map_err(|e| Error::json_line(path, number, &e))?;
+    let mut line: BankLine = serde_json::from_value(value).map_err(|e| Error::json_line(path, number, &e))?;
     let id = match line.id {
         Value::String(id) if !id.trim().is_empty() => id,
         Value::Number(id) => id.to_string(),
@@ -240,19 +216,12 @@ fn parse_line(line: &str, opt_out: OptOut, path: &Path, number: usize) -> Result
             return Err(Error::line(
                 path,
                 number,
-                format_args!(
-                    "the id {} is neither text nor a number",
-                    excerpt(&other.to_string(), 60)
-                ),
+                format_args!("the id {} is neither text nor a number", excerpt(&other.to_string(), 60)),
             ));
         }
     };
     if line.question.trim().is_empty() {
-        return Err(Error::line(
-            path,
-            number,
-            format_args!("question {:?} is empty", excerpt(&id, 60)),
-        ));
+        return Err(Error::line(path, number, format_args!("question {:?} is empty", excerpt(&id, 60))));
     }
     for choice in &mut line.choices {
         *choice = one_line(choice);
@@ -293,21 +262,9 @@ mod tests {
         let home = Bank::open(&"home".parse().unwrap()).unwrap();
         let uncertain = Bank::open(&"home:uncertain".parse().unwrap()).unwrap();
         assert_eq!((home.len(), uncertain.len()), (25, 25));
-        assert_eq!(
-            home.questions
-                .iter()
-                .filter(|question| question.family == Family::Presence)
-                .count(),
-            15
-        );
+        assert_eq!(home.questions.iter().filter(|question| question.family == Family::Presence).count(), 15);
         for (bare, with_opt_out) in home.questions.iter().zip(&uncertain.questions) {
-            assert!(
-                !bare
-                    .choices
-                    .texts()
-                    .iter()
-                    .any(|text| text.contains("cannot"))
-            );
+            assert!(!bare.choices.texts().iter().any(|text| text.contains("cannot")));
             let (last, others) = with_opt_out.choices.texts().split_last().unwrap();
             assert_eq!((&**last, others), (CANNOT_TELL, bare.choices.texts()));
         }
@@ -316,24 +273,15 @@ mod tests {
 
     #[test]
     fn every_question_is_asked_about_every_photograph() {
-        let asked = bank(TWO)
-            .unwrap()
-            .questions_about(&frames(&["a.png", "b/c.png"]), None);
+        let asked = bank(TWO).unwrap().questions_about(&frames(&["a.png", "b/c.png"]), None);
         let ids: Vec<&str> = asked.iter().map(|question| &*question.id.0).collect();
         assert_eq!(ids, ["lamp@a.png", "2@a.png", "lamp@b/c.png", "2@b/c.png"]);
-        assert!(
-            asked
-                .iter()
-                .all(|question| question.choices.truth().is_none())
-        );
+        assert!(asked.iter().all(|question| question.choices.truth().is_none()));
         assert_eq!(asked[0].evidence, json!({"bank_id": "lamp"}));
     }
 
     fn drawn(home: &Bank, frames: &[FrameId], per_image: usize) -> BTreeSet<String> {
-        home.questions_about(frames, NonZeroUsize::new(per_image))
-            .into_iter()
-            .map(|question| question.id.0)
-            .collect()
+        home.questions_about(frames, NonZeroUsize::new(per_image)).into_iter().map(|question| question.id.0).collect()
     }
 
     #[test]
@@ -362,30 +310,12 @@ mod tests {
                 r#"{"id":3,"question":"?","choices":["x","y"],"image":"a.png"}"#,
                 "line 4: a question of --ask has no \"image\"",
             ),
-            (
-                r#"{"id":3,"question":"?","choices":["x","y"],"hint":"a"}"#,
-                "line 4: unknown field `hint`",
-            ),
-            (
-                r#"{"id":3,"choices":["x","y"]}"#,
-                "line 4: missing field `question`",
-            ),
-            (
-                r#"{"id":3,"question":" ","choices":["x","y"]}"#,
-                "line 4: question \"3\" is empty",
-            ),
-            (
-                r#"{"id":true,"question":"?","choices":["x","y"]}"#,
-                "line 4: the id true",
-            ),
-            (
-                r#"{"id":3,"question":"?","choices":["x"]}"#,
-                "line 4: 1 choice: a question needs 2 to 26",
-            ),
-            (
-                r#"{"id":3,"question":"?","choices":["x","X "]}"#,
-                "line 4: choices A and B are both",
-            ),
+            (r#"{"id":3,"question":"?","choices":["x","y"],"hint":"a"}"#, "line 4: unknown field `hint`"),
+            (r#"{"id":3,"choices":["x","y"]}"#, "line 4: missing field `question`"),
+            (r#"{"id":3,"question":" ","choices":["x","y"]}"#, "line 4: question \"3\" is empty"),
+            (r#"{"id":true,"question":"?","choices":["x","y"]}"#, "line 4: the id true"),
+            (r#"{"id":3,"question":"?","choices":["x"]}"#, "line 4: 1 choice: a question needs 2 to 26"),
+            (r#"{"id":3,"question":"?","choices":["x","X "]}"#, "line 4: choices A and B are both"),
             (
                 r#"{"id":"2","question":"?","choices":["x","y"]}"#,
                 "line 4: line 3 has the same id, \"2\"; each needs its own",
@@ -394,10 +324,7 @@ mod tests {
                 r#"{"id":3,"question":"What color?","choices":["x","y"]}"#,
                 "line 4: line 3 has the same question, \"What color?\"; each needs its own",
             ),
-            (
-                r#"{"id":3,"question":"?","choices":["x","y"],"family":"all"}"#,
-                "line 4: the family \"all\" is the name",
-            ),
+            (r#"{"id":3,"question":"?","choices":["x","y"],"family":"all"}"#, "line 4: the family \"all\" is the name"),
         ] {
             let text = format!("{}{rest}", TWO.trim_start_matches('\u{feff}'));
             let error = bank(&text).unwrap_err().to_string();
@@ -406,12 +333,7 @@ mod tests {
         let error = bank("\n").unwrap_err().to_string();
         assert_eq!(error, "bank.jsonl: no questions in it");
         let missing = Bank::open(&BankPlace::File("no-such-bank".into())).unwrap_err();
-        assert!(
-            missing
-                .to_string()
-                .contains("home and home:uncertain are built in"),
-            "{missing}"
-        );
+        assert!(missing.to_string().contains("home and home:uncertain are built in"), "{missing}");
     }
 
     fn digest(text: &str) -> Digest {
@@ -421,11 +343,7 @@ mod tests {
     #[test]
     fn digest_covers_questions_but_not_blank_lines() {
         assert_eq!(digest(TWO), digest(&TWO.replace("\n\n", "\n")));
-        for other in [
-            TWO.replace("red", "pink"),
-            TWO.replace("presence", "color"),
-            TWO.replace("lamp?", "torch?"),
-        ] {
+        for other in [TWO.replace("red", "pink"), TWO.replace("presence", "color"), TWO.replace("lamp?", "torch?")] {
             assert_ne!(digest(TWO), digest(&other));
         }
     }

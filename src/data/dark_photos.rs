@@ -20,10 +20,7 @@ pub(crate) struct DarkPhoto {
 
 /// Value of `dark` in a line of `frames.jsonl`: a path, an object, or a list of these.
 #[derive(Debug, Deserialize)]
-#[serde(
-    untagged,
-    expecting = "a path, {\"path\", \"ev\", \"name\"} or a list of them expected for dark"
-)]
+#[serde(untagged, expecting = "a path, {\"path\", \"ev\", \"name\"} or a list of them expected for dark")]
 pub(super) enum DarkField {
     One(DarkEntry),
     /// Photographs, brightest or darkest first.
@@ -50,8 +47,8 @@ pub(super) struct PhotoDetails {
 }
 
 impl DarkField {
-    /// Converts the field to photographs, in order. `resolve` finds the file of a path in the data. Photographs without a name are called
-    /// `dark`, `dark-2` and so on by their position.
+    /// Converts the field to photographs, in order. `resolve` finds the file of a path in the data. Photographs without
+    /// a name are called `dark`, `dark-2` and so on by their position.
     ///
     /// # Errors
     /// If a name is invalid or occurs twice, an `ev` is not in (0, 30], or `resolve` fails.
@@ -106,10 +103,7 @@ mod tests {
             let exists = path.starts_with("low");
             exists.then_some(path).ok_or("no such file".to_owned())
         })?;
-        Ok(photos
-            .into_iter()
-            .map(|photo| (photo.name.to_string(), photo.ev))
-            .collect())
+        Ok(photos.into_iter().map(|photo| (photo.name.to_string(), photo.ev)).collect())
     }
 
     fn named(name: &str, ev: Option<f64>) -> (String, Option<f64>) {
@@ -121,17 +115,10 @@ mod tests {
         for (json, expected) in [
             (r#""low/0.png""#, vec![named("dark", None)]),
             ("[]", vec![]),
-            (
-                r#"["low/0.png","low/1.png"]"#,
-                vec![named("dark", None), named("dark-2", None)],
-            ),
+            (r#"["low/0.png","low/1.png"]"#, vec![named("dark", None), named("dark-2", None)]),
             (
                 r#"["low/0.png",{"path":"low/1.png","ev":4.5},{"path":"low/2.png","name":"lamp"}]"#,
-                vec![
-                    named("dark", None),
-                    named("dark-2", Some(4.5)),
-                    named("lamp", None),
-                ],
+                vec![named("dark", None), named("dark-2", Some(4.5)), named("lamp", None)],
             ),
         ] {
             assert_eq!(photos(json), Ok(expected), "{json}");
@@ -144,19 +131,10 @@ mod tests {
             ("3", "for dark"),
             (r#"{"file":"low/0.png"}"#, "for dark"),
             (r#""high/0.png""#, "no such file"),
-            (
-                r#"{"path":"low/0.png","ev":-2}"#,
-                "an ev of -2; a number above 0, at most 30, expected",
-            ),
+            (r#"{"path":"low/0.png","ev":-2}"#, "an ev of -2; a number above 0, at most 30, expected"),
             (r#"{"path":"low/0.png","ev":31}"#, "an ev of 31"),
-            (
-                r#"{"path":"low/0.png","name":"L3-ev"}"#,
-                "not a valid name of a dark photograph",
-            ),
-            (
-                r#"[{"path":"low/0.png","name":"dark-2"},"low/1.png"]"#,
-                "two photographs are named dark-2",
-            ),
+            (r#"{"path":"low/0.png","name":"L3-ev"}"#, "not a valid name of a dark photograph"),
+            (r#"[{"path":"low/0.png","name":"dark-2"},"low/1.png"]"#, "two photographs are named dark-2"),
         ] {
             let error = photos(json).unwrap_err();
             assert!(error.contains(part), "{json}: {error}");

@@ -16,10 +16,7 @@ pub(super) fn check_family(family: Family) -> Result<Family> {
     if family.name().trim() == Family::TOTAL {
         return Err(Error::data(
             "family",
-            format_args!(
-                "the family {:?} is the name of the total over all families; rename it",
-                Family::TOTAL
-            ),
+            format_args!("the family {:?} is the name of the total over all families; rename it", Family::TOTAL),
         ));
     }
     Ok(family)

@@ -8,9 +8,7 @@ use serde::{Serialize, Serializer};
 use super::Picture;
 use super::maps::MapFiles;
 use crate::error::Result;
-use crate::types::{
-    DepthKind, Digest, Frame, FrameId, InputNote, Intrinsics, SegmentName, Segmentation,
-};
+use crate::types::{DepthKind, Digest, Frame, FrameId, InputNote, Intrinsics, SegmentName, Segmentation};
 
 /// Metadata of a frame: scene, camera, names of segments, room.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -47,14 +45,8 @@ impl FrameFiles<'_> {
     /// # Errors
     /// If a number of the camera intrinsics is not finite.
     pub fn digest(&self) -> Result<Digest> {
-        let parts = [
-            self.picture.digest(),
-            self.maps.digest(),
-            Digest::canonical("darkqa.view/1", self.facts)?,
-        ];
-        Ok(Digest::from_parts(
-            parts.iter().map(|part| &part.as_bytes()[..]),
-        ))
+        let parts = [self.picture.digest(), self.maps.digest(), Digest::canonical("darkqa.view/1", self.facts)?];
+        Ok(Digest::from_parts(parts.iter().map(|part| &part.as_bytes()[..])))
     }
 
     /// Changes made to the samples while decoding, such as color conversion.

@@ -36,10 +36,7 @@ impl FrameOutput<'_> {
             ("width", json!(width)),
             ("height", json!(height)),
         ];
-        facts
-            .map(|(key, value)| (key.to_owned(), value))
-            .into_iter()
-            .collect()
+        facts.map(|(key, value)| (key.to_owned(), value)).into_iter().collect()
     }
 
     /// Writes one file of the frame, and returns its path relative to the output folder.
@@ -50,12 +47,7 @@ impl FrameOutput<'_> {
     }
 
     /// Writes the depth in millimetres as a 16-bit PNG, and adds it to the line.
-    pub(crate) fn write_depth(
-        &self,
-        line: &mut ListLine,
-        depth: &Array2<u32>,
-        kind: DepthKind,
-    ) -> Result<()> {
+    pub(crate) fn write_depth(&self, line: &mut ListLine, depth: &Array2<u32>, kind: DepthKind) -> Result<()> {
         let units = depth.mapv(|depth| u16::try_from(depth).unwrap_or(u16::MAX));
         let path = self.write("depth", "png", &grey16_png(&units)?)?;
         line.insert("depth".to_owned(), json!(path));
@@ -95,11 +87,7 @@ impl FrameOutput<'_> {
 }
 
 /// Writes the names of the segments of a scene; no file if there are none.
-pub(crate) fn write_segment_names(
-    out: &Path,
-    scene: &str,
-    names: &BTreeMap<u32, SegmentName>,
-) -> Result<()> {
+pub(crate) fn write_segment_names(out: &Path, scene: &str, names: &BTreeMap<u32, SegmentName>) -> Result<()> {
     if names.is_empty() {
         return Ok(());
     }
@@ -129,8 +117,7 @@ pub(crate) fn write_folder_files<'a>(
 /// Encodes segments as a `.npy` file (numpy.lib.format, version 1.0).
 fn npy_bytes(segments: &Array2<u32>) -> Vec<u8> {
     let (height, width) = segments.dim();
-    let header =
-        format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
+    let header = format!("{{'descr': '<u4', 'fortran_order': False, 'shape': ({height}, {width}), }}");
     // The header ends with a newline, padded so that the data start at a multiple of 64 bytes.
     let length = (header.len() + 11).next_multiple_of(64) - 10;
     let mut file = b"\x93NUMPY\x01\x00".to_vec();

@@ -2,19 +2,19 @@
 //!
 //! The common format is a folder with a `frames.jsonl`. Paths are relative to the folder:
 //!
-//! - `frames.jsonl`: one frame per line, `{"scene", "frame", "rgb", …}`; the name of a frame is `scene/frame`. A line may name
-//!   maps of the size of the image: `depth`, in metres as `.npy` or in units of `depth_scale` metres as PNG; `sem`, the
-//!   classes; and `over`, the segments. `over_source` is `renderer` or `connected_components` (objects) or `superpixel`
-//!   (parts). Also optional: `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx", "cy"}`), `room_gt`,
-//!   `t` (seconds) and `pose`; and `dark`, photographs of the same scene in the dark: a path, `{"path", "ev", "name"}`, or a list of
-//!   them ([`dark_photos`](super::dark_photos)).
+//! - `frames.jsonl`: one frame per line, `{"scene", "frame", "rgb", …}`; the name of a frame is `scene/frame`. A line
+//!   may name maps of the size of the image: `depth`, in metres as `.npy` or in units of `depth_scale` metres as PNG;
+//!   `sem`, the classes; and `over`, the segments. `over_source` is `renderer` or `connected_components` (objects) or
+//!   `superpixel` (parts). Also optional: `depth_kind` (`planar` or `euclid`), `intrinsics` (`{"fx", "fy", "cx",
+//!   "cy"}`), `room_gt`, `t` (seconds) and `pose`; and `dark`, photographs of the same scene in the dark: a path,
+//!   `{"path", "ev", "name"}`, or a list of them ([`dark_photos`](super::dark_photos)).
 //! - `classes.json`: the class of each number in `sem` ([`crate::labels`]).
-//! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind", "light"}`; the last three are optional. `light` is `lit`, or
-//!   `dark` for photographs that were taken in the dark.
+//! - `dataset.json`: `{"schema": "darkqa.dataset/1", "name", "depth_kind", "light"}`; the last three are optional.
+//!   `light` is `lit`, or `dark` for photographs that were taken in the dark.
 //! - `scenes/<scene>/segments.json`: the segments that have names, `{"7": {"name", "canonical", "region"}}`.
 //!
-//! Without `frames.jsonl`, every PNG, JPEG, WebP, TIFF and BMP file in the folder is a frame, named by its file name. The questions
-//! are in `questions.jsonl` in the same folder.
+//! Without `frames.jsonl`, every PNG, JPEG, WebP, TIFF and BMP file in the folder is a frame, named by its file name.
+//! The questions are in `questions.jsonl` in the same folder.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -124,39 +124,26 @@ impl FrameLine {
         };
         let depth = self.depth.map(resolve).transpose()?;
         let maps = MapPaths {
-            depth: depth
-                .map(|path| DepthFile::new(path, self.depth_scale))
-                .transpose()?,
+            depth: depth.map(|path| DepthFile::new(path, self.depth_scale)).transpose()?,
             semantic: self.sem.map(resolve).transpose()?,
             segments: self.over.map(resolve).transpose()?,
         };
-        let focal = self
-            .intrinsics
-            .map_or(1.0, |camera| camera.fx.min(camera.fy));
+        let focal = self.intrinsics.map_or(1.0, |camera| camera.fx.min(camera.fy));
         if !(focal.is_finite() && focal > 0.0) {
-            return Err(format!(
-                "a focal length of {focal} pixels; fx and fy above 0 expected"
-            ));
+            return Err(format!("a focal length of {focal} pixels; fx and fy above 0 expected"));
         }
         let facts = FrameFacts {
             depth_kind: self.depth_kind.or(info.depth_kind).unwrap_or_default(),
             intrinsics: self.intrinsics,
             segmentation: match self.over_source {
                 Some(SegmentSource::Superpixel) => Segmentation::Parts,
-                Some(SegmentSource::Renderer | SegmentSource::ConnectedComponents) | None => {
-                    Segmentation::Instances
-                }
+                Some(SegmentSource::Renderer | SegmentSource::ConnectedComponents) | None => Segmentation::Instances,
             },
             names: names.get(&self.scene).cloned().unwrap_or_default(),
             room: self.room_gt,
             scene: self.scene,
         };
-        Ok(ImageSource::File(Box::new(FrameFile {
-            rgb,
-            maps,
-            facts,
-            dark,
-        })))
+        Ok(ImageSource::File(Box::new(FrameFile { rgb, maps, facts, dark })))
     }
 }
 
@@ -166,17 +153,9 @@ pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) 
     let info = data_set_info(&root)?;
     let labels = labels(folder, further)?;
     let title = info.name.unwrap_or_default();
-    let name = if title.is_empty() {
-        stem(folder)
-    } else {
-        title.clone()
-    };
+    let name = if title.is_empty() { stem(folder) } else { title.clone() };
     let dataset = Dataset::new(name, sources(folder, further, missing)?, Vec::new());
-    Ok(Dataset {
-        title,
-        labels,
-        ..dataset
-    })
+    Ok(Dataset { title, labels, ..dataset })
 }
 
 /// Labels of the semantic maps of a folder; `None` without a `classes.json`.
@@ -210,15 +189,10 @@ fn segment_names(root: &Root, scene: &str) -> Result<Arc<BTreeMap<u32, SegmentNa
     if !path.exists() {
         return Ok(Arc::default());
     }
-    let path = root
-        .file(root.folder(), &below)
-        .map_err(|problem| Error::data("scene", problem))?;
+    let path = root.file(root.folder(), &below).map_err(|problem| Error::data("scene", problem))?;
     let names: BTreeMap<u32, SegmentName> = json(&path)?;
     let canonical = labels::canonical();
-    if let Some((id, name)) = names
-        .iter()
-        .find(|(_, name)| !canonical.contains(&name.canonical))
-    {
+    if let Some((id, name)) = names.iter().find(|(_, name)| !canonical.contains(&name.canonical)) {
         let problem = format_args!(
             "segment {id} ({:?}) has the class {:?}, which is not a class of mpcat40",
             name.name, name.canonical
@@ -241,11 +215,7 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
             return frames(folder, &set.root.data_root, missing);
         }
         let is_empty = fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_none());
-        let what = if is_empty {
-            "the folder is empty: "
-        } else {
-            ""
-        };
+        let what = if is_empty { "the folder is empty: " } else { "" };
         let problem = format_args!(
             "{what}no {QUESTIONS} or questions.csv in this folder, and no {FRAMES} with {CLASSES} to make questions of; --questions FILE names some, and --ask home asks about photographs without any"
         );
@@ -260,12 +230,8 @@ pub(super) fn open(folder: &Path, questions: Option<&Path>, set: &SetArgs) -> Re
         );
     }
     let read = ready_made::questions_about_frames(&file, set)?;
-    Dataset::new(
-        stem(folder),
-        sources(folder, &set.root.data_root, missing)?,
-        Vec::new(),
-    )
-    .with_file_questions(&file, read, set.bad)
+    Dataset::new(stem(folder), sources(folder, &set.root.data_root, missing)?, Vec::new())
+        .with_file_questions(&file, read, set.bad)
 }
 
 /// Question files of a folder other than [`QUESTIONS`].
@@ -281,9 +247,7 @@ pub(super) fn other_question_files(folder: &Path) -> impl Iterator<Item = PathBu
 pub(super) fn is_folder_of_frames(place: &Path, questions: Option<&Path>) -> bool {
     place.is_dir()
         && (questions.is_some()
-            || [FRAMES, QUESTIONS]
-                .iter()
-                .any(|name| place.join(name).exists())
+            || [FRAMES, QUESTIONS].iter().any(|name| place.join(name).exists())
             || !ready_made::is_set_folder(place))
 }
 
@@ -308,23 +272,17 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
     Ok([(id, ImageSource::image(path.to_owned()))].into())
 }
 
-fn listed_frames(
-    root: &Root,
-    list: &Path,
-    missing: MissingFiles,
-) -> Result<BTreeMap<FrameId, ImageSource>> {
+fn listed_frames(root: &Root, list: &Path, missing: MissingFiles) -> Result<BTreeMap<FrameId, ImageSource>> {
     let (info, mut names) = (data_set_info(root)?, SegmentNames::new());
     let mut sources = BTreeMap::new();
     for (number, line) in json_lines::<FrameLine>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         if !names.contains_key(&line.scene) {
-            let scene_names = segment_names(root, &line.scene)
-                .map_err(|problem| Error::line(list, number, problem))?;
+            let scene_names = segment_names(root, &line.scene).map_err(|problem| Error::line(list, number, problem))?;
             names.insert(line.scene.clone(), scene_names);
         }
-        let source = line
-            .into_source(root, &info, &names, missing)
-            .map_err(|problem| Error::line(list, number, problem))?;
+        let source =
+            line.into_source(root, &info, &names, missing).map_err(|problem| Error::line(list, number, problem))?;
         if sources.insert(id.clone(), source).is_some() {
             let problem = format_args!("a second frame {:?}", id.0);
             return Err(Error::line(list, number, problem));
@@ -353,25 +311,20 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
                 questions.display(),
                 inner.file_name().unwrap_or_default().to_string_lossy()
             ),
-            Some(inner) => format!(
-                "; a folder in it has some: name that one, as {}",
-                inner.display()
-            ),
+            Some(inner) => format!("; a folder in it has some: name that one, as {}", inner.display()),
             None => String::new(),
         };
-        let unread = found
-            .unsupported_note()
-            .map_or(String::new(), |unread| format!("; {unread}"));
-        let problem = format_args!(
-            "neither a {FRAMES} nor any {SUPPORTED_FORMATS} image in this folder{unread}{remedy}"
-        );
+        let unread = found.unsupported_note().map_or(String::new(), |unread| format!("; {unread}"));
+        let problem =
+            format_args!("neither a {FRAMES} nor any {SUPPORTED_FORMATS} image in this folder{unread}{remedy}");
         return Err(Error::data(folder.display(), problem));
     }
     found.warn_of_unsupported(folder);
     Ok(sources)
 }
 
-/// Warns if a folder in this one has images: they are not read. Links out of the folder and hidden folders are left out.
+/// Warns if a folder in this one has images: they are not read. Links out of the folder and hidden folders are left
+/// out.
 pub(super) fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<()> {
     let root = Root::new(folder, further)?;
     let inner: Vec<PathBuf> = root
@@ -384,11 +337,7 @@ pub(super) fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<(
             1 => "the images of 1 folder in it are not read:".to_owned(),
             n => format!("the images of {n} folders in it are not read, as"),
         };
-        tracing::warn!(
-            "{}: {count} {}; name such a folder, too, to read them",
-            folder.display(),
-            first.display()
-        );
+        tracing::warn!("{}: {count} {}; name such a folder, too, to read them", folder.display(), first.display());
     }
     Ok(())
 }
@@ -397,11 +346,7 @@ pub(super) fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<(
 ///
 /// # Errors
 /// If another image has the name: the bytes of a file name that are not UTF-8 all become the replacement character.
-pub(super) fn insert_image(
-    sources: &mut BTreeMap<FrameId, ImageSource>,
-    name: String,
-    path: &Path,
-) -> Result<()> {
+pub(super) fn insert_image(sources: &mut BTreeMap<FrameId, ImageSource>, name: String, path: &Path) -> Result<()> {
     let image = ImageSource::image(path.to_owned());
     if sources.insert(FrameId(name), image).is_some() {
         let problem = "another file has the same name but for bytes that are not UTF-8; rename it";
@@ -411,8 +356,7 @@ pub(super) fn insert_image(
 }
 
 fn is_hidden(path: &Path) -> bool {
-    path.file_name()
-        .is_some_and(|name| name.to_string_lossy().starts_with('.'))
+    path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'))
 }
 
 /// True if the path is a folder with an image directly in it.
@@ -448,9 +392,7 @@ mod tests {
     fn guessed_answer_format_is_reported() {
         let folder = folder("");
         for (answer, format) in [(r#""x""#, None), ("0", Some("answer = answer (index0)"))] {
-            let question = format!(
-                r#"{{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":{answer}}}"#
-            );
+            let question = format!(r#"{{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":{answer}}}"#);
             fs::write(folder.path().join(QUESTIONS), question).unwrap();
             let dataset = open(folder.path(), None, &SetArgs::default()).unwrap();
             let summary = dataset.summary.join("\n");
@@ -464,14 +406,11 @@ mod tests {
     #[test]
     fn frame_spelled_otherwise_is_named() {
         let folder = folder("");
-        let question =
-            r#"{"id":1,"frame":"A%2F0","question":"?","choices":["x","y"],"answer":"x"}"#;
+        let question = r#"{"id":1,"frame":"A%2F0","question":"?","choices":["x","y"],"answer":"x"}"#;
         fs::write(folder.path().join(QUESTIONS), question).unwrap();
         let problem = open(folder.path(), None, &SetArgs::default()).unwrap_err();
         assert!(
-            problem
-                .to_string()
-                .contains("does not have (its frame \"a/0\" differs only in spelling)"),
+            problem.to_string().contains("does not have (its frame \"a/0\" differs only in spelling)"),
             "{problem}"
         );
     }
@@ -498,48 +437,27 @@ mod tests {
     fn frame_has_the_maps_of_its_line() {
         let id = FrameId("a/0".into());
         let bare = folder(r#","depth":null,"depth_scale":0.001"#);
-        let frame = open(bare.path(), None, &SetArgs::default())
-            .unwrap()
-            .frame(&id)
-            .unwrap();
+        let frame = open(bare.path(), None, &SetArgs::default()).unwrap().frame(&id).unwrap();
         assert_eq!((&frame.id, frame.rgb.width()), (&id, 2));
         assert!(frame.depth.is_none() && frame.semantic.is_none() && frame.segments.is_none());
-        let full = folder(
-            r#","depth":"deep.png","depth_scale":0.002,"sem":"sem.png","over":"deep.png","t":1.5"#,
-        );
-        let frame = open(full.path(), None, &SetArgs::default())
-            .unwrap()
-            .frame(&id)
-            .unwrap();
+        let full = folder(r#","depth":"deep.png","depth_scale":0.002,"sem":"sem.png","over":"deep.png","t":1.5"#);
+        let frame = open(full.path(), None, &SetArgs::default()).unwrap().frame(&id).unwrap();
         assert_eq!(frame.depth.unwrap(), array![[0, 3000]]);
         assert_eq!(frame.semantic.unwrap(), array![[3, 4]]);
         assert_eq!(frame.segments.unwrap(), array![[0, 1500]]);
     }
 
     fn refusal(folder: &Path) -> String {
-        sources(folder, &[], MissingFiles::Refuse)
-            .err()
-            .unwrap()
-            .to_string()
+        sources(folder, &[], MissingFiles::Refuse).err().unwrap().to_string()
     }
 
     #[test]
     fn folder_without_images_suggests_a_subfolder() {
         let folder = tempfile::tempdir().unwrap();
-        assert!(
-            refusal(folder.path()).ends_with("in this folder"),
-            "{}",
-            refusal(folder.path())
-        );
+        assert!(refusal(folder.path()).ends_with("in this folder"), "{}", refusal(folder.path()));
         fs::create_dir(folder.path().join("inner")).unwrap();
-        RgbImage::new(2, 1)
-            .save(folder.path().join("inner/a.png"))
-            .unwrap();
-        assert!(
-            refusal(folder.path()).ends_with("inner"),
-            "{}",
-            refusal(folder.path())
-        );
+        RgbImage::new(2, 1).save(folder.path().join("inner/a.png")).unwrap();
+        assert!(refusal(folder.path()).ends_with("inner"), "{}", refusal(folder.path()));
     }
 
     #[test]
@@ -549,20 +467,12 @@ mod tests {
             (r#","sem":"no.png""#, "no such file: "),
             (r#","over":"""#, "the path is empty"),
             (r#","depth":"deep.png""#, "depth_scale is missing"),
-            (
-                r#","depth":"deep.png","depth_scale":0"#,
-                "depth_scale is 0;",
-            ),
+            (r#","depth":"deep.png","depth_scale":0"#, "depth_scale is 0;"),
             (r#","depth":"deep.png","depth_scale":"mm""#, "invalid type"),
         ] {
             let folder = folder(keys);
-            let error = open(folder.path(), None, &SetArgs::default())
-                .unwrap_err()
-                .to_string();
-            assert!(
-                error.contains("frames.jsonl, line 2: ") && error.contains(message),
-                "{error}"
-            );
+            let error = open(folder.path(), None, &SetArgs::default()).unwrap_err().to_string();
+            assert!(error.contains("frames.jsonl, line 2: ") && error.contains(message), "{error}");
         }
     }
 
@@ -579,12 +489,7 @@ mod tests {
     fn error_names_the_broken_line_once() {
         let folder = folder("");
         fs::write(folder.path().join(FRAMES), "\n{\n").unwrap();
-        let error = open(folder.path(), None, &SetArgs::default())
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.ends_with("frames.jsonl, line 2: EOF while parsing an object"),
-            "{error}"
-        );
+        let error = open(folder.path(), None, &SetArgs::default()).unwrap_err().to_string();
+        assert!(error.ends_with("frames.jsonl, line 2: EOF while parsing an object"), "{error}");
     }
 }

@@ -7,9 +7,8 @@ use crate::types::images::is_image_ending;
 
 /// Extensions of image formats that are not supported.
 const UNSUPPORTED: [&str; 28] = [
-    "heic", "heif", "hif", "avif", "gif", "jxl", "jp2", "j2k", "jpf", "psd", "tga", "ico", "ppm",
-    "pgm", "pnm", "pfm", "hdr", "dng", "cr2", "cr3", "nef", "arw", "orf", "raf", "rw2", "pef",
-    "srw", "svg",
+    "heic", "heif", "hif", "avif", "gif", "jxl", "jp2", "j2k", "jpf", "psd", "tga", "ico", "ppm", "pgm", "pnm", "pfm",
+    "hdr", "dng", "cr2", "cr3", "nef", "arw", "orf", "raf", "rw2", "pef", "srw", "svg",
 ];
 
 /// Image files in supported and in unsupported formats.
@@ -25,16 +24,12 @@ impl ImagePaths {
         for path in paths {
             if is_image(&path) {
                 images.push(path);
-            } else if is_file_with_extension(&path, |extension| {
-                UNSUPPORTED.contains(&&*extension.to_ascii_lowercase())
-            }) {
+            } else if is_file_with_extension(&path, |extension| UNSUPPORTED.contains(&&*extension.to_ascii_lowercase()))
+            {
                 unsupported.push(path);
             }
         }
-        Self {
-            images,
-            unsupported,
-        }
+        Self { images, unsupported }
     }
 
     /// Message with the number of unsupported images and the name of the first; `None` if all are supported.
@@ -45,9 +40,7 @@ impl ImagePaths {
             n => format!("{n} files look like images and are not read"),
         };
         let name = first.file_name().unwrap_or_default().to_string_lossy();
-        Some(format!(
-            "{count}, as {name}; {SUPPORTED_FORMATS} expected, so convert them first"
-        ))
+        Some(format!("{count}, as {name}; {SUPPORTED_FORMATS} expected, so convert them first"))
     }
 
     /// Warns if the folder has images in unsupported formats.
@@ -64,10 +57,7 @@ pub(crate) fn is_image(path: &Path) -> bool {
 }
 
 fn is_file_with_extension(path: &Path, is_wanted: impl Fn(&str) -> bool) -> bool {
-    path.extension()
-        .and_then(|extension| extension.to_str())
-        .is_some_and(is_wanted)
-        && path.is_file()
+    path.extension().and_then(|extension| extension.to_str()).is_some_and(is_wanted) && path.is_file()
 }
 
 #[cfg(test)]
@@ -79,9 +69,7 @@ mod tests {
     #[test]
     fn files_are_sorted_by_extension() {
         let folder = tempfile::tempdir().unwrap();
-        let names = [
-            "a.PNG", "b.webp", "c.tiff", "d.HEIC", "e.avif", "f.txt", "g",
-        ];
+        let names = ["a.PNG", "b.webp", "c.tiff", "d.HEIC", "e.avif", "f.txt", "g"];
         let paths = names.map(|name| folder.path().join(name));
         for path in &paths {
             fs::write(path, "").unwrap();
@@ -89,19 +77,12 @@ mod tests {
         let inner = folder.path().join("inner.png");
         fs::create_dir(&inner).unwrap();
         let found = ImagePaths::from_paths(paths.into_iter().chain([inner]));
-        let images: Vec<_> = found
-            .images
-            .iter()
-            .map(|path| path.file_name().unwrap())
-            .collect();
+        let images: Vec<_> = found.images.iter().map(|path| path.file_name().unwrap()).collect();
         assert_eq!(images, ["a.PNG", "b.webp", "c.tiff"]);
         assert_eq!(
             found.unsupported_note().unwrap(),
             "2 files look like images and are not read, as d.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected, so convert them first"
         );
-        assert_eq!(
-            ImagePaths::from_paths([folder.path().join("f.txt")]).unsupported_note(),
-            None
-        );
+        assert_eq!(ImagePaths::from_paths([folder.path().join("f.txt")]).unsupported_note(), None);
     }
 }

@@ -67,10 +67,7 @@ impl Inputs {
 /// If the name leads outside the output folder.
 pub(crate) fn stem(id: &FrameId) -> Result<String> {
     let path = Path::new(&id.0);
-    if !path
-        .components()
-        .all(|part| matches!(part, Component::Normal(_)))
-    {
+    if !path.components().all(|part| matches!(part, Component::Normal(_))) {
         let problem = "this name of a frame leads out of the output folder";
         return Err(Error::data(format_args!("{:?}", id.0), problem));
     }

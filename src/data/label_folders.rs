@@ -11,13 +11,15 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
-/// Opens a folder with one subfolder per class, and asks `question` about each image. Frames and questions are named `CLASS/FILE`.
+/// Opens a folder with one subfolder per class, and asks `question` about each image. Frames and questions are named
+/// `CLASS/FILE`.
 ///
-/// Without `choices`, a question offers all class names in alphabetical order. With `choices`, it offers that number of names: the true
-/// class and others drawn by a digest of the image file.
+/// Without `choices`, a question offers all class names in alphabetical order. With `choices`, it offers that number of
+/// names: the true class and others drawn by a digest of the image file.
 ///
 /// # Errors
-/// If the folder has fewer than two classes, the number of choices is invalid ([`choice_count`]), or a file cannot be read.
+/// If the folder has fewer than two classes, the number of choices is invalid ([`choice_count`]), or a file cannot be
+/// read.
 pub(super) fn open(root: &Root, question: &str, choices: Option<NonZeroUsize>) -> Result<Dataset> {
     let folder = root.folder();
     let classes = classes(root)?;
@@ -58,7 +60,8 @@ pub(super) fn open(root: &Root, question: &str, choices: Option<NonZeroUsize>) -
     Ok(Dataset::new(super::stem(folder), sources, questions))
 }
 
-/// Image files of each class, by class name. Warns about folders without images, images in unsupported formats, and links out of the data.
+/// Image files of each class, by class name. Warns about folders without images, images in unsupported formats, and
+/// links out of the data.
 ///
 /// # Errors
 /// If a folder cannot be read, or fewer than two have images.
@@ -85,14 +88,8 @@ fn classes(root: &Root) -> Result<BTreeMap<String, Vec<PathBuf>>> {
     }
     root.warn_of_links_out(&links_out);
     if classes.len() < 2 {
-        let found = if classes.is_empty() {
-            "no folder"
-        } else {
-            "1 folder"
-        };
-        let problem = format_args!(
-            "{found} with images in it; --label-folders needs one for each class, at least two"
-        );
+        let found = if classes.is_empty() { "no folder" } else { "1 folder" };
+        let problem = format_args!("{found} with images in it; --label-folders needs one for each class, at least two");
         return Err(Error::data(folder.display(), problem));
     }
     Ok(classes)
@@ -101,8 +98,8 @@ fn classes(root: &Root) -> Result<BTreeMap<String, Vec<PathBuf>>> {
 /// Number of choices of each question.
 ///
 /// # Errors
-/// If `choices` is below 2, or above the number of classes or [`Choices::MOST`]. Without `choices`, if there are more than
-/// [`Choices::MOST`] classes.
+/// If `choices` is below 2, or above the number of classes or [`Choices::MOST`]. Without `choices`, if there are more
+/// than [`Choices::MOST`] classes.
 fn choice_count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) -> Result<usize> {
     match choices.map(usize::from) {
         None if classes > Choices::MOST => Err(Error::usage(
@@ -114,38 +111,26 @@ fn choice_count(folder: &Path, classes: usize, choices: Option<NonZeroUsize>) ->
             ),
         )),
         None => Ok(classes),
-        Some(count) if !(2..=Choices::MOST).contains(&count) => Err(Error::usage(
-            "--choices",
-            format_args!("a question has 2 to {} choices", Choices::MOST),
-        )),
+        Some(count) if !(2..=Choices::MOST).contains(&count) => {
+            Err(Error::usage("--choices", format_args!("a question has 2 to {} choices", Choices::MOST)))
+        }
         Some(count) if count > classes => Err(Error::usage(
             "--choices",
-            format_args!(
-                "{} has only {classes} classes; leave out --choices to offer them all",
-                folder.display()
-            ),
+            format_args!("{} has only {classes} classes; leave out --choices to offer them all", folder.display()),
         )),
         Some(count) => Ok(count),
     }
 }
 
-/// Draws the class names to offer for an image: the true class, and the other classes with the smallest digests of image and name. They
-/// keep the order of `names`.
+/// Draws the class names to offer for an image: the true class, and the other classes with the smallest digests of
+/// image and name. They keep the order of `names`.
 fn draw_choices<'n>(names: &[&'n str], truth: &str, count: usize, image: &Digest) -> Vec<&'n str> {
-    let mut others: Vec<&str> = names
-        .iter()
-        .copied()
-        .filter(|name| *name != truth)
-        .collect();
+    let mut others: Vec<&str> = names.iter().copied().filter(|name| *name != truth).collect();
     others.sort_by_cached_key(|name| {
         *Digest::from_parts([&b"darkqa.label/1"[..], image.as_bytes(), name.as_bytes()]).as_bytes()
     });
     others.truncate(count - 1);
-    names
-        .iter()
-        .copied()
-        .filter(|name| *name == truth || others.contains(name))
-        .collect()
+    names.iter().copied().filter(|name| *name == truth || others.contains(name)).collect()
 }
 
 #[cfg(test)]
@@ -162,9 +147,7 @@ mod tests {
             std::fs::create_dir(&class).unwrap();
             std::fs::write(class.join("a.png"), "").unwrap();
         }
-        let problem = classes(&Root::new(folder.path(), &[]).unwrap())
-            .unwrap_err()
-            .to_string();
+        let problem = classes(&Root::new(folder.path(), &[]).unwrap()).unwrap_err().to_string();
         assert!(problem.contains("is not UTF-8; rename"), "{problem}");
     }
 
@@ -175,13 +158,8 @@ mod tests {
             std::fs::create_dir(folder.path().join(name)).unwrap();
             std::fs::write(folder.path().join(name).join("a.png"), "").unwrap();
         }
-        let problem = open(&Root::new(folder.path(), &[]).unwrap(), "Which?", None)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            problem.starts_with(&*folder.path().to_string_lossy()),
-            "{problem}"
-        );
+        let problem = open(&Root::new(folder.path(), &[]).unwrap(), "Which?", None).unwrap_err().to_string();
+        assert!(problem.starts_with(&*folder.path().to_string_lossy()), "{problem}");
     }
 
     const NAMES: [&str; 5] = ["Bicycle", "Boat", "Cup", "Dog", "Table"];
@@ -212,19 +190,12 @@ mod tests {
         assert_eq!(count(12, 0), Ok(12));
         assert_eq!(count(30, 4), Ok(4));
         for (classes, choices, part) in [
-            (
-                30,
-                0,
-                "d has 30 classes, and a question at most 26 choices; --choices 4",
-            ),
+            (30, 0, "d has 30 classes, and a question at most 26 choices; --choices 4"),
             (30, 27, "2 to 26 choices"),
             (5, 1, "2 to 26 choices"),
             (3, 4, "has only 3 classes"),
         ] {
-            assert!(
-                count(classes, choices).unwrap_err().contains(part),
-                "{part}"
-            );
+            assert!(count(classes, choices).unwrap_err().contains(part), "{part}");
         }
     }
 }

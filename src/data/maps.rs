@@ -1,7 +1,7 @@
 //! Depth, semantic and segment maps of an image: [`MapPaths`], [`MapFiles`].
 //!
-//! A map has one number for each pixel of its image. A map of another size is refused instead of scaled, because ids cannot be
-//! interpolated.
+//! A map has one number for each pixel of its image. A map of another size is refused instead of scaled, because ids
+//! cannot be interpolated.
 
 use std::path::{Path, PathBuf};
 
@@ -16,8 +16,8 @@ use crate::pictures::npy::Npy;
 use crate::pictures::raw_png::{RawPng, SampleForm};
 use crate::types::Digest;
 
-/// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong unit, such as
-/// millimetres read as metres.
+/// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong
+/// unit, such as millimetres read as metres.
 const MAX_DEPTH_MM: f64 = 1e6;
 
 /// Paths of the maps that a frame has.
@@ -48,19 +48,16 @@ impl DepthFile {
     pub(crate) fn new(path: PathBuf, scale: Option<f64>) -> Result<Self, String> {
         match (is_npy(&path), scale) {
             (true, None | Some(1.0)) => Ok(Self::Npy(path)),
-            (true, Some(scale)) => Err(format!(
-                "depth_scale is {scale}, but a .npy file of depth is in metres; leave it out"
-            )),
-            (false, Some(scale)) if scale.is_finite() && scale > 0.0 => {
-                Ok(Self::Png { path, scale })
+            (true, Some(scale)) => {
+                Err(format!("depth_scale is {scale}, but a .npy file of depth is in metres; leave it out"))
             }
-            (false, Some(scale)) => Err(format!(
-                "depth_scale is {scale}; the metres in one unit of the depth PNG expected, as 0.001"
-            )),
-            (false, None) => Err(
-                "depth_scale is missing: the metres in one unit of the depth PNG, as 0.001"
-                    .to_owned(),
-            ),
+            (false, Some(scale)) if scale.is_finite() && scale > 0.0 => Ok(Self::Png { path, scale }),
+            (false, Some(scale)) => {
+                Err(format!("depth_scale is {scale}; the metres in one unit of the depth PNG expected, as 0.001"))
+            }
+            (false, None) => {
+                Err("depth_scale is missing: the metres in one unit of the depth PNG, as 0.001".to_owned())
+            }
         }
     }
 
@@ -85,12 +82,9 @@ impl DepthFile {
             Self::Png { scale, .. } => {
                 // Convert the scale first: most scales are a whole number of millimetres, so the product is exact.
                 let unit = scale * 1_000.0;
-                let table: Vec<u32> = (0..=u16::MAX)
-                    .map(|units| millimetres(units.into(), unit).unwrap_or(u32::MAX))
-                    .collect();
-                let depths = png(bytes, &[SampleForm::Grey16], size, |units| {
-                    table[usize::from(units)]
-                })?;
+                let table: Vec<u32> =
+                    (0..=u16::MAX).map(|units| millimetres(units.into(), unit).unwrap_or(u32::MAX)).collect();
+                let depths = png(bytes, &[SampleForm::Grey16], size, |units| table[usize::from(units)])?;
                 if let Some(at) = depths.iter().position(|depth| *depth == u32::MAX) {
                     let units = png(bytes, &[SampleForm::Grey16], size, |units| units)?[at];
                     millimetres(units.into(), unit)?;
@@ -111,20 +105,11 @@ impl MapPaths {
         self.depth
             .iter()
             .map(|depth| depth.path().to_owned())
-            .chain(
-                [&self.semantic, &self.segments]
-                    .into_iter()
-                    .flatten()
-                    .cloned(),
-            )
+            .chain([&self.semantic, &self.segments].into_iter().flatten().cloned())
     }
 
     /// A frame without maps.
-    pub(crate) const NONE: Self = Self {
-        depth: None,
-        semantic: None,
-        segments: None,
-    };
+    pub(crate) const NONE: Self = Self { depth: None, semantic: None, segments: None };
 
     /// True if the frame has no maps.
     pub(super) fn is_empty(&self) -> bool {
@@ -146,16 +131,15 @@ impl MapPaths {
                 let size = if is_npy(path) {
                     Npy::parse(&bytes).map(|npy| npy.size)
                 } else {
-                    RawPng::open(&bytes, &SampleForm::ALL, MAX_PIXELS)
-                        .map(|png| png.size)
-                        .map_err(String::from)
+                    RawPng::open(&bytes, &SampleForm::ALL, MAX_PIXELS).map(|png| png.size).map_err(String::from)
                 };
                 Ok((path, with_path(path, size)?))
             })
             .collect()
     }
 
-    /// Turns off the EXIF rotation of the image if it has maps: maps are not rotated, so they must have the size of the image as stored.
+    /// Turns off the EXIF rotation of the image if it has maps: maps are not rotated, so they must have the size of the
+    /// image as stored.
     ///
     /// # Errors
     /// If the file states a rotation and a map has another size than the image as stored.
@@ -163,11 +147,7 @@ impl MapPaths {
         if self.is_empty() {
             return Ok(image);
         }
-        let Some(StatedOrientation {
-            orientation,
-            stored_size,
-        }) = image.stated_orientation()
-        else {
+        let Some(StatedOrientation { orientation, stored_size }) = image.stated_orientation() else {
             return Ok(image);
         };
         for (path, size) in self.sizes()? {
@@ -221,16 +201,9 @@ impl MapFiles<'_> {
             Some(DepthFile::Npy(_)) => "m".to_owned(),
             None => String::new(),
         };
-        let files = [&self.depth, &self.semantic, &self.segments].map(|file| {
-            file.as_deref().map_or_else(Vec::new, |bytes| {
-                Digest::from_bytes(bytes).as_bytes().to_vec()
-            })
-        });
-        Digest::from_parts(
-            [unit.as_bytes()]
-                .into_iter()
-                .chain(files.iter().map(Vec::as_slice)),
-        )
+        let files = [&self.depth, &self.semantic, &self.segments]
+            .map(|file| file.as_deref().map_or_else(Vec::new, |bytes| Digest::from_bytes(bytes).as_bytes().to_vec()));
+        Digest::from_parts([unit.as_bytes()].into_iter().chain(files.iter().map(Vec::as_slice)))
     }
 
     /// Decodes the depth of each pixel, in millimetres; `None` without a depth map.
@@ -286,12 +259,7 @@ fn segments(bytes: &[u8], size: Size, is_npy: bool) -> Result<Array2<u32>, Strin
 
 /// Checks the range of a segment id.
 fn segment_id(id: i128) -> Result<u32, String> {
-    u32::try_from(id).map_err(|_| {
-        format!(
-            "{id} is not the id of a segment; 0 (none) to {} expected",
-            u32::MAX
-        )
-    })
+    u32::try_from(id).map_err(|_| format!("{id} is not the id of a segment; 0 (none) to {} expected", u32::MAX))
 }
 
 /// Converts a depth to whole millimetres, rounded half to even; 0 if there is no depth. `unit` is millimetres per unit.
@@ -311,8 +279,7 @@ pub(crate) fn millimetres(units: f64, unit: f64) -> Result<u32, String> {
 }
 
 fn is_npy(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
+    path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("npy"))
 }
 
 /// Adds the path of the file to the error.
@@ -321,12 +288,7 @@ fn with_path<T>(path: &Path, read: Result<T, String>) -> Result<T> {
 }
 
 /// Decodes a PNG map of this size and converts each sample.
-fn png<T: Clone>(
-    bytes: &[u8],
-    forms: &[SampleForm],
-    size: Size,
-    convert: impl Fn(u16) -> T,
-) -> Result<Vec<T>, String> {
+fn png<T: Clone>(bytes: &[u8], forms: &[SampleForm], size: Size, convert: impl Fn(u16) -> T) -> Result<Vec<T>, String> {
     let png = RawPng::open(bytes, forms, MAX_PIXELS)?;
     check_size(png.size, size)?;
     png.samples(convert)
@@ -349,10 +311,7 @@ fn check_size(map: Size, image: Size) -> Result<(), String> {
     ))
 }
 
-fn collect_grid<T>(
-    size: Size,
-    values: impl Iterator<Item = Result<T, String>>,
-) -> Result<Array2<T>, String> {
+fn collect_grid<T>(size: Size, values: impl Iterator<Item = Result<T, String>>) -> Result<Array2<T>, String> {
     let values = values.collect::<Result<Vec<T>, String>>()?;
     Array2::from_shape_vec(size, values).map_err(|e| e.to_string())
 }

@@ -54,9 +54,7 @@ pub(crate) use ready_made::{ParquetColumns, SkipBad, cached_snapshot, refuse_lfs
 pub(crate) use root::Root;
 pub(crate) use root::RootArgs;
 pub(crate) use scene_args::SceneArgs;
-pub(crate) use settings::{
-    BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, parse_data_place,
-};
+pub(crate) use settings::{BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, parse_data_place};
 use similar_path::folded;
 
 /// Where the data are, as given by `--data`.
@@ -110,11 +108,7 @@ pub struct Dataset {
 }
 
 impl Dataset {
-    fn new(
-        name: String,
-        sources: BTreeMap<FrameId, ImageSource>,
-        questions: Vec<Question>,
-    ) -> Self {
+    fn new(name: String, sources: BTreeMap<FrameId, ImageSource>, questions: Vec<Question>) -> Self {
         Self {
             name,
             title: String::new(),
@@ -130,29 +124,22 @@ impl Dataset {
         }
     }
 
-    /// Opens the frames at a place, without questions. Paths may also lead into the folders in `further`. No image is read.
+    /// Opens the frames at a place, without questions. Paths may also lead into the folders in `further`. No image is
+    /// read.
     ///
     /// # Errors
     /// If the place is not a folder of frames.
     pub fn open_without_questions(place: &DataPlace, further: &[PathBuf]) -> Result<Self> {
         match place {
             DataPlace::Rooms(rooms) => Ok(Self::from_rooms(*rooms)),
-            DataPlace::Path(folder) | DataPlace::Known { path: folder, .. } => {
-                Self::from_frames(folder, further)
-            }
-            DataPlace::Files(_) => Err(Error::usage(
-                "--data",
-                format_args!("{place}: one folder of frames expected"),
-            )),
+            DataPlace::Path(folder) | DataPlace::Known { path: folder, .. } => Self::from_frames(folder, further),
+            DataPlace::Files(_) => Err(Error::usage("--data", format_args!("{place}: one folder of frames expected"))),
         }
     }
 
     /// The built-in rooms, without questions. No image is drawn yet.
     fn from_rooms(rooms: Rooms) -> Self {
-        let sources = rooms
-            .all()
-            .map(|(id, room)| (id, ImageSource::Room(room)))
-            .collect();
+        let sources = rooms.all().map(|(id, room)| (id, ImageSource::Room(room))).collect();
         Self {
             title: rooms.title(),
             labels: Some(rooms::labels()),
@@ -187,23 +174,11 @@ impl Dataset {
     /// Replaces the questions by those of a file.
     ///
     /// # Errors
-    /// If a question is about a frame that the data set does not have. With `--skip bad`, such questions are left out instead.
-    fn with_file_questions(
-        self,
-        file: &Path,
-        read: FileQuestions,
-        skip: Option<SkipBad>,
-    ) -> Result<Self> {
-        let FileQuestions {
-            questions,
-            scenes,
-            summary,
-            format,
-            rows,
-        } = read;
-        let unmatched = questions
-            .iter()
-            .find(|question| !self.sources.contains_key(&question.frame));
+    /// If a question is about a frame that the data set does not have. With `--skip bad`, such questions are left out
+    /// instead.
+    fn with_file_questions(self, file: &Path, read: FileQuestions, skip: Option<SkipBad>) -> Result<Self> {
+        let FileQuestions { questions, scenes, summary, format, rows } = read;
+        let unmatched = questions.iter().find(|question| !self.sources.contains_key(&question.frame));
         let problem = unmatched.map(|unmatched| {
             let wanted = folded(&unmatched.frame.0);
             let same = self.sources.keys().find(|id| folded(&id.0) == wanted);
@@ -220,25 +195,16 @@ impl Dataset {
                 self.name
             )
         });
-        let dataset = Self {
-            scenes,
-            questions,
-            summary,
-            format,
-            rows,
-            ..self
-        };
+        let dataset = Self { scenes, questions, summary, format, rows, ..self };
         match (problem, skip) {
             (None, _) => Ok(dataset),
             (Some(problem), Some(skip)) => dataset.without_unmatched_questions(&problem, skip),
-            (Some(problem), None) => {
-                Err(Error::data(problem, "--skip bad leaves such questions out"))
-            }
+            (Some(problem), None) => Err(Error::data(problem, "--skip bad leaves such questions out")),
         }
     }
 
-    /// Opens an image file or a folder of frames, without questions. Paths may also lead into the folders in `further`. No image is
-    /// read.
+    /// Opens an image file or a folder of frames, without questions. Paths may also lead into the folders in `further`.
+    /// No image is read.
     pub fn from_images(path: &Path, further: &[PathBuf]) -> Result<Self> {
         let sources = if path.is_dir() {
             let sources = frames::sources(path, further, MissingFiles::Refuse)?;
@@ -255,15 +221,13 @@ impl Dataset {
     /// Opens a folder of frames with the labels of its maps, without questions. No image is read.
     pub fn from_frames(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         if !folder.is_dir() {
-            return Err(Error::usage(
-                "DATA",
-                format_args!("{}: no such folder of frames", folder.display()),
-            ));
+            return Err(Error::usage("DATA", format_args!("{}: no such folder of frames", folder.display())));
         }
         frames::frames(folder, further, MissingFiles::Refuse)
     }
 
-    /// Labels of the semantic maps at a place; `None` without a `classes.json`, which may also lie in the folders in `further`.
+    /// Labels of the semantic maps at a place; `None` without a `classes.json`, which may also lie in the folders in
+    /// `further`.
     ///
     /// # Errors
     /// If `classes.json` cannot be read; the error names the file.
@@ -292,7 +256,8 @@ impl Dataset {
         self.sources.keys()
     }
 
-    /// Frames that a question about `frame` shows, in order: `frame` itself, or each image of a question with several images.
+    /// Frames that a question about `frame` shows, in order: `frame` itself, or each image of a question with several
+    /// images.
     #[must_use]
     pub(crate) fn shown_frames<'a>(&'a self, frame: &'a FrameId) -> &'a [FrameId] {
         match self.series.get(frame) {
@@ -310,9 +275,7 @@ impl Dataset {
     /// True if the data set has the frame, or every frame of a question with several images.
     #[must_use]
     pub(crate) fn has_frames(&self, frame: &FrameId) -> bool {
-        self.shown_frames(frame)
-            .iter()
-            .all(|frame| self.sources.contains_key(frame))
+        self.shown_frames(frame).iter().all(|frame| self.sources.contains_key(frame))
     }
 
     /// Scene of a frame, or the scene that all frames of a question with several images share; empty if there is none.
@@ -337,9 +300,9 @@ impl Dataset {
 
     /// Opens the data at a place; `questions` replaces the `questions.jsonl` of a folder of frames.
     ///
-    /// No image is read. Every question is checked: its choices, that its answer is one of them, and that its frame exists.
-    /// The built-in rooms, and a folder of frames with maps but no questions, have no questions yet: the caller generates
-    /// them from [`Self::labels`] and adds them with [`Self::with_questions`].
+    /// No image is read. Every question is checked: its choices, that its answer is one of them, and that its frame
+    /// exists. The built-in rooms, and a folder of frames with maps but no questions, have no questions yet: the caller
+    /// generates them from [`Self::labels`] and adds them with [`Self::with_questions`].
     pub fn open(place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
         Self::open_place(place, questions, set).map_err(|e| with_import_hint(place.path(), e))
     }
@@ -359,15 +322,10 @@ impl Dataset {
             DataPlace::Path(path) if frames::is_folder_of_frames(path, questions) => {
                 frames::open(path, questions, set)?
             }
-            DataPlace::Path(path) => {
-                Self::open_ready_made(std::slice::from_ref(path), questions, set)?
-            }
+            DataPlace::Path(path) => Self::open_ready_made(std::slice::from_ref(path), questions, set)?,
             DataPlace::Files(paths) => Self::open_ready_made(paths, questions, set)?,
             DataPlace::Known { name, path } => {
-                let set = SetArgs {
-                    preset: Some(name.clone()),
-                    ..set.clone()
-                };
+                let set = SetArgs { preset: Some(name.clone()), ..set.clone() };
                 Self::open_ready_made(std::slice::from_ref(path), questions, &set)?
             }
         };
@@ -375,11 +333,7 @@ impl Dataset {
             return Err(Error::data(&dataset.name, "no questions in it"));
         }
         let mut seen = HashSet::new();
-        if let Some(twice) = dataset
-            .questions
-            .iter()
-            .find(|question| !seen.insert(&question.id))
-        {
+        if let Some(twice) = dataset.questions.iter().find(|question| !seen.insert(&question.id)) {
             return Err(Error::data(
                 &dataset.name,
                 format_args!("two questions have the id {:?}", excerpt(&twice.id.0, 60)),
@@ -392,11 +346,7 @@ impl Dataset {
     ///
     /// # Errors
     /// If the set cannot be read, or the user gives other questions than its own.
-    fn open_ready_made(
-        places: &[PathBuf],
-        questions: Option<&Path>,
-        set: &SetArgs,
-    ) -> Result<Self> {
+    fn open_ready_made(places: &[PathBuf], questions: Option<&Path>, set: &SetArgs) -> Result<Self> {
         refuse_questions(questions, "a ready-made set brings its own questions")?;
         let first = places.first().map_or(Path::new(""), PathBuf::as_path);
         Ok(Self::from_set(ready_made::open(places, &stem(first), set)?))
@@ -422,9 +372,7 @@ impl Dataset {
 
     /// Lines of [`Self::summary`] to print: only the omissions if the set is in this program's own format.
     pub fn printed_summary(&self) -> impl Iterator<Item = &String> {
-        self.summary
-            .iter()
-            .filter(|line| self.format == SetFormat::Foreign || line.starts_with(LEFT_OUT))
+        self.summary.iter().filter(|line| self.format == SetFormat::Foreign || line.starts_with(LEFT_OUT))
     }
 
     /// The questions, in the order of their file.
@@ -450,10 +398,7 @@ impl Dataset {
                 Ok(Picture::Encoded(file))
             }
             Some(ImageSource::Room(room)) => Ok(Picture::Drawn(room.clone(), self.rule)),
-            None => Err(Error::data(
-                &self.name,
-                format_args!("no frame {:?} in it", frame.0),
-            )),
+            None => Err(Error::data(&self.name, format_args!("no frame {:?} in it", frame.0))),
         }
     }
 
@@ -471,11 +416,7 @@ impl Dataset {
     /// # Errors
     /// If the frame has no photograph of this name, or its file cannot be read.
     pub(crate) fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
-        let Some(photo) = self
-            .photographs(frame)
-            .iter()
-            .find(|photo| photo.name == *name)
-        else {
+        let Some(photo) = self.photographs(frame).iter().find(|photo| photo.name == *name) else {
             let problem = format_args!("no photograph {name} of the frame {:?} in it", frame.0);
             return Err(Error::data(&self.name, problem));
         };
@@ -512,12 +453,7 @@ impl Dataset {
             Some(ImageSource::File(file)) => (&file.maps, &file.facts),
             _ => (NONE, &*UNKNOWN),
         };
-        Ok(FrameFiles {
-            id: frame,
-            picture: self.picture(frame)?,
-            maps: maps.read()?,
-            facts,
-        })
+        Ok(FrameFiles { id: frame, picture: self.picture(frame)?, maps: maps.read()?, facts })
     }
 
     /// Decodes a frame with its image and its maps.
@@ -533,25 +469,15 @@ impl Dataset {
 fn refuse_questions(questions: Option<&Path>, why: &str) -> Result<()> {
     match questions {
         None => Ok(()),
-        Some(path) => Err(Error::usage(
-            "--questions",
-            format_args!("{} cannot be used: {why}", path.display()),
-        )),
+        Some(path) => Err(Error::usage("--questions", format_args!("{} cannot be used: {why}", path.display()))),
     }
 }
 
 /// Name of a folder, or of a file without its extension.
 fn stem(path: &Path) -> String {
     let named = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let name = if named.is_dir() {
-        named.file_name()
-    } else {
-        named.file_stem()
-    };
-    name.map_or_else(
-        || "data".to_owned(),
-        |name| name.to_string_lossy().into_owned(),
-    )
+    let name = if named.is_dir() { named.file_name() } else { named.file_stem() };
+    name.map_or_else(|| "data".to_owned(), |name| name.to_string_lossy().into_owned())
 }
 
 #[cfg(test)]
@@ -563,16 +489,10 @@ mod tests {
     #[test]
     fn only_files_lose_their_extension() {
         let folder = tempfile::tempdir().unwrap();
-        let (inner, set) = (
-            folder.path().join("data.v1"),
-            folder.path().join("set.v2.tsv"),
-        );
+        let (inner, set) = (folder.path().join("data.v1"), folder.path().join("set.v2.tsv"));
         fs::create_dir(&inner).unwrap();
         fs::write(&set, "").unwrap();
-        assert_eq!(
-            (stem(&inner), stem(&set)),
-            ("data.v1".into(), "set.v2".into())
-        );
+        assert_eq!((stem(&inner), stem(&set)), ("data.v1".into(), "set.v2".into()));
         assert_eq!(stem(&inner.join(".")), "data.v1");
     }
 }

@@ -1,5 +1,5 @@
-//! Episodic-memory questions of OpenEQA and the frames of their walks: [`OpenQuestion`], [`read_questions`], [`walk_frames`] and
-//! [`sample_indices`]. Follows `facebookresearch/open-eqa` at cfa3fce.
+//! Episodic-memory questions of OpenEQA and the frames of their walks: [`OpenQuestion`], [`read_questions`],
+//! [`walk_frames`] and [`sample_indices`]. Follows `facebookresearch/open-eqa` at cfa3fce.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -57,10 +57,7 @@ pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
     }
     let mut seen = BTreeSet::new();
     if let Some(twice) = questions.iter().find(|question| !seen.insert(&question.id)) {
-        return Err(Error::data(
-            path.display(),
-            format_args!("two questions have the id {:?}", twice.id.0),
-        ));
+        return Err(Error::data(path.display(), format_args!("two questions have the id {:?}", twice.id.0)));
     }
     Ok(questions)
 }
@@ -70,9 +67,8 @@ pub(crate) fn read_questions(path: &Path) -> Result<Vec<OpenQuestion>> {
 /// # Errors
 /// If the folder is missing or has no such file, or if the folder or a frame lies outside `root`.
 pub(crate) fn walk_frames(root: &Root, episode: &str) -> Result<Vec<PathBuf>> {
-    let folder = root
-        .path(root.folder(), Path::new(episode))
-        .map_err(|problem| Error::data("episode_history", problem))?;
+    let folder =
+        root.path(root.folder(), Path::new(episode)).map_err(|problem| Error::data("episode_history", problem))?;
     let mut links_out = Vec::new();
     let is_frame = |path: &PathBuf| path.to_string_lossy().ends_with("-rgb.png");
     let mut paths = root.entries(&folder, &mut links_out)?;
@@ -88,8 +84,8 @@ pub(crate) fn walk_frames(root: &Root, episode: &str) -> Result<Vec<PathBuf>> {
     Ok(paths)
 }
 
-/// Indices of `k` frames out of `n`, like `np.round(np.linspace(0, n - 1, k))`: rounded half to even, with repeats if `n` is less than
-/// `k`; empty if `n` is 0.
+/// Indices of `k` frames out of `n`, like `np.round(np.linspace(0, n - 1, k))`: rounded half to even, with repeats if
+/// `n` is less than `k`; empty if `n` is 0.
 #[must_use]
 pub(crate) fn sample_indices(n: usize, k: usize) -> Vec<usize> {
     if n == 0 {
@@ -100,11 +96,7 @@ pub(crate) fn sample_indices(n: usize, k: usize) -> Vec<usize> {
     let step = if k > 1 { last / (k - 1) as f64 } else { 0.0 };
     (0..k)
         .map(|index| {
-            let position = if index + 1 == k && k > 1 {
-                last
-            } else {
-                index as f64 * step
-            };
+            let position = if index + 1 == k && k > 1 { last } else { index as f64 * step };
             position.round_ties_even() as usize
         })
         .collect()
@@ -124,10 +116,7 @@ mod tests {
         assert_eq!(sample_indices(6, 3), [0, 2, 5]);
         assert_eq!(sample_indices(3, 7), [0, 0, 1, 1, 1, 2, 2]);
         assert_eq!(sample_indices(168, 5), [0, 42, 84, 125, 167]);
-        assert_eq!(
-            (sample_indices(1, 3), sample_indices(5, 1)),
-            (vec![0, 0, 0], vec![0])
-        );
+        assert_eq!((sample_indices(1, 3), sample_indices(5, 1)), (vec![0, 0, 0], vec![0]));
         assert!(sample_indices(0, 4).is_empty());
     }
 
@@ -141,19 +130,14 @@ mod tests {
         let file = tempfile::NamedTempFile::new().unwrap();
         let one = r#"{"question": "Where?", "answer": "there", "category": "object localization",
             "question_id": "a", "episode_history": "hm3d-v0/000-x"}"#;
-        let extra =
-            one.replace("\"a\"", "\"b\"")
-                .replacen('{', "{\"extra_answers\": [\"here\"], ", 1);
+        let extra = one.replace("\"a\"", "\"b\"").replacen('{', "{\"extra_answers\": [\"here\"], ", 1);
         let loaded = read_text(file.path(), &format!("[{one}, {extra}]")).unwrap();
         assert_eq!((loaded[0].split(), &loaded[0].extra), ("hm3d-v0", &None));
         assert_eq!(loaded[1].extra.as_deref(), Some(&["here".to_owned()][..]));
         for (text, message) in [
             ("[]", "no questions in it"),
             ("{}", "a JSON array of"),
-            (
-                &*format!("[{one}, {one}]"),
-                "two questions have the id \"a\"",
-            ),
+            (&*format!("[{one}, {one}]"), "two questions have the id \"a\""),
         ] {
             let error = read_text(file.path(), text).unwrap_err().to_string();
             assert!(error.contains(message), "{error}");
@@ -166,18 +150,8 @@ mod tests {
         let folder = base.path().join("hm3d-v0/000-x");
         fs::create_dir_all(&folder).unwrap();
         let root = Root::new(base.path(), &[]).unwrap();
-        assert!(
-            walk_frames(&root, "hm3d-v0/000-x")
-                .unwrap_err()
-                .to_string()
-                .contains("-rgb.png")
-        );
-        for name in [
-            "00010-rgb.png",
-            "00002-rgb.png",
-            "00002-depth.png",
-            "intrinsic_color.txt",
-        ] {
+        assert!(walk_frames(&root, "hm3d-v0/000-x").unwrap_err().to_string().contains("-rgb.png"));
+        for name in ["00010-rgb.png", "00002-rgb.png", "00002-depth.png", "intrinsic_color.txt"] {
             fs::write(folder.join(name), "").unwrap();
         }
         let names: Vec<_> = walk_frames(&root, "hm3d-v0/000-x").unwrap();

@@ -12,8 +12,8 @@ use super::{Dataset, ImageSource, stem};
 use crate::error::{Error, Result};
 use crate::types::{FrameId, PhotoName};
 
-/// Makes a frame of each photograph in normal light, named by its file, with its partner in low light as dark photograph. Warns
-/// about images without a partner. The data set has no questions.
+/// Makes a frame of each photograph in normal light, named by its file, with its partner in low light as dark
+/// photograph. Warns about images without a partner. The data set has no questions.
 ///
 /// # Errors
 /// If two photographs in normal light have the same name.
@@ -29,11 +29,7 @@ pub(super) fn open(folder: &Path, pairs: Pairs) -> Result<Dataset> {
     for pair in pairs.pairs {
         let name = pair.normal.file_name().unwrap_or_default();
         let id = FrameId(name.to_string_lossy().into_owned());
-        let dark = DarkPhoto {
-            name: PhotoName::numbered(0),
-            path: pair.low,
-            ev: None,
-        };
+        let dark = DarkPhoto { name: PhotoName::numbered(0), path: pair.low, ev: None };
         let source = ImageSource::File(Box::new(FrameFile {
             rgb: pair.normal.clone(),
             maps: MapPaths::default(),
@@ -41,10 +37,7 @@ pub(super) fn open(folder: &Path, pairs: Pairs) -> Result<Dataset> {
             dark: vec![dark],
         }));
         if sources.insert(id, source).is_some() {
-            return Err(Error::data(
-                pair.normal.display(),
-                "a second file of this name",
-            ));
+            return Err(Error::data(pair.normal.display(), "a second file of this name"));
         }
     }
     Ok(Dataset::new(stem(folder), sources, Vec::new()))

@@ -8,11 +8,7 @@ use super::image_paths::ImagePaths;
 use crate::error::{Error, Result};
 
 /// Names of the normal-light and the low-light folder: plain words, and the names in the LOL and LISU data sets.
-const FOLDERS: [[&str; 2]; 3] = [
-    ["normal", "low"],
-    ["high", "low"],
-    ["val_rgb_h", "val_rgb_l"],
-];
+const FOLDERS: [[&str; 2]; 3] = [["normal", "low"], ["high", "low"], ["val_rgb_h", "val_rgb_l"]];
 
 /// One scene in normal and in low light.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -44,20 +40,19 @@ enum PairSide {
 impl Pairs {
     /// Finds the pairs in a folder. Two layouts are known:
     /// - Subfolders `normal` and `low`, `high` and `low`, or `val_rgb_h` and `val_rgb_l`, in upper or lower case.
-    /// - All images in the folder itself. Names begin or end with `normal` or `high` in normal light, with `low` in low light
-    ///   (`normal00733.png`, `low00733.png`).
+    /// - All images in the folder itself. Names begin or end with `normal` or `high` in normal light, with `low` in low
+    ///   light (`normal00733.png`, `low00733.png`).
     ///
     /// # Errors
-    /// If no pair is found, or two images of the same side have the same name. `other_folders` is the command's way to name two folders.
+    /// If no pair is found, or two images of the same side have the same name. `other_folders` is the command's way to
+    /// name two folders.
     pub(crate) fn open(folder: &Path, further: &[PathBuf], other_folders: &str) -> Result<Self> {
         let root = Root::new(folder, further)?;
         let mut links_out = Vec::new();
         let entries = root.entries(folder, &mut links_out)?;
         root.warn_of_links_out(&links_out);
         for [normal, low] in FOLDERS {
-            if let (Some(normal), Some(low)) =
-                (subfolder(&entries, normal), subfolder(&entries, low))
-            {
+            if let (Some(normal), Some(low)) = (subfolder(&entries, normal), subfolder(&entries, low)) {
                 return Self::from_folders(normal, low, further);
             }
         }
@@ -77,8 +72,8 @@ impl Pairs {
         })
     }
 
-    /// Pairs the images of two folders by name. The extension and the words `normal`, `high` and `low` at the beginning or end of
-    /// a name are ignored.
+    /// Pairs the images of two folders by name. The extension and the words `normal`, `high` and `low` at the beginning
+    /// or end of a name are ignored.
     ///
     /// # Errors
     /// If no pair is found, or two images of the same folder have the same name.
@@ -95,17 +90,13 @@ impl Pairs {
             }
         }
         Self::match_names(sides, Vec::new()).ok_or_else(|| {
-            let problem =
-                format_args!("no image in it has the name of one in {}", normal.display());
+            let problem = format_args!("no image in it has the name of one in {}", normal.display());
             Error::data(low.display(), problem)
         })
     }
 
     /// Pairs the images whose names occur on both sides; `None` if there are none.
-    fn match_names(
-        [mut normal, low]: [BTreeMap<String, PathBuf>; 2],
-        mut unmatched: Vec<PathBuf>,
-    ) -> Option<Self> {
+    fn match_names([mut normal, low]: [BTreeMap<String, PathBuf>; 2], mut unmatched: Vec<PathBuf>) -> Option<Self> {
         let mut pairs = Vec::new();
         for (name, low) in low {
             match normal.remove(&name) {
@@ -121,9 +112,7 @@ impl Pairs {
 
 /// The folder with this name, in any case.
 fn subfolder<'a>(entries: &'a [PathBuf], name: &str) -> Option<&'a PathBuf> {
-    entries
-        .iter()
-        .find(|path| path.is_dir() && file_name(path).eq_ignore_ascii_case(name))
+    entries.iter().find(|path| path.is_dir() && file_name(path).eq_ignore_ascii_case(name))
 }
 
 /// Adds an image to a side of the pairs.
@@ -140,8 +129,8 @@ fn add_image(side: &mut BTreeMap<String, PathBuf>, name: String, path: &Path) ->
     }
 }
 
-/// True if two neighbouring characters belong to the same word. The letter case separates words, so `low` is a word in `sofaLow`, `low1`
-/// and `1_low`, but not in `yellow`.
+/// True if two neighbouring characters belong to the same word. The letter case separates words, so `low` is a word in
+/// `sofaLow`, `low1` and `1_low`, but not in `yellow`.
 fn are_in_one_word(one: Option<char>, next: Option<char>) -> bool {
     let (Some(one), Some(next)) = (one, next) else {
         return false;
@@ -149,14 +138,11 @@ fn are_in_one_word(one: Option<char>, next: Option<char>) -> bool {
     one.is_alphabetic() && next.is_alphabetic() && one.is_lowercase() == next.is_lowercase()
 }
 
-/// Splits a file name into the name of the pair and the side, given by a word at its beginning or end. If the two words contradict
-/// each other, the one at the beginning counts.
+/// Splits a file name into the name of the pair and the side, given by a word at its beginning or end. If the two words
+/// contradict each other, the one at the beginning counts.
 fn split_side(stem: &str) -> (String, Option<PairSide>) {
-    const WORDS: [(&str, PairSide); 3] = [
-        ("normal", PairSide::Normal),
-        ("high", PairSide::Normal),
-        ("low", PairSide::Low),
-    ];
+    const WORDS: [(&str, PairSide); 3] =
+        [("normal", PairSide::Normal), ("high", PairSide::Normal), ("low", PairSide::Low)];
     let lower = stem.to_ascii_lowercase();
     let prefix = WORDS.iter().find(|(word, _)| {
         let rest = lower.strip_prefix(word);
@@ -193,17 +179,11 @@ fn images(paths: Vec<PathBuf>, folder: &Path) -> Vec<PathBuf> {
 }
 
 fn file_name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 fn stem(path: &Path) -> String {
-    path.file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
+    path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 #[cfg(test)]
@@ -252,21 +232,12 @@ mod tests {
         let folder = folder(&files);
         let pairs = Pairs::open(folder.path(), &[], "").unwrap();
         let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
-        assert_eq!(
-            (names(&pairs), unmatched),
-            (vec!["1"], others.map(str::to_owned).to_vec())
-        );
+        assert_eq!((names(&pairs), unmatched), (vec!["1"], others.map(str::to_owned).to_vec()));
     }
 
     #[test]
     fn images_without_a_partner_are_unmatched() {
-        let folder = folder(&[
-            "normal1.png",
-            "low1.png",
-            "low1_edited.png",
-            "high3.png",
-            "x.png",
-        ]);
+        let folder = folder(&["normal1.png", "low1.png", "low1_edited.png", "high3.png", "x.png"]);
         let pairs = Pairs::open(folder.path(), &[], "").unwrap();
         let unmatched: Vec<String> = pairs.unmatched.iter().map(|path| file_name(path)).collect();
         assert_eq!(unmatched, ["high3.png", "low1_edited.png", "x.png"]);
@@ -275,9 +246,7 @@ mod tests {
     #[test]
     fn missing_pairs_and_duplicate_names_are_errors() {
         let none = folder(&["a.png", "low/1.png"]);
-        let error = Pairs::open(none.path(), &[], "name two folders")
-            .unwrap_err()
-            .to_string();
+        let error = Pairs::open(none.path(), &[], "name two folders").unwrap_err().to_string();
         assert!(error.ends_with("; name two folders"), "{error}");
         let two = folder(&["normal1.png", "low1.png", "low1.jpg"]);
         let error = Pairs::open(two.path(), &[], "").unwrap_err().to_string();

@@ -24,9 +24,11 @@ impl Photographs {
     /// Lists the images at a place. No image is read.
     ///
     /// - A folder with a `frames.jsonl`: the frames in it.
-    /// - Any other folder: all images in it and in its subfolders, named by their relative paths. Hidden files are skipped.
+    /// - Any other folder: all images in it and in its subfolders, named by their relative paths. Hidden files are
+    ///   skipped.
     /// - An image file: this image.
-    /// - The built-in rooms and ready-made sets: their images. A folder of Parquet files without other images is such a set.
+    /// - The built-in rooms and ready-made sets: their images. A folder of Parquet files without other images is such a
+    ///   set.
     ///
     /// # Errors
     /// If the place cannot be read, or has no image.
@@ -43,30 +45,16 @@ impl Photographs {
                 return Self::open_set(place, set);
             }
         };
-        Ok(Self {
-            dataset,
-            notes: Vec::new(),
-        })
+        Ok(Self { dataset, notes: Vec::new() })
     }
 
     /// The images of a ready-made set, whose rows need no questions.
     fn open_set(place: &DataPlace, set: &SetArgs) -> Result<Self> {
-        let set = SetArgs {
-            images_alone: true,
-            ..set.clone()
-        };
+        let set = SetArgs { images_alone: true, ..set.clone() };
         let dataset = Dataset::open_place(place, None, &set)?;
         let images = counted(dataset.frames().count(), "image");
-        let note =
-            format!("{place}: {images}; questions in it are ignored, and those of --ask are asked");
-        Ok(Self {
-            dataset: Dataset {
-                questions: Vec::new(),
-                summary: Vec::new(),
-                ..dataset
-            },
-            notes: vec![note],
-        })
+        let note = format!("{place}: {images}; questions in it are ignored, and those of --ask are asked");
+        Ok(Self { dataset: Dataset { questions: Vec::new(), summary: Vec::new(), ..dataset }, notes: vec![note] })
     }
 
     fn open_folder(folder: &Path, set: &SetArgs) -> Result<Self> {
@@ -75,10 +63,7 @@ impl Photographs {
         let own = folder.join(frames::QUESTIONS);
         let own = own.exists().then_some(own);
         for file in own.into_iter().chain(frames::other_question_files(folder)) {
-            notes.push(format!(
-                "{} is ignored: the questions are those of --ask",
-                file.display()
-            ));
+            notes.push(format!("{} is ignored: the questions are those of --ask", file.display()));
         }
         if folder.join(frames::FRAMES).exists() {
             let dataset = frames::frames(folder, further, MissingFiles::new(set.bad))?;
@@ -87,30 +72,21 @@ impl Photographs {
         let root = Root::new(folder, further)?;
         let mut scan = Scan::default();
         scan.add_folder(&root, folder)?;
-        let has_parquet = scan.files.iter().any(|path| {
-            path.extension()
-                .is_some_and(|name| name.eq_ignore_ascii_case("parquet"))
-        });
+        let has_parquet =
+            scan.files.iter().any(|path| path.extension().is_some_and(|name| name.eq_ignore_ascii_case("parquet")));
         let found = ImagePaths::from_paths(scan.files);
         let mut sources = BTreeMap::new();
         for path in &found.images {
-            let parts: Vec<_> = path
-                .strip_prefix(folder)
-                .unwrap_or(path)
-                .iter()
-                .map(|part| part.to_string_lossy())
-                .collect();
+            let parts: Vec<_> =
+                path.strip_prefix(folder).unwrap_or(path).iter().map(|part| part.to_string_lossy()).collect();
             frames::insert_image(&mut sources, parts.join("/"), path)?;
         }
         if sources.is_empty() && has_parquet && !is_lerobot_set(folder) {
             return Self::open_set(&DataPlace::Path(folder.to_owned()), set);
         }
         if sources.is_empty() {
-            let unread = found
-                .unsupported_note()
-                .map_or(String::new(), |unread| format!("; {unread}"));
-            let problem =
-                format_args!("no {SUPPORTED_FORMATS} image in this folder or below{unread}");
+            let unread = found.unsupported_note().map_or(String::new(), |unread| format!("; {unread}"));
+            let problem = format_args!("no {SUPPORTED_FORMATS} image in this folder or below{unread}");
             return Err(Error::data(folder.display(), problem));
         }
         found.warn_of_unsupported(folder);
@@ -122,10 +98,7 @@ impl Photographs {
                 counted(sources.len(), "image")
             ));
         }
-        Ok(Self {
-            dataset: Dataset::new(stem(folder), sources, Vec::new()),
-            notes,
-        })
+        Ok(Self { dataset: Dataset::new(stem(folder), sources, Vec::new()), notes })
     }
 }
 
@@ -141,9 +114,7 @@ struct Scan {
 
 impl Scan {
     fn add_folder(&mut self, root: &Root, folder: &Path) -> Result<()> {
-        let real = folder
-            .canonicalize()
-            .map_err(|e| Error::file(folder, "read", e))?;
+        let real = folder.canonicalize().map_err(|e| Error::file(folder, "read", e))?;
         if !self.seen.insert(real) {
             return Ok(());
         }
@@ -185,21 +156,13 @@ mod tests {
     #[test]
     fn images_in_subfolders_are_named_by_path() {
         let folder = tempfile::tempdir().unwrap();
-        for name in [
-            "b.png",
-            "living/a.png",
-            "living/deep/a.png",
-            ".hidden/x.png",
-        ] {
+        for name in ["b.png", "living/a.png", "living/deep/a.png", ".hidden/x.png"] {
             save(folder.path(), name);
         }
         fs::write(folder.path().join("notes.txt"), "").unwrap();
         let (names, notes) = found(folder.path()).unwrap();
         assert_eq!(names, ["b.png", "living/a.png", "living/deep/a.png"]);
-        assert!(
-            notes[0].contains("3 images in it and in the folders below"),
-            "{notes:?}"
-        );
+        assert!(notes[0].contains("3 images in it and in the folders below"), "{notes:?}");
         let (names, notes) = found(&folder.path().join("living/deep")).unwrap();
         assert_eq!((names, notes.len()), (vec!["a.png".to_owned()], 0));
         assert_eq!(found(&folder.path().join("b.png")).unwrap().0, ["b.png"]);
@@ -227,10 +190,7 @@ mod tests {
     fn folder_without_image_is_refused_and_its_questions_ignored() {
         let folder = tempfile::tempdir().unwrap();
         let problem = found(folder.path()).unwrap_err().to_string();
-        assert!(
-            problem.ends_with("image in this folder or below"),
-            "{problem}"
-        );
+        assert!(problem.ends_with("image in this folder or below"), "{problem}");
         fs::write(folder.path().join("a.heic"), "").unwrap();
         let problem = found(folder.path()).unwrap_err().to_string();
         assert!(problem.contains("1 file looks like an image"), "{problem}");

@@ -1,7 +1,8 @@
 //! Folders that a data set may read files from: [`Root`].
 //!
-//! A downloaded data set must not be able to send private files of the user to an endpoint. Every path in the data is therefore
-//! resolved here, following links, and must be below the folder of the data or a folder given with `--data-root`.
+//! A downloaded data set must not be able to send private files of the user to an endpoint. Every path in the data is
+//! therefore resolved here, following links, and must be below the folder of the data or a folder given with
+//! `--data-root`.
 
 use std::fs;
 use std::path::{self, Component, Path, PathBuf};
@@ -26,8 +27,8 @@ const SCHEMES: [&str; 6] = ["http:", "https:", "ftp:", "file:", "s3:", "gs:"];
 
 /// Reserved device names on Windows, with or without an extension. On other systems they are ordinary file names.
 const DEVICES: [&str; 22] = [
-    "con", "prn", "aux", "nul", "com1", "com2", "com3", "com4", "com5", "com6", "com7", "com8",
-    "com9", "lpt1", "lpt2", "lpt3", "lpt4", "lpt5", "lpt6", "lpt7", "lpt8", "lpt9",
+    "con", "prn", "aux", "nul", "com1", "com2", "com3", "com4", "com5", "com6", "com7", "com8", "com9", "lpt1", "lpt2",
+    "lpt3", "lpt4", "lpt5", "lpt6", "lpt7", "lpt8", "lpt9",
 ];
 
 /// Folder of a data set, and further folders that the user allows.
@@ -60,11 +61,7 @@ impl Root {
     /// # Errors
     /// If one of the folders does not exist.
     pub(crate) fn new(folder: &Path, further: &[PathBuf]) -> Result<Self> {
-        let folder = if folder.as_os_str().is_empty() {
-            Path::new(".")
-        } else {
-            folder
-        };
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
         let (mut canonical, mut unresolved) = (Vec::new(), Vec::new());
         let folders = std::iter::once(folder).chain(further.iter().map(PathBuf::as_path));
         for (number, folder) in folders.enumerate() {
@@ -91,9 +88,9 @@ impl Root {
 
     /// Name and path of an image that the data name by a path relative to `base`.
     ///
-    /// The name of a frame is the normalised path of its image, so that one file is one frame (with one noise seed) however its path is
-    /// written. The path is relative to the folder of the data, with `/`, without `.` and without `..` after a folder. Outside this
-    /// folder, it is the path in the data without `.`.
+    /// The name of a frame is the normalised path of its image, so that one file is one frame (with one noise seed)
+    /// however its path is written. The path is relative to the folder of the data, with `/`, without `.` and without
+    /// `..` after a folder. Outside this folder, it is the path in the data without `.`.
     ///
     /// # Errors
     /// As [`Self::file`].
@@ -105,21 +102,17 @@ impl Root {
             Err(_) => with_slashes(&without_dots(Path::new(spelled))),
         };
         // After a symbolic link to a folder, `..` leads elsewhere than the text suggests. Keep such a path as it is.
-        let is_same_file = normalized == spelled
-            || file.canonicalize().ok() == self.folder.join(&normalized).canonicalize().ok();
-        let name = if is_same_file {
-            normalized
-        } else {
-            spelled.to_owned()
-        };
+        let is_same_file =
+            normalized == spelled || file.canonicalize().ok() == self.folder.join(&normalized).canonicalize().ok();
+        let name = if is_same_file { normalized } else { spelled.to_owned() };
         Ok((FrameId(name), file))
     }
 
     /// Path of an existing file that the data name relative to `base`.
     ///
     /// # Errors
-    /// If the name is not a path, leads outside the folders, or the file does not exist. The error does not reveal whether a file
-    /// outside the folders exists.
+    /// If the name is not a path, leads outside the folders, or the file does not exist. The error does not reveal
+    /// whether a file outside the folders exists.
     pub(crate) fn file(&self, base: &Path, spelled: &Path) -> Result<PathBuf, String> {
         let path = self.path(base, spelled)?;
         if path.is_file() {
@@ -144,18 +137,12 @@ impl Root {
         check_name(spelled)?;
         let path = base.join(spelled);
         let unresolved = without_dots(&absolute(&path));
-        let is_below_a_root = self
-            .unresolved
-            .iter()
-            .chain(&self.canonical)
-            .any(|root| unresolved.starts_with(root));
+        let is_below_a_root = self.unresolved.iter().chain(&self.canonical).any(|root| unresolved.starts_with(root));
         if !is_below_a_root {
             return Err(self.outside_error(spelled, &unresolved));
         }
         match path.canonicalize() {
-            Ok(canonical) if !self.contains(&canonical) => {
-                Err(self.outside_error(spelled, &canonical))
-            }
+            Ok(canonical) if !self.contains(&canonical) => Err(self.outside_error(spelled, &canonical)),
             _ => Ok(path),
         }
     }
@@ -173,16 +160,12 @@ impl Root {
         }
     }
 
-    /// Paths in a folder of the data, sorted by name. Links out of the folders are added to `links_out` instead; links to nothing are left
-    /// out.
+    /// Paths in a folder of the data, sorted by name. Links out of the folders are added to `links_out` instead; links
+    /// to nothing are left out.
     ///
     /// # Errors
     /// If the folder cannot be read.
-    pub(crate) fn entries(
-        &self,
-        folder: &Path,
-        links_out: &mut Vec<PathBuf>,
-    ) -> Result<Vec<PathBuf>> {
+    pub(crate) fn entries(&self, folder: &Path, links_out: &mut Vec<PathBuf>) -> Result<Vec<PathBuf>> {
         let mut inside = Vec::new();
         for path in reading::entries(folder)? {
             match self.locate(&path) {
@@ -226,9 +209,7 @@ impl Root {
 
     /// True if a canonical path is below one of the folders.
     fn contains(&self, canonical: &Path) -> bool {
-        self.canonical
-            .iter()
-            .any(|root| canonical.starts_with(root))
+        self.canonical.iter().any(|root| canonical.starts_with(root))
     }
 
     /// Warns of links that lead outside the folders; the warning names the first.
@@ -250,11 +231,8 @@ impl Root {
 
     /// Error for a link out of the folders.
     pub(crate) fn link_out_error(&self, link: &Path) -> Error {
-        let problem = format_args!(
-            "leads out of {}, the folder of the data; {}",
-            self.folder.display(),
-            allowing_flag(link)
-        );
+        let problem =
+            format_args!("leads out of {}, the folder of the data; {}", self.folder.display(), allowing_flag(link));
         Error::data(link.display(), problem)
     }
 
@@ -271,17 +249,15 @@ impl Root {
     }
 }
 
-/// Remedy for a link out of the folders: the flag that allows its target. The target of a link to a folder is that folder.
+/// Remedy for a link out of the folders: the flag that allows its target. The target of a link to a folder is that
+/// folder.
 fn allowing_flag(link: &Path) -> String {
     let real = link.canonicalize().unwrap_or_else(|_| link.to_owned());
     let folder = match real.parent() {
         Some(parent) if !real.is_dir() => parent,
         _ => &real,
     };
-    format!(
-        "--data-root {} allows the folder that it leads to",
-        shell_word(&folder.display().to_string())
-    )
+    format!("--data-root {} allows the folder that it leads to", shell_word(&folder.display().to_string()))
 }
 
 /// Checks that a name in the data is a path: not empty, not a URL, not a device.
@@ -355,13 +331,7 @@ mod tests {
         let set = outer.path().join("set");
         let root = Root::new(&set, &[]).unwrap();
         let inside = set.join("fr/a.png").display().to_string();
-        for spelled in [
-            "fr/a.png",
-            "./fr//a.png",
-            "fr/../fr/a.png",
-            "../set/fr/a.png",
-            &inside,
-        ] {
+        for spelled in ["fr/a.png", "./fr//a.png", "fr/../fr/a.png", "../set/fr/a.png", &inside] {
             let (name, _) = root.image(&set, spelled).unwrap();
             assert_eq!(name.0, "fr/a.png", "{spelled}");
         }
@@ -376,31 +346,15 @@ mod tests {
         let root = Root::new(&set, &[]).unwrap();
         let secret = outer.path().join("secret.png").display().to_string();
         let missing = outer.path().join("nothing.png").display().to_string();
-        for spelled in [
-            "../secret.png",
-            "fr/../../secret.png",
-            &secret,
-            "../nothing.png",
-            &missing,
-            "/etc/passwd",
-        ] {
+        for spelled in ["../secret.png", "fr/../../secret.png", &secret, "../nothing.png", &missing, "/etc/passwd"] {
             let problem = root.image(&set, spelled).unwrap_err();
-            assert!(
-                problem.contains("lies outside set/") && problem.contains("--data-root "),
-                "{problem}"
-            );
+            assert!(problem.contains("lies outside set/") && problem.contains("--data-root "), "{problem}");
         }
         let allowed = Root::new(&set, &[outer.path().to_owned()]).unwrap();
-        assert_eq!(
-            allowed.image(&set, "../secret.png").unwrap().0.0,
-            "../secret.png"
-        );
+        assert_eq!(allowed.image(&set, "../secret.png").unwrap().0.0, "../secret.png");
         assert!(allowed.image(&set, "/etc/passwd").is_err());
         let problem = Root::new(&set, &[outer.path().join("none")]).unwrap_err();
-        assert!(
-            problem.to_string().starts_with("--data-root: "),
-            "{problem}"
-        );
+        assert!(problem.to_string().starts_with("--data-root: "), "{problem}");
     }
 
     #[test]
@@ -424,35 +378,19 @@ mod tests {
     #[test]
     fn links_are_resolved_before_the_check() {
         let outer = test_folder();
-        let (set, link) = (
-            outer.path().join("set"),
-            std::os::unix::fs::symlink::<PathBuf, PathBuf>,
-        );
+        let (set, link) = (outer.path().join("set"), std::os::unix::fs::symlink::<PathBuf, PathBuf>);
         link(outer.path().join("secret.png"), set.join("out.png")).unwrap();
         link(set.join("fr"), set.join("inner")).unwrap();
         fs::create_dir_all(outer.path().join("far/deep")).unwrap();
         link(outer.path().join("far/deep"), set.join("far")).unwrap();
         fs::write(outer.path().join("far/b.png"), "").unwrap();
         let root = Root::new(&set, &[]).unwrap();
-        assert!(
-            root.image(&set, "out.png")
-                .unwrap_err()
-                .contains("lies outside")
-        );
-        assert!(
-            root.image(&set, "far/../b.png")
-                .unwrap_err()
-                .contains("lies outside")
-        );
+        assert!(root.image(&set, "out.png").unwrap_err().contains("lies outside"));
+        assert!(root.image(&set, "far/../b.png").unwrap_err().contains("lies outside"));
         assert_eq!(root.image(&set, "inner/a.png").unwrap().0.0, "inner/a.png");
         // The folder of the data may itself be reached by a link.
         link(set.clone(), outer.path().join("alias")).unwrap();
         let alias = outer.path().join("alias");
-        assert!(
-            Root::new(&alias, &[])
-                .unwrap()
-                .image(&alias, "fr/a.png")
-                .is_ok()
-        );
+        assert!(Root::new(&alias, &[]).unwrap().image(&alias, "fr/a.png").is_ok());
     }
 }

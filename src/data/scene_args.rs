@@ -14,21 +14,21 @@ use crate::types::{Decides, SetLight};
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct SceneArgs {
-    /// Light in which the photographs were taken; dark photographs are evaluated at L0 only, raw and enhanced, unless --levels or --llie-on
-    /// are given; default: from dataset.json, else lit
+    /// Light in which the photographs were taken; dark photographs are evaluated at L0 only, raw and enhanced, unless
+    /// --levels or --llie-on are given; default: from dataset.json, else lit
     #[arg(long, value_enum, value_name = "LIGHT", add = Decides::Trials)]
     pub light: Option<SetLight>,
-    /// Photographs of the same scenes in normal and in low light: two folders, or one with folders normal and low; the low ones are
-    /// asked as the condition dark; needs --questions, about the names of the files in normal light;
+    /// Photographs of the same scenes in normal and in low light: two folders, or one with folders normal and low; the
+    /// low ones are asked as the condition dark; needs --questions, about the names of the files in normal light;
     /// default: none
     #[arg(long, value_name = "NORMAL,LOW|DIR", conflicts_with = "label_folders", add = Decides::Reply)]
     pub pairs: Option<PairFolders>,
-    /// Question about each image in a folder with one subfolder per class; choices are the subfolder names, the answer is the image's
-    /// subfolder; default: none
+    /// Question about each image in a folder with one subfolder per class; choices are the subfolder names, the answer
+    /// is the image's subfolder; default: none
     #[arg(long, value_name = "QUESTION", add = Decides::Reply)]
     pub label_folders: Option<String>,
-    /// Number of choices of a --label-folders question: its own class and others drawn at random by content, at most 26; default: all
-    /// classes
+    /// Number of choices of a --label-folders question: its own class and others drawn at random by content, at most
+    /// 26; default: all classes
     #[arg(long, value_name = "N", requires = "label_folders", add = Decides::Reply)]
     pub choices: Option<NonZeroUsize>,
 }
@@ -48,13 +48,8 @@ impl std::str::FromStr for PairFolders {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split(',').map(str::trim).collect::<Vec<_>>()[..] {
             [one] if !one.is_empty() => Ok(Self::One(one.into())),
-            [normal, low] if !normal.is_empty() && !low.is_empty() => {
-                Ok(Self::Two(normal.into(), low.into()))
-            }
-            _ => Err(
-                "two folders with a comma between them expected, or one folder with both"
-                    .to_owned(),
-            ),
+            [normal, low] if !normal.is_empty() && !low.is_empty() => Ok(Self::Two(normal.into(), low.into())),
+            _ => Err("two folders with a comma between them expected, or one folder with both".to_owned()),
         }
     }
 }
@@ -99,9 +94,7 @@ impl SceneArgs {
         match (self.light, place) {
             (Some(light), _) => Ok(light),
             (None, DataPlace::Path(path)) if path.is_dir() => frames::light(path, further),
-            (None, DataPlace::Path(path)) if ready_made::is_zip_file(path) => {
-                ready_made::light_of_archive(path)
-            }
+            (None, DataPlace::Path(path)) if ready_made::is_zip_file(path) => ready_made::light_of_archive(path),
             (None, _) => Ok(SetLight::Lit),
         }
     }
@@ -110,12 +103,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn open(
-        &self,
-        place: &DataPlace,
-        questions: Option<&Path>,
-        set: &SetArgs,
-    ) -> Result<Dataset> {
+    pub(crate) fn open(&self, place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
         match self.pairs_or_classes(place, &set.root.data_root)? {
             None => Dataset::open(place, questions, set),
             Some(dataset) if self.pairs.is_some() => {
@@ -138,11 +126,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn pairs_or_classes(
-        &self,
-        place: &DataPlace,
-        further: &[PathBuf],
-    ) -> Result<Option<Dataset>> {
+    pub(crate) fn pairs_or_classes(&self, place: &DataPlace, further: &[PathBuf]) -> Result<Option<Dataset>> {
         if let Some(pairs) = &self.pairs {
             return pair_frames::open(pairs.folder(), pairs.open(further)?).map(Some);
         }

@@ -18,8 +18,9 @@ use crate::types::{Decides, Family, shell_word};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct DataArgs {
-    /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by its name, as
-    /// mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable for the files of one set
+    /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by
+    /// its name, as mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable
+    /// for the files of one set
     #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = parse_data_place, default_values_t = [DataPlace::default()], add = Decides::Reply)]
     pub data: Vec<DataPlace>,
     /// Options for reading a ready-made set.
@@ -69,8 +70,9 @@ pub(crate) struct SelectionArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct BankArgs {
-    /// Ask questions without known answers about every image of --data; the report gives each model's agreement with its own answer in the
-    /// light; home or home:uncertain (built in), or a JSONL file of id, question, choices; default: none
+    /// Ask questions without known answers about every image of --data; the report gives each model's agreement with
+    /// its own answer in the light; home or home:uncertain (built in), or a JSONL file of id, question, choices;
+    /// default: none
     #[arg(long, value_name = "home|home:uncertain|FILE", conflicts_with_all = ["questions", "rules"], add = Decides::Reply)]
     pub ask: Option<BankPlace>,
     /// Ask only N of the questions about each image, drawn by its name; default: all
@@ -94,11 +96,12 @@ pub(crate) struct DecodeArgs {
     /// The maximum size of an image.
     #[command(flatten)]
     pub limit: PixelLimit,
-    /// Treatment of images whose file states other colours than sRGB (an ICC profile, cICP, gAMA); clip also converts HDR, where light
-    /// above 203 cd/m² becomes white
+    /// Treatment of images whose file states other colours than sRGB (an ICC profile, cICP, gAMA); clip also converts
+    /// HDR, where light above 203 cd/m² becomes white
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub colour: ColourRule,
-    /// Encoding of the samples of 16-bit PNG and TIFF images; OpenEXR images are always linear light, 8-bit images never
+    /// Encoding of the samples of 16-bit PNG and TIFF images; OpenEXR images are always linear light, 8-bit images
+    /// never
     #[arg(long, value_enum, default_value_t, add = Decides::Pixels)]
     pub transfer: Transfer,
     /// Scale linear light by this many EV before everything else, -20 to 20; default: not at all
@@ -137,8 +140,8 @@ impl DecodeArgs {
     }
 }
 
-/// Parses the value of `--data`: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its path, such as
-/// `mmvp:FILE`. An existing file or folder with the same name takes precedence, except for `rooms:…`.
+/// Parses the value of `--data`: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its
+/// path, such as `mmvp:FILE`. An existing file or folder with the same name takes precedence, except for `rooms:…`.
 pub(crate) fn parse_data_place(text: &str) -> Result<DataPlace, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
@@ -146,10 +149,9 @@ pub(crate) fn parse_data_place(text: &str) -> Result<DataPlace, String> {
         None if text == "rooms" && !path.exists() => Ok(DataPlace::Rooms(Rooms::default())),
         None if path.exists() => Ok(DataPlace::Path(path)),
         None => match text.split_once(':') {
-            Some((name, place)) if is_known_set(name) => Ok(DataPlace::Known {
-                name: name.to_owned(),
-                path: PathBuf::from(place),
-            }),
+            Some((name, place)) if is_known_set(name) => {
+                Ok(DataPlace::Known { name: name.to_owned(), path: PathBuf::from(place) })
+            }
             // A single letter before the colon is a drive on Windows.
             Some((name, place)) if name.len() > 1 && PathBuf::from(place).exists() => Err(format!(
                 "no rules for a set named {name:?}; there are {}; other sets are read by the names of their columns: --data {}",
@@ -178,10 +180,7 @@ impl fmt::Display for DataPlace {
             Self::Rooms(rooms) => write!(f, "rooms:{rooms}"),
             Self::Path(path) => path.display().fmt(f),
             Self::Files(paths) => {
-                let paths: Vec<String> = paths
-                    .iter()
-                    .map(|path| path.display().to_string())
-                    .collect();
+                let paths: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
                 f.write_str(&paths.join(", "))
             }
             Self::Known { name, path } => write!(f, "{name}:{}", path.display()),

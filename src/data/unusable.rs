@@ -37,16 +37,11 @@ impl Dataset {
     ///
     /// # Errors
     /// If more is left out than `skip` allows, including broken rows.
-    pub(crate) fn without_unusable(
-        mut self,
-        unusable: &BTreeMap<FrameId, String>,
-        skip: SkipBad,
-    ) -> Result<Self> {
+    pub(crate) fn without_unusable(mut self, unusable: &BTreeMap<FrameId, String>, skip: SkipBad) -> Result<Self> {
         let Some(first) = unusable.values().next() else {
             return Ok(self);
         };
-        self.sources
-            .retain(|frame, _| !unusable.contains_key(frame));
+        self.sources.retain(|frame, _| !unusable.contains_key(frame));
         if self.questions.is_empty() {
             let (bad, all) = (unusable.len(), unusable.len() + self.sources.len());
             return self.record_omission(bad, all, "images", first, skip);
@@ -60,37 +55,20 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Self::without_unusable`].
-    pub(super) fn without_unmatched_questions(
-        mut self,
-        first: &str,
-        skip: SkipBad,
-    ) -> Result<Self> {
+    pub(super) fn without_unmatched_questions(mut self, first: &str, skip: SkipBad) -> Result<Self> {
         let questions = self.take_questions();
         let all = questions.len();
-        self.questions = questions
-            .into_iter()
-            .filter(|question| self.has_frames(&question.frame))
-            .collect();
+        self.questions = questions.into_iter().filter(|question| self.has_frames(&question.frame)).collect();
         let bad = all - self.questions.len();
         let rows = self.rows.all.max(all);
         self.record_omission(bad, rows, "questions", first, skip)
     }
 
     /// Checks that `bad` of `all` may be left out, and adds a line to the summary.
-    fn record_omission(
-        mut self,
-        bad: usize,
-        all: usize,
-        noun: &str,
-        first: &str,
-        skip: SkipBad,
-    ) -> Result<Self> {
+    fn record_omission(mut self, bad: usize, all: usize, noun: &str, first: &str, skip: SkipBad) -> Result<Self> {
         self.rows.bad += bad;
-        skip.check(self.rows.bad, all, noun, first)
-            .map_err(|problem| Error::data(&self.name, problem))?;
-        self.summary.push(format!(
-            "{LEFT_OUT}{bad} of {all} {noun} (unusable images); the first: {first}"
-        ));
+        skip.check(self.rows.bad, all, noun, first).map_err(|problem| Error::data(&self.name, problem))?;
+        self.summary.push(format!("{LEFT_OUT}{bad} of {all} {noun} (unusable images); the first: {first}"));
         Ok(self)
     }
 }

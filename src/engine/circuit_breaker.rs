@@ -11,14 +11,16 @@ use crate::types::{Failure, FailureKind};
 /// Number of failed trials after which a model without any success is stopped, because further trials would fail, too.
 const FAILURES_AT_START: usize = 5;
 
-/// Minimum number of consecutive failures after which a model that has succeeded before is stopped. Servers recover from shorter outages.
+/// Minimum number of consecutive failures after which a model that has succeeded before is stopped. Servers recover
+/// from shorter outages.
 const FAILURES_IN_A_ROW: usize = 20;
 
-/// Maximum number of consecutive failures about one frame or walk that count, because the server may fail for it alone. Chosen: the other
-/// trials about it are set aside after as many.
+/// Maximum number of consecutive failures about one frame or walk that count, because the server may fail for it alone.
+/// Chosen: the other trials about it are set aside after as many.
 const MAX_FAILURES_PER_SOURCE: usize = 2;
 
-/// Minimum number of frames or walks of refusals in a row that may concern the content, for a model to be stopped; chosen.
+/// Minimum number of frames or walks of refusals in a row that may concern the content, for a model to be stopped;
+/// chosen.
 const MIN_REFUSED_SOURCES: usize = 3;
 
 /// Reason why no more trials are asked.
@@ -56,11 +58,13 @@ struct ModelHealth {
     succeeded: bool,
     /// Number of failures since the last success that the server or the network caused.
     outage: usize,
-    /// The same failures by frame or walk. One frame may be the cause, so it adds at most [`MAX_FAILURES_PER_SOURCE`] to `outage`.
+    /// The same failures by frame or walk. One frame may be the cause, so it adds at most [`MAX_FAILURES_PER_SOURCE`]
+    /// to `outage`.
     outage_sources: BTreeMap<String, usize>,
     /// Number of requests that the server refused, in the whole run.
     refusals: usize,
-    /// Frames or walks of the refused requests. If there is only one, it may be the cause, and the model is not stopped.
+    /// Frames or walks of the refused requests. If there is only one, it may be the cause, and the model is not
+    /// stopped.
     refused_sources: BTreeSet<String>,
     /// Number of refusals since the last success by a status that concerns every request.
     status_refusals: usize,
@@ -81,15 +85,14 @@ impl ModelHealth {
         }
     }
 
-    /// True if every further request would be refused, as far as the refusals of this kind show: the model has answered nothing, or has
-    /// stopped answering.
+    /// True if every further request would be refused, as far as the refusals of this kind show: the model has answered
+    /// nothing, or has stopped answering.
     fn is_refused(&self, error: &AskError) -> bool {
         // The content of a frame or two may be the cause.
         let is_by_status = error.reach == Reach::ByStatus
             && self.status_refusals >= FAILURES_AT_START
             && self.status_sources.len() >= MIN_REFUSED_SOURCES;
-        let is_first =
-            !self.succeeded && self.refusals >= FAILURES_AT_START && self.refused_sources.len() > 1;
+        let is_first = !self.succeeded && self.refusals >= FAILURES_AT_START && self.refused_sources.len() > 1;
         is_by_status || is_first
     }
 }
@@ -122,11 +125,7 @@ pub(crate) struct CircuitBreaker {
 
 impl CircuitBreaker {
     /// A circuit breaker for these models. Up to `concurrency` requests in flight may fail for the same cause.
-    pub(crate) fn new(
-        models: &[ModelUnderTest],
-        concurrency: usize,
-        max_failures: Option<usize>,
-    ) -> Self {
+    pub(crate) fn new(models: &[ModelUnderTest], concurrency: usize, max_failures: Option<usize>) -> Self {
         Self {
             max_failures,
             fails_fast: false,
@@ -169,9 +168,7 @@ impl CircuitBreaker {
     /// The reason why the run ended; [`EndReason::AllAsked`] if nothing stopped it.
     pub(crate) fn into_end(self) -> EndReason {
         match self.end {
-            Some(EndReason::Stopped(_)) if !self.stopped => {
-                EndReason::ModelsStopped(self.model_errors)
-            }
+            Some(EndReason::Stopped(_)) if !self.stopped => EndReason::ModelsStopped(self.model_errors),
             end => end.unwrap_or(EndReason::AllAsked),
         }
     }
@@ -210,13 +207,7 @@ impl CircuitBreaker {
 
     /// Records a failed trial about a frame or walk. `may_be_cause` is the result of
     /// [`Suspects::may_be_cause`](super::suspects::Suspects).
-    pub(crate) fn failed(
-        &mut self,
-        model: usize,
-        error: &AskError,
-        source: &str,
-        may_be_cause: bool,
-    ) {
+    pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str, may_be_cause: bool) {
         if error.reach == Reach::Interrupted {
             return;
         }
@@ -227,8 +218,8 @@ impl CircuitBreaker {
         self.check(model, error, source, may_be_cause);
     }
 
-    /// Records a refused trial about a frame or walk that waits until the model answers another one. If it fails in the end,
-    /// [`failed`](Self::failed) counts it.
+    /// Records a refused trial about a frame or walk that waits until the model answers another one. If it fails in the
+    /// end, [`failed`](Self::failed) counts it.
     pub(crate) fn refused(&mut self, model: usize, error: &AskError, source: &str) {
         self.models[model].health.count_refusal(error, source);
         self.check(model, error, source, false);
@@ -236,51 +227,30 @@ impl CircuitBreaker {
 
     /// Stops a model or the run if the last failure shows that further trials would fail.
     fn check(&mut self, model: usize, error: &AskError, source: &str, may_be_cause: bool) {
-        let ModelState {
-            name,
-            endpoint,
-            health,
-        } = &mut self.models[model];
+        let ModelState { name, endpoint, health } = &mut self.models[model];
         let Failure { kind, message, .. } = &error.failure;
         // The error that ends the run begins with the endpoint.
-        let message = message
-            .strip_prefix(endpoint.as_str())
-            .and_then(|rest| rest.strip_prefix(": "))
-            .unwrap_or(message);
+        let message =
+            message.strip_prefix(endpoint.as_str()).and_then(|rest| rest.strip_prefix(": ")).unwrap_or(message);
         match kind {
             // The images or their content are the cause; the next may succeed.
             FailureKind::Image | FailureKind::Filtered | FailureKind::Request => {}
             _ => {
                 let source_failures = health.outage_sources.entry(source.to_owned()).or_default();
                 *source_failures += 1;
-                let counts = *source_failures <= MAX_FAILURES_PER_SOURCE
-                    || !may_be_cause
-                    || error.is_unconnected();
+                let counts = *source_failures <= MAX_FAILURES_PER_SOURCE || !may_be_cause || error.is_unconnected();
                 health.outage += usize::from(counts);
             }
         }
-        let max_outage = if health.succeeded {
-            self.max_outage
-        } else {
-            FAILURES_AT_START
-        };
+        let max_outage = if health.succeeded { self.max_outage } else { FAILURES_AT_START };
         let problem = if error.reach == Reach::Endpoint {
             Some(format!("{name}: {message}"))
         } else if health.is_refused(error) && health.succeeded {
-            Some(format!(
-                "{name}: {} trials in a row were refused: {message}",
-                health.status_refusals
-            ))
+            Some(format!("{name}: {} trials in a row were refused: {message}", health.status_refusals))
         } else if health.is_refused(error) {
-            Some(format!(
-                "{name}: the first {} trials were all refused: {message}",
-                health.refusals
-            ))
+            Some(format!("{name}: the first {} trials were all refused: {message}", health.refusals))
         } else if health.outage >= max_outage {
-            Some(format!(
-                "{name}: {} trials in a row failed: {message}",
-                health.outage
-            ))
+            Some(format!("{name}: {} trials in a row failed: {message}", health.outage))
         } else {
             None
         };
@@ -289,10 +259,7 @@ impl CircuitBreaker {
         health.stopped |= problem.is_some();
         let too_many = self.max_failures.is_some_and(|max| self.failures >= max);
         let too_many = too_many.then(|| {
-            format!(
-                "the limit of failed trials is reached (--stop failures={}); the last: {message}",
-                self.failures
-            )
+            format!("the limit of failed trials is reached (--stop failures={}); the last: {message}", self.failures)
         });
         let endpoint = endpoint.clone();
         self.stopped |= self.fails_fast && is_newly_stopped;
@@ -306,11 +273,9 @@ impl CircuitBreaker {
             let problem = format!("{problem} (replies so far are stored; {how})");
             if is_newly_stopped {
                 let (endpoint, problem) = (endpoint.clone(), problem.clone());
-                self.model_errors
-                    .push(Error::Endpoint { endpoint, problem });
+                self.model_errors.push(Error::Endpoint { endpoint, problem });
             }
-            self.end
-                .get_or_insert(EndReason::Stopped(Error::Endpoint { endpoint, problem }));
+            self.end.get_or_insert(EndReason::Stopped(Error::Endpoint { endpoint, problem }));
         }
     }
 }
@@ -322,19 +287,14 @@ mod tests {
     use crate::types::View;
 
     fn breaker(models: usize, max_failures: Option<usize>) -> CircuitBreaker {
-        let model =
-            |_| ModelUnderTest::new(Model::Random(Random { seed: 0 }), View::Image, None).unwrap();
+        let model = |_| ModelUnderTest::new(Model::Random(Random { seed: 0 }), View::Image, None).unwrap();
         let models: Vec<ModelUnderTest> = (0..models).map(model).collect();
         CircuitBreaker::new(&models, 2, max_failures)
     }
 
     /// Error of a request that was sent.
     fn error(kind: FailureKind, reach: Reach) -> AskError {
-        AskError {
-            reach,
-            may_have_effect: true,
-            ..AskError::new(kind, "no".into())
-        }
+        AskError { reach, may_have_effect: true, ..AskError::new(kind, "no".into()) }
     }
 
     /// True if one of two models is stopped after `times` failures, about `frames` frames.
@@ -345,12 +305,7 @@ mod tests {
         }
         for i in 0..times {
             breaker.succeeded(1);
-            breaker.failed(
-                0,
-                &error(kind, Reach::Trial),
-                &(i % frames).to_string(),
-                true,
-            );
+            breaker.failed(0, &error(kind, Reach::Trial), &(i % frames).to_string(), true);
         }
         assert!(!breaker.stopped(), "the other model continues");
         breaker.is_stopped(0)
@@ -375,23 +330,14 @@ mod tests {
         use FailureKind::{Connection, Image, Request, Server};
         for kind in [Connection, Server] {
             assert!(stopped_after(kind, 5, 3, false), "{kind:?}");
-            assert!(
-                !stopped_after(kind, 99, 1, false),
-                "one frame may be the cause: {kind:?}"
-            );
+            assert!(!stopped_after(kind, 99, 1, false), "one frame may be the cause: {kind:?}");
             assert!(!stopped_after(kind, 4, 4, false));
             assert!(stopped_after(kind, 20, 10, true) && !stopped_after(kind, 19, 19, true));
         }
         assert!(stopped_after(Request, 5, 2, false));
-        assert!(
-            !stopped_after(Request, 9, 1, false),
-            "one frame may be the cause"
-        );
+        assert!(!stopped_after(Request, 9, 1, false), "one frame may be the cause");
         assert!(!stopped_after(Request, 99, 99, true), "others succeeded");
-        assert!(
-            !stopped_after(Image, 99, 99, false),
-            "the images are the cause"
-        );
+        assert!(!stopped_after(Image, 99, 99, false), "the images are the cause");
     }
 
     #[test]
@@ -409,14 +355,10 @@ mod tests {
 
     #[test]
     fn failures_to_connect_count_whatever_their_text() {
-        for (may_have_effect, message, is_stopped) in [
-            (false, "dns error: failed to lookup address", true),
-            (true, "broken after a tcp connect error", false),
-        ] {
-            let failure = AskError {
-                may_have_effect,
-                ..AskError::new(FailureKind::Connection, message.into())
-            };
+        for (may_have_effect, message, is_stopped) in
+            [(false, "dns error: failed to lookup address", true), (true, "broken after a tcp connect error", false)]
+        {
+            let failure = AskError { may_have_effect, ..AskError::new(FailureKind::Connection, message.into()) };
             let mut breaker = breaker(1, None);
             breaker.succeeded(0);
             for _ in 0..20 {
@@ -433,12 +375,7 @@ mod tests {
             if i % 10 == 0 {
                 breaker.succeeded(0);
             }
-            breaker.failed(
-                0,
-                &error(FailureKind::Server, Reach::Trial),
-                &i.to_string(),
-                true,
-            );
+            breaker.failed(0, &error(FailureKind::Server, Reach::Trial), &i.to_string(), true);
         }
         assert!(!breaker.is_stopped(0));
     }
@@ -461,22 +398,13 @@ mod tests {
     #[test]
     fn aborted_requests_do_not_count_as_failures() {
         let mut breaker = breaker(1, Some(1));
-        breaker.failed(
-            0,
-            &error(FailureKind::Connection, Reach::Interrupted),
-            "a",
-            true,
-        );
+        breaker.failed(0, &error(FailureKind::Connection, Reach::Interrupted), "a", true);
         assert!(!breaker.stopped() && breaker.failures() == 0);
     }
 
     #[test]
     fn an_interrupt_after_the_last_reply_changes_nothing() {
-        let all = Counts {
-            trials: 2,
-            answered: 2,
-            failed: 0,
-        };
+        let all = Counts { trials: 2, answered: 2, failed: 0 };
         assert_eq!(EndReason::Interrupted.status(all), Status::Complete);
         // Truncated replies may be left to ask again.
         assert_eq!(EndReason::OverBudget.status(all), Status::OverBudget);

@@ -10,16 +10,12 @@ use crate::runs::changed_settings::{CHANGED_FOR, REFUSED_FOR, changes, key, stri
 use crate::store;
 use crate::types::manifests::{Columns, JUDGES};
 
-/// Flags whose values may change after replies if a server refused them: they decide how a reply is drawn, not what is asked.
-const SAMPLING: [&str; 5] = [
-    "--temperature",
-    "--top-p",
-    "--sampling-seed",
-    "--max-tokens",
-    "--wire",
-];
+/// Flags whose values may change after replies if a server refused them: they decide how a reply is drawn, not what is
+/// asked.
+const SAMPLING: [&str; 5] = ["--temperature", "--top-p", "--sampling-seed", "--max-tokens", "--wire"];
 
-/// The run in the folder of a command; empty without one, or if its manifest cannot be read, which opening the folder reports.
+/// The run in the folder of a command; empty without one, or if its manifest cannot be read, which opening the folder
+/// reports.
 #[derive(Debug, Default)]
 pub(crate) struct Continuation {
     /// Columns of its manifest.
@@ -31,10 +27,11 @@ pub(crate) struct Continuation {
 }
 
 impl Continuation {
-    /// Settings of a model (or judge) that continue the run's under its trial keys; `None` if they are equal, or belong to another run.
+    /// Settings of a model (or judge) that continue the run's under its trial keys; `None` if they are equal, or belong
+    /// to another run.
     ///
-    /// They may differ in a larger token limit, in sampling settings that the server refused, and in everything if the run has no reply
-    /// of the model (`free_without_replies`).
+    /// They may differ in a larger token limit, in sampling settings that the server refused, and in everything if the
+    /// run has no reply of the model (`free_without_replies`).
     pub(crate) fn accept(
         &self,
         column: &str,
@@ -55,9 +52,7 @@ impl Continuation {
         let refused = strings(self.settings.get(&key(REFUSED_FOR, name, is_judge)));
         let is_permitted = |change: &ChangedSetting| {
             let is_forced = SAMPLING.contains(&&*change.flag) && refused.contains(&change.flag);
-            is_forced
-                || is_grown_limit(change)
-                || noted.iter().any(|known| known.sets_the_same(change))
+            is_forced || is_grown_limit(change) || noted.iter().any(|known| known.sets_the_same(change))
         };
         let after = self.replies(name);
         let is_free = free_without_replies && after == Some(0);
@@ -68,10 +63,7 @@ impl Continuation {
         for change in changed {
             let last = all.iter().rfind(|known| known.flag == change.flag);
             if !last.is_some_and(|last| last.sets_the_same(&change)) {
-                all.push(ChangedSetting {
-                    after: after.unwrap_or_default(),
-                    ..change
-                });
+                all.push(ChangedSetting { after: after.unwrap_or_default(), ..change });
             }
         }
         Some(own.continuing(stored, all))

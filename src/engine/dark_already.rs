@@ -44,11 +44,10 @@ pub(crate) fn print_note(job: &JobSettings, progress: &Progress) {
     }
 }
 
-/// Mean linear luminance of up to [`MAX_SAMPLED`] evenly spaced frames, and their number; `None` if none can be decoded.
+/// Mean linear luminance of up to [`MAX_SAMPLED`] evenly spaced frames, and their number; `None` if none can be
+/// decoded.
 pub(crate) fn brightness(frames: &dyn Frames, sources: &[Source]) -> Option<(f64, usize)> {
-    let sample = sample_frames(frames, sources, |picture| {
-        Some(mean_luminance(&picture.decode().ok()?))
-    });
+    let sample = sample_frames(frames, sources, |picture| Some(mean_luminance(&picture.decode().ok()?)));
     let mean = sample.iter().sum::<f64>() / sample.len() as f64;
     (!sample.is_empty()).then_some((mean, sample.len()))
 }
@@ -65,14 +64,9 @@ pub(crate) enum DarkImages {
 impl DarkImages {
     /// Decides from the declared light of a data set and from the levels and enhancers of the job.
     pub(crate) fn new(set: SetLight, light: &LightSettings, enhancers: &EnhancerArgs) -> Self {
-        let asks_raw_and_enhanced_l0 = light.levels == [AxisLevel::L0]
-            && !enhancers.is_empty()
-            && enhancers.on().includes_kind(None);
-        if set == SetLight::Dark || asks_raw_and_enhanced_l0 {
-            Self::Expected
-        } else {
-            Self::Unexpected
-        }
+        let asks_raw_and_enhanced_l0 =
+            light.levels == [AxisLevel::L0] && !enhancers.is_empty() && enhancers.on().includes_kind(None);
+        if set == SetLight::Dark || asks_raw_and_enhanced_l0 { Self::Expected } else { Self::Unexpected }
     }
 }
 
@@ -89,8 +83,9 @@ pub(crate) fn warn<E: Experiment>(experiment: &E) {
     }
 }
 
-/// Median of the mean luma, from 0 to 255, of up to [`MAX_SAMPLED`] evenly spaced frames; the upper middle value if their number is even.
-/// Skips built-in rooms, which are lit, and files that cannot be decoded, which are reported in their trials. `None` if no frame is left.
+/// Median of the mean luma, from 0 to 255, of up to [`MAX_SAMPLED`] evenly spaced frames; the upper middle value if
+/// their number is even. Skips built-in rooms, which are lit, and files that cannot be decoded, which are reported in
+/// their trials. `None` if no frame is left.
 fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
     let mut sample = sample_frames(frames, sources, |picture| match picture {
         Picture::Encoded(_) => Some(brightness_in_codes(&picture.decode().ok()?)),
@@ -100,7 +95,8 @@ fn median_luma(frames: &dyn Frames, sources: &[Source]) -> Option<f64> {
     sample.get(sample.len() / 2).copied()
 }
 
-/// Measures up to [`MAX_SAMPLED`] evenly spaced frames. Frames that cannot be read or for which `measure` returns `None` are left out.
+/// Measures up to [`MAX_SAMPLED`] evenly spaced frames. Frames that cannot be read or for which `measure` returns
+/// `None` are left out.
 fn sample_frames(
     frames: &dyn Frames,
     sources: &[Source],

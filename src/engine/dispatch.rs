@@ -1,4 +1,5 @@
-//! The asynchronous part of a run: sends the trials of prepared groups, and stores each reply when it arrives ([`Dispatcher`]).
+//! The asynchronous part of a run: sends the trials of prepared groups, and stores each reply when it arrives
+//! ([`Dispatcher`]).
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, HashSet};
@@ -62,8 +63,8 @@ pub(crate) struct TrialCounts {
 }
 
 impl Dispatcher<'_> {
-    /// Asks the trials of the groups that `make` sends. `make` runs on a separate thread until the channel is closed. `stoppers` cancel
-    /// enhancements in progress.
+    /// Asks the trials of the groups that `make` sends. `make` runs on a separate thread until the channel is closed.
+    /// `stoppers` cancel enhancements in progress.
     pub(crate) fn run<I: Item>(
         &self,
         counts: TrialCounts,
@@ -72,10 +73,7 @@ impl Dispatcher<'_> {
         stoppers: Vec<EnhancerStopper>,
         make: impl FnOnce(&Sender<PreparedGroup<I>>) + Send,
     ) -> Result<EndReason> {
-        let runtime = runtime::Builder::new_multi_thread()
-            .enable_all()
-            .build()
-            .map_err(|e| thread_start_error(&e))?;
+        let runtime = runtime::Builder::new_multi_thread().enable_all().build().map_err(|e| thread_start_error(&e))?;
         let (sender, groups) = mpsc::channel(GROUPS_AHEAD);
         let sink = ReplySink::<I> {
             dispatcher: self,
@@ -106,12 +104,8 @@ impl Dispatcher<'_> {
     }
 
     fn breaker(&self) -> CircuitBreaker {
-        let most = self
-            .models
-            .iter()
-            .filter_map(|model| model.server.as_ref())
-            .map(|server| server.max_in_flight())
-            .max();
+        let most =
+            self.models.iter().filter_map(|model| model.server.as_ref()).map(|server| server.max_in_flight()).max();
         CircuitBreaker::new(
             self.models,
             most.unwrap_or(self.settings.concurrency.max()),
@@ -159,8 +153,8 @@ struct ReplySink<'a, I: Item> {
     served: Vec<ServedNames>,
 }
 
-/// State of the first question to a model. With `--max-cost`, other questions wait until it ends, because the charged tokens of prompts
-/// are not known before.
+/// State of the first question to a model. With `--max-cost`, other questions wait until it ends, because the charged
+/// tokens of prompts are not known before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum FirstQuestion {
     NotAsked,
@@ -170,7 +164,6 @@ enum FirstQuestion {
 
 impl<I: Item> ReplySink<'_, I> {
     /// Asks the trials of all groups until they end or the circuit breaker stops the run.
-    #[expect(clippy::too_many_lines, reason = "one loop over all events of a run")]
     async fn ask(mut self, mut groups: Receiver<PreparedGroup<I>>) -> Result<EndReason> {
         let concurrency = self.dispatcher.settings.concurrency.max();
         let mut lanes = Lanes::<I>::new(self.dispatcher.models, concurrency);
@@ -197,13 +190,7 @@ impl<I: Item> ReplySink<'_, I> {
                         let model = &self.dispatcher.models[ready.trial.model];
                         let given_up = self.given_up.subscribe();
                         let has_timed_out = self.dispatcher.timed_out.contains(&ready.trial.key);
-                        in_flight.spawn(send(
-                            model.clone(),
-                            ready,
-                            permit,
-                            has_timed_out,
-                            given_up,
-                        ));
+                        in_flight.spawn(send(model.clone(), ready, permit, has_timed_out, given_up));
                     }
                 }
             }
@@ -229,8 +216,7 @@ impl<I: Item> ReplySink<'_, I> {
                 _ => None,
             };
             let since = Instant::now();
-            let wants_more =
-                more_groups && lanes.wants_more(|model| self.breaker.is_stopped(model));
+            let wants_more = more_groups && lanes.wants_more(|model| self.breaker.is_stopped(model));
             tokio::select! {
                 () = interrupt.next() => {
                     grace = Some(self.dispatcher.settings.grace);
@@ -270,22 +256,16 @@ impl<I: Item> ReplySink<'_, I> {
                  leave it out, or send it smaller (--image max-side=N)"
             );
         }
-        self.first_failures.warn(self.dispatcher.models, |model| {
-            self.breaker.is_stopped(model)
-        });
+        self.first_failures.warn(self.dispatcher.models, |model| self.breaker.is_stopped(model));
         self.store.sync()?;
         self.in_flight_cost.end(self.store.folder())?;
         Ok(self.breaker.into_end())
     }
 
-    /// The next trial to send. Trials about an image for which the server fails repeatedly come last, and are dropped if it still fails.
+    /// The next trial to send. Trials about an image for which the server fails repeatedly come last, and are dropped
+    /// if it still fails.
     fn next(&mut self, lanes: &mut Lanes<'_, I>) -> Option<PreparedTrial<I>> {
-        let Self {
-            breaker,
-            suspects,
-            not_asked,
-            ..
-        } = self;
+        let Self { breaker, suspects, not_asked, .. } = self;
         let not_asked = RefCell::new(not_asked);
         lanes.next(
             |trial| {
@@ -310,9 +290,7 @@ impl<I: Item> ReplySink<'_, I> {
         let model = &self.dispatcher.models[index];
         let images = ready.stimulus.images.iter().map(|image| image.facts());
         let permit = self.budget.permit(model, &ready.trial, images);
-        if let (Permit::Reserved(_), FirstQuestion::NotAsked) =
-            (&permit, self.first_questions[index])
-        {
+        if let (Permit::Reserved(_), FirstQuestion::NotAsked) = (&permit, self.first_questions[index]) {
             self.first_questions[index] = FirstQuestion::InFlight;
         }
         permit
@@ -330,14 +308,9 @@ impl<I: Item> ReplySink<'_, I> {
 
     /// Shows the numbers of trials and the cost so far, and whether `--max-cost` delays requests.
     fn show_counts(&self, is_held_back: bool) {
-        let pace = if is_held_back {
-            " · slowed by --max-cost"
-        } else {
-            ""
-        };
+        let pace = if is_held_back { " · slowed by --max-cost" } else { "" };
         let failures = self.breaker.failures();
-        self.bar
-            .count(self.answered, failures, self.budget.spent(), pace);
+        self.bar.count(self.answered, failures, self.budget.spent(), pace);
     }
 
     /// Adds the time since `since` to the timings of a state.
@@ -347,8 +320,8 @@ impl<I: Item> ReplySink<'_, I> {
         }
     }
 
-    /// Waits for the requests in flight, because they may be paid for already, up to the time `grace` if it is set. A further interrupt
-    /// aborts them. Requests that wait for their turn or for a retry are aborted at once.
+    /// Waits for the requests in flight, because they may be paid for already, up to the time `grace` if it is set. A
+    /// further interrupt aborts them. Requests that wait for their turn or for a retry are aborted at once.
     async fn drain(
         &mut self,
         mut in_flight: JoinSet<Finished<I>>,
@@ -365,13 +338,7 @@ impl<I: Item> ReplySink<'_, I> {
         }
         if !in_flight.is_empty() {
             let (at_most, again) = match grace {
-                Some(grace) => (
-                    format!(
-                        ", after {} s (--stop grace) at the latest",
-                        grace.as_secs_f64()
-                    ),
-                    " again",
-                ),
+                Some(grace) => (format!(", after {} s (--stop grace) at the latest", grace.as_secs_f64()), " again"),
                 None => (String::new(), ""),
             };
             progress.print_on_terminal(&format!(
@@ -410,18 +377,10 @@ impl<I: Item> ReplySink<'_, I> {
 
     /// Prepares the trials of a group. If the images could not be made, records all trials as failed, and returns none.
     fn accept(&mut self, group: PreparedGroup<I>) -> Result<Vec<PreparedTrial<I>>> {
-        let PreparedGroup {
-            stimulus,
-            trials,
-            problem,
-            notes,
-        } = group;
+        let PreparedGroup { stimulus, trials, problem, notes } = group;
         self.store_notes(&notes);
         let stimulus = Arc::new(stimulus);
-        let ready = trials.into_iter().map(|trial| PreparedTrial {
-            trial,
-            stimulus: Arc::clone(&stimulus),
-        });
+        let ready = trials.into_iter().map(|trial| PreparedTrial { trial, stimulus: Arc::clone(&stimulus) });
         let Some(problem) = problem else {
             return Ok(ready.collect());
         };
@@ -430,10 +389,7 @@ impl<I: Item> ReplySink<'_, I> {
             self.breaker.ended(problem);
             return Ok(Vec::new());
         }
-        let error = AskError {
-            attempts: 0,
-            ..AskError::new(FailureKind::Image, problem.to_string())
-        };
+        let error = AskError { attempts: 0, ..AskError::new(FailureKind::Image, problem.to_string()) };
         for ready in ready {
             self.store_result(Ok((ready, Err(error.clone()))))?;
         }
@@ -473,8 +429,7 @@ impl<I: Item> ReplySink<'_, I> {
         self.limits.warn_of_charges(model, &self.budget);
         match result {
             Err(refused) if self.refusals.must_wait(&ready, &refused) => {
-                self.breaker
-                    .refused(model, &refused, ready.trial.item.source());
+                self.breaker.refused(model, &refused, ready.trial.item.source());
                 self.refusals.add(ready, refused);
             }
             result => {
@@ -487,11 +442,7 @@ impl<I: Item> ReplySink<'_, I> {
     }
 
     /// Stores the reply or the failure of one trial, once a refusal is known to concern the trial or the run.
-    fn store_settled(
-        &mut self,
-        ready: &PreparedTrial<I>,
-        result: Result<Reply, AskError>,
-    ) -> Result<()> {
+    fn store_settled(&mut self, ready: &PreparedTrial<I>, result: Result<Reply, AskError>) -> Result<()> {
         let trial = &ready.trial;
         match &result {
             Ok(_) => {
@@ -509,8 +460,7 @@ impl<I: Item> ReplySink<'_, I> {
                     );
                 }
                 let may_be_cause = self.suspects.may_be_cause(trial.model, source);
-                self.breaker
-                    .failed(trial.model, error, source, may_be_cause);
+                self.breaker.failed(trial.model, error, source, may_be_cause);
                 let concerns_all = match error.reach {
                     Reach::Trial => false,
                     Reach::ByStatus => self.breaker.is_stopped(trial.model),
@@ -519,7 +469,8 @@ impl<I: Item> ReplySink<'_, I> {
                 if !concerns_all {
                     self.first_failures.add(trial.model, source, &error.failure);
                 }
-                // If the endpoint is the cause or the run ends, the trial does not count as asked, unless it cost something.
+                // If the endpoint is the cause or the run ends, the trial does not count as asked, unless it cost
+                // something.
                 if concerns_all && error.lost.is_none() {
                     return Ok(());
                 }
@@ -532,8 +483,7 @@ impl<I: Item> ReplySink<'_, I> {
             if let Some(usage) = reply.usage {
                 let model = &self.dispatcher.models[trial.model];
                 let images = ready.stimulus.images.iter().map(|image| image.facts());
-                self.tokens
-                    .add(model, trial, images.clone(), usage, &self.budget);
+                self.tokens.add(model, trial, images.clone(), usage, &self.budget);
                 self.budget.observe(model, trial, images, usage);
             }
         }
@@ -543,9 +493,7 @@ impl<I: Item> ReplySink<'_, I> {
             Ok(reply) => answered(blank, reply)?,
             Err(error) => Record {
                 lost: *error.lost,
-                finish: error
-                    .finish
-                    .map(|word| Finish::Other(word.into()).shorten()),
+                finish: error.finish.map(|word| Finish::Other(word.into()).shorten()),
                 ..blank.with_failure(error.failure, error.attempts)
             },
         };
@@ -557,16 +505,14 @@ impl<I: Item> ReplySink<'_, I> {
         Ok(())
     }
 
-    /// Warns once for each model at an endpoint if its replies do not depend on the image. Skipped for photographs taken in the dark, where
-    /// such replies are no evidence.
+    /// Warns once for each model at an endpoint if its replies do not depend on the image. Skipped for photographs
+    /// taken in the dark, where such replies are no evidence.
     fn check_dependence(&mut self, trial: &Trial<I>, record: &Record<I::Detail>) {
         let model = &self.dispatcher.models[trial.model];
         if !model.model.is_remote() || self.dispatcher.settings.set_light == SetLight::Dark {
             return;
         }
-        let reply = LitReply::from_record(record, || {
-            Digest::from_parts(trial.prompt.parts().map(str::as_bytes))
-        });
+        let reply = LitReply::from_record(record, || Digest::from_parts(trial.prompt.parts().map(str::as_bytes)));
         let found = reply.and_then(|reply| self.dependence[trial.model].add(reply));
         if let Some(found) = found {
             tracing::warn!("{}", found.words(&model.name));

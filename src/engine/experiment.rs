@@ -33,8 +33,8 @@ pub(crate) struct ExpectedRequest {
     pub(crate) reply_tokens: f64,
 }
 
-/// An evaluation that is ready to run: multiple-choice questions, or open questions whose answers a judge marks. Its inputs are opened
-/// and checked, but no request was sent and nothing was written yet.
+/// An evaluation that is ready to run: multiple-choice questions, or open questions whose answers a judge marks. Its
+/// inputs are opened and checked, but no request was sent and nothing was written yet.
 pub(crate) trait Experiment: Sync {
     /// The question, or the answer to judge, of one trial.
     type Item: Item;
@@ -70,7 +70,8 @@ pub(crate) trait Experiment: Sync {
     /// Image sources (frames or walks) of this run or shard.
     fn sources(&self) -> &[Source];
 
-    /// In a shard, the sources of the whole run that enhancers are tried on; empty for those of [`sources`](Self::sources).
+    /// In a shard, the sources of the whole run that enhancers are tried on; empty for those of
+    /// [`sources`](Self::sources).
     fn probe_sources(&self) -> &[Source] {
         &[]
     }
@@ -108,20 +109,22 @@ pub(crate) trait Experiment: Sync {
         &[]
     }
 
-    /// All trials of a phase, including those that already have a reply. `records` reads the records so far; it is called only if the
-    /// trials depend on replies of an earlier phase.
+    /// All trials of a phase, including those that already have a reply. `records` reads the records so far; it is
+    /// called only if the trials depend on replies of an earlier phase.
     fn plan(
         &self,
         phase: usize,
         records: impl FnOnce() -> Result<Vec<RecordOf<Self>>>,
     ) -> Result<Vec<SourcePlan<Self::Item>>>;
 
-    /// Requests of later phases that cannot be planned yet, such as the judge's marks for answers that have not arrived.
+    /// Requests of later phases that cannot be planned yet, such as the judge's marks for answers that have not
+    /// arrived.
     fn expected_requests(&self, _remaining: &[SourcePlan<Self::Item>]) -> Vec<ExpectedRequest> {
         Vec::new()
     }
 
-    /// Scores a run, and writes the report and the manifest into the run folder. The outcome is incomplete if a reply cannot be scored.
+    /// Scores a run, and writes the report and the manifest into the run folder. The outcome is incomplete if a reply
+    /// cannot be scored.
     fn report(
         &self,
         store: &Store<DetailOf<Self>>,

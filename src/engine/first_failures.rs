@@ -25,10 +25,7 @@ impl FirstFailures {
         };
         self.0
             .entry((model, failure.kind))
-            .or_insert_with(|| FirstFailure {
-                source: source.to_owned(),
-                message: failure.message.clone(),
-            });
+            .or_insert_with(|| FirstFailure { source: source.to_owned(), message: failure.message.clone() });
     }
 
     /// Warns about each kind of failure, except of stopped models, whose error describes it.

@@ -24,10 +24,7 @@ pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
             Some(_) => Ok(path),
             None => Err(Error::usage(
                 "--resume",
-                format_args!(
-                    "{}: no run in this folder; --out begins a new run",
-                    path.display()
-                ),
+                format_args!("{}: no run in this folder; --out begins a new run", path.display()),
             )),
         },
         RunPlace::Automatic => automatic(experiment),

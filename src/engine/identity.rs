@@ -1,5 +1,5 @@
-//! The settings that define a run: those that all trials share ([`images`]), and the definitions of the values in its columns
-//! ([`columns`]).
+//! The settings that define a run: those that all trials share ([`images`]), and the definitions of the values in its
+//! columns ([`columns`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,8 +16,8 @@ use crate::types::{Degradation, Digest, PairDark, ProfileName};
 use darkqa_enhance::{self, SizeArgs, Tiling};
 use darkqa_light::{KindSettings, Synthesis, version};
 
-/// The kinds of degradation in the paper. Their versions are part of the identity of every run. The versions of other kinds are in the
-/// column `variant` of runs that use them, so that they can be added to an existing run.
+/// The kinds of degradation in the paper. Their versions are part of the identity of every run. The versions of other
+/// kinds are in the column `variant` of runs that use them, so that they can be added to an existing run.
 const PAPER_KINDS: [Kind; 2] = [Kind::Exposure, Kind::Sensor];
 
 /// Settings of a recipe that all trials share.
@@ -33,10 +33,7 @@ pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
         ("synthesis", json!(PAPER_KINDS.map(version))),
         ("enhancement", json!(darkqa_enhance::VERSION)),
     ];
-    fields
-        .into_iter()
-        .chain(scaling)
-        .map(|(field, value)| (field.to_owned(), value))
+    fields.into_iter().chain(scaling).map(|(field, value)| (field.to_owned(), value))
 }
 
 /// Definitions of the models, enhancers, noise profiles and other kinds of degradation of a run.
@@ -45,9 +42,7 @@ pub(crate) fn columns<'a>(
     recipe: &Recipe,
     settings: &JobSettings,
 ) -> Columns {
-    let models = models
-        .into_iter()
-        .map(|model| (model.name.to_string(), model_definition(model)));
+    let models = models.into_iter().map(|model| (model.name.to_string(), model_definition(model)));
     let enhancers = recipe.enhancers.iter().map(|(name, digest)| {
         let content = enhancer_definition(digest, &settings.loading.size);
         (name.as_str().to_owned(), content)
@@ -94,7 +89,8 @@ pub(crate) fn columns<'a>(
         .collect()
 }
 
-/// Settings by flag that affect the replies of a model, other than question and images, and the address of its endpoint.
+/// Settings by flag that affect the replies of a model, other than question and images, and the address of its
+/// endpoint.
 pub(crate) fn model_definition(model: &ModelUnderTest) -> Value {
     let mut content = model.model.content();
     if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
@@ -104,8 +100,8 @@ pub(crate) fn model_definition(model: &ModelUnderTest) -> Value {
     content
 }
 
-/// Settings by flag that affect the pixels of an enhancer. Automatic tiling is left out: it changes at most one sample in a thousand,
-/// compared with enhancement of the whole image.
+/// Settings by flag that affect the pixels of an enhancer. Automatic tiling is left out: it changes at most one sample
+/// in a thousand, compared with enhancement of the whole image.
 pub(crate) fn enhancer_definition(digest: &Digest, size: &SizeArgs) -> Value {
     let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
     let mut content = json!({
@@ -162,19 +158,11 @@ pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
             ("--tpm", json!(sending.quota.tokens)),
         ]);
     }
-    settings
-        .into_iter()
-        .map(|(field, value)| (field.to_owned(), value))
-        .collect()
+    settings.into_iter().map(|(field, value)| (field.to_owned(), value)).collect()
 }
 
 /// Operating system and processor of this machine.
 pub(crate) fn platform() -> BTreeMap<String, String> {
-    let facts = [
-        ("system", std::env::consts::OS),
-        ("processor", std::env::consts::ARCH),
-    ];
-    facts
-        .map(|(fact, value)| (fact.to_owned(), value.to_owned()))
-        .into()
+    let facts = [("system", std::env::consts::OS), ("processor", std::env::consts::ARCH)];
+    facts.map(|(fact, value)| (fact.to_owned(), value.to_owned())).into()
 }

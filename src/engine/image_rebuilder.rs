@@ -24,8 +24,8 @@ use darkqa_light::KindSettings;
 
 /// Flags for the current paths of a run's data and enhancers, and for running them.
 ///
-/// Their environment variables are `DARKQA_MOVED_DATA`, `DARKQA_MOVED_LLIE` and `DARKQA_MOVED_ENHANCED`, because `DARKQA_DATA` applies to
-/// new runs only.
+/// Their environment variables are `DARKQA_MOVED_DATA`, `DARKQA_MOVED_LLIE` and `DARKQA_MOVED_ENHANCED`, because
+/// `DARKQA_DATA` applies to new runs only.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RebuildArgs {
     /// The data, if they were moved; default: where they were
@@ -76,15 +76,12 @@ impl ImageRebuilder {
         };
         if manifest.images.is_empty() {
             return Err(wrong(
-                "the manifest of the run has no image flags, so its images cannot be made again"
-                    .to_owned(),
+                "the manifest of the run has no image flags, so its images cannot be made again".to_owned(),
             ));
         }
         let flags = ImageFlags::read(&manifest.images).map_err(wrong)?;
         let flags = with_new_paths(flags, &args).map_err(wrong)?;
-        let has_enhanced = conditions
-            .iter()
-            .any(|condition| condition.enhancer.is_some());
+        let has_enhanced = conditions.iter().any(|condition| condition.enhancer.is_some());
         let models = if has_enhanced { &*flags.llie } else { &[] };
         let elsewhere = if has_enhanced { &*flags.enhanced } else { &[] };
         let files = enhancers::read_models(models)?;
@@ -98,9 +95,8 @@ impl ImageRebuilder {
         } else {
             let dataset = if manifest.identity.contains_key(ASK) {
                 Photographs::open(&flags.data.place(), &flags.data.set)?.dataset
-            } else if let Some(dataset) = flags
-                .scene
-                .pairs_or_classes(&flags.data.place(), &flags.data.set.root.data_root)?
+            } else if let Some(dataset) =
+                flags.scene.pairs_or_classes(&flags.data.place(), &flags.data.set.root.data_root)?
             {
                 dataset
             } else {
@@ -115,45 +111,27 @@ impl ImageRebuilder {
             runtime: args.runtime,
             threads: args.threads,
         };
-        Ok(Self {
-            data,
-            recipe,
-            enhancers: EnhancerModels::load(files, &loading)?.take()?,
-        })
+        Ok(Self { data, recipe, enhancers: EnhancerModels::load(files, &loading)?.take()? })
     }
 
     /// The images of a frame or walk in each of these conditions, in the order in which they would be sent.
     ///
     /// # Errors
     /// If the frame is missing, or an image cannot be made.
-    pub(crate) fn images(
-        &mut self,
-        name: &FrameId,
-        conditions: &[Condition],
-    ) -> Result<Vec<Vec<Arc<Payload>>>> {
+    pub(crate) fn images(&mut self, name: &FrameId, conditions: &[Condition]) -> Result<Vec<Vec<Arc<Payload>>>> {
         let mut source = self.source(name).map_err(|e| {
-            let problem =
-                format_args!("{e}; if the data were moved, name their folder with --data");
+            let problem = format_args!("{e}; if the data were moved, name their folder with --data");
             Error::data(name, problem)
         })?;
         let frames: &dyn Frames = match &self.data {
             FrameData::Frames(dataset) => dataset,
             FrameData::Walks(folder, _) => folder,
         };
-        if conditions
-            .iter()
-            .any(|condition| condition.pair().is_some())
-        {
+        if conditions.iter().any(|condition| condition.pair().is_some()) {
             photographs::measure(frames, std::slice::from_mut(&mut source))?;
         }
         let timings = Timings::default();
-        let steps = ImageSteps {
-            frames,
-            recipe: &self.recipe,
-            limit: None,
-            timings: &timings,
-            stored: None,
-        };
+        let steps = ImageSteps { frames, recipe: &self.recipe, limit: None, timings: &timings, stored: None };
         let enhancers = std::mem::take(&mut self.enhancers);
         let mut pipeline = ImagePipeline::new(steps, enhancers, Implausible::NotLookedFor);
         let conditions: Vec<&Condition> = conditions.iter().collect();

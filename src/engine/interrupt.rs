@@ -1,5 +1,6 @@
-//! Interrupts: Ctrl-C; SIGTERM, which batch systems send before they kill a process; and SIGHUP, which a terminal sends when it is
-//! closed. A run that asks listens for them ([`Interrupt`]); they end everything else at once ([`end_at_interrupts`]).
+//! Interrupts: Ctrl-C; SIGTERM, which batch systems send before they kill a process; and SIGHUP, which a terminal sends
+//! when it is closed. A run that asks listens for them ([`Interrupt`]); they end everything else at once
+//! ([`end_at_interrupts`]).
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -11,18 +12,19 @@ pub(crate) const INTERRUPTED: u8 = 130;
 /// Number of listeners. Without one, interrupts end the process.
 static LISTENERS: AtomicUsize = AtomicUsize::new(0);
 
-/// Makes interrupts end the process with the code [`INTERRUPTED`] while there is no [`Interrupt`]. Signals that the process was started
-/// to ignore, as by `nohup`, stay ignored.
+/// Makes interrupts end the process with the code [`INTERRUPTED`] while there is no [`Interrupt`]. Signals that the
+/// process was started to ignore, as by `nohup`, stay ignored.
 ///
-/// Without this, the first process of a container ignores them, because the kernel ends it only by signals that it handles; and every
-/// process does after its first listener, because that stays installed. Files are whole at any time: they are written under another name.
+/// Without this, the first process of a container ignores them, because the kernel ends it only by signals that it
+/// handles; and every process does after its first listener, because that stays installed. Files are whole at any time:
+/// they are written under another name.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "a signal handler")]
 pub(crate) fn end_at_interrupts() {
     let handler: extern "C" fn(libc::c_int) = end;
     for signal in [libc::SIGINT, libc::SIGTERM, libc::SIGHUP] {
-        // SAFETY: an all-zero `sigaction` is valid, both calls read or write only that structure, and the handler calls only functions
-        // that POSIX allows in handlers. Later listeners call it first.
+        // SAFETY: an all-zero `sigaction` is valid, both calls read or write only that structure, and the handler calls
+        // only functions that POSIX allows in handlers. Later listeners call it first.
         unsafe {
             let mut action: libc::sigaction = std::mem::zeroed();
             let is_known = libc::sigaction(signal, std::ptr::null(), &raw mut action) == 0;
@@ -41,14 +43,16 @@ pub(crate) fn end_at_interrupts() {}
 
 /// Ends the process if there is no listener.
 ///
-/// A process that Ctrl-C ends dies by the signal, so that the script that called it ends, too; the first process of a container cannot.
+/// A process that Ctrl-C ends dies by the signal, so that the script that called it ends, too; the first process of a
+/// container cannot.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "calls that are allowed in a signal handler")]
 extern "C" fn end(signal: libc::c_int) {
     if LISTENERS.load(Ordering::SeqCst) > 0 {
         return;
     }
-    // SAFETY: POSIX allows these calls in a signal handler. The signal that is raised is blocked until the handler returns.
+    // SAFETY: POSIX allows these calls in a signal handler. The signal that is raised is blocked until the handler
+    // returns.
     unsafe {
         if signal == libc::SIGINT && libc::getpid() != 1 {
             libc::signal(signal, libc::SIG_DFL);
@@ -76,8 +80,8 @@ impl Drop for Listening {
     }
 }
 
-/// A listener for interrupts. While it exists, interrupts do not end the process. An interrupt between two calls of [`Self::next`] is
-/// kept for the second.
+/// A listener for interrupts. While it exists, interrupts do not end the process. An interrupt between two calls of
+/// [`Self::next`] is kept for the second.
 #[derive(Debug)]
 pub(crate) struct Interrupt {
     #[cfg(unix)]
@@ -105,19 +109,14 @@ impl Interrupt {
             Ok(Self {
                 ctrl_c: listen(SignalKind::interrupt(), "SIGINT")?,
                 terminate: listen(SignalKind::terminate(), "SIGTERM")?,
-                hang_up: if is_hang_up_ignored() {
-                    None
-                } else {
-                    Some(listen(SignalKind::hangup(), "SIGHUP")?)
-                },
+                hang_up: if is_hang_up_ignored() { None } else { Some(listen(SignalKind::hangup(), "SIGHUP")?) },
                 // Last: a signal before this line ends the process, and none is lost.
                 _listening: Listening::new(),
             })
         }
         #[cfg(windows)]
         Ok(Self {
-            ctrl_c: tokio::signal::windows::ctrl_c()
-                .map_err(|e| Error::file("Ctrl-C", "listen for", e))?,
+            ctrl_c: tokio::signal::windows::ctrl_c().map_err(|e| Error::file("Ctrl-C", "listen for", e))?,
             _listening: Listening::new(),
         })
     }
@@ -137,7 +136,8 @@ impl Interrupt {
 
 /// True if the process was started with SIGHUP ignored, as by `nohup`; a listener would undo that.
 ///
-/// Linux lists the ignored signals in /proc. Other systems are assumed to have no `nohup` if standard error is a terminal.
+/// Linux lists the ignored signals in /proc. Other systems are assumed to have no `nohup` if standard error is a
+/// terminal.
 #[cfg(unix)]
 fn is_hang_up_ignored() -> bool {
     /// The bit of SIGHUP, signal 1.
@@ -147,10 +147,7 @@ fn is_hang_up_ignored() -> bool {
         .lines()
         .find_map(|line| line.strip_prefix("SigIgn:"))
         .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
-    ignored.map_or_else(
-        || !std::io::IsTerminal::is_terminal(&std::io::stderr()),
-        |mask| mask & HANG_UP != 0,
-    )
+    ignored.map_or_else(|| !std::io::IsTerminal::is_terminal(&std::io::stderr()), |mask| mask & HANG_UP != 0)
 }
 
 #[cfg(all(test, unix))]

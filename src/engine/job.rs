@@ -38,17 +38,8 @@ pub(crate) struct Job<'a, E: Experiment> {
 
 impl<'a, E: Experiment> Job<'a, E> {
     /// A job in the run folder of the experiment. Nothing is written.
-    pub(crate) fn new(
-        experiment: &'a E,
-        files: Vec<ModelFile>,
-        progress: &'a Progress,
-    ) -> Result<Self> {
-        Ok(Self {
-            folder: folder::find(experiment)?,
-            experiment,
-            files,
-            progress,
-        })
+    pub(crate) fn new(experiment: &'a E, files: Vec<ModelFile>, progress: &'a Progress) -> Result<Self> {
+        Ok(Self { folder: folder::find(experiment)?, experiment, files, progress })
     }
 
     /// Asks the remaining trials, or only estimates them (`--dry-run`).
@@ -57,11 +48,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// If nothing can be asked, or no further trial could succeed. Replies that had arrived are kept.
     pub(crate) fn run(self) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
-        if self.experiment.settings().money.dry_run {
-            self.estimate()
-        } else {
-            self.open()?.ask()
-        }
+        if self.experiment.settings().money.dry_run { self.estimate() } else { self.open()?.ask() }
     }
 
     /// Writes the remaining requests as files of a Batch API, and marks their trials in the run as sent.
@@ -76,8 +63,8 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// Submits the remaining requests in batches, and waits for their replies.
     ///
     /// # Errors
-    /// If a model is built in, or a server refuses a request that every further call would repeat. Submitted batches are kept, and the
-    /// same command continues.
+    /// If a model is built in, or a server refuses a request that every further call would repeat. Submitted batches
+    /// are kept, and the same command continues.
     pub(crate) fn run_batch(self, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
         if self.experiment.settings().money.dry_run {
@@ -90,14 +77,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     fn estimate(self) -> Result<Outcome> {
         let show = self.experiment.settings().show;
         let forecast = self.forecast()?;
-        Ok(Outcome::text(
-            Status::Complete,
-            if show.is_json() {
-                json(&forecast)?
-            } else {
-                render(&forecast)
-            },
-        ))
+        Ok(Outcome::text(Status::Complete, if show.is_json() { json(&forecast)? } else { render(&forecast) }))
     }
 
     /// Estimates the remaining requests and their cost. Sends nothing and writes no file.
@@ -115,12 +95,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         for phase in 0..E::PHASES.len() {
             let mut plan = Plan::new(experiment.plan(phase, || store::read_records(&self.folder))?);
             let models = experiment.models(phase).len();
-            measured.push(MeasuredTokens::from_stored(
-                models,
-                &plan,
-                experiment.sources(),
-                &stored,
-            ));
+            measured.push(MeasuredTokens::from_stored(models, &plan, experiment.sources(), &stored));
             let again = truncated(&stored, experiment.models(phase));
             plan.exclude(|key| answered.contains(key) && !again.contains(key));
             plans.push(plan);
@@ -155,26 +130,19 @@ impl<'a, E: Experiment> Job<'a, E> {
 
     /// Opens the run folder.
     fn open(self) -> Result<OpenRun<'a, E>> {
-        let Self {
-            experiment,
-            files,
-            folder,
-            progress,
-        } = self;
+        let Self { experiment, files, folder, progress } = self;
         let settings = experiment.settings();
         let damage = store::manifest_damage(&folder)?;
         let stored = match damage {
             Some(_) => None,
             None => store::read_manifest(&folder, DetailOf::<E>::SCHEMA)?,
         };
-        let complete = stored
-            .as_ref()
-            .is_some_and(|stored| stored.status == Status::Complete);
+        let complete = stored.as_ref().is_some_and(|stored| stored.status == Status::Complete);
         let images = settings.images.open(settings.access)?;
         let mut enhancers = EnhancerModels::from_files(files, &settings.loading);
         if !complete {
-            // Loaded before the folder is created, so that a broken enhancer leaves no folder. Enhancers with stored findings were loaded
-            // by an earlier run, and are not loaded here.
+            // Loaded before the folder is created, so that a broken enhancer leaves no folder. Enhancers with stored
+            // findings were loaded by an earlier run, and are not loaded here.
             enhancers.open_runtime()?;
             let maker = Maker::new(enhancers.version(), &settings.loading.size);
             let are_all_known = match &images {
@@ -192,9 +160,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         }
         let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
         let lacks_notes = store.repair_notes();
-        store.add_questions(experiment.questions(), manifest.inputs.as_ref(), || {
-            planned_keys(experiment, &folder)
-        })?;
+        store.add_questions(experiment.questions(), manifest.inputs.as_ref(), || planned_keys(experiment, &folder))?;
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
             HashSet::new()
         } else {
@@ -205,16 +171,7 @@ impl<'a, E: Experiment> Job<'a, E> {
                 store.append(record)?;
             }
         }
-        Ok(OpenRun {
-            experiment,
-            progress,
-            enhancers,
-            store,
-            lacks_notes,
-            manifest,
-            keys: HashSet::new(),
-            images,
-        })
+        Ok(OpenRun { experiment, progress, enhancers, store, lacks_notes, manifest, keys: HashSet::new(), images })
     }
 }
 
@@ -228,23 +185,17 @@ fn planned_keys<E: Experiment>(experiment: &E, folder: &Path) -> Result<HashSet<
     Ok(keys)
 }
 
-/// Writes the manifest of this command into a run folder whose manifest is damaged. The command is taken for the one that made the run if
-/// it plans the trials of all stored replies, because the key of a trial is a digest of everything that affects its reply.
+/// Writes the manifest of this command into a run folder whose manifest is damaged. The command is taken for the one
+/// that made the run if it plans the trials of all stored replies, because the key of a trial is a digest of everything
+/// that affects its reply.
 ///
 /// # Errors
 /// If a stored reply belongs to a trial that this command does not plan.
-fn restore_manifest<E: Experiment>(
-    experiment: &E,
-    folder: &Path,
-    manifest: &RunManifest,
-    damage: &str,
-) -> Result<()> {
+fn restore_manifest<E: Experiment>(experiment: &E, folder: &Path, manifest: &RunManifest, damage: &str) -> Result<()> {
     let planned = planned_keys(experiment, folder)?;
     let trials = store::read_trials(folder)?;
-    let (own, others) = trials
-        .iter()
-        .filter(|trial| !trial.failed())
-        .partition::<Vec<_>, _>(|trial| planned.contains(&trial.key));
+    let (own, others) =
+        trials.iter().filter(|trial| !trial.failed()).partition::<Vec<_>, _>(|trial| planned.contains(&trial.key));
     if !others.is_empty() {
         let problem = format!(
             "{damage}, and {} of {} replies are not of this command: the records are intact; call the command that made them, with all its \
@@ -256,9 +207,6 @@ fn restore_manifest<E: Experiment>(
         return Err(Error::Run { path, problem });
     }
     store::restore_manifest(folder, manifest)?;
-    tracing::warn!(
-        "{damage}; made again: all {} replies of the run are of this command",
-        own.len()
-    );
+    tracing::warn!("{damage}; made again: all {} replies of the run are of this command", own.len());
     Ok(())
 }

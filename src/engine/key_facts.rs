@@ -8,8 +8,8 @@ use crate::engine::models::ModelUnderTest;
 use crate::error::Result;
 use crate::types::{Condition, Digest, QuestionId, TrialKey};
 
-/// The inputs that affect a reply, from which the key of a trial is computed. Question and condition are included, because built-in
-/// models answer by their names. The fields are sorted by name, as [`Digest::presorted`] requires.
+/// The inputs that affect a reply, from which the key of a trial is computed. Question and condition are included,
+/// because built-in models answer by their names. The fields are sorted by name, as [`Digest::presorted`] requires.
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(crate) struct KeyFacts<'a> {
     before: &'a str,
@@ -61,11 +61,7 @@ impl<'a> KeyFacts<'a> {
 
     /// Sets the choices in the order shown, and the number of earlier trials with the same question.
     pub(crate) fn with_choices(self, choices: &'a [String], repeat: u32) -> Self {
-        Self {
-            choices: Some(choices),
-            repeat: (repeat > 0).then_some(repeat),
-            ..self
-        }
+        Self { choices: Some(choices), repeat: (repeat > 0).then_some(repeat), ..self }
     }
 
     /// Computes the key of the trial, a digest of all facts.

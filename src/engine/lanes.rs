@@ -9,7 +9,8 @@ use crate::engine::models::ModelUnderTest;
 use crate::engine::open_files::RequestLimit;
 use crate::types::text::counted;
 
-/// Maximum bytes of images held so that idle endpoints can work ahead of the slowest; chosen: about fifty images of 1280×720 as PNG.
+/// Maximum bytes of images held so that idle endpoints can work ahead of the slowest; chosen: about fifty images of
+/// 1280×720 as PNG.
 const BYTES_AHEAD: usize = 64 << 20;
 
 /// A trial with its stimulus, which it shares with the other trials of its group.
@@ -34,8 +35,8 @@ struct Lane<I> {
     is_held: bool,
 }
 
-/// Waiting trials and the number in flight, per endpoint, so that a slow endpoint does not hold up the others. All endpoints share the
-/// images of a group, which are made once.
+/// Waiting trials and the number in flight, per endpoint, so that a slow endpoint does not hold up the others. All
+/// endpoints share the images of a group, which are made once.
 pub(crate) struct Lanes<'a, I> {
     models: &'a [ModelUnderTest],
     by_endpoint: Vec<Lane<I>>,
@@ -52,9 +53,7 @@ impl<'a, I> Lanes<'a, I> {
         let mut lanes: Vec<Lane<I>> = Vec::new();
         let mut lane_of_model = Vec::new();
         for (index, model) in models.iter().enumerate() {
-            let shared = lanes
-                .iter()
-                .position(|lane| models[lane.models[0]].model.shares_endpoint(&model.model));
+            let shared = lanes.iter().position(|lane| models[lane.models[0]].model.shares_endpoint(&model.model));
             let lane = shared.unwrap_or_else(|| {
                 let server = model.server.as_ref();
                 lanes.push(Lane {
@@ -71,28 +70,18 @@ impl<'a, I> Lanes<'a, I> {
             lanes[lane].models.push(index);
             lane_of_model.push(lane);
         }
-        Self {
-            models,
-            by_endpoint: lanes,
-            lane_of_model,
-            default_width,
-            live_images: VecDeque::new(),
-        }
+        Self { models, by_endpoint: lanes, lane_of_model, default_width, live_images: VecDeque::new() }
     }
 
-    /// Limits the requests in flight to the connections that this process may open in addition to the files of these threads. Prints a
-    /// warning if that is fewer than the settings allow.
+    /// Limits the requests in flight to the connections that this process may open in addition to the files of these
+    /// threads. Prints a warning if that is fewer than the settings allow.
     pub(crate) fn keep_within_open_files(&mut self, threads: ThreadArgs) {
         let Some(RequestLimit { limit, requests }) = RequestLimit::now(threads.count()) else {
             return;
         };
         let addresses: usize = self.by_endpoint.iter().map(|lane| lane.addresses).sum();
         let mut most = 0;
-        for lane in self
-            .by_endpoint
-            .iter_mut()
-            .filter(|lane| lane.addresses > 0)
-        {
+        for lane in self.by_endpoint.iter_mut().filter(|lane| lane.addresses > 0) {
             lane.max_in_flight = (requests / addresses * lane.addresses).max(1);
             let server = self.models[lane.models[0]].server.as_ref();
             most += server.map_or(0, |server| server.max_in_flight());
@@ -118,14 +107,8 @@ impl<'a, I> Lanes<'a, I> {
     /// Adds the trials of a group.
     pub(crate) fn extend(&mut self, ready: Vec<PreparedTrial<I>>) {
         if let Some(first) = ready.first() {
-            let bytes = first
-                .stimulus
-                .images
-                .iter()
-                .map(|image| image.facts().bytes)
-                .sum();
-            self.live_images
-                .push_back((Arc::downgrade(&first.stimulus), bytes));
+            let bytes = first.stimulus.images.iter().map(|image| image.facts().bytes).sum();
+            self.live_images.push_back((Arc::downgrade(&first.stimulus), bytes));
         }
         for ready in ready {
             let lane = self.lane_of_model[ready.trial.model];
@@ -143,8 +126,8 @@ impl<'a, I> Lanes<'a, I> {
         has_any
     }
 
-    /// Takes the next trial from a lane that has room and is not held by the budget. Trials for which `is_dropped` is true are dropped;
-    /// those for which `is_deferred` is true are set aside until [`Self::requeue_deferred`].
+    /// Takes the next trial from a lane that has room and is not held by the budget. Trials for which `is_dropped` is
+    /// true are dropped; those for which `is_deferred` is true are set aside until [`Self::requeue_deferred`].
     pub(crate) fn next(
         &mut self,
         is_dropped: impl Fn(&Trial<I>) -> bool,
@@ -173,9 +156,7 @@ impl<'a, I> Lanes<'a, I> {
 
     /// True if any trial is set aside.
     pub(crate) fn has_deferred(&self) -> bool {
-        self.by_endpoint
-            .iter()
-            .any(|lane| !lane.deferred.is_empty())
+        self.by_endpoint.iter().any(|lane| !lane.deferred.is_empty())
     }
 
     /// Appends the trials that were set aside to the waiting ones.
@@ -185,8 +166,8 @@ impl<'a, I> Lanes<'a, I> {
         }
     }
 
-    /// Returns a trial that the budget does not allow now to its queue, and holds its lane until a trial ends or [`Self::release`] is
-    /// called.
+    /// Returns a trial that the budget does not allow now to its queue, and holds its lane until a trial ends or
+    /// [`Self::release`] is called.
     pub(crate) fn put_back(&mut self, ready: PreparedTrial<I>) {
         let lane = &mut self.by_endpoint[self.lane_of_model[ready.trial.model]];
         lane.in_flight -= 1;
@@ -203,9 +184,7 @@ impl<'a, I> Lanes<'a, I> {
 
     /// True if the budget holds a lane whose endpoint has room for another request.
     pub(crate) fn is_held_back(&self) -> bool {
-        self.by_endpoint
-            .iter()
-            .any(|lane| lane.is_held && lane.in_flight < self.width(lane))
+        self.by_endpoint.iter().any(|lane| lane.is_held && lane.in_flight < self.width(lane))
     }
 
     /// Releases all lanes held by the budget, so that their next trials are tried again.
@@ -225,20 +204,20 @@ impl<'a, I> Lanes<'a, I> {
         !self.is_empty()
     }
 
-    /// True if another group should be prepared: no trial is waiting, or a lane of a model that is not stopped has none waiting and the
-    /// images held are smaller than [`BYTES_AHEAD`].
+    /// True if another group should be prepared: no trial is waiting, or a lane of a model that is not stopped has none
+    /// waiting and the images held are smaller than [`BYTES_AHEAD`].
     pub(crate) fn wants_more(&mut self, is_stopped: impl Fn(usize) -> bool) -> bool {
         if self.is_empty() {
             return true;
         }
-        let has_idle_lane = self.by_endpoint.iter().any(|lane| {
-            lane.waiting.is_empty() && lane.models.iter().any(|model| !is_stopped(*model))
-        });
+        let has_idle_lane = self
+            .by_endpoint
+            .iter()
+            .any(|lane| lane.waiting.is_empty() && lane.models.iter().any(|model| !is_stopped(*model)));
         if !has_idle_lane {
             return false;
         }
-        self.live_images
-            .retain(|(stimulus, _)| stimulus.strong_count() > 0);
+        self.live_images.retain(|(stimulus, _)| stimulus.strong_count() > 0);
         let held_bytes: usize = self.live_images.iter().map(|(_, bytes)| bytes).sum();
         held_bytes < BYTES_AHEAD
     }

@@ -18,32 +18,21 @@ use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
 use crate::types::{InputSummary, ListedModel, StoredDetail as _};
 use darkqa_score::answers::record::Detail as _;
 
-/// The manifest of a run that starts, or that continues the run of the `stored` manifest. It keeps the date, columns and image flags of
-/// the stored one; after a complete run, it keeps everything but the identity.
+/// The manifest of a run that starts, or that continues the run of the `stored` manifest. It keeps the date, columns
+/// and image flags of the stored one; after a complete run, it keeps everything but the identity.
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
-pub(crate) fn run_manifest<E: Experiment>(
-    experiment: &E,
-    stored: Option<RunManifest>,
-) -> Result<RunManifest> {
+pub(crate) fn run_manifest<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> Result<RunManifest> {
     let job = experiment.settings();
     let mut settings = identity::settings(job);
-    let notes: BTreeMap<String, Value> = experiment
-        .notes()
-        .into_iter()
-        .map(|(field, value)| (field.to_owned(), value))
-        .collect();
+    let notes: BTreeMap<String, Value> =
+        experiment.notes().into_iter().map(|(field, value)| (field.to_owned(), value)).collect();
     settings.extend(notes.clone());
     let kept = stored.iter().flat_map(|stored| &stored.settings);
-    settings.extend(
-        kept.filter(|(key, _)| is_kept(key))
-            .map(|(key, value)| (key.clone(), value.clone())),
-    );
+    settings.extend(kept.filter(|(key, _)| is_kept(key)).map(|(key, value)| (key.clone(), value.clone())));
     settings.extend(job.tasks.map(tasks_setting));
-    let mut columns = stored
-        .as_ref()
-        .map_or_else(Default::default, |stored| stored.columns.clone());
+    let mut columns = stored.as_ref().map_or_else(Default::default, |stored| stored.columns.clone());
     for (column, values) in experiment.columns() {
         columns.entry(column).or_default().extend(values);
     }
@@ -60,10 +49,7 @@ pub(crate) fn run_manifest<E: Experiment>(
         enhancers: BTreeMap::new(),
         inputs: inputs(experiment),
         shard: job.shard.is_part().then(|| job.shard.to_string()),
-        part: experiment.part().map(|place| RunPart {
-            place,
-            trials: vec![0; place.count],
-        }),
+        part: experiment.part().map(|place| RunPart { place, trials: vec![0; place.count] }),
         settings,
         images: job.image_flags.clone(),
         reply_reading: DetailOf::<E>::REPLY_READING.map(str::to_owned),
@@ -79,11 +65,7 @@ pub(crate) fn run_manifest<E: Experiment>(
     let before = stored.clone();
     let models = experiment.columns().remove("model").unwrap_or_default();
     let views = job.ask.views();
-    let current_models = renamed::CurrentModels {
-        models: &models,
-        views: &views,
-        settings: other_settings,
-    };
+    let current_models = renamed::CurrentModels { models: &models, views: &views, settings: other_settings };
     renamed::note_renamed_models(&mut manifest, &before, current_models)?;
     let images = merged_flags(&stored.images, manifest.images);
     if stored.status != Status::Complete {
@@ -135,17 +117,14 @@ pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunMani
     manifest.settings.extend(settings);
 }
 
-/// Image flags of the stored manifest and of this call. Lists are joined, with the stored values first; other values are those of this
-/// call.
+/// Image flags of the stored manifest and of this call. Lists are joined, with the stored values first; other values
+/// are those of this call.
 fn merged_flags(stored: &ImageWords, current: ImageWords) -> ImageWords {
     let mut all = stored.clone();
     for (flag, value) in current {
         let value = match (all.remove(&flag), value) {
             (Some(Value::Array(mut known)), Value::Array(more)) => {
-                let more: Vec<Value> = more
-                    .into_iter()
-                    .filter(|value| !known.contains(value))
-                    .collect();
+                let more: Vec<Value> = more.into_iter().filter(|value| !known.contains(value)).collect();
                 known.extend(more);
                 Value::Array(known)
             }

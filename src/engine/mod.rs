@@ -1,8 +1,8 @@
 //! The engine of everything that is asked: a [`Job`] carries out an [`Experiment`](experiment::Experiment).
 //!
-//! A job opens the run folder. For each phase it plans the remaining trials, has their images made, asks about them, and stores every
-//! reply when it arrives. At the end the experiment scores the run. Differences between questions with choices and open questions are in
-//! their `Experiment`. Cost limits, resuming and batches are here, once.
+//! A job opens the run folder. For each phase it plans the remaining trials, has their images made, asks about them,
+//! and stores every reply when it arrives. At the end the experiment scores the run. Differences between questions with
+//! choices and open questions are in their `Experiment`. Cost limits, resuming and batches are here, once.
 
 pub(crate) mod batch;
 pub(crate) mod circuit_breaker;

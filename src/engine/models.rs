@@ -1,4 +1,5 @@
-//! The models of a run: their flags ([`ModelArgs`]), their settings ([`AskSettings`]) and the opened models (`ModelUnderTest`).
+//! The models of a run: their flags ([`ModelArgs`]), their settings ([`AskSettings`]) and the opened models
+//! (`ModelUnderTest`).
 //!
 //! Models that flags name and models of a models file are merged into one list of settings.
 
@@ -43,7 +44,8 @@ pub(crate) struct ModelUnderTest {
     pub(crate) model: Arc<Model>,
     /// The name in records and tables.
     pub(crate) name: Arc<str>,
-    /// Digest of the settings that affect the model's replies ([`Model::digest`]). Cached, because every trial key contains it.
+    /// Digest of the settings that affect the model's replies ([`Model::digest`]). Cached, because every trial key
+    /// contains it.
     pub(crate) digest: Arc<str>,
     pub(crate) view: View,
     /// The endpoint; `None` for a built-in model.
@@ -101,15 +103,8 @@ impl ModelUnderTest {
     }
 
     /// The record of a trial, without an outcome.
-    pub(crate) fn blank<I: Item>(
-        &self,
-        trial: &Trial<I>,
-        stimulus: &Stimulus,
-    ) -> Record<I::Detail> {
-        Record {
-            max_tokens: self.model.changed_limit(),
-            ..I::blank(trial, stimulus, &self.name)
-        }
+    pub(crate) fn blank<I: Item>(&self, trial: &Trial<I>, stimulus: &Stimulus) -> Record<I::Detail> {
+        Record { max_tokens: self.model.changed_limit(), ..I::blank(trial, stimulus, &self.name) }
     }
 
     /// True if the model is asked the question with this index among the selected ones.
@@ -118,8 +113,8 @@ impl ModelUnderTest {
     }
 }
 
-/// Opens all models, with and without images. Sends nothing. `added` names further models, which are asked with images. `built_in` makes
-/// the built-in models that only one type of experiment has.
+/// Opens all models, with and without images. Sends nothing. `added` names further models, which are asked with images.
+/// `built_in` makes the built-in models that only one type of experiment has.
 ///
 /// # Errors
 /// If a model cannot be opened, or two models differ in no setting that affects replies.
@@ -160,10 +155,7 @@ pub(crate) fn open_all(
 /// Refuses two models whose trials would have the same keys.
 fn refuse_same_trials(models: &[ModelUnderTest]) -> Result<()> {
     for (i, model) in models.iter().enumerate() {
-        if let Some(other) = models[..i]
-            .iter()
-            .find(|other| have_same_trials(other, model))
-        {
+        if let Some(other) = models[..i].iter().find(|other| have_same_trials(other, model)) {
             let how = match model.view {
                 View::Image => "",
                 View::Blind => " without images",
@@ -203,17 +195,14 @@ impl Endpoints {
     }
 }
 
-/// The models that are asked in a condition, each with its index in `models`. Without a condition, those that are asked without images.
+/// The models that are asked in a condition, each with its index in `models`. Without a condition, those that are asked
+/// without images.
 pub(crate) fn asked_in<'a>(
     models: &'a [ModelUnderTest],
     condition: Option<&Condition>,
 ) -> Vec<(usize, &'a ModelUnderTest)> {
     let view = condition.map_or(View::Blind, |_| View::Image);
-    models
-        .iter()
-        .enumerate()
-        .filter(|(_, model)| model.view == view)
-        .collect()
+    models.iter().enumerate().filter(|(_, model)| model.view == view).collect()
 }
 
 /// Opens an endpoint.
@@ -225,31 +214,23 @@ pub(crate) fn endpoint(server: &Server) -> Result<Arc<Endpoint>> {
 ///
 /// # Errors
 /// If the model answers multiple-choice questions only, or cannot be opened.
-pub(crate) fn open(
-    name: &ModelName,
-    endpoint: Option<&Arc<Endpoint>>,
-    parameters: &Parameters,
-) -> Result<Model> {
+pub(crate) fn open(name: &ModelName, endpoint: Option<&Arc<Endpoint>>, parameters: &Parameters) -> Result<Model> {
     match name {
         ModelName::Script(path) => Ok(Model::Script(Script::load(path)?)),
         ModelName::Remote(name) => {
-            let endpoint =
-                endpoint.ok_or_else(|| Error::usage("--base-url", "no endpoint is known"))?;
-            let parameters = Parameters {
-                model: name.clone(),
-                ..parameters.clone()
-            };
+            let endpoint = endpoint.ok_or_else(|| Error::usage("--base-url", "no endpoint is known"))?;
+            let parameters = Parameters { model: name.clone(), ..parameters.clone() };
             let model = Remote::open(Arc::clone(endpoint), parameters)?;
             Ok(Model::Remote(Box::new(model)))
         }
-        ModelName::Random | ModelName::Observer(_) | ModelName::RoomNet => Err(Error::usage(
-            "--model",
-            "a model that can answer open questions expected",
-        )),
+        ModelName::Random | ModelName::Observer(_) | ModelName::RoomNet => {
+            Err(Error::usage("--model", "a model that can answer open questions expected"))
+        }
     }
 }
 
-/// Adds to the settings of a manifest which flags of each model the server refused, and which settings changed within the run.
+/// Adds to the settings of a manifest which flags of each model the server refused, and which settings changed within
+/// the run.
 pub(crate) fn note_changes(models: &[&ModelUnderTest], settings: &mut BTreeMap<String, Value>) {
     for model in models {
         let forced = model.model.forced();
@@ -267,8 +248,8 @@ pub(crate) fn note_changes(models: &[&ModelUnderTest], settings: &mut BTreeMap<S
     }
 }
 
-/// Changes to requests that the endpoint required, by model, as settings for the manifest. The changes of a model that is asked both with
-/// and without images are merged.
+/// Changes to requests that the endpoint required, by model, as settings for the manifest. The changes of a model that
+/// is asked both with and without images are merged.
 pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String, Value)> {
     let mut by_name: BTreeMap<String, Vec<String>> = BTreeMap::new();
     for model in models {
@@ -280,7 +261,5 @@ pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String
             }
         }
     }
-    by_name
-        .into_iter()
-        .map(|(name, changes)| (name, json!(changes)))
+    by_name.into_iter().map(|(name, changes)| (name, json!(changes)))
 }

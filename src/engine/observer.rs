@@ -14,8 +14,8 @@ use darkqa_questions::observer::controls::control_image;
 use darkqa_questions::observer::{Observation, ObservedFrame, VERSION, is_in_rulebook};
 use darkqa_questions::rules::Rules;
 
-/// Number of cached observations. A few are enough, because questions about one image follow each other; with all controls,
-/// each image has one observation for each of them.
+/// Number of cached observations. A few are enough, because questions about one image follow each other; with all
+/// controls, each image has one observation for each of them.
 const OBSERVATIONS: usize = 64;
 
 /// The data set, the rules and the caches that the observer and its controls share.
@@ -51,10 +51,7 @@ impl Observer {
                 dataset.name()
             ))
         })?;
-        if let Some(unknown) = questions
-            .iter()
-            .find(|question| !is_in_rulebook(question, &rules))
-        {
+        if let Some(unknown) = questions.iter().find(|question| !is_in_rulebook(question, &rules)) {
             return Err(unusable(&format!(
                 "the question {:?} ({:?}) is not one of the rulebook's, and the observer understands no others; if another \
                  rulebook made it, name that with --rules",
@@ -72,14 +69,13 @@ impl Observer {
             observations: Recent::new(OBSERVATIONS),
         };
         if let Some(first) = questions.first() {
-            observer
-                .observed_frame(&first.frame)
-                .map_err(|problem| unusable(&problem))?;
+            observer.observed_frame(&first.frame).map_err(|problem| unusable(&problem))?;
         }
         Ok(Arc::new(observer))
     }
 
-    /// The observer as a model, or one of its controls. The seed of `prior` determines the guesses and the random choices of a control.
+    /// The observer as a model, or one of its controls. The seed of `prior` determines the guesses and the random
+    /// choices of a control.
     pub(crate) fn model(self: &Arc<Self>, control: Option<Control>, prior: Random) -> Local {
         let (observer, seed) = (Arc::clone(self), prior.seed);
         let rules = self.rules.digest();
@@ -90,18 +86,14 @@ impl Observer {
             name(control),
             digest,
             prior,
-            Box::new(move |question: &Question, call: &Call<'_>| {
-                observer.answer(question, call, control, seed)
-            }),
+            Box::new(move |question: &Question, call: &Call<'_>| observer.answer(question, call, control, seed)),
         )
     }
 
     fn observed_frame(&self, frame: &FrameId) -> Result<Arc<ObservedFrame>, String> {
         self.frames.get(frame, || {
             let maps = self.dataset.frame(frame).map_err(|e| e.to_string())?;
-            ObservedFrame::new(&maps, &self.labels, &self.rules, &self.palette)
-                .map(Arc::new)
-                .map_err(|e| e.to_string())
+            ObservedFrame::new(&maps, &self.labels, &self.rules, &self.palette).map(Arc::new).map_err(|e| e.to_string())
         })
     }
 
@@ -127,11 +119,7 @@ impl Observer {
             Ok::<_, String>(Arc::new(observed.observe(&pixels)))
         })?;
         let choice = observation.answer(question, &self.rules, &self.palette);
-        Ok(LocalAnswer {
-            choice,
-            observed: Some(observed(&observation, choice)),
-            guessed: false,
-        })
+        Ok(LocalAnswer { choice, observed: Some(observed(&observation, choice)), guessed: false })
     }
 }
 
@@ -151,8 +139,6 @@ fn observed(observation: &Observation, choice: Option<usize>) -> Observed {
         seen: observation.seen_count(),
         detected: observation.detected_count(),
         explained_ppm: (1e6 * observation.explained_variance() + 0.5) as u32,
-        outlines: outlines
-            .map(|(id, confirmed, _)| (id, (100.0 * confirmed) as u8))
-            .collect(),
+        outlines: outlines.map(|(id, confirmed, _)| (id, (100.0 * confirmed) as u8)).collect(),
     }
 }

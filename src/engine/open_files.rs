@@ -5,10 +5,12 @@
 /// Files reserved for short use besides connections: images, maps, caches and the manifest; chosen.
 const RESERVED_FILES: usize = 16;
 
-/// Files reserved for each thread that makes images, up to a quarter of the limit in total. Chosen: a thread seldom has two open.
+/// Files reserved for each thread that makes images, up to a quarter of the limit in total. Chosen: a thread seldom has
+/// two open.
 const FILES_PER_THREAD: usize = 2;
 
-/// Connections per request in flight: the client may open a new connection for a request that then takes one that became free.
+/// Connections per request in flight: the client may open a new connection for a request that then takes one that
+/// became free.
 const CONNECTIONS_PER_REQUEST: usize = 2;
 
 /// Soft limit to try if the system refuses the hard limit. macOS reports no hard limit, but allows no more than this.
@@ -25,8 +27,8 @@ pub(crate) struct RequestLimit {
 }
 
 impl RequestLimit {
-    /// Raises the limit, and subtracts the files that are open now and those reserved for `threads` image threads. `None` if the limit
-    /// is unknown or infinite.
+    /// Raises the limit, and subtracts the files that are open now and those reserved for `threads` image threads.
+    /// `None` if the limit is unknown or infinite.
     pub(crate) fn now(threads: usize) -> Option<Self> {
         let limit = raise_limit()?;
         Some(Self::within(limit, open_files(), threads))
@@ -36,34 +38,24 @@ impl RequestLimit {
         let for_threads = FILES_PER_THREAD.saturating_mul(threads).min(limit / 4);
         let taken = open + RESERVED_FILES + for_threads;
         let requests = limit.saturating_sub(taken) / CONNECTIONS_PER_REQUEST;
-        Self {
-            limit,
-            requests: requests.max(1),
-        }
+        Self { limit, requests: requests.max(1) }
     }
 }
 
-/// Raises the soft limit of open files as far as the system allows, and returns it. `None` if it is unknown or infinite.
+/// Raises the soft limit of open files as far as the system allows, and returns it. `None` if it is unknown or
+/// infinite.
 #[cfg(unix)]
 #[expect(unsafe_code, reason = "a limit of the operating system")]
 pub(crate) fn raise_limit() -> Option<usize> {
-    let mut limit = libc::rlimit {
-        rlim_cur: 0,
-        rlim_max: 0,
-    };
+    let mut limit = libc::rlimit { rlim_cur: 0, rlim_max: 0 };
     // SAFETY: each call only reads or writes the `rlimit` structure passed to it.
     unsafe {
         if libc::getrlimit(libc::RLIMIT_NOFILE, &raw mut limit) != 0 {
             return None;
         }
         for target in [limit.rlim_max, FALLBACK_LIMIT.min(limit.rlim_max)] {
-            let raised = libc::rlimit {
-                rlim_cur: target,
-                ..limit
-            };
-            if target > limit.rlim_cur
-                && libc::setrlimit(libc::RLIMIT_NOFILE, &raw const raised) == 0
-            {
+            let raised = libc::rlimit { rlim_cur: target, ..limit };
+            if target > limit.rlim_cur && libc::setrlimit(libc::RLIMIT_NOFILE, &raw const raised) == 0 {
                 limit = raised;
             }
         }

@@ -49,8 +49,8 @@ use darkqa_score::answers::MIN_REPLIES;
 /// Share of `--max-cost` below which a cost that no server stated is not mentioned; chosen.
 const SMALL_SHARE: f64 = 0.01;
 
-/// Number of trials about undegraded images that each model is asked first, if the run has that many; chosen so that a server that drops
-/// every second image is noticed within them.
+/// Number of trials about undegraded images that each model is asked first, if the run has that many; chosen so that a
+/// server that drops every second image is noticed within them.
 const UNTOUCHED_FIRST: usize = 128;
 
 /// A run folder that is locked for this process, and the state needed to ask its trials.
@@ -123,10 +123,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             return Ok(());
         };
         let models = every_model(self.experiment);
-        let run_models = RunModels {
-            models: &models,
-            manifest: Some(&self.manifest),
-        };
+        let run_models = RunModels { models: &models, manifest: Some(&self.manifest) };
         let trials = self.store.trials()?;
         let budget = Budget::for_run(&settings.money, &[], run_models, &trials)?;
         let spent = budget.charged();
@@ -145,8 +142,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             let cost = ShardBudget::new(limit, spent);
             cost.note(&mut self.manifest);
             let shard = settings.shard;
-            self.progress
-                .note(&format!("shard {shard}: {}", cost.words()));
+            self.progress.note(&format!("shard {shard}: {}", cost.words()));
         }
         Ok(())
     }
@@ -172,7 +168,8 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(())
     }
 
-    /// The trials of a phase that have no reply and do not wait for a batch. Replies that shards of another division have are copied first.
+    /// The trials of a phase that have no reply and do not wait for a batch. Replies that shards of another division
+    /// have are copied first.
     pub(crate) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut stored = self.store.trials()?;
         let mut plan = Plan::new(self.experiment.plan(phase, || self.store.records())?);
@@ -192,17 +189,12 @@ impl<E: Experiment> OpenRun<'_, E> {
         if asked_again > 0 {
             let replies = plural(asked_again, "truncated reply is", "truncated replies are");
             let flag = self.experiment.token_flag(phase);
-            self.progress
-                .note(&format!("{replies} asked again with the larger {flag}"));
+            self.progress.note(&format!("{replies} asked again with the larger {flag}"));
         }
         let paid_for = lost_for_good(&stored, self.experiment.settings());
         let not_again = plan.exclude(|key| paid_for.contains(key));
         if not_again > 0 {
-            let (trials, were) = if not_again == 1 {
-                ("trial", "was")
-            } else {
-                ("trials", "were")
-            };
+            let (trials, were) = if not_again == 1 { ("trial", "was") } else { ("trials", "were") };
             tracing::warn!(
                 "{not_again} {trials} not asked again: {were} charged for several attempts without a reply; asked again with more \
                  --retries paid, best with a larger {} in another folder",
@@ -214,11 +206,7 @@ impl<E: Experiment> OpenRun<'_, E> {
         // Dropped before the set of keys grows, because each of these sets takes 70 MB for a million trials.
         drop((answered, again, paid_for));
         self.keys.extend(&plan.keys);
-        Ok(Remaining {
-            plan,
-            stored,
-            in_batch,
-        })
+        Ok(Remaining { plan, stored, in_batch })
     }
 
     /// Adds the images whose notes were lost to a plan, without trials.
@@ -239,11 +227,7 @@ impl<E: Experiment> OpenRun<'_, E> {
     }
 
     /// Copies the replies to these trials from shards of another division of the run. Returns true if any were copied.
-    fn copy_from_other_shards(
-        &mut self,
-        keys: &[TrialKey],
-        answered: &HashSet<TrialKey>,
-    ) -> Result<bool> {
+    fn copy_from_other_shards(&mut self, keys: &[TrialKey], answered: &HashSet<TrialKey>) -> Result<bool> {
         let others = OtherShards::find::<DetailOf<E>>(self.store.folder(), &self.manifest)?;
         let wanted = keys.iter().filter(|key| !answered.contains(key));
         let sources = self.experiment.sources().iter();
@@ -278,37 +262,22 @@ impl<E: Experiment> OpenRun<'_, E> {
 
     /// Asks the remaining trials of a phase.
     pub(crate) fn ask_phase(&mut self, phase: usize, remaining: Remaining<E>) -> Result<EndReason> {
-        let Remaining {
-            mut plan, stored, ..
-        } = remaining;
+        let Remaining { mut plan, stored, .. } = remaining;
         let experiment = self.experiment;
         let settings = experiment.settings();
         let models = experiment.models(phase);
         let all = every_model(experiment);
-        let run_models = RunModels {
-            models: &all,
-            manifest: Some(&self.manifest),
-        };
+        let run_models = RunModels { models: &all, manifest: Some(&self.manifest) };
         let batches = Journal::open(self.store.folder(), &self.manifest)?.max_open_cost();
         let budget = Budget::for_run(&settings.money, models, run_models, &stored)?;
         let in_flight_cost = InFlightCost::open(self.store.folder())?;
         let budget = budget.with_unrecorded(batches + in_flight_cost.killed());
-        let counts = TrialCounts {
-            trials: plan.keys.len(),
-            answered: plan.keys.len() - plan.remaining(),
-        };
+        let counts = TrialCounts { trials: plan.keys.len(), answered: plan.keys.len() - plan.remaining() };
         let shows_images = !plan.conditions().is_empty();
-        let enhancers = if shows_images {
-            self.enhancers.take_models()?
-        } else {
-            Vec::new()
-        };
+        let enhancers = if shows_images { self.enhancers.take_models()? } else { Vec::new() };
         self.begin(counts, &stored)?;
-        let timed_out: HashSet<TrialKey> = stored
-            .iter()
-            .filter(|trial| trial.timed_out_at_gateway())
-            .map(|trial| trial.key)
-            .collect();
+        let timed_out: HashSet<TrialKey> =
+            stored.iter().filter(|trial| trial.timed_out_at_gateway()).map(|trial| trial.key).collect();
         warn_of_timeouts(plan.remaining_where(|key| timed_out.contains(key)));
         drop(stored);
         let workers = Workers::start(settings.loading.threads.threads)?;
@@ -334,11 +303,9 @@ impl<E: Experiment> OpenRun<'_, E> {
             plan.sources.rotate_left(first);
         }
         if models.iter().any(|model| model.model.is_remote()) {
-            plan.ask_untouched_first(
-                MIN_REPLIES * models.len(),
-                UNTOUCHED_FIRST * models.len(),
-                |source| sources[source].frames.len() == 1,
-            );
+            plan.ask_untouched_first(MIN_REPLIES * models.len(), UNTOUCHED_FIRST * models.len(), |source| {
+                sources[source].frames.len() == 1
+            });
         }
         let stoppers = pipeline.stoppers();
         let dispatcher = Dispatcher {
@@ -348,10 +315,7 @@ impl<E: Experiment> OpenRun<'_, E> {
             timings: &timings,
             timed_out,
             in_flight_cost,
-            replies: ReplyChecks::new(
-                experiment.token_flag(phase),
-                experiment.mark_protocol(phase),
-            ),
+            replies: ReplyChecks::new(experiment.token_flag(phase), experiment.mark_protocol(phase)),
         };
         let missing = missing_notes(experiment, self.store.folder());
         let started = Instant::now();
@@ -361,10 +325,8 @@ impl<E: Experiment> OpenRun<'_, E> {
         self.note_enhancers(usages);
         if settings.show_timings {
             let threads = workers.single_threaded.len();
-            let held_back = models
-                .iter()
-                .map(|model| model.model.held_back())
-                .fold(HeldBack::default(), HeldBack::longest);
+            let held_back =
+                models.iter().map(|model| model.model.held_back()).fold(HeldBack::default(), HeldBack::longest);
             let line = timings.summary(started.elapsed(), threads, held_back);
             let line = match E::PHASES {
                 [_] => line,
@@ -390,10 +352,8 @@ impl<E: Experiment> OpenRun<'_, E> {
 
     /// Writes the numbers of trials into the manifest, so that they are known even if the process is killed.
     pub(crate) fn write_counts(&mut self, stored: &[StoredTrial]) -> Result<()> {
-        self.manifest.counts = Counts {
-            failed: 0,
-            ..self.counts(stored.iter().map(|trial| (trial.key, trial.failed())))
-        };
+        self.manifest.counts =
+            Counts { failed: 0, ..self.counts(stored.iter().map(|trial| (trial.key, trial.failed()))) };
         self.store.write_manifest(&self.manifest)
     }
 
@@ -413,8 +373,8 @@ impl<E: Experiment> OpenRun<'_, E> {
         Ok(())
     }
 
-    /// Numbers of trials of the run, from the keys of the stored trials and whether each failed. Trials that an earlier command planned
-    /// count only if they are answered.
+    /// Numbers of trials of the run, from the keys of the stored trials and whether each failed. Trials that an earlier
+    /// command planned count only if they are answered.
     fn counts(&self, stored: impl Iterator<Item = (TrialKey, bool)>) -> Counts {
         let (mut unplanned, mut answered, mut failed) = (0, 0, 0);
         for (key, has_failed) in stored {
@@ -426,11 +386,7 @@ impl<E: Experiment> OpenRun<'_, E> {
                 failed += 1;
             }
         }
-        Counts {
-            trials: self.keys.len() + unplanned,
-            answered,
-            failed,
-        }
+        Counts { trials: self.keys.len() + unplanned, answered, failed }
     }
 
     /// Scores the run, and writes the report into its folder.
@@ -472,10 +428,7 @@ fn longer_replies(models: &[&ModelUnderTest], trials: &[StoredTrial]) -> BTreeMa
         let tokens = trial.usage().and_then(|usage| usage.completion_tokens);
         let model = models.iter().find(|model| *model.name == **trial.model);
         let limit = model.and_then(|model| model.model.reply_limit());
-        if tokens
-            .zip(limit)
-            .is_some_and(|(tokens, limit)| tokens > limit)
-        {
+        if tokens.zip(limit).is_some_and(|(tokens, limit)| tokens > limit) {
             *longer.entry(trial.model.to_string()).or_default() += 1;
         }
     }
@@ -495,20 +448,15 @@ pub(crate) fn pipeline<'a, E: Experiment>(
     limit: Option<ImageLimit>,
     timings: &'a Timings,
 ) -> ImagePipeline<'a> {
-    let steps = ImageSteps {
-        frames: experiment.frames(),
-        recipe: experiment.recipe(),
-        limit,
-        timings,
-        stored: None,
-    };
+    let steps = ImageSteps { frames: experiment.frames(), recipe: experiment.recipe(), limit, timings, stored: None };
     let implausible = experiment.settings().loading.probe.implausible();
     let mut pipeline = ImagePipeline::new(steps, enhancers, implausible);
     pipeline.whole_run = experiment.probe_sources();
     pipeline
 }
 
-/// The strictest image limit of all endpoints, because each image is made once for all of them; `None` if all models are built in.
+/// The strictest image limit of all endpoints, because each image is made once for all of them; `None` if all models
+/// are built in.
 pub(crate) fn image_limit(settings: &JobSettings) -> Option<ImageLimit> {
     let limit = settings
         .ask
@@ -557,34 +505,20 @@ fn warn_of_timeouts(trials: usize) {
 
 /// Keys of the trials without a reply that were charged as often as `--retries paid` allows.
 pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
-    let Some(max_lost) = settings
-        .ask
-        .servers()
-        .into_iter()
-        .map(|server| server.sending.paid_retries)
-        .max()
-    else {
+    let Some(max_lost) = settings.ask.servers().into_iter().map(|server| server.sending.paid_retries).max() else {
         return HashSet::new();
     };
-    stored
-        .iter()
-        .filter(|trial| trial.failed() && trial.lost_attempts() > max_lost)
-        .map(|trial| trial.key)
-        .collect()
+    stored.iter().filter(|trial| trial.failed() && trial.lost_attempts() > max_lost).map(|trial| trial.key).collect()
 }
 
 /// Keys of the trials whose reply was truncated at a lower limit than the current one of their model.
 pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
-    let limits: HashMap<&str, (u32, u32)> = models
-        .iter()
-        .filter_map(|model| Some((&*model.name, model.model.token_limits()?)))
-        .collect();
+    let limits: HashMap<&str, (u32, u32)> =
+        models.iter().filter_map(|model| Some((&*model.name, model.model.token_limits()?))).collect();
     stored
         .iter()
         .filter(|trial| {
-            limits
-                .get(trial.model.as_str())
-                .is_some_and(|&(limit, first)| trial.is_truncated_below(limit, first))
+            limits.get(trial.model.as_str()).is_some_and(|&(limit, first)| trial.is_truncated_below(limit, first))
         })
         .map(|trial| trial.key)
         .collect()
@@ -592,9 +526,5 @@ pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> Ha
 
 /// Keys of the trials that have a reply.
 pub(crate) fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
-    stored
-        .iter()
-        .filter(|record| !record.failed())
-        .map(|record| record.key)
-        .collect()
+    stored.iter().filter(|record| !record.failed()).map(|record| record.key).collect()
 }

@@ -1,10 +1,11 @@
 //! Trials that the server refused for a cause that it does not name: [`Refusals`].
 //!
-//! A refusal (4xx) may concern the image and the question of one trial, as a filter of the server does under any words; or every request
-//! of the run. What else the model does tells them apart: the trial waits until the model answers another one, and is then asked once
-//! more. If it is refused again for the same cause, the server refuses this content and will do so again: the trial counts as a reply
-//! that a filter withheld, as if the server had sent the filter as its finish reason. Refused requests cost nothing. Later trials with
-//! the same cause are not asked twice. If the model answers nothing, the refusals stay failures, and the circuit breaker stops the model.
+//! A refusal (4xx) may concern the image and the question of one trial, as a filter of the server does under any words;
+//! or every request of the run. What else the model does tells them apart: the trial waits until the model answers
+//! another one, and is then asked once more. If it is refused again for the same cause, the server refuses this content
+//! and will do so again: the trial counts as a reply that a filter withheld, as if the server had sent the filter as
+//! its finish reason. Refused requests cost nothing. Later trials with the same cause are not asked twice. If the model
+//! answers nothing, the refusals stay failures, and the circuit breaker stops the model.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -29,7 +30,8 @@ impl<I> Waiting<I> {
     }
 }
 
-/// Number of trials refused by a status at the end of a run, without a later answer, from which on the key may be the cause; chosen.
+/// Number of trials refused by a status at the end of a run, without a later answer, from which on the key may be the
+/// cause; chosen.
 const STATUS_REFUSALS_AT_END: usize = 3;
 
 /// Refused trials of one model.
@@ -57,10 +59,7 @@ impl<I> Refusals<I> {
             again: BTreeMap::new(),
             confirmed: BTreeSet::new(),
         };
-        Self {
-            models: (0..models).map(of_model).collect(),
-            released: Vec::new(),
-        }
+        Self { models: (0..models).map(of_model).collect(), released: Vec::new() }
     }
 
     /// True if the cause of a refusal is not known yet, so that the trial waits for another answer of its model.
@@ -69,7 +68,8 @@ impl<I> Refusals<I> {
         let Some(cause) = unknown_cause(error) else {
             return false;
         };
-        // The same words may come from a key that was revoked in the meantime: only another answer shows that it was not.
+        // The same words may come from a key that was revoked in the meantime: only another answer shows that it was
+        // not.
         let is_known = model.confirmed.contains(&cause) && error.reach == Reach::Trial;
         !is_known && !model.again.contains_key(&ready.trial.key)
     }
@@ -77,16 +77,12 @@ impl<I> Refusals<I> {
     /// Adds a trial that waits.
     pub(super) fn add(&mut self, ready: PreparedTrial<I>, error: AskError) {
         if let Some(cause) = unknown_cause(&error) {
-            self.models[ready.trial.model].waiting.push(Waiting {
-                ready,
-                error,
-                cause,
-            });
+            self.models[ready.trial.model].waiting.push(Waiting { ready, error, cause });
         }
     }
 
-    /// The result of a trial that does not wait, and the results of waiting trials that follow from it. A refusal of the content becomes a
-    /// reply.
+    /// The result of a trial that does not wait, and the results of waiting trials that follow from it. A refusal of
+    /// the content becomes a reply.
     pub(super) fn settle(&mut self, (ready, result): Finished<I>) -> Vec<Finished<I>> {
         let model = &mut self.models[ready.trial.model];
         let earlier = model.again.remove(&ready.trial.key);
@@ -105,9 +101,7 @@ impl<I> Refusals<I> {
             Err(error) => {
                 let cause = unknown_cause(&error);
                 let is_same = matches!((&earlier, &cause), (Some((first, _)), Some(second)) if first == second);
-                let is_known = cause
-                    .as_ref()
-                    .is_some_and(|cause| model.confirmed.contains(cause));
+                let is_known = cause.as_ref().is_some_and(|cause| model.confirmed.contains(cause));
                 let error = match earlier {
                     Some((_, first)) => AskError {
                         attempts: error.attempts + first.attempts,
@@ -137,25 +131,22 @@ impl<I> Refusals<I> {
         std::mem::take(&mut self.released)
     }
 
-    /// Trials to ask again when no others are left: one of each cause, of models that have answered. Several refusals by a status at the
-    /// end may have the key as their cause, and stay failures.
+    /// Trials to ask again when no others are left: one of each cause, of models that have answered. Several refusals
+    /// by a status at the end may have the key as their cause, and stay failures.
     pub(super) fn release_last(&mut self) -> Vec<PreparedTrial<I>> {
         self.models
             .iter_mut()
             .filter(|model| model.has_answered)
             .flat_map(|model| {
-                let by_status = model
-                    .waiting
-                    .iter()
-                    .filter(|waiting| waiting.is_by_status());
+                let by_status = model.waiting.iter().filter(|waiting| waiting.is_by_status());
                 let is_content = by_status.count() < STATUS_REFUSALS_AT_END;
                 model.release(is_content)
             })
             .collect()
     }
 
-    /// Takes the waiting trials out, with their refusals. `is_over` is true if all others were asked: then the refusals concern every
-    /// request.
+    /// Takes the waiting trials out, with their refusals. `is_over` is true if all others were asked: then the refusals
+    /// concern every request.
     pub(super) fn take_rest(&mut self, is_over: bool) -> Vec<Finished<I>> {
         self.models
             .iter_mut()
@@ -172,22 +163,15 @@ impl<I> Refusals<I> {
 }
 
 impl<I> OfModel<I> {
-    /// Takes one waiting trial of each cause that no trial is asked again for; those refused by a status only if `by_status`.
+    /// Takes one waiting trial of each cause that no trial is asked again for; those refused by a status only if
+    /// `by_status`.
     fn release(&mut self, by_status: bool) -> Vec<PreparedTrial<I>> {
-        let mut causes: BTreeSet<Cause> = self
-            .again
-            .values()
-            .map(|(cause, _)| cause.clone())
-            .collect();
+        let mut causes: BTreeSet<Cause> = self.again.values().map(|(cause, _)| cause.clone()).collect();
         let mut released = Vec::new();
         for waiting in std::mem::take(&mut self.waiting) {
             let is_open = by_status || !waiting.is_by_status();
             if is_open && causes.insert(waiting.cause.clone()) {
-                let Waiting {
-                    ready,
-                    error,
-                    cause,
-                } = waiting;
+                let Waiting { ready, error, cause } = waiting;
                 self.again.insert(ready.trial.key, (cause, error));
                 released.push(ready);
             } else {
@@ -197,27 +181,21 @@ impl<I> OfModel<I> {
         released
     }
 
-    /// Takes the waiting trials of confirmed causes, as replies that a filter withheld; those refused by a status only if `by_status`.
+    /// Takes the waiting trials of confirmed causes, as replies that a filter withheld; those refused by a status only
+    /// if `by_status`.
     fn filtered(&mut self, by_status: bool) -> Vec<Finished<I>> {
         let confirmed = &self.confirmed;
-        let (known, rest) =
-            std::mem::take(&mut self.waiting)
-                .into_iter()
-                .partition(|waiting: &Waiting<I>| {
-                    confirmed.contains(&waiting.cause) && (by_status || !waiting.is_by_status())
-                });
+        let (known, rest) = std::mem::take(&mut self.waiting).into_iter().partition(|waiting: &Waiting<I>| {
+            confirmed.contains(&waiting.cause) && (by_status || !waiting.is_by_status())
+        });
         self.waiting = rest;
-        known
-            .into_iter()
-            .map(|Waiting { ready, error, .. }| (ready, error.into_filtered()))
-            .collect()
+        known.into_iter().map(|Waiting { ready, error, .. }| (ready, error.into_filtered())).collect()
     }
 }
 
 /// The cause of a refusal that may concern the content, if it is not known to be moderation; `None` for other errors.
 fn unknown_cause(error: &AskError) -> Option<Cause> {
-    let is_open = error.failure.kind == FailureKind::Request
-        && matches!(error.reach, Reach::Trial | Reach::ByStatus);
+    let is_open = error.failure.kind == FailureKind::Request && matches!(error.reach, Reach::Trial | Reach::ByStatus);
     let refusal = error.refusal.as_ref().filter(|_| is_open)?;
     Some((refusal.status, refusal.cause.clone()))
 }

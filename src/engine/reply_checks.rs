@@ -15,13 +15,10 @@ pub(crate) struct ReplyChecks {
 }
 
 impl ReplyChecks {
-    /// Checks without replies, for models whose token limit this flag sets, and for replies that this protocol reads as marks.
+    /// Checks without replies, for models whose token limit this flag sets, and for replies that this protocol reads as
+    /// marks.
     pub(crate) fn new(flag: &'static str, protocol: Option<Protocol>) -> Self {
-        Self {
-            flag,
-            truncation: TruncationCheck::new(flag),
-            marks: protocol.map(MarkCheck::new),
-        }
+        Self { flag, truncation: TruncationCheck::new(flag), marks: protocol.map(MarkCheck::new) }
     }
 
     /// Counts a reply.
@@ -73,17 +70,11 @@ impl MarkCheck {
     const MIN_UNREAD: usize = 5;
 
     fn new(protocol: Protocol) -> Self {
-        Self {
-            protocol,
-            replies: 0,
-            unread: 0,
-            tolerant: 0,
-            cut: 0,
-            has_warned: false,
-        }
+        Self { protocol, replies: 0, unread: 0, tolerant: 0, cut: 0, has_warned: false }
     }
 
-    /// Counts a reply. Returns the problem once, if at least [`Self::MIN_UNREAD`] replies and more than half of all have no mark.
+    /// Counts a reply. Returns the problem once, if at least [`Self::MIN_UNREAD`] replies and more than half of all
+    /// have no mark.
     fn count(&mut self, reply: &Reply) -> Option<UnreadMarks> {
         self.replies += 1;
         if mark(&reply.text, self.protocol).is_none() {
@@ -102,33 +93,29 @@ impl MarkCheck {
         } else {
             Cause::Unknown
         };
-        Some(UnreadMarks {
-            unread: self.unread,
-            replies: self.replies,
-            cause,
-        })
+        Some(UnreadMarks { unread: self.unread, replies: self.replies, cause })
     }
 }
 
 impl UnreadMarks {
     /// The warning, with the flag of the token limit.
     fn words(&self, flag: &str) -> String {
-        let Self {
-            unread, replies, ..
-        } = self;
+        let Self { unread, replies, .. } = self;
         let remedy = match self.cause {
             Cause::Limit => format!(
                 "most of them were cut at the token limit: a judge that thinks or explains first needs a larger {flag}"
             ),
-            Cause::Protocol => "the same command with --protocol tolerant reads most of them; only answers that the upstream protocol \
+            Cause::Protocol => {
+                "the same command with --protocol tolerant reads most of them; only answers that the upstream protocol \
                                 shortened are judged again"
-                .to_owned(),
-            Cause::Unknown => "interrupt the run, and see the replies with the command show; another --judge may follow its prompt"
-                .to_owned(),
+                    .to_owned()
+            }
+            Cause::Unknown => {
+                "interrupt the run, and see the replies with the command show; another --judge may follow its prompt"
+                    .to_owned()
+            }
         };
-        format!(
-            "{unread} of the first {replies} replies of the judge have no mark that is read: {remedy}"
-        )
+        format!("{unread} of the first {replies} replies of the judge have no mark that is read: {remedy}")
     }
 }
 
@@ -140,45 +127,22 @@ mod tests {
         let mut check = MarkCheck::new(protocol);
         texts
             .iter()
-            .filter_map(|text| {
-                check.count(&Reply {
-                    finish: finish.clone(),
-                    ..Reply::local((*text).to_owned())
-                })
-            })
+            .filter_map(|text| check.count(&Reply { finish: finish.clone(), ..Reply::local((*text).to_owned()) }))
             .last()
     }
 
     #[test]
     fn unread_marks_are_reported_with_their_cause() {
         for (text, finish, protocol, cause) in [
-            (
-                "{\"mark\": 4}",
-                Finish::Stop,
-                Protocol::Upstream,
-                Some(Cause::Protocol),
-            ),
+            ("{\"mark\": 4}", Finish::Stop, Protocol::Upstream, Some(Cause::Protocol)),
             ("{\"mark\": 4}", Finish::Stop, Protocol::Tolerant, None),
             ("4", Finish::Stop, Protocol::Upstream, None),
             ("", Finish::Length, Protocol::Tolerant, Some(Cause::Limit)),
-            (
-                "<think>Maybe 4",
-                Finish::Length,
-                Protocol::Upstream,
-                Some(Cause::Limit),
-            ),
-            (
-                "It fits.",
-                Finish::Stop,
-                Protocol::Tolerant,
-                Some(Cause::Unknown),
-            ),
+            ("<think>Maybe 4", Finish::Length, Protocol::Upstream, Some(Cause::Limit)),
+            ("It fits.", Finish::Stop, Protocol::Tolerant, Some(Cause::Unknown)),
         ] {
             let found = problem(&[text; 12], &finish, protocol);
-            assert_eq!(
-                found.as_ref().map(|found| found.unread),
-                cause.as_ref().map(|_| 5)
-            );
+            assert_eq!(found.as_ref().map(|found| found.unread), cause.as_ref().map(|_| 5));
             assert_eq!(found.map(|found| found.cause), cause, "{text}");
         }
     }
@@ -188,9 +152,6 @@ mod tests {
         let mut texts = vec!["4"; 6];
         texts.extend(["fits"; 6]);
         assert_eq!(problem(&texts, &Finish::Stop, Protocol::Upstream), None);
-        assert_eq!(
-            problem(&["fits"; 4], &Finish::Stop, Protocol::Upstream),
-            None
-        );
+        assert_eq!(problem(&["fits"; 4], &Finish::Stop, Protocol::Upstream), None);
     }
 }

@@ -1,8 +1,8 @@
 //! A built-in model that sees images, `--model room-net`: [`RoomNet`].
 //!
-//! A small network, trained on well-lit drawn rooms, predicts the class and the distance of each pixel and the type of the room. The
-//! answers are derived from these by rules. The only input is the image of the request. The model is a demonstration, and not a
-//! vision-language model.
+//! A small network, trained on well-lit drawn rooms, predicts the class and the distance of each pixel and the type of
+//! the room. The answers are derived from these by rules. The only input is the image of the request. The model is a
+//! demonstration, and not a vision-language model.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -26,14 +26,7 @@ const VERSION: u32 = 1;
 const SIZE: [usize; 2] = [192, 144];
 
 /// The room types of the network's last output, in its order.
-const ROOMS: [&str; 6] = [
-    "bedroom",
-    "bathroom",
-    "kitchen",
-    "living room",
-    "dining room",
-    "office",
-];
+const ROOMS: [&str; 6] = ["bedroom", "bathroom", "kitchen", "living room", "dining room", "office"];
 
 /// Number of cached predictions. A few are enough, because questions about one image follow each other.
 const PREDICTIONS: usize = 16;
@@ -63,25 +56,18 @@ impl RoomNet {
         }))
     }
 
-    /// The network as a model. If the image does not show the answer, the model guesses as `prior` does, and the record marks the guess.
+    /// The network as a model. If the image does not show the answer, the model guesses as `prior` does, and the record
+    /// marks the guess.
     pub(crate) fn model(self: &Arc<Self>, prior: Random) -> Local {
         let net = Arc::clone(self);
-        let digest = Digest::from_parts([
-            &VERSION.to_le_bytes()[..],
-            ROOM_NET,
-            self.rules.digest().as_bytes(),
-        ]);
+        let digest = Digest::from_parts([&VERSION.to_le_bytes()[..], ROOM_NET, self.rules.digest().as_bytes()]);
         Local::new(
             NAME.to_owned(),
             digest,
             prior,
             Box::new(move |question: &Question, call: &Call<'_>| {
                 let choice = net.answer(question, call).map_err(|e| e.to_string())?;
-                Ok(LocalAnswer {
-                    choice,
-                    observed: None,
-                    guessed: choice.is_none(),
-                })
+                Ok(LocalAnswer { choice, observed: None, guessed: choice.is_none() })
             }),
         )
     }
@@ -116,16 +102,12 @@ impl RoomNet {
             .map(|code| f32::from(*code) / 255.0)
             .collect();
         let outputs = self.network()?.run(vec![1, 3, height, width], input)?;
-        let [classes, metres, rooms] = outputs
-            .try_into()
-            .map_err(|_| Error::Runtime(format!("{NAME}: three outputs expected")))?;
+        let [classes, metres, rooms] =
+            outputs.try_into().map_err(|_| Error::Runtime(format!("{NAME}: three outputs expected")))?;
         let maps = PredictedMaps {
             image,
             classes: classes.into_iter().map(|class: f32| class as u16).collect(),
-            distance_mm: metres
-                .into_iter()
-                .map(|m: f32| (1000.0 * m) as u32)
-                .collect(),
+            distance_mm: metres.into_iter().map(|m: f32| (1000.0 * m) as u32).collect(),
             rooms: ROOMS.into_iter().zip(rooms).collect(),
         };
         PredictedFrame::new(maps, &self.rules, &self.palette)

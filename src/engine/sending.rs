@@ -12,8 +12,8 @@ use crate::types::{LostAttempts, Reply};
 /// One trial, with its reply or error.
 pub(super) type Finished<I> = (PreparedTrial<I>, Result<Reply, AskError>);
 
-/// Sends one trial to its model, unless it is given up first. Returns the trial with its reply or error, including the cost of lost
-/// attempts. `has_timed_out` is true if a gateway gave up on it in an earlier call.
+/// Sends one trial to its model, unless it is given up first. Returns the trial with its reply or error, including the
+/// cost of lost attempts. `has_timed_out` is true if a gateway gave up on it in an earlier call.
 pub(super) async fn send<I: Item>(
     model: ModelUnderTest,
     ready: PreparedTrial<I>,
@@ -47,10 +47,7 @@ pub(super) async fn send<I: Item>(
             error.lost.unstated = charged.unstated;
             Err(error)
         }
-        None => Err(AskError {
-            lost: Box::new(charged),
-            ..AskError::given_up()
-        }),
+        None => Err(AskError { lost: Box::new(charged), ..AskError::given_up() }),
     };
     (ready, result)
 }

@@ -13,13 +13,10 @@ pub(super) struct ServedNames {
 }
 
 impl ServedNames {
-    /// Adds a reply. Warns if the first name is evidently that of another model, and once if a later name differs from the first.
+    /// Adds a reply. Warns if the first name is evidently that of another model, and once if a later name differs from
+    /// the first.
     pub(super) fn add(&mut self, model: &ModelUnderTest, reply: &Reply) {
-        let Some(served) = reply
-            .served_model
-            .as_deref()
-            .filter(|name| !name.is_empty())
-        else {
+        let Some(served) = reply.served_model.as_deref().filter(|name| !name.is_empty()) else {
             return;
         };
         let name = &model.name;

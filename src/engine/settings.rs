@@ -9,18 +9,14 @@ use std::time::Duration;
 use clap::Args;
 use serde_json::Value;
 
-use crate::ask::{
-    AccessArgs, ConcurrencyBounds, Constrain, Parameters, RequestArgs, Sending, SettingsOrigin,
-};
+use crate::ask::{AccessArgs, ConcurrencyBounds, Constrain, Parameters, RequestArgs, Sending, SettingsOrigin};
 use crate::engine::continuation::Continuation;
 use crate::engine::costs::{MoneyArgs, MoneySettings};
 use crate::engine::image_cache::StoreArgs;
 use crate::engine::images::enhancement::enhancers::{self, EnhancerRunArgs};
 use crate::engine::images::recipes::image_words::ImageWords;
 use crate::engine::images::trials::check_used;
-use crate::engine::models::{
-    AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline,
-};
+use crate::engine::models::{AskSettings, AskingArgs, KeyUse, ModelArgs, ModelName, ResolveContext, TextBaseline};
 use crate::error::{Error, Result};
 use crate::files::folder_access::FolderAccess;
 use crate::pictures::{ImageArgs, PayloadFormat};
@@ -95,16 +91,16 @@ pub(crate) struct JobArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Scale")]
 pub(crate) struct ScaleArgs {
-    /// Run shard I of N, split by frames or walks: I/N; auto/N or auto takes the numbers of the batch system (Slurm arrays, indexed
-    /// Kubernetes jobs); none runs everything. --rpm, --tpm and --max-cost apply to all shards together. With another N, replies of earlier
-    /// shards are copied; default: auto in a Slurm array, else none
+    /// Run shard I of N, split by frames or walks: I/N; auto/N or auto takes the numbers of the batch system (Slurm
+    /// arrays, indexed Kubernetes jobs); none runs everything. --rpm, --tpm and --max-cost apply to all shards
+    /// together. With another N, replies of earlier shards are copied; default: auto in a Slurm array, else none
     #[arg(long, value_name = "I/N|auto/N|auto|none", add = Decides::Trials)]
     pub shard: Option<String>,
     /// Number of shards that run at once, each with its share of --rpm and --tpm; default: all
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub workers: Option<NonZeroU32>,
-    /// Seconds that an interrupted run (Ctrl-C, SIGTERM, SIGHUP) waits for requests in flight; choose less than the grace period of the
-    /// batch system
+    /// Seconds that an interrupted run (Ctrl-C, SIGTERM, SIGHUP) waits for requests in flight; choose less than the
+    /// grace period of the batch system
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "120", add = Decides::Nothing)]
     pub grace: Duration,
     /// Print the time of each step, the bottleneck and remedies at the end
@@ -119,11 +115,12 @@ pub(crate) struct OutputArgs {
     /// Run folder; default: results/TIME-MODEL-DATA-HASH, which the same command finds again
     #[arg(long, value_name = "DIR", conflicts_with = "resume", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
-    /// Continue the run in this folder: repeat its flags, with added values to extend it (--profile paper,physical); default: none
+    /// Continue the run in this folder: repeat its flags, with added values to extend it (--profile paper,physical);
+    /// default: none
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub resume: Option<PathBuf>,
-    /// Create run and --images-cache folders with the permissions of the umask; default: readable by you only, because they hold replies
-    /// and pictures of homes
+    /// Create run and --images-cache folders with the permissions of the umask; default: readable by you only, because
+    /// they hold replies and pictures of homes
     #[arg(long, add = Decides::Nothing)]
     pub shared: bool,
     /// How the report is printed.
@@ -131,7 +128,8 @@ pub(crate) struct OutputArgs {
     pub show: ShowArgs,
 }
 
-/// Validated settings that all experiments share. Files, environment variables and API keys are read to resolve them, and not later.
+/// Validated settings that all experiments share. Files, environment variables and API keys are read to resolve them,
+/// and not later.
 #[derive(Debug)]
 pub(crate) struct JobSettings {
     /// Levels and kinds of degradation.
@@ -196,16 +194,13 @@ pub(crate) struct ExperimentSettings {
 impl JobSettings {
     /// True if at least one model of the run gets images.
     pub(crate) fn shows_images(&self) -> bool {
-        self.ask
-            .models
-            .iter()
-            .any(|model| model.view == View::Image)
+        self.ask.models.iter().any(|model| model.view == View::Image)
     }
 
     /// Reads the files of the enhancement models, after a check that the run uses each.
     ///
-    /// Opens ONNX Runtime if an enhancer or the model `room-net` needs it, to report a missing library before any slow step. The folder
-    /// of an existing run is exempt, because that run may not need the runtime any more.
+    /// Opens ONNX Runtime if an enhancer or the model `room-net` needs it, to report a missing library before any slow
+    /// step. The folder of an existing run is exempt, because that run may not need the runtime any more.
     pub(crate) fn enhancers(&self) -> Result<Vec<ModelFile>> {
         check_used(&self.light, &self.enhancers)?;
         let files = enhancers::read_models(&self.enhancers.llie)?;
@@ -259,7 +254,8 @@ impl JobArgs {
         }
     }
 
-    /// Checks that each model has an endpoint and the API key that it needs, without sending a request. Returns `NAME (VIEW)` per model.
+    /// Checks that each model has an endpoint and the API key that it needs, without sending a request. Returns `NAME
+    /// (VIEW)` per model.
     ///
     /// # Errors
     /// [`Error::Usage`] with the invalid flag, variable or file.
@@ -274,11 +270,7 @@ impl JobArgs {
         };
         let defaults = self.request_defaults(experiment);
         let settings = AskSettings::resolve(&self.models, &defaults, context)?;
-        Ok(settings
-            .models
-            .iter()
-            .map(|model| format!("{} ({})", model.name, model.view))
-            .collect())
+        Ok(settings.models.iter().map(|model| format!("{} ({})", model.name, model.view)).collect())
     }
 
     /// Validates the flags, and reads the files and environment variables that they name.
@@ -287,21 +279,14 @@ impl JobArgs {
     /// [`Error::Usage`] with the invalid flag.
     pub(crate) fn resolve(self, experiment: &ExperimentSettings) -> Result<JobSettings> {
         let place = RunPlace::from(self.output.clone());
-        let ResolvedShard { shard, tasks } = ResolvedShard::resolve(
-            self.scale.shard.as_deref(),
-            |name| std::env::var(name).ok(),
-            place.folder(),
-        )?;
+        let ResolvedShard { shard, tasks } =
+            ResolvedShard::resolve(self.scale.shard.as_deref(), |name| std::env::var(name).ok(), place.folder())?;
         let defaults = self.request_defaults(experiment);
         let context = ResolveContext {
             typed: &self.typed,
             shard,
             workers: self.scale.workers,
-            keys: if self.money.dry_run {
-                KeyUse::NotNeeded
-            } else {
-                KeyUse::Needed
-            },
+            keys: if self.money.dry_run { KeyUse::NotNeeded } else { KeyUse::Needed },
             data: experiment.data.as_deref(),
             text_baseline: experiment.text_baseline,
         };
@@ -373,7 +358,8 @@ impl RunPlace {
         self.folder().map_or(Ok(None), RunPlan::read)
     }
 
-    /// The run in the named folder. Empty without a run, or if the manifest cannot be read: opening the folder reports that error.
+    /// The run in the named folder. Empty without a run, or if the manifest cannot be read: opening the folder reports
+    /// that error.
     fn continuation(&self) -> Continuation {
         Continuation {
             columns: self.read_or_default(store::read_columns),
@@ -393,7 +379,8 @@ impl RunPlace {
         read.flatten().unwrap_or_default()
     }
 
-    /// Returns the choice if its folder is writable. The check runs before images are made, so that an error costs no time.
+    /// Returns the choice if its folder is writable. The check runs before images are made, so that an error costs no
+    /// time.
     ///
     /// # Errors
     /// [`Error::Usage`] if a folder to resume is missing, or if the folder is not writable.
@@ -410,10 +397,7 @@ impl RunPlace {
             }
         };
         let absolute = path::absolute(path).map_err(|e| not_writable(flag, path, &e))?;
-        let existing = absolute
-            .ancestors()
-            .find(|folder| folder.exists())
-            .unwrap_or(&absolute);
+        let existing = absolute.ancestors().find(|folder| folder.exists()).unwrap_or(&absolute);
         // An unnamed temporary file, which the system deletes when it is closed.
         tempfile::tempfile_in(existing).map_err(|e| not_writable(flag, existing, &e))?;
         Ok(self)
@@ -433,8 +417,5 @@ impl RunPlace {
 fn not_writable(flag: &str, folder: &Path, e: &dyn Display) -> Error {
     let folder = folder.display();
     let remedy = "--out DIR names another folder";
-    Error::usage(
-        flag,
-        format_args!("cannot write to {folder}: {e}; {remedy}"),
-    )
+    Error::usage(flag, format_args!("cannot write to {folder}: {e}; {remedy}"))
 }

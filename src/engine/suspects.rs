@@ -5,10 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::ask::{AskError, Reach};
 use crate::types::FailureKind;
 
-/// Number of failed trials about an image after which its other trials are asked last. A single failure may have another cause.
+/// Number of failed trials about an image after which its other trials are asked last. A single failure may have
+/// another cause.
 const ASIDE_AFTER: usize = 2;
 
-/// Number of failed trials about an image after which no more are asked, if the model answers about other images; chosen.
+/// Number of failed trials about an image after which no more are asked, if the model answers about other images;
+/// chosen.
 const GIVEN_UP_AFTER: usize = 3;
 
 /// Counts of failures by model and by frame or walk, to find images that make a server fail.
@@ -16,7 +18,8 @@ const GIVEN_UP_AFTER: usize = 3;
 pub(crate) struct Suspects {
     /// Number of failures of the server or the network, by model and source.
     failures: BTreeMap<(usize, String), usize>,
-    /// Models with the sources that they have answered a trial about. Such a source is not suspected: the server had an outage.
+    /// Models with the sources that they have answered a trial about. Such a source is not suspected: the server had an
+    /// outage.
     answered: BTreeSet<(usize, String)>,
     /// True once only the trials that were set aside are left.
     asks_deferred: bool,
@@ -30,7 +33,8 @@ impl Suspects {
         self.answered.insert(key);
     }
 
-    /// Records a failure, unless its cause cannot be the image. Returns true if the other trials about the image are set aside from now on.
+    /// Records a failure, unless its cause cannot be the image. Returns true if the other trials about the image are
+    /// set aside from now on.
     pub(crate) fn failed(&mut self, model: usize, error: &AskError, source: &str) -> bool {
         use FailureKind::{Connection, Response, Server, Timeout};
         let may_be_image = matches!(error.failure.kind, Connection | Response | Server | Timeout);
@@ -43,7 +47,8 @@ impl Suspects {
         *count == ASIDE_AFTER && !self.asks_deferred
     }
 
-    /// True if the image alone may be the cause of a failure: the model has not answered about it, and trials about others are left.
+    /// True if the image alone may be the cause of a failure: the model has not answered about it, and trials about
+    /// others are left.
     pub(crate) fn may_be_cause(&self, model: usize, source: &str) -> bool {
         !self.asks_deferred && !self.answered.contains(&(model, source.to_owned()))
     }
@@ -53,11 +58,10 @@ impl Suspects {
         !self.asks_deferred && self.count(model, source) >= ASIDE_AFTER
     }
 
-    /// True if no more trials about a source are asked in this call, because the server fails for it and answers others.
+    /// True if no more trials about a source are asked in this call, because the server fails for it and answers
+    /// others.
     pub(crate) fn is_given_up(&self, model: usize, source: &str) -> bool {
-        self.asks_deferred
-            && self.has_answered(model)
-            && self.count(model, source) >= GIVEN_UP_AFTER
+        self.asks_deferred && self.has_answered(model) && self.count(model, source) >= GIVEN_UP_AFTER
     }
 
     /// Begins the trials that were set aside; no others are left.
@@ -67,10 +71,7 @@ impl Suspects {
 
     /// True if a model has answered any trial.
     pub(crate) fn has_answered(&self, model: usize) -> bool {
-        self.answered
-            .range((model, String::new())..)
-            .next()
-            .is_some_and(|(answered, _)| *answered == model)
+        self.answered.range((model, String::new())..).next().is_some_and(|(answered, _)| *answered == model)
     }
 
     fn count(&self, model: usize, source: &str) -> usize {
@@ -114,9 +115,6 @@ mod tests {
         for _ in 0..9 {
             suspects.failed(0, &error(FailureKind::RateLimit), "i1");
         }
-        assert!(
-            !suspects.is_deferred(0, "i1"),
-            "the rate is not about the image"
-        );
+        assert!(!suspects.is_deferred(0, "i1"), "the rate is not about the image");
     }
 }

@@ -24,17 +24,11 @@ impl TruncationCheck {
 
     /// A check without replies, for models whose token limit this flag sets.
     pub(super) fn new(flag: &'static str) -> Self {
-        Self {
-            flag,
-            replies: 0,
-            cut: 0,
-            empty: 0,
-            has_warned: false,
-        }
+        Self { flag, replies: 0, cut: 0, empty: 0, has_warned: false }
     }
 
-    /// Counts a reply. Warns once: if more than half of the first [`Self::FIRST`] replies have no text, or later if a quarter of all
-    /// replies were cut.
+    /// Counts a reply. Warns once: if more than half of the first [`Self::FIRST`] replies have no text, or later if a
+    /// quarter of all replies were cut.
     pub(super) fn count(&mut self, reply: &Reply) {
         self.replies += 1;
         if reply.finish == Finish::Length {
@@ -83,15 +77,8 @@ mod tests {
     fn after(replies: usize, is_cut: impl Fn(usize) -> bool) -> TruncationCheck {
         let mut check = TruncationCheck::new("--max-tokens");
         for i in 0..replies {
-            let finish = if is_cut(i) {
-                Finish::Length
-            } else {
-                Finish::Stop
-            };
-            check.count(&Reply {
-                finish,
-                ..Reply::local("It is".into())
-            });
+            let finish = if is_cut(i) { Finish::Length } else { Finish::Stop };
+            check.count(&Reply { finish, ..Reply::local("It is".into()) });
         }
         check
     }
@@ -101,9 +88,6 @@ mod tests {
         assert!(!after(19, |_| true).has_warned, "too few");
         assert!(after(20, |i| i % 4 == 0).has_warned);
         assert!(!after(400, |i| i % 5 == 0).has_warned);
-        assert!(
-            after(400, |i| i >= 290).has_warned,
-            "not the first ten alone"
-        );
+        assert!(after(400, |i| i >= 290).has_warned, "not the first ten alone");
     }
 }

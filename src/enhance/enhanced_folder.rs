@@ -23,13 +23,9 @@ impl FromStr for EnhancedFolder {
             .split_once('=')
             .filter(|(_, folder)| !folder.is_empty())
             .ok_or("expected NAME=DIR, such as mine=enhanced/")?;
-        let name = EnhancerName::new(name).map_err(|_| {
-            format!("{name:?} is not a valid name; use letters, digits, '_', '-' and '.'")
-        })?;
-        Ok(Self {
-            name,
-            folder: folder.into(),
-        })
+        let name = EnhancerName::new(name)
+            .map_err(|_| format!("{name:?} is not a valid name; use letters, digits, '_', '-' and '.'"))?;
+        Ok(Self { name, folder: folder.into() })
     }
 }
 

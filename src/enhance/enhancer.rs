@@ -23,8 +23,8 @@ use super::planes::Planes;
 use super::probes::Usage;
 use super::sizing::reach::{self, Context};
 use super::sizing::{
-    AcceptedSizes, MULTIPLES, PlanError, SeamRule, SizePlan, SizeRule, SizeSearch, TileWindow,
-    TiledImage, Tiling, count_image, count_planned, not_local, seams_differ, sizes_not_found,
+    AcceptedSizes, MULTIPLES, PlanError, SeamRule, SizePlan, SizeRule, SizeSearch, TileWindow, TiledImage, Tiling,
+    count_image, count_planned, not_local, seams_differ, sizes_not_found,
 };
 
 /// Method to fit an image to a model that accepts a single size.
@@ -33,8 +33,8 @@ pub enum Fitting {
     /// Pad the image or cut it into tiles. Refused if a pixel of the output depends on distant pixels.
     #[default]
     Tiles,
-    /// Resize the image to the fixed size, and the result back (`--llie-options resize`). The model sees a distorted image, and the
-    /// result is blurred.
+    /// Resize the image to the fixed size, and the result back (`--llie-options resize`). The model sees a distorted
+    /// image, and the result is blurred.
     Resize,
 }
 
@@ -60,22 +60,21 @@ fn graph_source(
         let bytes = random.with_seeds(std::mem::take(&mut file.bytes));
         return Ok((GraphSource::Memory(bytes), flushed));
     }
-    // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file, without changes.
+    // ONNX Runtime locates external data relative to the model's path, so such a model is loaded from its file, without
+    // changes.
     if !has_wrong_shapes {
         return Ok((GraphSource::Path(file.path.clone()), 0));
     }
     let path = std::path::absolute(&file.path).map_err(|e| Error::file(&file.path, "locate", e))?;
-    let source = GraphSource::MemoryBeside {
-        bytes: std::mem::take(&mut file.bytes),
-        folder: path.with_file_name(""),
-    };
+    let source = GraphSource::MemoryBeside { bytes: std::mem::take(&mut file.bytes), folder: path.with_file_name("") };
     Ok((source, 0))
 }
 
 /// Side, in pixels, of a test image that should fit in memory with any model; chosen.
 const SMALL_SIDE: usize = 64;
 
-/// Result of one attempt to enhance an image: the enhanced image, or a failed run that may succeed at another input size.
+/// Result of one attempt to enhance an image: the enhanced image, or a failed run that may succeed at another input
+/// size.
 type Attempt = std::result::Result<Rgb, RunFailure>;
 
 /// A loaded enhancement model.
@@ -105,8 +104,8 @@ pub struct Enhancer {
 }
 
 impl Enhancer {
-    /// Loads a model from the bytes in `file`, which its digest identifies; a model with external data is read again from its path.
-    /// `threads` is the number of threads for one image, by default the number of cores.
+    /// Loads a model from the bytes in `file`, which its digest identifies; a model with external data is read again
+    /// from its path. `threads` is the number of threads for one image, by default the number of cores.
     ///
     /// # Errors
     /// If ONNX Runtime refuses the model, or if its image input or image output cannot be identified.
@@ -128,25 +127,14 @@ impl Enhancer {
         let has_wrong_shapes = file.leave_out_wrong_shapes();
         let random = RandomOperators::find(&file.bytes).unwrap_or_default();
         let products = computed_products(&file.bytes);
-        let threads = if products.is_empty() {
-            threads
-        } else {
-            Some(NonZeroUsize::MIN)
-        };
+        let threads = if products.is_empty() { threads } else { Some(NonZeroUsize::MIN) };
         let (source, flushed) = graph_source(&mut file, &random, has_wrong_shapes)?;
-        let graph = Graph::load(
-            source,
-            &file.sidecar,
-            file.preset.as_ref(),
-            runtime,
-            threads,
-            limits,
-        )?
-        .map_err(|problem| {
-            let path = file.path.clone();
-            let problem = sidecar::insert_sidecar_name(&problem, &path);
-            Error::Enhancer { path, problem }
-        })?;
+        let graph =
+            Graph::load(source, &file.sidecar, file.preset.as_ref(), runtime, threads, limits)?.map_err(|problem| {
+                let path = file.path.clone();
+                let problem = sidecar::insert_sidecar_name(&problem, &path);
+                Error::Enhancer { path, problem }
+            })?;
         let remarks = graph
             .unread_images()
             .into_iter()
@@ -231,8 +219,7 @@ impl Enhancer {
     /// Text table of the model's input and output conventions, with the source of each value.
     #[must_use]
     pub fn describe(&self) -> String {
-        self.description
-            .text(&self.path, &self.graph, &self.graph.convention)
+        self.description.text(&self.path, &self.graph, &self.graph.convention)
     }
 
     /// A handle that stops the enhancer from another thread.
@@ -243,12 +230,12 @@ impl Enhancer {
 
     /// Enhances an image; the result has the same size.
     ///
-    /// For a model with a fixed size, the image is padded, tiled or resized, as chosen by [`Self::with_fitting`]. If the model fails at
-    /// the image's size, the sizes that it accepts are searched by trial, once per model.
+    /// For a model with a fixed size, the image is padded, tiled or resized, as chosen by [`Self::with_fitting`]. If
+    /// the model fails at the image's size, the sizes that it accepts are searched by trial, once per model.
     ///
     /// # Errors
-    /// If the model fails on this image, if its output has another size or values that are NaN or out of range, if tiles differ where
-    /// they overlap, or if a memory or time limit is exceeded.
+    /// If the model fails on this image, if its output has another size or values that are NaN or out of range, if
+    /// tiles differ where they overlap, or if a memory or time limit is exceeded.
     pub fn enhance(&mut self, image: &Rgb) -> Result<Rgb> {
         if self.consecutive_overruns >= MAX_CONSECUTIVE_OVERRUNS {
             return Err(self.error(format!(
@@ -258,9 +245,7 @@ impl Enhancer {
         self.graph.restart_clock();
         let size = [image.height(), image.width()];
         let attempt = match self.attempt(image, self.rule(size))? {
-            Err(failure) if failure.may_depend_on_size() => {
-                self.attempt_at_found_size(image, failure)?
-            }
+            Err(failure) if failure.may_depend_on_size() => self.attempt_at_found_size(image, failure)?,
             attempt => attempt,
         };
         match attempt {
@@ -320,16 +305,13 @@ impl Enhancer {
         }
     }
 
-    /// Enhances an image padded to the first of [`MULTIPLES`] at which the model runs or exceeds a limit. Some models accept any size above
-    /// a minimum, and fail on smaller images.
+    /// Enhances an image padded to the first of [`MULTIPLES`] at which the model runs or exceeds a limit. Some models
+    /// accept any size above a minimum, and fail on smaller images.
     fn attempt_padded(&mut self, image: &Rgb, failure: RunFailure) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let mut tried = vec![size];
         for multiple in MULTIPLES {
-            let rule = SizeRule {
-                multiple,
-                ..self.rule(size)
-            };
+            let rule = SizeRule { multiple, ..self.rule(size) };
             let whole = rule.run_size(size);
             if !tried.contains(&whole) {
                 tried.push(whole);
@@ -367,17 +349,16 @@ impl Enhancer {
             let tile = rule.run_size([reach::FREE_SIDE; 2]);
             let alignment = self.alignment(rule, tile, context)?;
             if alignment > 1 && rule.tile.is_none() {
-                // The reach was measured at one position within a block of `alignment` pixels; at others it may be larger.
+                // The reach was measured at one position within a block of `alignment` pixels; at others it may be
+                // larger.
                 context += alignment - 1;
             }
             rule.multiple = alignment;
         }
-        let mut plan =
-            SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.plan_error(e))?;
+        let mut plan = SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.plan_error(e))?;
         if rule.takes_any_size() && plan.seams == SeamRule::MustHold && plan.tiles.count() > 1 {
             rule.multiple = self.alignment(rule, plan.run_size(), plan.geometry.context)?;
-            plan =
-                SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.plan_error(e))?;
+            plan = SizePlan::new(size, rule, self.tiling, context).map_err(|e| self.plan_error(e))?;
         }
         if rule.takes_any_size() {
             self.check_memory(rule, plan.run_size(), size)?;
@@ -402,7 +383,8 @@ impl Enhancer {
         Ok(found)
     }
 
-    /// Fails if a large run needs more memory than is available. The input has height and width `input`, the image `size`.
+    /// Fails if a large run needs more memory than is available. The input has height and width `input`, the image
+    /// `size`.
     fn check_memory(&mut self, rule: SizeRule, input: [usize; 2], size: [usize; 2]) -> Result<()> {
         let used = self.graph.used_time();
         let checked = self.memory.run(&self.graph, rule, input, size)?;
@@ -433,16 +415,9 @@ impl Enhancer {
     }
 
     /// Resizes an image to height and width `input`, enhances it, and resizes the result back.
-    fn attempt_resized(
-        &mut self,
-        image: &Rgb,
-        rule: SizeRule,
-        input: [usize; 2],
-    ) -> Result<Attempt> {
+    fn attempt_resized(&mut self, image: &Rgb, rule: SizeRule, input: [usize; 2]) -> Result<Attempt> {
         self.check_memory(rule, input, [image.height(), image.width()])?;
-        let planes = Planes::from_rgb(image)
-            .resized(input[0], input[1])
-            .map_err(|e| self.error(e))?;
+        let planes = Planes::from_rgb(image).resized(input[0], input[1]).map_err(|e| self.error(e))?;
         let enhanced = match self.graph.run_planes(&planes)? {
             RunResult::Output(planes) => planes,
             RunResult::Failed(failure) => return Ok(Err(failure)),
@@ -499,27 +474,18 @@ impl Enhancer {
         self.graph.restart_clock();
         let image = Rgb::black(size[0], size[1]);
         match self.graph.probe(&image, TileWindow::whole(size)) {
-            Ok(RunResult::Failed(RunFailure::NoMemory { requested, .. })) => {
-                requested.is_some() && requested == bytes
-            }
+            Ok(RunResult::Failed(RunFailure::NoMemory { requested, .. })) => requested.is_some() && requested == bytes,
             _ => false,
         }
     }
 
     /// Error about this model; the message is the file's name followed by `problem`.
     pub(super) fn error(&self, problem: impl AsRef<str>) -> Error {
-        Error::Enhancer {
-            path: self.path.clone(),
-            problem: sidecar::insert_sidecar_name(problem.as_ref(), &self.path),
-        }
+        Error::Enhancer { path: self.path.clone(), problem: sidecar::insert_sidecar_name(problem.as_ref(), &self.path) }
     }
 
     fn invalid_values_error(&self, values: InvalidValues, image: &Rgb) -> Error {
         let size = [image.height(), image.width()];
-        self.error(describe_invalid_values(
-            values,
-            self.graph.decoding.range(),
-            size,
-        ))
+        self.error(describe_invalid_values(values, self.graph.decoding.range(), size))
     }
 }

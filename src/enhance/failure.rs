@@ -1,4 +1,5 @@
-//! Failures of a run ([`RunFailure`]), and messages about models that ONNX Runtime cannot load ([`describe_load_failure`]).
+//! Failures of a run ([`RunFailure`]), and messages about models that ONNX Runtime cannot load
+//! ([`describe_load_failure`]).
 //!
 //! The recognised error messages are those of ONNX Runtime 1.17 to 1.31.1.
 
@@ -55,12 +56,7 @@ pub(super) enum RunFailure {
 impl RunFailure {
     /// Classifies an error message of ONNX Runtime from a run on an input of height and width `fed`.
     pub(super) fn from_message(fed: [usize; 2], message: String) -> Self {
-        const MEMORY: [&str; 4] = [
-            "Failed to allocate memory",
-            "bad_alloc",
-            "bad allocation",
-            "Available memory of",
-        ];
+        const MEMORY: [&str; 4] = ["Failed to allocate memory", "bad_alloc", "bad allocation", "Available memory of"];
         if MEMORY.iter().any(|words| message.contains(words)) {
             let requested = parse_number_after(&message, "requested buffer of size ");
             return Self::NoMemory { fed, requested };
@@ -73,28 +69,22 @@ impl RunFailure {
         match self {
             Self::WrongSize { .. } => self.upscaling_factor().is_none(),
             Self::RuntimeError { .. } => true,
-            Self::NoMemory { .. }
-            | Self::TimedOut(_)
-            | Self::MemoryExceeded(_)
-            | Self::CannotTile(_) => false,
+            Self::NoMemory { .. } | Self::TimedOut(_) | Self::MemoryExceeded(_) | Self::CannotTile(_) => false,
         }
     }
 
     /// Factor by which the model enlarges both sides; `None` if it does not enlarge them or by different factors.
     fn upscaling_factor(&self) -> Option<usize> {
         match self {
-            Self::WrongSize {
-                fed,
-                given: Some(given),
-                ..
-            } => UPSCALING_FACTORS
-                .into_iter()
-                .find(|factor| fed.map(|side| side * factor) == *given),
+            Self::WrongSize { fed, given: Some(given), .. } => {
+                UPSCALING_FACTORS.into_iter().find(|factor| fed.map(|side| side * factor) == *given)
+            }
             _ => None,
         }
     }
 
-    /// Message about the failure, to follow the file's name. For [`Self::NoMemory`], `out_of_memory` in `limits` adds figures and a remedy.
+    /// Message about the failure, to follow the file's name. For [`Self::NoMemory`], `out_of_memory` in `limits` adds
+    /// figures and a remedy.
     pub(super) fn message(&self) -> String {
         match self {
             Self::WrongSize { fed, dims, given } => match self.upscaling_factor() {
@@ -136,13 +126,9 @@ impl RunFailure {
     }
 }
 
-/// Message about input or output values that cannot be used, for an image of this size; it follows the file's name. `range` is the
-/// expected range of the output.
-pub(super) fn describe_invalid_values(
-    values: InvalidValues,
-    range: ValueRange,
-    size: [usize; 2],
-) -> String {
+/// Message about input or output values that cannot be used, for an image of this size; it follows the file's name.
+/// `range` is the expected range of the output.
+pub(super) fn describe_invalid_values(values: InvalidValues, range: ValueRange, size: [usize; 2]) -> String {
     match values {
         InvalidValues::NonFiniteInput => format!(
             "is fed values that are not finite, from `input` or `from` in MODEL.onnx.toml on an image of {}; check their divisions and powers",
@@ -165,9 +151,7 @@ fn wrong_size_remedy(fed: [usize; 2], given: [usize; 2]) -> &'static str {
         [Some(rows), Some(columns)] if rows == columns && rows <= 64 => {
             "its convolutions cut off the edges; export it with padding that keeps the size"
         }
-        [Some(_), Some(_)] => {
-            "it makes the image smaller; export it with the upsampling to the size of the input"
-        }
+        [Some(_), Some(_)] => "it makes the image smaller; export it with the upsampling to the size of the input",
         _ => "export it so that it gives the size of the input",
     }
 }
@@ -183,30 +167,19 @@ pub(super) fn describe_load_failure(message: &str, version: &str) -> String {
         parse_number_after(message, "Unsupported model IR version: "),
         parse_number_after(message, "max supported IR version: "),
     );
-    let opset = (
-        parse_number_after(message, "Opset "),
-        parse_number_after(message, "is till opset "),
-    );
+    let opset = (parse_number_after(message, "Opset "), parse_number_after(message, "is till opset "));
     match (ir, opset) {
-        ((Some(needed), Some(most)), _) => {
-            describe_too_new("IR version", needed, most, PINNED_IR, version)
-        }
-        (_, (Some(needed), Some(most))) => {
-            describe_too_new("operator set", needed, most, PINNED_OPSET, version)
-        }
-        _ if message.contains("is not a registered function/op")
-            || message.contains("No Op registered for") =>
-        {
-            format!(
-                "has an operator that is not part of ONNX; export it with standard operators only ({message})"
-            )
+        ((Some(needed), Some(most)), _) => describe_too_new("IR version", needed, most, PINNED_IR, version),
+        (_, (Some(needed), Some(most))) => describe_too_new("operator set", needed, most, PINNED_OPSET, version),
+        _ if message.contains("is not a registered function/op") || message.contains("No Op registered for") => {
+            format!("has an operator that is not part of ONNX; export it with standard operators only ({message})")
         }
         _ => format!("ONNX Runtime cannot load it: {message}"),
     }
 }
 
-/// Message about a model that needs a newer ONNX Runtime than `version`: version `needed` of `what`, where `version` reads up to `most`
-/// and [`PINNED`] up to `pinned`.
+/// Message about a model that needs a newer ONNX Runtime than `version`: version `needed` of `what`, where `version`
+/// reads up to `most` and [`PINNED`] up to `pinned`.
 fn describe_too_new(what: &str, needed: u32, most: u32, pinned: u32, version: &str) -> String {
     let way_out = if needed <= pinned && version != PINNED {
         format!(
@@ -233,27 +206,16 @@ mod tests {
 
     /// Failure of a run on an input of height 10 and width 20 that gave an output of size `given`.
     fn wrong_size(given: [usize; 2]) -> RunFailure {
-        RunFailure::WrongSize {
-            fed: [10, 20],
-            dims: vec![1, 3, given[0] as i64, given[1] as i64],
-            given: Some(given),
-        }
+        RunFailure::WrongSize { fed: [10, 20], dims: vec![1, 3, given[0] as i64, given[1] as i64], given: Some(given) }
     }
 
     #[test]
     fn messages_about_wrong_sizes_name_the_likely_cause() {
         let twice = wrong_size([20, 40]);
         assert!(!twice.may_depend_on_size());
-        assert!(
-            twice.message().starts_with("enlarges by 2: "),
-            "{}",
-            twice.message()
-        );
+        assert!(twice.message().starts_with("enlarges by 2: "), "{}", twice.message());
         let cut = wrong_size([6, 16]).message();
-        assert!(
-            cut.contains("16 × 6 for one of 20 × 10") && cut.contains("padding"),
-            "{cut}"
-        );
+        assert!(cut.contains("16 × 6 for one of 20 × 10") && cut.contains("padding"), "{cut}");
         assert!(wrong_size([5, 10]).message().contains("upsampling"));
         for given in [[20, 60], [8, 16], [50, 100]] {
             let failure = wrong_size(given);
@@ -266,13 +228,7 @@ mod tests {
         let memory = "Failed to allocate memory for requested buffer of size 844424930131968";
         let failure = RunFailure::from_message([1, 1], memory.to_owned());
         let requested = Some(844_424_930_131_968);
-        assert_eq!(
-            failure,
-            RunFailure::NoMemory {
-                fed: [1, 1],
-                requested
-            }
-        );
+        assert_eq!(failure, RunFailure::NoMemory { fed: [1, 1], requested });
         assert!(!failure.may_depend_on_size());
         assert!(RunFailure::from_message([1, 1], "shape mismatch".to_owned()).may_depend_on_size());
     }
@@ -281,23 +237,14 @@ mod tests {
     fn message_about_a_too_new_file_names_the_version_that_reads_it() {
         let ir = "model.cc:256 Unsupported model IR version: 13, max supported IR version: 10";
         let words = describe_load_failure(ir, "1.20.1");
-        assert!(
-            words.contains("IR version 13") && words.contains("1.31.1 reads it"),
-            "{words}"
-        );
+        assert!(words.contains("IR version 13") && words.contains("1.31.1 reads it"), "{words}");
         let newest = ir.replace("13", "99");
         let words = describe_load_failure(&newest, "1.31.1");
-        assert!(
-            words.contains("a newer one") && words.contains("or older"),
-            "{words}"
-        );
+        assert!(words.contains("a newer one") && words.contains("or older"), "{words}");
         let opset = "Opset 27 is under development and support for this is limited. The operator schemas may change. Current official support for domain ai.onnx is till opset 26.";
         let words = describe_load_failure(opset, "1.31.1");
         assert!(words.contains("operator set 27"), "{words}");
         let other = describe_load_failure("no such operator", "1.31.1");
-        assert!(
-            other.ends_with("cannot load it: no such operator"),
-            "{other}"
-        );
+        assert!(other.ends_with("cannot load it: no such operator"), "{other}");
     }
 }

@@ -6,8 +6,8 @@
 //! ModelFile::read ─► name, digest ┘
 //! ```
 //!
-//! The convention of a model defines how its input is prepared and how its output is decoded. Each setting is taken from the first source
-//! that defines it:
+//! The convention of a model defines how its input is prepared and how its output is decoded. Each setting is taken
+//! from the first source that defines it:
 //!
 //! 1. the graph (layout, element type, sizes)
 //! 2. a sidecar `MODEL.onnx.toml`
@@ -24,17 +24,18 @@
 //! Graph ─► OutputDecoding (range) ─ [image = EXPRESSION] ─ [luma] ─ clamp, rounding ─► Composition
 //! ```
 //!
-//! [`ModelFile::read`] works without ONNX Runtime. A file that is not an ONNX model is therefore refused before ONNX Runtime is located or
-//! installed, and a resumed run can check the model's digest without it.
+//! [`ModelFile::read`] works without ONNX Runtime. A file that is not an ONNX model is therefore refused before ONNX
+//! Runtime is located or installed, and a resumed run can check the model's digest without it.
 //!
-//! [`Enhancer::enhance`] passes an image to the model whole, padded, in tiles, or resized if a flag allows it (`sizing`). Trial inferences
-//! find properties that a graph does not declare: the required multiple of the input size or the size fixed by tracing
-//! (`sizing/size_search`, `files/traced_sizes`), and the receptive field (`sizing/reach`). `limits` estimates the memory of an inference in
-//! advance and limits its time. `libraries` checks a shared library before loading it.
+//! [`Enhancer::enhance`] passes an image to the model whole, padded, in tiles, or resized if a flag allows it
+//! (`sizing`). Trial inferences find properties that a graph does not declare: the required multiple of the input size
+//! or the size fixed by tracing (`sizing/size_search`, `files/traced_sizes`), and the receptive field (`sizing/reach`).
+//! `limits` estimates the memory of an inference in advance and limits its time. `libraries` checks a shared library
+//! before loading it.
 //!
 //! A wrong convention gives a wrong image, not an error. Each model is therefore tested on dark frames before a run
-//! ([`Enhancer::probe`]), and its images are checked during the run ([`Usage::judge`]). Both use the rules in `probes/plausible`.
-//! `probes/doctor` renders the model's images under each convention.
+//! ([`Enhancer::probe`]), and its images are checked during the run ([`Usage::judge`]). Both use the rules in
+//! `probes/plausible`. `probes/doctor` renders the model's images under each convention.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -64,12 +65,12 @@ pub use graphs::{LoadLimits, Network, Stopper};
 pub use libraries::{Install, Runtime, RuntimeSearch, disable_telemetry};
 pub use limits::{MemoryLimit, TimeLimit};
 pub use probes::{
-    DARK, Examination, FRAMES, Findings, ImageOutput, ImageUse, Implausible, ProposedLine, Settled,
-    Usage, brightness, burnt_out, shows_nothing,
+    DARK, Examination, FRAMES, Findings, ImageOutput, ImageUse, Implausible, ProposedLine, Settled, Usage, brightness,
+    burnt_out, shows_nothing,
 };
 pub use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use sizing::Tiling;
 
-/// Version of the input encoding and output decoding. Any change to enhanced pixels increments it, so that results stored by an older
-/// version are not reused.
+/// Version of the input encoding and output decoding. Any change to enhanced pixels increments it, so that results
+/// stored by an older version are not reused.
 pub const VERSION: u32 = 2;

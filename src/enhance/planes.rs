@@ -20,18 +20,9 @@ impl Planes {
     /// The planes of an image, its bytes divided by 255.
     pub(super) fn from_rgb(image: &Rgb) -> Self {
         let pixels = image.samples().chunks_exact(3);
-        let samples = (0..3)
-            .flat_map(|channel| {
-                pixels
-                    .clone()
-                    .map(move |pixel| f32::from(pixel[channel]) / 255.0)
-            })
-            .collect();
-        Self {
-            height: image.height(),
-            width: image.width(),
-            samples,
-        }
+        let samples =
+            (0..3).flat_map(|channel| pixels.clone().map(move |pixel| f32::from(pixel[channel]) / 255.0)).collect();
+        Self { height: image.height(), width: image.width(), samples }
     }
 
     /// Height and width in pixels.
@@ -39,19 +30,13 @@ impl Planes {
         [self.height, self.width]
     }
 
-    /// The image with its luma replaced by the single plane `luma`. The difference is added to each channel, which keeps the chroma.
+    /// The image with its luma replaced by the single plane `luma`. The difference is added to each channel, which
+    /// keeps the chroma.
     pub(super) fn with_luma(&self, luma: &Self) -> Self {
         let plane = self.height * self.width;
-        let changes: Vec<f32> = (0..plane)
-            .map(|pixel| luma.samples[pixel] - self.sample(pixel).luma())
-            .collect();
+        let changes: Vec<f32> = (0..plane).map(|pixel| luma.samples[pixel] - self.sample(pixel).luma()).collect();
         Self {
-            samples: self
-                .samples
-                .iter()
-                .zip(changes.iter().cycle())
-                .map(|(sample, change)| sample + change)
-                .collect(),
+            samples: self.samples.iter().zip(changes.iter().cycle()).map(|(sample, change)| sample + change).collect(),
             ..*self
         }
     }
@@ -78,9 +63,7 @@ impl Planes {
         match channels {
             Channels::Rgb => self,
             Channels::Y => {
-                let samples = (0..self.height * self.width)
-                    .map(|pixel| self.sample(pixel).luma())
-                    .collect();
+                let samples = (0..self.height * self.width).map(|pixel| self.sample(pixel).luma()).collect();
                 Self { samples, ..self }
             }
         }
@@ -104,9 +87,9 @@ impl Planes {
 
     /// The image resized to another height and width; its samples are clamped to 0..1 first.
     ///
-    /// The filter is bilinear, with its support widened by the ratio when the image shrinks. Unlike sharper filters it never leaves the
-    /// range of the image's values, so it makes no haloes. Samples stay floats, because the few codes of a dark image would be rounded
-    /// twice in bytes.
+    /// The filter is bilinear, with its support widened by the ratio when the image shrinks. Unlike sharper filters it
+    /// never leaves the range of the image's values, so it makes no haloes. Samples stay floats, because the few codes
+    /// of a dark image would be rounded twice in bytes.
     pub(super) fn resized(&self, height: usize, width: usize) -> Result<Self, String> {
         let (old_height, old_width) = (side_as_u32(self.height)?, side_as_u32(self.width)?);
         let (new_height, new_width) = (side_as_u32(height)?, side_as_u32(width)?);
@@ -117,11 +100,7 @@ impl Planes {
                 .ok_or("a plane has another size than its image")?;
             samples.extend(resize(&plane, new_width, new_height, FilterType::Triangle).into_raw());
         }
-        Ok(Self {
-            height,
-            width,
-            samples,
-        })
+        Ok(Self { height, width, samples })
     }
 }
 
@@ -150,42 +129,23 @@ mod tests {
     #[test]
     fn every_byte_comes_back() {
         let image = image(11, 24);
-        assert_eq!(
-            Planes::from_rgb(&image).to_rgb(Rounding::Round).unwrap(),
-            image
-        );
+        assert_eq!(Planes::from_rgb(&image).to_rgb(Rounding::Round).unwrap(), image);
     }
 
     #[test]
     fn samples_are_clamped_and_rounded() {
-        let planes = Planes {
-            height: 1,
-            width: 2,
-            samples: vec![-0.1, 1.1, 0.5, f32::INFINITY, 1.4 / 255.0, 1.6 / 255.0],
-        };
+        let planes =
+            Planes { height: 1, width: 2, samples: vec![-0.1, 1.1, 0.5, f32::INFINITY, 1.4 / 255.0, 1.6 / 255.0] };
         // 0.5 · 255 = 127.5 is rounded up
-        assert_eq!(
-            planes.to_rgb(Rounding::Round).unwrap().samples(),
-            [0, 128, 1, 255, 255, 2]
-        );
+        assert_eq!(planes.to_rgb(Rounding::Round).unwrap().samples(), [0, 128, 1, 255, 255, 2]);
     }
 
     #[test]
     fn resizing_preserves_flat_colours_and_the_range() {
         let flat = Rgb::new(9, 7, [3, 120, 255].repeat(63)).unwrap();
         let resized = Planes::from_rgb(&flat).resized(4, 16).unwrap();
-        assert_eq!(
-            (resized.height, resized.width, resized.samples.len()),
-            (4, 16, 192)
-        );
-        assert_eq!(
-            resized
-                .resized(9, 7)
-                .unwrap()
-                .to_rgb(Rounding::Round)
-                .unwrap(),
-            flat
-        );
+        assert_eq!((resized.height, resized.width, resized.samples.len()), (4, 16, 192));
+        assert_eq!(resized.resized(9, 7).unwrap().to_rgb(Rounding::Round).unwrap(), flat);
         let mut too_large = Planes::from_rgb(&image(8, 8));
         too_large.samples[0] = 5.0;
         let resized = too_large.resized(16, 5).unwrap();
@@ -194,12 +154,8 @@ mod tests {
 
     #[test]
     fn resizing_keeps_pixels_in_their_places() {
-        let halves: Vec<u8> = (0..16)
-            .flat_map(|i| [if i % 4 < 2 { 0 } else { 255 }; 3])
-            .collect();
-        let small = Planes::from_rgb(&Rgb::new(4, 4, halves).unwrap())
-            .resized(2, 2)
-            .unwrap();
+        let halves: Vec<u8> = (0..16).flat_map(|i| [if i % 4 < 2 { 0 } else { 255 }; 3]).collect();
+        let small = Planes::from_rgb(&Rgb::new(4, 4, halves).unwrap()).resized(2, 2).unwrap();
         for row in small.samples.chunks_exact(2) {
             assert!(row[0] < 0.2 && row[1] > 0.8, "{row:?}");
         }

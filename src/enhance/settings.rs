@@ -18,17 +18,18 @@ use darkqa_base::types::{Decides, SetLight, TreatmentSet};
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct EnhancerArgs {
-    /// Enhancer: lift or gray-gain (built in), FILE.onnx, or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol, ruas-upe, ruas-dark, sci,
-    /// iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer, restormer, mirnet, kind, agllnet,
-    /// zero-dce-tf); repeatable: each is compared with raw; default: none
+    /// Enhancer: lift or gray-gain (built in), FILE.onnx, or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
+    /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet,
+    /// llformer, restormer, mirnet, kind, agllnet, zero-dce-tf); repeatable: each is compared with raw; default: none
     #[arg(long, value_name = "NAME|FILE", add = Decides::Trials)]
     pub llie: Vec<PathBuf>,
-    /// Images enhanced by another program, evaluated as enhancer NAME: DIR has one image for each that `synthesize` writes, with the same
-    /// name and its JSON file; repeatable; default: none
+    /// Images enhanced by another program, evaluated as enhancer NAME: DIR has one image for each that `synthesize`
+    /// writes, with the same name and its JSON file; repeatable; default: none
     #[arg(long, value_name = "NAME=DIR", add = Decides::Trials)]
     pub enhanced: Vec<EnhancedFolder>,
-    /// Images to enhance, separated by commas: a variant (ev, noise, auto, motion); l0 (untouched images, for photographs that are dark
-    /// already); dark (the dark photographs of pairs); both (ev,noise); all; default: noise, or l0 for photographs that are dark already
+    /// Images to enhance, separated by commas: a variant (ev, noise, auto, motion); l0 (untouched images, for
+    /// photographs that are dark already); dark (the dark photographs of pairs); both (ev,noise); all; default: noise,
+    /// or l0 for photographs that are dark already
     #[arg(long, value_name = "l0|noise|ev|auto|motion|both|dark|all", add = Decides::Trials)]
     pub llie_on: Option<TreatmentSet>,
 }
@@ -46,17 +47,15 @@ impl EnhancerArgs {
         self.llie.is_empty() && self.enhanced.is_empty()
     }
 
-    /// The same flags with the default for a data set in this light: for photographs that are dark already, L0 is enhanced.
+    /// The same flags with the default for a data set in this light: for photographs that are dark already, L0 is
+    /// enhanced.
     #[must_use]
     pub fn for_set(self, set: SetLight) -> Self {
         let default = match set {
             SetLight::Lit => None,
             SetLight::Dark => Some(TreatmentSet::only(None)),
         };
-        Self {
-            llie_on: self.llie_on.or(default),
-            ..self
-        }
+        Self { llie_on: self.llie_on.or(default), ..self }
     }
 }
 
@@ -64,16 +63,16 @@ impl EnhancerArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct SizeArgs {
-    /// Enhance in tiles of N × N pixels, their seams checked, or whole; auto is 256 for images above 1280 × 720 if sidecar or preset state
-    /// that tiles are exact, else whole
+    /// Enhance in tiles of N × N pixels, their seams checked, or whole; auto is 256 for images above 1280 × 720 if
+    /// sidecar or preset state that tiles are exact, else whole
     #[arg(long, value_name = "N|whole|auto", default_value_t, add = Decides::Pixels)]
     pub tile: Tiling,
-    /// Largest longer side in pixels: larger images are reduced to it, enhanced and scaled back (bilinear); for models that must see the
-    /// whole image and need too much memory for it; default: no limit
+    /// Largest longer side in pixels: larger images are reduced to it, enhanced and scaled back (bilinear); for models
+    /// that must see the whole image and need too much memory for it; default: no limit
     #[arg(long, value_name = "PIXELS", add = Decides::Pixels)]
     pub llie_max_side: Option<NonZeroUsize>,
-    /// Resize images to the fixed size of an enhancer, and the results back (bilinear), instead of filling and cutting them;
-    /// for enhancers that need the whole image; it blurs, and moves brightness by some codes of 255
+    /// Resize images to the fixed size of an enhancer, and the results back (bilinear), instead of filling and cutting
+    /// them; for enhancers that need the whole image; it blurs, and moves brightness by some codes of 255
     #[arg(long, add = Decides::Pixels)]
     pub llie_resize: bool,
 }
@@ -82,11 +81,7 @@ impl SizeArgs {
     /// How images of other sizes reach an enhancer with a fixed size.
     #[must_use]
     pub fn fitting(&self) -> Fitting {
-        if self.llie_resize {
-            Fitting::Resize
-        } else {
-            Fitting::Tiles
-        }
+        if self.llie_resize { Fitting::Resize } else { Fitting::Tiles }
     }
 }
 
@@ -94,7 +89,8 @@ impl SizeArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct ProbeArgs {
-    /// Use an enhancer whose images are implausible: flat, inverted, in swapped colours or in another value range; the report marks it
+    /// Use an enhancer whose images are implausible: flat, inverted, in swapped colours or in another value range; the
+    /// report marks it
     #[arg(long, add = Decides::Nothing)]
     pub llie_anyway: bool,
 }
@@ -102,11 +98,7 @@ pub struct ProbeArgs {
 impl ProbeArgs {
     /// Whether an enhancer with implausible images is used.
     pub fn implausible(&self) -> Implausible {
-        if self.llie_anyway {
-            Implausible::Used
-        } else {
-            Implausible::Refused
-        }
+        if self.llie_anyway { Implausible::Used } else { Implausible::Refused }
     }
 }
 
@@ -114,19 +106,20 @@ impl ProbeArgs {
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Enhancement")]
 pub struct RuntimeArgs {
-    /// ONNX Runtime library; default: ORT_DYLIB_PATH, else the first found next to the program, in its Python environment, the cache
-    /// folder, the Python environments on PATH, or the system; else pip installs it once
+    /// ONNX Runtime library; default: ORT_DYLIB_PATH, else the first found next to the program, in its Python
+    /// environment, the cache folder, the Python environments on PATH, or the system; else pip installs it once
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub ort_lib: Option<PathBuf>,
     /// Never install ONNX Runtime
     #[arg(long, add = Decides::Nothing)]
     pub offline: bool,
-    /// Maximum seconds for loading an enhancer and for one image; a slower image fails, and three failures in a row stop the enhancer; 0 is
-    /// no limit
+    /// Maximum seconds for loading an enhancer and for one image; a slower image fails, and three failures in a row
+    /// stop the enhancer; 0 is no limit
     #[arg(long, value_name = "SECONDS", default_value_t, add = Decides::Nothing)]
     pub llie_timeout: TimeLimit,
-    /// Maximum memory of the program in GB (10⁹ bytes) while an enhancer runs, on Linux; an image that takes more fails, and three failures
-    /// in a row stop the enhancer; 0 is no limit; default: 80 % of the free memory at the start
+    /// Maximum memory of the program in GB (10⁹ bytes) while an enhancer runs, on Linux; an image that takes more
+    /// fails, and three failures in a row stop the enhancer; 0 is no limit; default: 80 % of the free memory at the
+    /// start
     #[arg(long, value_name = "GB", add = Decides::Nothing)]
     pub llie_max_memory: Option<MemoryLimit>,
 }
@@ -141,16 +134,11 @@ impl RuntimeArgs {
     #[must_use]
     pub fn search(&self) -> RuntimeSearch {
         RuntimeSearch {
-            library: self.ort_lib.clone().or_else(|| {
-                env::var_os("ORT_DYLIB_PATH")
-                    .filter(|path| !path.is_empty())
-                    .map(PathBuf::from)
-            }),
-            install: if self.offline {
-                Install::Offline
-            } else {
-                Install::Allowed
-            },
+            library: self
+                .ort_lib
+                .clone()
+                .or_else(|| env::var_os("ORT_DYLIB_PATH").filter(|path| !path.is_empty()).map(PathBuf::from)),
+            install: if self.offline { Install::Offline } else { Install::Allowed },
         }
     }
 }

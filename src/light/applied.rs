@@ -41,7 +41,8 @@ pub enum AppliedDegradation {
 }
 
 impl AppliedDegradation {
-    /// Resolves a degradation for a frame. `synthesis` is its noise profile; a kind without profiles uses only the sensor of it.
+    /// Resolves a degradation for a frame. `synthesis` is its noise profile; a kind without profiles uses only the
+    /// sensor of it.
     ///
     /// # Errors
     /// If the sensor does not have the gain that automatic exposure needs, or the image would move too far.
@@ -71,10 +72,7 @@ impl AppliedDegradation {
             }
             Kind::Motion => {
                 let time = severity.value() / 1000.0;
-                Self::Motion {
-                    streak: motion.streak(time, view, key)?,
-                    time,
-                }
+                Self::Motion { streak: motion.streak(time, view, key)?, time }
             }
         })
     }

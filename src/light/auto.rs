@@ -1,9 +1,11 @@
-//! Reaction of a camera with automatic exposure to an exposure drop: the settings [`AutoExposure`] and the result [`AutoShot`].
+//! Reaction of a camera with automatic exposure to an exposure drop: the settings [`AutoExposure`] and the result
+//! [`AutoShot`].
 //!
-//! For a scene that is ΔEV darker, the camera exposes s stops longer, adds g stops of gain, and leaves d = ΔEV − s − g uncompensated. The
-//! number of photons falls by 2^−(ΔEV − s), the brightness of the image by 2^−d, and the longer exposure blurs the image if the camera
-//! turns. The noise is that of the noise profile `physical` at the drop d, with the gain K = K₀ · 2^g and the ratio r = 2^d. The relative
-//! variance of the shot noise of a sample y is then K · r / y = K₀ · 2^(ΔEV − s) / y, whatever the split between gain and darkness.
+//! For a scene that is ΔEV darker, the camera exposes s stops longer, adds g stops of gain, and leaves d = ΔEV − s − g
+//! uncompensated. The number of photons falls by 2^−(ΔEV − s), the brightness of the image by 2^−d, and the longer
+//! exposure blurs the image if the camera turns. The noise is that of the noise profile `physical` at the drop d, with
+//! the gain K = K₀ · 2^g and the ratio r = 2^d. The relative variance of the shot noise of a sample y is then K · r / y
+//! = K₀ · 2^(ΔEV − s) / y, whatever the split between gain and darkness.
 
 use std::fmt;
 use std::str::FromStr;
@@ -46,29 +48,20 @@ pub struct AutoSettings {
 impl Default for AutoSettings {
     /// From 1/120 s to the 1/30 s of a video with 30 frames a second; chosen.
     fn default() -> Self {
-        Self {
-            shutter: 2.0,
-            gain: None,
-            base_gain: None,
-            base_time: 1.0 / 120.0,
-        }
+        Self { shutter: 2.0, gain: None, base_gain: None, base_time: 1.0 / 120.0 }
     }
 }
 
 impl AutoSettings {
-    /// The settings for a camera. By default, the gain reaches the camera's largest K, and K₀ is [`MAX_GAIN`] stops below it, or the
-    /// camera's smallest K if that is larger.
+    /// The settings for a camera. By default, the gain reaches the camera's largest K, and K₀ is [`MAX_GAIN`] stops
+    /// below it, or the camera's smallest K if that is larger.
     #[must_use]
     pub fn for_camera(&self, camera: &CameraModel) -> AutoExposure {
         let [low, high] = camera.gain_range();
-        let base_gain = self
-            .base_gain
-            .unwrap_or_else(|| low.max(high / libm::exp2(MAX_GAIN)));
+        let base_gain = self.base_gain.unwrap_or_else(|| low.max(high / libm::exp2(MAX_GAIN)));
         AutoExposure {
             shutter: self.shutter,
-            gain: self
-                .gain
-                .unwrap_or_else(|| libm::log2(high / base_gain).clamp(0.0, MAX_GAIN)),
+            gain: self.gain.unwrap_or_else(|| libm::log2(high / base_gain).clamp(0.0, MAX_GAIN)),
             base_gain,
             base_time: self.base_time,
         }
@@ -114,7 +107,8 @@ impl AutoExposure {
     }
 }
 
-/// Relative tolerance for K outside the camera's range: a measured K has an error of 0.1 to 0.2 % (`calibrate`), and users round it.
+/// Relative tolerance for K outside the camera's range: a measured K has an error of 0.1 to 0.2 % (`calibrate`), and
+/// users round it.
 const GAIN_TOLERANCE: f64 = 2e-3;
 
 impl AutoShot {
@@ -176,9 +170,7 @@ fn seconds(value: &str) -> Result<f64, String> {
     let (numerator, denominator) = value.split_once('/').unwrap_or((value, "1"));
     let numerator: Option<f64> = numerator.trim().parse().ok();
     let denominator: Option<f64> = denominator.trim().parse().ok();
-    let seconds = numerator
-        .zip(denominator)
-        .map(|(numerator, denominator)| numerator / denominator);
+    let seconds = numerator.zip(denominator).map(|(numerator, denominator)| numerator / denominator);
     seconds.filter(|seconds| *seconds > 0.0 && *seconds <= MAX_BASE_TIME).ok_or_else(|| {
         format!("base-time={value}: a number of seconds above 0, up to {MAX_BASE_TIME}, expected, as 1/120 or 0.01")
     })
@@ -246,13 +238,7 @@ mod tests {
             (900, [2.0, 4.0, 3.0, 1.0 / 30.0, 6.0]),
         ] {
             let shot = auto.shot(Severity::from_hundredths(drop));
-            let found = [
-                shot.shutter,
-                shot.gain,
-                shot.dark,
-                shot.time,
-                shot.system_gain,
-            ];
+            let found = [shot.shutter, shot.gain, shot.dark, shot.time, shot.system_gain];
             for (found, expected) in found.iter().zip([shutter, gain, dark, time, system_gain]) {
                 assert!((found - expected).abs() < 1e-12, "{drop}: {shot:?}");
             }
@@ -262,28 +248,14 @@ mod tests {
     #[test]
     fn a_gain_that_the_camera_lacks_is_refused() {
         let camera = CameraModel::default();
-        let max_gain = shot("gain=4", &camera, Severity::L3)
-            .synthesis(&camera)
-            .unwrap();
+        let max_gain = shot("gain=4", &camera, Severity::L3).synthesis(&camera).unwrap();
         assert_eq!(max_gain.name().as_str(), "physical");
-        for auto in [
-            "gain=4.01",
-            "gain=4,base-gain=0.38",
-            "gain=0,base-gain=0.09",
-        ] {
-            let error = shot(auto, &camera, Severity::L5)
-                .synthesis(&camera)
-                .unwrap_err()
-                .to_string();
-            assert!(
-                error.starts_with("--auto: at ") && error.contains("sony-a7s2 has K from 0.1 to 6"),
-                "{error}"
-            );
+        for auto in ["gain=4.01", "gain=4,base-gain=0.38", "gain=0,base-gain=0.09"] {
+            let error = shot(auto, &camera, Severity::L5).synthesis(&camera).unwrap_err().to_string();
+            assert!(error.starts_with("--auto: at ") && error.contains("sony-a7s2 has K from 0.1 to 6"), "{error}");
         }
         // At L2 only two stops of gain are used, which the camera has.
-        shot("gain=5", &camera, Severity::L2)
-            .synthesis(&camera)
-            .unwrap();
+        shot("gain=5", &camera, Severity::L2).synthesis(&camera).unwrap();
     }
 
     #[test]
@@ -293,23 +265,14 @@ mod tests {
         assert_eq!(gains("shutter=2", &nikon), (high / 16.0, 4.0));
         assert_eq!(gains("gain=2", &nikon), (high / 16.0, 2.0));
         let quarter = high / 4.0;
-        assert_eq!(
-            gains(&format!("base-gain={quarter}"), &nikon),
-            (quarter, 2.0)
-        );
+        assert_eq!(gains(&format!("base-gain={quarter}"), &nikon), (quarter, 2.0));
         // Only one gain was measured, so the gain cannot be raised. Users may type its K rounded.
         let mut own = CameraModel::default();
         own.set_gain_range([0.399_7, 0.399_7]).unwrap();
         assert_eq!(gains("shutter=2", &own), (0.399_7, 0.0));
         assert_eq!(gains("gain=0,base-gain=0.4", &own), (0.4, 0.0));
-        let error = shot("gain=0,base-gain=0.401", &own, Severity::L1)
-            .synthesis(&own)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("K is 0.401, but sony-a7s2 has K from 0.3997 to 0.3997"),
-            "{error}"
-        );
+        let error = shot("gain=0,base-gain=0.401", &own, Severity::L1).synthesis(&own).unwrap_err().to_string();
+        assert!(error.contains("K is 0.401, but sony-a7s2 has K from 0.3997 to 0.3997"), "{error}");
     }
 
     #[test]
@@ -333,14 +296,8 @@ mod tests {
         for (wrong, part) in [
             ("basegain=1", "did you mean base-gain?"),
             ("shuter=1", "did you mean shutter?"),
-            (
-                "shutter=17",
-                "shutter=17: a number from 0 to 16 expected (EV)",
-            ),
-            (
-                "base-gain=0",
-                "base-gain=0: a number from 0.01 to 100 expected (ADU per electron)",
-            ),
+            ("shutter=17", "shutter=17: a number from 0 to 16 expected (EV)"),
+            ("base-gain=0", "base-gain=0: a number from 0.01 to 100 expected (ADU per electron)"),
             ("base-time=0", "base-time=0: a number of seconds above 0"),
             ("base-time=1/0", "base-time=1/0"),
             ("base-time=11", "up to 10, expected, as 1/120 or 0.01"),

@@ -16,7 +16,8 @@ use super::noise_profile::{Amplify, Coupling, Tone};
 use super::raw::negative::{Capture, OutputSample};
 use super::raw::noise::Term;
 
-/// All parameters that decide an image, except its frame and its noise key. The images equal those of [`degrade`](super::degrade).
+/// All parameters that decide an image, except its frame and its noise key. The images equal those of
+/// [`degrade`](super::degrade).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CaptureState {
@@ -67,9 +68,7 @@ impl CaptureState {
         let drop_ev = applied.drop_ev();
         let streak = match applied {
             AppliedDegradation::Exposure(_) | AppliedDegradation::Sensor { .. } => Streak::STILL,
-            AppliedDegradation::Auto { streak, .. } | AppliedDegradation::Motion { streak, .. } => {
-                *streak
-            }
+            AppliedDegradation::Auto { streak, .. } | AppliedDegradation::Motion { streak, .. } => *streak,
         };
         let sensor = applied.synthesis().map(|synthesis| SensorState {
             amplify: synthesis.amplify,
@@ -77,11 +76,7 @@ impl CaptureState {
             coupling: synthesis.coupling,
             camera: synthesis.state_after_drop(key, drop_ev),
         });
-        Self {
-            drop_ev,
-            streak,
-            sensor,
-        }
+        Self { drop_ev, streak, sensor }
     }
 
     /// Checks that all parameters are in range.
@@ -95,10 +90,7 @@ impl CaptureState {
             return Ok(());
         };
         let camera = &sensor.camera;
-        for (name, matrix) in [
-            ("rgb_to_camera", &camera.rgb_to_camera),
-            ("camera_to_rgb", &camera.camera_to_rgb),
-        ] {
+        for (name, matrix) in [("rgb_to_camera", &camera.rgb_to_camera), ("camera_to_rgb", &camera.camera_to_rgb)] {
             for value in matrix.as_flattened() {
                 check_range(name, *value, [-100.0, 100.0])?;
             }
@@ -137,7 +129,8 @@ impl CaptureState {
         self.capture(sensor, clean, key, noise)
     }
 
-    /// Makes the image of a frame as linear light, before rounding to codes; white is 1. Light L has the code ⌊255 · L^(1/2.2) + ½⌋.
+    /// Makes the image of a frame as linear light, before rounding to codes; white is 1. Light L has the code ⌊255 ·
+    /// L^(1/2.2) + ½⌋.
     #[must_use]
     pub fn light(&self, clean: Clean<'_>, key: &NoiseKey, noise: NoiseTerms) -> Light {
         let Some(sensor) = &self.sensor else {
@@ -159,15 +152,8 @@ impl CaptureState {
         noise: NoiseTerms,
     ) -> Image<T> {
         let blurred = (!self.streak.is_still()).then(|| blur(clean, self.streak));
-        let exposed = blurred
-            .as_ref()
-            .map_or(clean, |light| clean.with_light(light));
-        let SensorState {
-            amplify,
-            tone,
-            coupling,
-            camera,
-        } = sensor;
+        let exposed = blurred.as_ref().map_or(clean, |light| clean.with_light(light));
+        let SensorState { amplify, tone, coupling, camera } = sensor;
         let terms = noise.terms();
         let capture = Capture::from_state(key, camera, *amplify, *tone, terms, Isa::best());
         let headroom_ev = coupling.headroom_ev(self.drop_ev);
@@ -175,7 +161,8 @@ impl CaptureState {
     }
 }
 
-/// The severity of a drop with at most two decimals, for which the exposure drop has an exact table; `None` for other drops.
+/// The severity of a drop with at most two decimals, for which the exposure drop has an exact table; `None` for other
+/// drops.
 fn exact_severity(drop_ev: f64) -> Option<Severity> {
     let severity = Severity::from_hundredths((100.0 * drop_ev).round() as u16);
     (severity.value().to_bits() == drop_ev.to_bits()).then_some(severity)
@@ -196,14 +183,8 @@ mod tests {
     use darkqa_base::types::{Degradation, FrameId};
 
     fn picture() -> Rgb {
-        Rgb::new(
-            37,
-            151,
-            (0..3 * 37 * 151)
-                .map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
-                .collect(),
-        )
-        .unwrap()
+        Rgb::new(37, 151, (0..3 * 37 * 151).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect())
+            .unwrap()
     }
 
     fn key() -> NoiseKey {
@@ -213,10 +194,7 @@ mod tests {
     fn applied(how: &str, reading: NoiseProfile) -> AppliedDegradation {
         let how: Degradation = how.parse().unwrap();
         let synthesis = Synthesis::new(reading, crate::CameraModel::default());
-        let view = FrameView {
-            width: 640,
-            focal: None,
-        };
+        let view = FrameView { width: 640, focal: None };
         let (auto, motion) = (AutoExposure::default(), Motion::default());
         AppliedDegradation::new(&how, &synthesis, &auto, &motion, view, &key()).unwrap()
     }
@@ -237,8 +215,7 @@ mod tests {
     fn a_deserialized_state_makes_the_same_image() {
         for (how, reading) in CASES {
             let applied = applied(how, reading);
-            let expected =
-                crate::Exposures::default().degrade((&picture()).into(), &applied, &key());
+            let expected = crate::Exposures::default().degrade((&picture()).into(), &applied, &key());
             let state = CaptureState::new(&applied, &key());
             let text = serde_json::to_string(&state).unwrap();
             let state: CaptureState = serde_json::from_str(&text).unwrap();
@@ -270,12 +247,8 @@ mod tests {
         let state = CaptureState::new(&applied("L2-noise@eld", NoiseProfile::Eld), &key());
         let other = NoiseKey::new(6, &FrameId("b".to_owned()));
         let picture = picture();
-        let [expected, other, noisy] = [
-            (key(), NoiseTerms::None),
-            (other, NoiseTerms::None),
-            (key(), NoiseTerms::All),
-        ]
-        .map(|(key, noise)| state.image((&picture).into(), &key, noise));
+        let [expected, other, noisy] = [(key(), NoiseTerms::None), (other, NoiseTerms::None), (key(), NoiseTerms::All)]
+            .map(|(key, noise)| state.image((&picture).into(), &key, noise));
         assert_eq!(expected, other);
         assert_ne!(expected, noisy);
     }

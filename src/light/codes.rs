@@ -24,7 +24,8 @@ pub(crate) fn encode(light: &[f32], codes: &mut [u8], isa: Isa) {
 const PIECES_PER_OCTAVE: usize = 128;
 /// Number of low bits of a single-precision number that give its position within a piece.
 const OFFSET_BITS: u32 = 23 - PIECES_PER_OCTAVE.ilog2();
-/// Octaves of the table: 20 from 2⁻²⁰ to 1, and one that begins at 1. The edge between codes 0 and 1 is at light 1.16 · 2⁻²⁰.
+/// Octaves of the table: 20 from 2⁻²⁰ to 1, and one that begins at 1. The edge between codes 0 and 1 is at light 1.16 ·
+/// 2⁻²⁰.
 const OCTAVES: usize = 21;
 
 /// Smallest light in the table, 2⁻²⁰. Darker light has the same code, 0.
@@ -36,10 +37,7 @@ static TABLE: LazyLock<Box<[Piece]>> = LazyLock::new(|| {
         .map(|index| {
             let start = f32::from_bits(DARKEST.to_bits() + (index << OFFSET_BITS));
             let code = (255.0 * libm::pow(f64::from(start), 1.0 / curve::GAMMA) + 0.5).floor();
-            Piece {
-                next: round_up(libm::pow((code + 0.5) / 255.0, curve::GAMMA)),
-                code: code as u32,
-            }
+            Piece { next: round_up(libm::pow((code + 0.5) / 255.0, curve::GAMMA)), code: code as u32 }
         })
         .collect()
 });
@@ -47,11 +45,7 @@ static TABLE: LazyLock<Box<[Piece]>> = LazyLock::new(|| {
 /// Rounds `x` up to single precision.
 fn round_up(x: f64) -> f32 {
     let nearest = x as f32;
-    if f64::from(nearest) < x {
-        nearest.next_up()
-    } else {
-        nearest
-    }
+    if f64::from(nearest) < x { nearest.next_up() } else { nearest }
 }
 
 /// Codes of the light in one piece of the table.
@@ -106,18 +100,13 @@ mod tests {
             let light = [edge.next_down(), edge];
             assert_eq!(encode_all(&light), [code as u8, code as u8 + 1]);
         }
-        let light: Vec<f32> = (0..=1_000_000_u32)
-            .map(|i| (i as f32 / 1e6).powi(3))
-            .collect();
+        let light: Vec<f32> = (0..=1_000_000_u32).map(|i| (i as f32 / 1e6).powi(3)).collect();
         for (light, code) in light.iter().zip(encode_all(&light)) {
             let expected = 255.0 * libm::pow(f64::from(*light), 1.0 / 2.2) + 0.5;
             let is_edge = (expected - expected.round()).abs() < 1e-9;
             assert!(is_edge || code == expected.floor() as u8, "{light}");
         }
-        assert_eq!(
-            encode_all(&[0.0, 1e-30, 1.0, 16.0, -1.0]),
-            [0, 0, 255, 255, 0]
-        );
+        assert_eq!(encode_all(&[0.0, 1e-30, 1.0, 16.0, -1.0]), [0, 0, 255, 255, 0]);
     }
 
     #[test]

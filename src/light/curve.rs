@@ -47,8 +47,8 @@ pub fn smoothstep(display: f32) -> f32 {
     display * display * (3.0 - 2.0 * display)
 }
 
-/// The nearest 8-bit code of a display value, which is clamped to [0, 1]. Truncation would add a bias of half a code, 7 % of a grey at
-/// L5.
+/// The nearest 8-bit code of a display value, which is clamped to [0, 1]. Truncation would add a bias of half a code, 7
+/// % of a grey at L5.
 #[cfg(test)]
 #[must_use]
 pub fn to_code(display: f64) -> u8 {

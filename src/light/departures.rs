@@ -1,4 +1,5 @@
-//! Measures the effects of choices that the paper leaves open, and compares them with the table in `src/docs/method.md`.
+//! Measures the effects of choices that the paper leaves open, and compares them with the table in
+//! `src/docs/method.md`.
 //!
 //! The frame is a flat grey; the camera has the middle of each range (K 0.7746, r 200, brightness gain 1.25).
 
@@ -54,11 +55,7 @@ fn means(values: impl Iterator<Item = f64>) -> [f64; 3] {
 /// Mean linear light of each channel before the exposure drop.
 fn light(raw: Bayer, state: &CameraState) -> [f64; 3] {
     let values = display(raw, state);
-    means(
-        values
-            .iter()
-            .map(|value| curve::gamma_expand(f64::from(*value))),
-    )
+    means(values.iter().map(|value| curve::gamma_expand(f64::from(*value))))
 }
 
 fn quotient(one: [f64; 3], other: [f64; 3]) -> [f64; 3] {
@@ -83,16 +80,9 @@ fn shadow_lift_without_clipping(amplify: Amplify) -> [f64; 3] {
                 planes[Plane::at(row, column) as usize] += f64::from(raw.sample(row, column));
             }
         }
-        let [red, gr, gb, blue] =
-            planes.map(|sum| 4.0 * state.rgb_gain * sum / (SIZE * SIZE) as f64);
-        let camera = [
-            state.red_gain * red,
-            f64::midpoint(gr, gb),
-            state.blue_gain * blue,
-        ];
-        state
-            .camera_to_rgb
-            .map(|row| row.iter().zip(camera).map(|(weight, x)| weight * x).sum())
+        let [red, gr, gb, blue] = planes.map(|sum| 4.0 * state.rgb_gain * sum / (SIZE * SIZE) as f64);
+        let camera = [state.red_gain * red, f64::midpoint(gr, gb), state.blue_gain * blue];
+        state.camera_to_rgb.map(|row| row.iter().zip(camera).map(|(weight, x)| weight * x).sum())
     });
     quotient(noisy, clean)
 }
@@ -104,13 +94,8 @@ fn deviation(raw: Bayer) -> [f64; 3] {
     let developer = Developer::new(&median(), Tone::None, Isa::best());
     developer.encode(&values, developer.factor(Severity::L1.value()), &mut codes);
     let mean = means(codes.iter().map(|code| f64::from(*code)));
-    let squares = means(
-        codes
-            .iter()
-            .map(|code| f64::from(*code))
-            .enumerate()
-            .map(|(i, code)| (code - mean[i % 3]).powi(2)),
-    );
+    let squares =
+        means(codes.iter().map(|code| f64::from(*code)).enumerate().map(|(i, code)| (code - mean[i % 3]).powi(2)));
     squares.map(f64::sqrt)
 }
 
@@ -159,54 +144,24 @@ fn documented_figures() -> Vec<(String, [f64; 3])> {
 #[test]
 fn documented_effects_equal_the_measured_ones() {
     let clean_128 = raw(128, Amplify::All, &[]);
-    let without_brightness = CameraState {
-        rgb_gain: 1.0,
-        ..median()
-    };
+    let without_brightness = CameraState { rgb_gain: 1.0, ..median() };
     let (paper, eld) = (Amplify::ShotOnly, Amplify::All);
     let found = [
         (
             "light, if the brightness gain were left out",
-            quotient(
-                light(clean_128.clone(), &without_brightness),
-                light(clean_128, &median()),
-            ),
+            quotient(light(clean_128.clone(), &without_brightness), light(clean_128, &median())),
         ),
         ("light of grey 16, `paper`", shadow_lift(paper)),
-        (
-            "light of grey 16, `paper`, nothing clipped",
-            shadow_lift_without_clipping(paper),
-        ),
+        ("light of grey 16, `paper`, nothing clipped", shadow_lift_without_clipping(paper)),
         ("light of grey 16, `eld`", shadow_lift(eld)),
-        (
-            "light of grey 16, `eld`, nothing clipped",
-            shadow_lift_without_clipping(eld),
-        ),
-        (
-            "shot noise alone, `paper` and `eld`",
-            deviation_of_term(paper, Term::Shot),
-        ),
-        (
-            "read noise alone, `paper`",
-            deviation_of_term(paper, Term::Read),
-        ),
-        (
-            "row noise alone, `paper`",
-            deviation_of_term(paper, Term::Row),
-        ),
-        (
-            "quantisation noise alone, `paper`",
-            deviation_of_term(paper, Term::Quantisation),
-        ),
-        (
-            "read noise alone, `eld`",
-            deviation_of_term(eld, Term::Read),
-        ),
+        ("light of grey 16, `eld`, nothing clipped", shadow_lift_without_clipping(eld)),
+        ("shot noise alone, `paper` and `eld`", deviation_of_term(paper, Term::Shot)),
+        ("read noise alone, `paper`", deviation_of_term(paper, Term::Read)),
+        ("row noise alone, `paper`", deviation_of_term(paper, Term::Row)),
+        ("quantisation noise alone, `paper`", deviation_of_term(paper, Term::Quantisation)),
+        ("read noise alone, `eld`", deviation_of_term(eld, Term::Read)),
         ("row noise alone, `eld`", deviation_of_term(eld, Term::Row)),
-        (
-            "quantisation noise alone, `eld`",
-            deviation_of_term(eld, Term::Quantisation),
-        ),
+        ("quantisation noise alone, `eld`", deviation_of_term(eld, Term::Quantisation)),
         ("row noise shared by two sensor rows, `eld`", banding(2)),
     ];
     let documented = documented_figures();

@@ -17,8 +17,8 @@ const CHUNK: usize = 1 << 16;
 /// 2^23: adding it to a number from 0 to 255 leaves the nearest whole number in the lowest byte.
 const ROUND: f32 = 8_388_608.0;
 
-/// Applies an exposure drop without noise (DarkQA, eqs. 1–3). 8-bit codes follow the [`table`]; 16-bit codes and light are rounded to
-/// 8 bits after the drop.
+/// Applies an exposure drop without noise (DarkQA, eqs. 1–3). 8-bit codes follow the [`table`]; 16-bit codes and light
+/// are rounded to 8 bits after the drop.
 #[must_use]
 pub fn expose<'a>(clean: impl Into<Clean<'a>>, drop: Severity) -> Rgb {
     match clean.into() {
@@ -33,11 +33,7 @@ fn expose_codes(clean: &Rgb, drop: Severity) -> Rgb {
     let mut scaled = [0; 256];
     let factor = curve::display_factor(drop.value()) as f32;
     let isa = Isa::best();
-    isa.run(Scale {
-        clean: &codes,
-        factor,
-        codes: &mut scaled,
-    });
+    isa.run(Scale { clean: &codes, factor, codes: &mut scaled });
     // Scaling is faster, but for some drops (not those of the paper) single precision rounds a tie differently.
     if scaled == table {
         return expose_by(clean, drop.value());
@@ -49,7 +45,8 @@ fn expose_codes(clean: &Rgb, drop: Severity) -> Rgb {
     degraded
 }
 
-/// Applies an exposure drop of any number of EV without noise. Ties between 8-bit codes are rounded as in single precision.
+/// Applies an exposure drop of any number of EV without noise. Ties between 8-bit codes are rounded as in single
+/// precision.
 #[must_use]
 pub fn expose_by<'a>(clean: impl Into<Clean<'a>>, drop_ev: f64) -> Rgb {
     let clean = clean.into();
@@ -84,8 +81,7 @@ fn expose_16_bits(clean: &Rgb16Image, drop_ev: f64, degraded: &mut Rgb) {
 fn expose_light(clean: &Light, drop_ev: f64, degraded: &mut Rgb) {
     // Lower limit in light of each code from 1: halfway, in codes, to the code below.
     let drop = libm::exp2(drop_ev);
-    let steps: [f64; 255] =
-        std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, curve::GAMMA) * drop);
+    let steps: [f64; 255] = std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, curve::GAMMA) * drop);
     let chunks = degraded.samples_mut().par_chunks_mut(CHUNK);
     let clean = clean.samples().par_chunks(CHUNK);
     chunks.zip(clean).for_each(|(codes, clean)| {
@@ -131,21 +127,12 @@ fn darken(light: f64, factor: f64) -> f32 {
 /// # Panics
 /// If the sizes differ.
 pub fn expose_into(clean: &Rgb, drop_ev: f64, degraded: &mut Rgb) {
-    assert_eq!(
-        (clean.height(), clean.width()),
-        (degraded.height(), degraded.width())
-    );
+    assert_eq!((clean.height(), clean.width()), (degraded.height(), degraded.width()));
     let (factor, isa) = (curve::display_factor(drop_ev) as f32, Isa::best());
     let chunks = degraded.samples_mut().par_chunks_mut(CHUNK);
-    chunks
-        .zip(clean.samples().par_chunks(CHUNK))
-        .for_each(|(codes, clean)| {
-            isa.run(Scale {
-                clean,
-                factor,
-                codes,
-            });
-        });
+    chunks.zip(clean.samples().par_chunks(CHUNK)).for_each(|(codes, clean)| {
+        isa.run(Scale { clean, factor, codes });
+    });
 }
 
 struct Scale<'a> {
@@ -165,8 +152,9 @@ impl Kernel for Scale<'_> {
     }
 }
 
-/// Offset before rounding, so that exact ties are rounded up despite the rounding error of the power. Exact ties occur at multiples of
-/// 2.2 EV, whose factor is a power of two; elsewhere the nearest tie is 1.4e-6 away (measured over all 1600 drops).
+/// Offset before rounding, so that exact ties are rounded up despite the rounding error of the power. Exact ties occur
+/// at multiples of 2.2 EV, whose factor is a power of two; elsewhere the nearest tie is 1.4e-6 away (measured over all
+/// 1600 drops).
 const TIE: f64 = 1e-9;
 
 /// Code after the drop for each 8-bit code: floor(2^(−ΔEV/2.2) · code + ½); ties are rounded up.
@@ -283,9 +271,7 @@ mod tests {
             assert_eq!(found, expected, "{hundredths}");
             assert_eq!(crc32(&table), crc, "{hundredths}");
         }
-        let all: Vec<u8> = (1..=1600)
-            .flat_map(|drop| table(Severity::from_hundredths(drop)))
-            .collect();
+        let all: Vec<u8> = (1..=1600).flat_map(|drop| table(Severity::from_hundredths(drop))).collect();
         assert_eq!(crc32(&all), 0x2f73_04d1);
     }
 
@@ -324,10 +310,7 @@ mod tests {
     #[test]
     fn every_sample_follows_the_table() {
         let clean = Rgb::new(16, 16, (0..768).map(|i| i as u8).collect()).unwrap();
-        for level in Severity::LADDER
-            .into_iter()
-            .chain([220, 440, 1333].map(Severity::from_hundredths))
-        {
+        for level in Severity::LADDER.into_iter().chain([220, 440, 1333].map(Severity::from_hundredths)) {
             let table = table(level);
             let degraded = expose(&clean, level);
             for (clean, degraded) in clean.samples().iter().zip(degraded.samples()) {

@@ -23,19 +23,10 @@ pub struct Exposures {
 impl Exposures {
     /// Applies a degradation to the frame. Frame, key and noise profiles must be the same in each call.
     #[must_use]
-    pub fn degrade(
-        &mut self,
-        clean: Clean<'_>,
-        degradation: &AppliedDegradation,
-        key: &NoiseKey,
-    ) -> Rgb {
+    pub fn degrade(&mut self, clean: Clean<'_>, degradation: &AppliedDegradation, key: &NoiseKey) -> Rgb {
         match degradation {
             AppliedDegradation::Exposure(severity) => expose(clean, *severity),
-            AppliedDegradation::Sensor {
-                severity,
-                reading,
-                synthesis,
-            } => {
+            AppliedDegradation::Sensor { severity, reading, synthesis } => {
                 let negative = self
                     .negatives
                     .remove(reading)
@@ -45,11 +36,7 @@ impl Exposures {
                 self.negatives.insert(reading.clone(), negative);
                 degraded
             }
-            AppliedDegradation::Auto {
-                shot,
-                streak,
-                synthesis,
-            } => {
+            AppliedDegradation::Auto { shot, streak, synthesis } => {
                 let light = self.blurred(clean, *streak);
                 develop_by(light, key, synthesis, shot.dark)
             }
@@ -63,9 +50,7 @@ impl Exposures {
             return clean;
         }
         let cached = self.blurred.take().filter(|(path, _)| *path == streak);
-        let (_, light) = self
-            .blurred
-            .insert(cached.unwrap_or_else(|| (streak, blur(clean, streak))));
+        let (_, light) = self.blurred.insert(cached.unwrap_or_else(|| (streak, blur(clean, streak))));
         clean.with_light(light)
     }
 }
@@ -98,31 +83,17 @@ mod tests {
     }
 
     fn picture() -> Rgb {
-        Rgb::new(
-            40,
-            150,
-            (0..3 * 40 * 150)
-                .map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8)
-                .collect(),
-        )
-        .unwrap()
+        Rgb::new(40, 150, (0..3 * 40 * 150).map(|i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8).collect())
+            .unwrap()
     }
 
     /// The parameters of a degradation with these settings.
-    fn apply(
-        synthesis: &Synthesis,
-        how: &str,
-        auto: &str,
-        motion: &str,
-    ) -> Result<AppliedDegradation> {
+    fn apply(synthesis: &Synthesis, how: &str, auto: &str, motion: &str) -> Result<AppliedDegradation> {
         let auto: AutoSettings = auto.parse().unwrap();
         let auto = auto.for_camera(&CameraModel::default());
         let motion: Motion = motion.parse().unwrap();
         let how: Degradation = how.parse().unwrap();
-        let view = FrameView {
-            width: 640,
-            focal: None,
-        };
+        let view = FrameView { width: 640, focal: None };
         AppliedDegradation::new(&how, synthesis, &auto, &motion, view, &key("a"))
     }
 
@@ -166,29 +137,18 @@ mod tests {
         }
     }
 
-    /// At L3 shutter and gain compensate the whole drop: the image is as bright as without a drop, with the noise of the gain
-    /// K = 0.375 · 2⁴.
+    /// At L3 shutter and gain compensate the whole drop: the image is as bright as without a drop, with the noise of
+    /// the gain K = 0.375 · 2⁴.
     #[test]
     fn gain_brightens_and_keeps_the_noise_of_its_photons() {
-        let AppliedDegradation::Auto {
-            shot, synthesis, ..
-        } = applied("L3-auto", "gain=4", "speed=0")
-        else {
+        let AppliedDegradation::Auto { shot, synthesis, .. } = applied("L3-auto", "gain=4", "speed=0") else {
             panic!("automatic exposure expected");
         };
         let state = synthesis.state_after_drop(&key("a"), shot.dark);
         assert!((state.system_gain - 6.0).abs() < 1e-12 && (state.ratio - 1.0).abs() < 1e-12);
-        let (bright, dark) = (
-            image("L3-auto", "gain=4", "speed=0"),
-            physical(Severity::L3, 6.0),
-        );
-        let [bright, dark] = [bright, dark].map(|image| {
-            image
-                .samples()
-                .iter()
-                .map(|code| u64::from(*code))
-                .sum::<u64>()
-        });
+        let (bright, dark) = (image("L3-auto", "gain=4", "speed=0"), physical(Severity::L3, 6.0));
+        let [bright, dark] =
+            [bright, dark].map(|image| image.samples().iter().map(|code| u64::from(*code)).sum::<u64>());
         assert!(bright > 4 * dark);
     }
 
@@ -209,10 +169,7 @@ mod tests {
 
     /// Variance of the shot noise of a flat grey, relative to the squared signal, times the signal in ADU.
     fn relative_shot_variance(auto: &str, how: &str) -> f64 {
-        let AppliedDegradation::Auto {
-            shot, synthesis, ..
-        } = applied(how, auto, "speed=0")
-        else {
+        let AppliedDegradation::Auto { shot, synthesis, .. } = applied(how, auto, "speed=0") else {
             panic!("automatic exposure expected");
         };
         let grey = Rgb::new(256, 256, vec![117; 3 * 256 * 256]).unwrap();
@@ -238,10 +195,7 @@ mod tests {
         ] {
             let found = relative_shot_variance(auto, how);
             let off = found / expected - 1.0;
-            assert!(
-                off.abs() < 0.03,
-                "{auto} at {how}: {found} instead of {expected}"
-            );
+            assert!(off.abs() < 0.03, "{auto} at {how}: {found} instead of {expected}");
         }
     }
 
@@ -257,20 +211,18 @@ mod tests {
         camera.set_sampling(crate::Sampling::Fixed);
         camera.pin_gain(state.system_gain).unwrap();
         let median = CameraState::draw(&key("a"), &camera);
-        [
-            state.read_scale / median.read_scale,
-            state.row_deviation / median.row_deviation,
-        ]
+        [state.read_scale / median.read_scale, state.row_deviation / median.row_deviation]
     }
 
-    /// Common random numbers: all kinds of degradation share the draws of a frame, and a random direction does not change them.
+    /// Common random numbers: all kinds of degradation share the draws of a frame, and a random direction does not
+    /// change them.
     #[test]
     fn auto_and_noise_share_their_draws() {
         let noise = camera_state("L3-noise@eld", "angle=0");
         let auto = camera_state("L3-auto", "angle=random");
         assert_eq!(noise.rgb_to_camera, auto.rgb_to_camera);
-        let [noise_gains, auto_gains] = [&noise, &auto]
-            .map(|state| [state.rgb_gain, state.red_gain, state.blue_gain].map(f64::to_bits));
+        let [noise_gains, auto_gains] =
+            [&noise, &auto].map(|state| [state.rgb_gain, state.red_gain, state.blue_gain].map(f64::to_bits));
         assert_eq!(noise_gains, auto_gains);
         // The scatter of the fits is shared, too.
         for (noise, auto) in fit_scatter(&noise).iter().zip(fit_scatter(&auto)) {
@@ -283,11 +235,7 @@ mod tests {
     }
 
     fn mean_light(image: &Rgb) -> f64 {
-        image
-            .samples()
-            .iter()
-            .map(|code| (f64::from(*code) / 255.0).powf(2.2))
-            .sum::<f64>()
+        image.samples().iter().map(|code| (f64::from(*code) / 255.0).powf(2.2)).sum::<f64>()
             / image.samples().len() as f64
     }
 
@@ -298,9 +246,7 @@ mod tests {
         let blurred = image("T33.33-motion", "gain=4", "angle=20");
         assert_ne!(blurred, picture());
         assert!((mean_light(&blurred) / mean_light(&picture()) - 1.0).abs() < 0.01);
-        let facts = applied("T33.33-motion", "gain=4", "angle=20")
-            .exposure()
-            .unwrap();
+        let facts = applied("T33.33-motion", "gain=4", "angle=20").exposure().unwrap();
         assert_eq!((facts.shutter, facts.system_gain), (None, None));
         assert!((facts.time_ms - 33.33).abs() < 1e-9);
         assert!((facts.blur_px.unwrap() - 6.776).abs() < 1e-2);
@@ -310,14 +256,7 @@ mod tests {
     #[test]
     fn the_cache_does_not_change_images() {
         let mut exposures = Exposures::default();
-        for how in [
-            "L5-auto",
-            "L1-auto",
-            "E1-auto",
-            "L3-auto",
-            "L3-noise@eld",
-            "T16.67-motion",
-        ] {
+        for how in ["L5-auto", "L1-auto", "E1-auto", "L3-auto", "L3-noise@eld", "T16.67-motion"] {
             let applied = applied(how, "gain=4", "speed=30");
             let found = exposures.degrade((&picture()).into(), &applied, &key("a"));
             assert_eq!(found, image(how, "gain=4", "speed=30"), "{how}");
@@ -325,9 +264,7 @@ mod tests {
     }
 
     fn apply_error(how: &str, auto: &str, motion: &str) -> String {
-        apply(&Synthesis::default(), how, auto, motion)
-            .unwrap_err()
-            .to_string()
+        apply(&Synthesis::default(), how, auto, motion).unwrap_err().to_string()
     }
 
     #[test]
@@ -335,10 +272,7 @@ mod tests {
         let error = apply_error("L5-auto", "gain=5", "speed=30");
         assert!(error.contains("K from 0.1 to 6"), "{error}");
         let error = apply_error("T133.33-motion", "gain=4", "speed=360");
-        assert!(
-            error.contains("325.20 pixels") && error.contains("at most 256"),
-            "{error}"
-        );
+        assert!(error.contains("325.20 pixels") && error.contains("at most 256"), "{error}");
         let error = apply_error("L1-auto", "shutter=2", "speed=1200");
         assert!(error.contains("pixels during the exposure"), "{error}");
     }

@@ -7,8 +7,8 @@ use darkqa_base::types::degradations::{Axis, Kind};
 use darkqa_base::types::{AxisLevel, KindSet, PairDark};
 
 impl Levels {
-    /// The levels of a run with these kinds. If the light levels are L0 to L5 (the default), kinds on an axis without a named level get
-    /// their own ladder.
+    /// The levels of a run with these kinds. If the light levels are L0 to L5 (the default), kinds on an axis without a
+    /// named level get their own ladder.
     ///
     /// # Errors
     /// If a kind has no level, or a level has no kind.
@@ -16,10 +16,7 @@ impl Levels {
         let mut levels = self.0.clone();
         levels.retain(|level| *level != AxisLevel::PAIR);
         let is_clean = levels.iter().all(|level| level.severity().is_none());
-        let has_ladders = levels
-            .iter()
-            .filter(|level| level.axis() != Some(Axis::MOTION))
-            .eq(&ladder(LIGHT));
+        let has_ladders = levels.iter().filter(|level| level.axis() != Some(Axis::MOTION)).eq(&ladder(LIGHT));
         for axis in Axis::ALL.into_iter().filter(|_| !is_clean) {
             let kind = kinds.kinds().find(|kind| kind.axis() == axis);
             let level = self.0.iter().find(|level| level.axis() == Some(axis));
@@ -36,11 +33,8 @@ impl Levels {
                     levels.retain(|level| level.axis() != Some(axis));
                 }
                 (None, Some(level)) => {
-                    let words: Vec<&str> = Kind::ALL
-                        .into_iter()
-                        .filter(|kind| kind.axis() == axis)
-                        .map(Kind::word)
-                        .collect();
+                    let words: Vec<&str> =
+                        Kind::ALL.into_iter().filter(|kind| kind.axis() == axis).map(Kind::word).collect();
                     let problem = format_args!(
                         "{level} is a level of {}, but --variant {kinds} selects none of them",
                         words.join(", ")
@@ -55,16 +49,12 @@ impl Levels {
         Ok(levels)
     }
 
-    /// The kinds and profiles for synthetic images that are as dark as each frame's own photograph; empty unless the levels include
-    /// `match`.
+    /// The kinds and profiles for synthetic images that are as dark as each frame's own photograph; empty unless the
+    /// levels include `match`.
     ///
     /// # Errors
     /// If the levels include `match`, but no kind reduces the light.
-    pub(super) fn matches(
-        &self,
-        kinds: KindSet,
-        readings: &NoiseProfiles,
-    ) -> Result<Vec<PairDark>> {
+    pub(super) fn matches(&self, kinds: KindSet, readings: &NoiseProfiles) -> Result<Vec<PairDark>> {
         if !self.0.contains(&AxisLevel::PAIR) {
             return Ok(Vec::new());
         }
@@ -78,9 +68,8 @@ impl Levels {
             }
         }
         if all.is_empty() {
-            let problem = format_args!(
-                "match reduces the light, which --variant {kinds} does not; add ev or noise to it"
-            );
+            let problem =
+                format_args!("match reduces the light, which --variant {kinds} does not; add ev or noise to it");
             return Err(Error::usage("--levels", problem));
         }
         Ok(all)
@@ -90,8 +79,7 @@ impl Levels {
 /// Labels of the first and the last level of a kind's ladder.
 fn ladder_ends(kind: Kind) -> [String; 2] {
     let ladder = kind.ladder();
-    [ladder.first(), ladder.last()]
-        .map(|severity| severity.map_or(String::new(), |severity| kind.label(*severity)))
+    [ladder.first(), ladder.last()].map(|severity| severity.map_or(String::new(), |severity| kind.label(*severity)))
 }
 
 #[cfg(test)]
@@ -100,9 +88,7 @@ mod tests {
 
     fn resolve(levels: &str, kinds: &str) -> std::result::Result<String, String> {
         let levels: Levels = levels.parse().unwrap();
-        let levels = levels
-            .for_kinds(kinds.parse().unwrap())
-            .map_err(|e| e.to_string())?;
+        let levels = levels.for_kinds(kinds.parse().unwrap()).map_err(|e| e.to_string())?;
         let names: Vec<String> = levels.iter().map(ToString::to_string).collect();
         Ok(names.join(" "))
     }
@@ -131,17 +117,9 @@ mod tests {
                 "--levels: no level of motion is named; add T8.33-T133.33, or leave out motion in --variant",
             ),
             ("T5", "both,motion", "no level of ev is named; add L1-L5"),
-            (
-                "L0,L3",
-                "motion",
-                "L3 is a level of ev, noise, auto, but --variant motion selects none of them",
-            ),
+            ("L0,L3", "motion", "L3 is a level of ev, noise, auto, but --variant motion selects none of them"),
             ("L0-L5,2.5", "motion", "L1 is a level of ev, noise, auto"),
-            (
-                "L0-L5,T5",
-                "both",
-                "T5 is a level of motion, but --variant both selects none of them",
-            ),
+            ("L0-L5,T5", "both", "T5 is a level of motion, but --variant both selects none of them"),
         ] {
             let error = resolve(levels, kinds).unwrap_err();
             assert!(error.contains(part), "{levels} {kinds}: {error}");

@@ -22,13 +22,16 @@ pub(super) const LIGHT: Kind = Kind::ALL[0];
 impl FromStr for Levels {
     type Err = String;
 
-    /// Parses items separated by commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, exposure times such as `T33.33`, or
-    /// `match` (as dark as each frame's own photograph). Sorts the levels and removes duplicates.
+    /// Parses items separated by commas, in any order: `L3`, `L0-L5`, a number of EV, `0..10:0.5`, exposure times such
+    /// as `T33.33`, or `match` (as dark as each frame's own photograph). Sorts the levels and removes duplicates.
     fn from_str(text: &str) -> Result<Self, String> {
         let mut levels = Vec::new();
         for item in text.split(',').map(str::trim) {
             if item.is_empty() {
-                return Err("a level is missing; write levels as L3, L0-L5, 3.3 (EV), 0..10:0.5 or T33.33 (ms), between commas".to_owned());
+                return Err(
+                    "a level is missing; write levels as L3, L0-L5, 3.3 (EV), 0..10:0.5 or T33.33 (ms), between commas"
+                        .to_owned(),
+                );
             } else if item.eq_ignore_ascii_case(MATCH) {
                 levels.push(AxisLevel::PAIR);
             } else if let Some((from, rest)) = item.split_once("..") {
@@ -42,10 +45,7 @@ impl FromStr for Levels {
         levels.sort_unstable();
         levels.dedup();
         if levels.len() > MAX_LEVELS {
-            return Err(format!(
-                "{} levels; at most {MAX_LEVELS} are possible",
-                levels.len()
-            ));
+            return Err(format!("{} levels; at most {MAX_LEVELS} are possible", levels.len()));
         }
         Ok(Self(levels))
     }
@@ -77,10 +77,7 @@ fn example_range(kind: Kind) -> &'static str {
 
 /// L0 and the levels of a kind's ladder.
 pub(super) fn ladder(kind: Kind) -> Vec<AxisLevel> {
-    let ladder = kind
-        .ladder()
-        .iter()
-        .map(|severity| AxisLevel::new(kind, *severity));
+    let ladder = kind.ladder().iter().map(|severity| AxisLevel::new(kind, *severity));
     std::iter::once(AxisLevel::L0).chain(ladder).collect()
 }
 
@@ -100,8 +97,7 @@ fn named_range(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, St
     let (kind, _) = split_axis(last);
     let (from, to) = (parse_level(first)?, parse_level(last)?);
     let ladder = ladder(kind);
-    let are_named =
-        !is_number(first) && !is_number(last) && ladder.contains(&from) && ladder.contains(&to);
+    let are_named = !is_number(first) && !is_number(last) && ladder.contains(&from) && ladder.contains(&to);
     if !are_named {
         let names: Vec<String> = ladder.iter().map(ToString::to_string).collect();
         return Err(format!(
@@ -119,10 +115,7 @@ fn named_range(item: &str, first: &str, last: &str) -> Result<Vec<AxisLevel>, St
         return Err(format!("{item:?} runs backwards; write {to}-{from}"));
     }
     let range = from..=to;
-    Ok(ladder
-        .into_iter()
-        .filter(|level| range.contains(level))
-        .collect())
+    Ok(ladder.into_iter().filter(|level| range.contains(level)).collect())
 }
 
 /// Step of an example range on the axis of a kind.
@@ -133,7 +126,8 @@ fn example_step(kind: Kind) -> &'static str {
     }
 }
 
-/// Parses a range with a step, such as `0..10:0.5`. The end is included if a step meets it. `item` is the text of the range.
+/// Parses a range with a step, such as `0..10:0.5`. The end is included if a step meets it. `item` is the text of the
+/// range.
 fn stepped_range(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, String> {
     let (kind, number) = split_axis(from);
     let unit = kind.axis().unit;
@@ -150,9 +144,7 @@ fn stepped_range(item: &str, from: &str, rest: &str) -> Result<Vec<AxisLevel>, S
     let (from, to) = (hundredths(item, kind, number)?, hundredths(item, kind, to)?);
     let step = hundredths(item, kind, by)?;
     if step == 0 {
-        return Err(format!(
-            "{item:?} has a step of 0; the step is at least 0.01 {unit}"
-        ));
+        return Err(format!("{item:?} has a step of 0; the step is at least 0.01 {unit}"));
     }
     if from > to {
         return Err(format!(
@@ -213,15 +205,8 @@ fn parse_number(kind: Kind, number: &str) -> Result<AxisLevel, String> {
     if number.parse::<f64>() == Ok(0.0) {
         return Ok(AxisLevel::L0);
     }
-    if number
-        .parse()
-        .is_ok_and(|value: f64| value > kind.max_severity().value())
-    {
-        return Err(format!(
-            "{number:?} is above {} {}, the maximum",
-            kind.max_severity(),
-            kind.axis().unit
-        ));
+    if number.parse().is_ok_and(|value: f64| value > kind.max_severity().value()) {
+        return Err(format!("{number:?} is above {} {}, the maximum", kind.max_severity(), kind.axis().unit));
     }
     let severity = number.parse::<Severity>().map_err(|e| e.to_string())?;
     Ok(AxisLevel::new(kind, severity))
@@ -240,19 +225,12 @@ mod tests {
     fn levels_are_parsed_in_any_form() {
         assert_eq!(names("L0-L5"), ["L0", "L1", "L2", "L3", "L4", "L5"]);
         assert_eq!(names("l3, L0,L3"), ["L0", "L3"]);
-        assert_eq!(
-            names("L4-L5,3.30,6,0,E11"),
-            ["L0", "E3.3", "L3", "L4", "L5", "E11"]
-        );
+        assert_eq!(names("L4-L5,3.30,6,0,E11"), ["L0", "E3.3", "L3", "L4", "L5", "E11"]);
     }
 
     #[test]
     fn ranges_use_the_names_of_the_papers_levels() {
-        assert_eq!(
-            names("0..10:2.5"),
-            ["L0", "E2.5", "E5", "L4", "E10"],
-            "both ends"
-        );
+        assert_eq!(names("0..10:2.5"), ["L0", "E2.5", "E5", "L4", "E10"], "both ends");
         assert_eq!(names("2 .. 7 : 2"), ["L1", "L2", "L3"], "no step ends at 7");
         assert_eq!(names("9..9:1,L5,9.0"), ["L5"], "once");
         assert_eq!(names("0..16:0.1").len(), 161);
@@ -271,25 +249,15 @@ mod tests {
     fn exposure_times_have_a_letter() {
         assert_eq!(names("T33.33, t5,T0,L1"), ["L0", "L1", "T5", "T33.33"]);
         assert_eq!(names("T8.33-T33.33"), ["T8.33", "T16.67", "T33.33"]);
-        assert_eq!(
-            names("L0-T133.33").len(),
-            6,
-            "L0 and the ladder of exposure times"
-        );
+        assert_eq!(names("L0-T133.33").len(), 6, "L0 and the ladder of exposure times");
         assert_eq!(names("T10..T30:10"), ["T10", "T20", "T30"]);
         assert_eq!(names("T0..30:15,T5.50"), ["L0", "T5.5", "T15", "T30"]);
         for (wrong, part) in [
             ("T600", "\"600\" is above 500 ms, the maximum"),
             ("T3.333", "has more than two decimals"),
-            (
-                "T10..T50",
-                "\"T10..T50\" has no step; write FROM..TO:STEP in ms, as T10..T50:10",
-            ),
+            ("T10..T50", "\"T10..T50\" has no step; write FROM..TO:STEP in ms, as T10..T50:10"),
             ("T50..T10:5", "runs backwards; write T10..T50:5"),
-            (
-                "10..T50:5",
-                "\"T50\" is not a number; write FROM..TO:STEP in EV",
-            ),
+            ("10..T50:5", "\"T50\" is not a number; write FROM..TO:STEP in EV"),
             (
                 "T10-T20",
                 "are two of L0, T8.33, T16.67, T33.33, T66.67, T133.33; write T10..T20:10 for exposure times in ms",
@@ -311,10 +279,7 @@ mod tests {
             ("L0,,L3", "a level is missing"),
             ("L3-L1", "\"L3-L1\" runs backwards; write L1-L3"),
             ("0-5", "write L0-L5 for the paper's levels, or 0..5:0.5"),
-            (
-                "L0,L1-E5",
-                "\"L1-E5\": the ends of a range with a dash are two of L0",
-            ),
+            ("L0,L1-E5", "\"L1-E5\": the ends of a range with a dash are two of L0"),
             ("L1-5", "write 2..5:0.5"),
             ("3.333", "\"3.333\" has more than two decimals"),
             ("16.5", "\"16.5\" is above 16 EV"),
@@ -322,21 +287,12 @@ mod tests {
             ("99999", "\"99999\" is above 16 EV"),
             ("-2", "\"-2\" is below 0"),
             ("E2", "is written L1"),
-            (
-                "0..10",
-                "\"0..10\" has no step; write FROM..TO:STEP in EV, as 0..10:0.5",
-            ),
+            ("0..10", "\"0..10\" has no step; write FROM..TO:STEP in EV, as 0..10:0.5"),
             ("10..0:2", "\"10..0:2\" runs backwards; write 0..10:2"),
             ("0..10:0", "a step of 0; the step is at least 0.01 EV"),
-            (
-                "0..10:0.001",
-                "\"0..10:0.001\": level: \"0.001\" has more than two decimals",
-            ),
+            ("0..10:0.001", "\"0..10:0.001\": level: \"0.001\" has more than two decimals"),
             ("0..20:1", "\"0..20:1\": \"20\" is above 16 EV"),
-            (
-                "L0..L5:1",
-                "\"L0..L5:1\": \"L0\" is not a number; write FROM..TO:STEP in EV",
-            ),
+            ("L0..L5:1", "\"L0..L5:1\": \"L0\" is not a number; write FROM..TO:STEP in EV"),
             ("0..10:", "\"\" is not a number"),
             ("..10:1", "\"\" is not a number"),
             ("0..10:1:2", "is not a decimal number"),

@@ -11,8 +11,8 @@
 //! # Ok::<(), darkqa_base::Error>(())
 //! ```
 //!
-//! [`raw::negative::ladder`] makes several levels with less work. [`CaptureState`] is a serializable state that makes an image again, its
-//! noise-free form, or its linear light.
+//! [`raw::negative::ladder`] makes several levels with less work. [`CaptureState`] is a serializable state that makes
+//! an image again, its noise-free form, or its linear light.
 //!
 //! ```text
 //! Exposure   sRGB ─ gamma ─ × 2^−ΔEV ─ gamma⁻¹ ─ 8 bit                            a table of 256 codes
@@ -23,20 +23,18 @@
 //! Auto       sRGB ─ gamma ─ blur ─ unprocess ─ … the sensor branch, physical, at the camera's own gain
 //! ```
 //!
-//! The sensor branch has no forward tone curve, because the paper lists none. Before the drop, its shadows are therefore
-//! brighter than those of the exposure branch (grey 16 becomes 39, 192 becomes 172). So the two branches differ in both
-//! contrast and noise.
+//! The sensor branch has no forward tone curve, because the paper lists none. Before the drop, its shadows are
+//! therefore brighter than those of the exposure branch (grey 16 becomes 39, 192 becomes 172). So the two branches
+//! differ in both contrast and noise.
 //!
-//! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. A random number depends only on its
-//! address, such as seed, frame and sensor site (see [`draws`]). Powers and logarithms are computed by `libm` and tabulated; all other
-//! operations are IEEE sums, products, quotients and square roots in a fixed order. The state of the camera is computed in double
-//! precision, samples in single precision with vector instructions (see [`Isa`](darkqa_base::types::images::Isa)).
+//! The result depends only on the arguments and on [`VERSION`], not on threads, order or machine. A random number
+//! depends only on its address, such as seed, frame and sensor site (see [`draws`]). Powers and logarithms are computed
+//! by `libm` and tabulated; all other operations are IEEE sums, products, quotients and square roots in a fixed order.
+//! The state of the camera is computed in double precision, samples in single precision with vector instructions (see
+//! [`Isa`](darkqa_base::types::images::Isa)).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
-#![expect(
-    clippy::inline_always,
-    reason = "only inlined code is compiled for a kernel's instruction set, see isa"
-)]
+#![expect(clippy::inline_always, reason = "only inlined code is compiled for a kernel's instruction set, see isa")]
 
 mod applied;
 mod auto;
@@ -74,9 +72,7 @@ pub use pair_ev::{PairEv, mean_luminance};
 pub use raw::CleanRaw;
 pub use raw::negative::{Negative, develop_with_state};
 #[cfg(feature = "flags")]
-pub use settings::{
-    CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings,
-};
+pub use settings::{CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings};
 
 use darkqa_base::error::Result;
 use darkqa_base::types::{Degradation, Rgb};
@@ -87,24 +83,18 @@ pub const VERSION: u32 = 2;
 
 /// Applies a degradation to a frame; without one, returns the frame.
 ///
-/// `synthesis` is the noise profile of the degradation. Automatic exposure and motion have their default settings, and the focal length
-/// is unknown. For other settings, and for several degradations of one frame, use [`AppliedDegradation`] and [`Exposures`].
+/// `synthesis` is the noise profile of the degradation. Automatic exposure and motion have their default settings, and
+/// the focal length is unknown. For other settings, and for several degradations of one frame, use
+/// [`AppliedDegradation`] and [`Exposures`].
 ///
 /// # Errors
-/// If the sensor does not have the gain that automatic exposure needs, or the image would move too far during the exposure.
-pub fn degrade(
-    clean: &Rgb,
-    degradation: Option<&Degradation>,
-    key: &NoiseKey,
-    synthesis: &Synthesis,
-) -> Result<Rgb> {
+/// If the sensor does not have the gain that automatic exposure needs, or the image would move too far during the
+/// exposure.
+pub fn degrade(clean: &Rgb, degradation: Option<&Degradation>, key: &NoiseKey, synthesis: &Synthesis) -> Result<Rgb> {
     let Some(how) = degradation else {
         return Ok(clean.clone());
     };
-    let view = FrameView {
-        width: clean.width(),
-        focal: None,
-    };
+    let view = FrameView { width: clean.width(), focal: None };
     let (auto, motion) = (AutoExposure::default(), Motion::default());
     let applied = AppliedDegradation::new(how, synthesis, &auto, &motion, view, key)?;
     Ok(Exposures::default().degrade(clean.into(), &applied, key))

@@ -1,5 +1,5 @@
-//! Noise profiles, interpretations of the paper's noise model: their choices ([`Synthesis`]), the named ones ([`NoiseProfile`]), and those
-//! of a run ([`NoiseProfiles`]).
+//! Noise profiles, interpretations of the paper's noise model: their choices ([`Synthesis`]), the named ones
+//! ([`NoiseProfile`]), and those of a run ([`NoiseProfiles`]).
 
 use std::collections::BTreeMap;
 
@@ -9,8 +9,8 @@ use super::camera::CameraModel;
 use darkqa_base::error::{Error, Result};
 use darkqa_base::types::{Degradation, ProfileName};
 
-/// Choices that define the sensor branch. The default follows the paper; `src/docs/method.md` documents the choices that the paper leaves
-/// open, with their effects.
+/// Choices that define the sensor branch. The default follows the paper; `src/docs/method.md` documents the choices
+/// that the paper leaves open, with their effects.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Synthesis {
     /// Noise terms that the ratio r amplifies.
@@ -28,8 +28,8 @@ pub struct Synthesis {
 /// A named interpretation of the paper's noise model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseProfile {
-    /// As the DarkQA paper states it. Read, row and quantisation noise are added after the amplification, and contribute less than 0.1
-    /// codes.
+    /// As the DarkQA paper states it. Read, row and quantisation noise are added after the amplification, and
+    /// contribute less than 0.1 codes.
     #[default]
     Paper,
     /// The ratio amplifies all noise, as in ELD (Wei et al. 2020).
@@ -66,13 +66,7 @@ impl Synthesis {
             NoiseProfile::Level => (Amplify::ShotOnly, Tone::None, Coupling::Photon),
             NoiseProfile::Physical => (Amplify::All, Tone::BeforeEv, Coupling::Photon),
         };
-        Self {
-            amplify,
-            tone,
-            draws: Draws::Shared,
-            coupling,
-            camera,
-        }
+        Self { amplify, tone, draws: Draws::Shared, coupling, camera }
     }
 
     /// Name of the profile with these choices, for any camera; `custom` if there is none.
@@ -106,10 +100,8 @@ impl NoiseProfiles {
     /// Several named profiles with one camera; `paper` alone for an empty list.
     #[must_use]
     pub fn from_profiles(readings: &[NoiseProfile], camera: &CameraModel) -> Self {
-        let profiles: BTreeMap<_, _> = readings
-            .iter()
-            .map(|reading| (reading.name(), Synthesis::new(*reading, camera.clone())))
-            .collect();
+        let profiles: BTreeMap<_, _> =
+            readings.iter().map(|reading| (reading.name(), Synthesis::new(*reading, camera.clone()))).collect();
         if profiles.is_empty() {
             return Synthesis::new(NoiseProfile::Paper, camera.clone()).into();
         }
@@ -163,10 +155,7 @@ impl NoiseProfiles {
         let mut profiles = self.0.values();
         match (profiles.next(), profiles.next()) {
             (Some(synthesis), None) => Ok(synthesis),
-            _ => Err(Error::usage(
-                "--profile",
-                "this command takes one noise profile",
-            )),
+            _ => Err(Error::usage("--profile", "this command takes one noise profile")),
         }
     }
 }
@@ -222,9 +211,9 @@ pub enum Coupling {
 }
 
 impl Coupling {
-    /// Light at which the sensor saturates for linear scene light, in EV above white. In the paper, light is clipped at white before the
-    /// drop, so the headroom is 0. If less light means fewer photons, light is reduced before it reaches the sensor, so the headroom equals
-    /// the drop.
+    /// Light at which the sensor saturates for linear scene light, in EV above white. In the paper, light is clipped at
+    /// white before the drop, so the headroom is 0. If less light means fewer photons, light is reduced before it
+    /// reaches the sensor, so the headroom equals the drop.
     #[must_use]
     pub fn headroom_ev(self, drop_ev: f64) -> f64 {
         match self {
@@ -254,10 +243,7 @@ mod tests {
     #[test]
     fn the_default_is_the_paper() {
         let camera = CameraModel::default();
-        assert_eq!(
-            Synthesis::new(NoiseProfile::Paper, camera.clone()),
-            Synthesis::default()
-        );
+        assert_eq!(Synthesis::new(NoiseProfile::Paper, camera.clone()), Synthesis::default());
         let physical = Synthesis::new(NoiseProfile::Physical, camera);
         assert_eq!(physical.amplify, Amplify::All);
         assert_eq!(physical.coupling, Coupling::Photon);
@@ -270,27 +256,18 @@ mod tests {
         for reading in NoiseProfile::ALL {
             let synthesis = Synthesis::new(reading, camera.clone());
             assert_eq!(synthesis.name(), reading.name());
-            let fresh = Synthesis {
-                draws: Draws::Fresh,
-                ..synthesis
-            };
+            let fresh = Synthesis { draws: Draws::Fresh, ..synthesis };
             assert_eq!(fresh.name(), ProfileName::CUSTOM);
         }
     }
 
     #[test]
     fn errors_name_the_missing_profile() {
-        let readings =
-            NoiseProfiles::from_profiles(&[NoiseProfile::Paper], &CameraModel::default());
+        let readings = NoiseProfiles::from_profiles(&[NoiseProfile::Paper], &CameraModel::default());
         let degradation: Degradation = "L3-noise@eld".parse().unwrap();
-        let error = readings
-            .for_degradation(Some(&degradation))
-            .unwrap_err()
-            .to_string();
+        let error = readings.for_degradation(Some(&degradation)).unwrap_err().to_string();
         assert!(
-            error.contains(
-                "L3-noise@eld needs a noise profile that is not among those of --profile (paper)"
-            ),
+            error.contains("L3-noise@eld needs a noise profile that is not among those of --profile (paper)"),
             "{error}"
         );
         assert!(readings.for_degradation(None).is_ok());

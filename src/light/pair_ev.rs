@@ -6,32 +6,30 @@ use darkqa_base::types::Rgb;
 /// Weights of red, green and blue in the luminance of linear sRGB (ITU-R BT.709).
 const LUMINANCE: [f64; 3] = [0.2126, 0.7152, 0.0722];
 
-/// Exposure difference between two photographs of the same scene, in EV; positive if the second is darker. The photographs may be
-/// misaligned and differ in size.
+/// Exposure difference between two photographs of the same scene, in EV; positive if the second is darker. The
+/// photographs may be misaligned and differ in size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairEv {
     /// log₂ of the ratio of the mean linear luminances, bright to dark.
     pub mean: f64,
-    /// Median of the per-pixel log₂ luminance ratios, without pixels that are black in either image. For images of different sizes, log₂
-    /// of the ratio of the median luminances. `None` if no ratio is defined.
+    /// Median of the per-pixel log₂ luminance ratios, without pixels that are black in either image. For images of
+    /// different sizes, log₂ of the ratio of the median luminances. `None` if no ratio is defined.
     pub median: Option<f64>,
-    /// Exposure drop with which [`expose`](super::expose) makes the bright image as dark as the other one: like `mean`, but with light
-    /// computed as code^2.2.
+    /// Exposure drop with which [`expose`](super::expose) makes the bright image as dark as the other one: like `mean`,
+    /// but with light computed as code^2.2.
     pub synthesis: f64,
 }
 
 impl PairEv {
     /// Measures a pair, the bright image first; `None` if at least one image is black.
     ///
-    /// Luminance is linear sRGB (IEC 61966-2-1), so that `mean` matches the change of shutter time and gain, within 0.03 EV up to 9 EV.
-    /// Noise that is clipped at black brightens the dark image: above 6 EV, `mean` is too small for noisy images. The paper's synthesis
-    /// uses the power 2.2 instead, which differs near black: for a real pair of LOL-v2, `mean` is 3.59 EV and `synthesis` 4.08 EV.
+    /// Luminance is linear sRGB (IEC 61966-2-1), so that `mean` matches the change of shutter time and gain, within
+    /// 0.03 EV up to 9 EV. Noise that is clipped at black brightens the dark image: above 6 EV, `mean` is too small for
+    /// noisy images. The paper's synthesis uses the power 2.2 instead, which differs near black: for a real pair of
+    /// LOL-v2, `mean` is 3.59 EV and `synthesis` 4.08 EV.
     #[must_use]
     pub fn measure(normal: &Rgb, low: &Rgb) -> Option<Self> {
-        let (bright, dark) = (
-            luminance(normal, srgb_to_linear),
-            luminance(low, srgb_to_linear),
-        );
+        let (bright, dark) = (luminance(normal, srgb_to_linear), luminance(low, srgb_to_linear));
         let is_same_size = (normal.height(), normal.width()) == (low.height(), low.width());
         let [gamma_bright, gamma_dark] =
             [normal, low].map(|image| mean(&luminance(image, |code| libm::pow(code, GAMMA))));
@@ -39,17 +37,9 @@ impl PairEv {
             mean: ev_difference(mean(&bright), mean(&dark))?,
             synthesis: ev_difference(gamma_bright, gamma_dark)?,
             median: if is_same_size {
-                median(
-                    bright
-                        .iter()
-                        .zip(&dark)
-                        .filter_map(|(bright, dark)| ev_difference(*bright, *dark))
-                        .collect(),
-                )
+                median(bright.iter().zip(&dark).filter_map(|(bright, dark)| ev_difference(*bright, *dark)).collect())
             } else {
-                median(bright)
-                    .zip(median(dark))
-                    .and_then(|(bright, dark)| ev_difference(bright, dark))
+                median(bright).zip(median(dark)).and_then(|(bright, dark)| ev_difference(bright, dark))
             },
         })
     }
@@ -68,11 +58,7 @@ pub fn mean_luminance(image: &Rgb) -> f64 {
 
 /// Converts an sRGB code to linear light, both from 0 to 1 (IEC 61966-2-1).
 fn srgb_to_linear(code: f64) -> f64 {
-    if code <= 0.04045 {
-        code / 12.92
-    } else {
-        libm::pow((code + 0.055) / 1.055, 2.4)
-    }
+    if code <= 0.04045 { code / 12.92 } else { libm::pow((code + 0.055) / 1.055, 2.4) }
 }
 
 /// Luminance of each pixel. `to_linear` converts a code to linear light, both from 0 to 1.
@@ -81,13 +67,7 @@ fn luminance(image: &Rgb, to_linear: impl Fn(f64) -> f64) -> Vec<f64> {
     image
         .samples()
         .chunks_exact(3)
-        .map(|pixel| {
-            pixel
-                .iter()
-                .zip(LUMINANCE)
-                .map(|(code, weight)| weight * linear[usize::from(*code)])
-                .sum::<f64>()
-        })
+        .map(|pixel| pixel.iter().zip(LUMINANCE).map(|(code, weight)| weight * linear[usize::from(*code)]).sum::<f64>())
         .collect()
 }
 
@@ -109,8 +89,7 @@ mod tests {
 
     /// Pseudo-random image without black pixels.
     fn scene() -> Rgb {
-        let samples =
-            (0..96 * 128 * 3_u32).map(|i| (40 + (i.wrapping_mul(2_654_435_761) >> 8) % 200) as u8);
+        let samples = (0..96 * 128 * 3_u32).map(|i| (40 + (i.wrapping_mul(2_654_435_761) >> 8) % 200) as u8);
         Rgb::new(96, 128, samples.collect()).unwrap()
     }
 
@@ -124,8 +103,7 @@ mod tests {
             } else {
                 255.0 * (1.055 * libm::pow(light, 1.0 / 2.4) - 0.055)
             };
-            let dither =
-                f64::from((index as u32).wrapping_mul(2_246_822_519) >> 8) / f64::from(1 << 24);
+            let dither = f64::from((index as u32).wrapping_mul(2_246_822_519) >> 8) / f64::from(1 << 24);
             *code = (exact + dither).floor() as u8;
         }
         dark
@@ -152,11 +130,7 @@ mod tests {
 
     #[test]
     fn identical_images_differ_by_zero() {
-        let same = PairEv {
-            mean: 0.0,
-            median: Some(0.0),
-            synthesis: 0.0,
-        };
+        let same = PairEv { mean: 0.0, median: Some(0.0), synthesis: 0.0 };
         assert_eq!(PairEv::measure(&scene(), &scene()), Some(same));
     }
 

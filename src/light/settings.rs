@@ -1,5 +1,5 @@
-//! Levels, kinds and noise of degradations: flags ([`LightArgs`], [`SensorArgs`]) and resolved settings ([`LightSettings`],
-//! [`SensorSettings`]).
+//! Levels, kinds and noise of degradations: flags ([`LightArgs`], [`SensorArgs`]) and resolved settings
+//! ([`LightSettings`], [`SensorSettings`]).
 
 use clap::{Args, ValueEnum};
 use serde::Serialize;
@@ -9,29 +9,25 @@ use super::auto::{AutoExposure, AutoSettings};
 use super::draws::NoiseKey;
 use super::levels::{LIGHT, Levels, ladder};
 use super::movement::{FrameView, Motion};
-use super::noise_profile::{
-    Amplify, Coupling, Draws, NoiseProfile, NoiseProfiles, Synthesis, Tone,
-};
+use super::noise_profile::{Amplify, Coupling, Draws, NoiseProfile, NoiseProfiles, Synthesis, Tone};
 use super::{CameraModel, Sampling};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::types::degradations::Kind;
-use darkqa_base::types::{
-    AxisLevel, Decides, Degradation, KindSet, PairDark, ProfileName, SetLight,
-};
+use darkqa_base::types::{AxisLevel, Decides, Degradation, KindSet, PairDark, ProfileName, SetLight};
 
 /// The levels and kinds of degradation.
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub struct LightArgs {
-    /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5; of motion,
-    /// exposure times in ms, as T33.33 or T8.33-T133.33; match is as dark as the photograph in the dark of each frame; default: L0-L5,
-    /// of photographs in the dark L0
+    /// Levels, as L0-L5 or L0,L3, exposure drops in EV up to 16, as L0,3.3, and ranges of them, as 0..10:0.5; of
+    /// motion, exposure times in ms, as T33.33 or T8.33-T133.33; match is as dark as the photograph in the dark of each
+    /// frame; default: L0-L5, of photographs in the dark L0
     ///
     /// L0-L5 is also the ladder of motion, T8.33-T133.33, unless exposure times are named.
     #[arg(long, value_name = "LEVELS", add = Decides::Trials)]
     pub levels: Option<Levels>,
-    /// Variants, as ev,auto: ev (exposure drop alone), noise (with sensor noise), both (of these two), auto (as a camera with automatic
-    /// exposure responds to the drop), motion (motion blur alone), all
+    /// Variants, as ev,auto: ev (exposure drop alone), noise (with sensor noise), both (of these two), auto (as a
+    /// camera with automatic exposure responds to the drop), motion (motion blur alone), all
     #[arg(long, value_name = "LIST", default_value_t = KindSet::BOTH, add = Decides::Trials)]
     pub variant: KindSet,
     /// The sensor and its noise.
@@ -58,16 +54,18 @@ impl LightArgs {
 #[derive(Debug, Clone, Args)]
 #[command(next_help_heading = "Light")]
 pub struct CameraArgs {
-    /// Automatic exposure of the variant auto: maximum stops of longer exposure (shutter), then of gain; at L0 the system gain is base-gain
-    /// (ADU per electron) and the exposure time base-time (seconds); the rest of the drop stays dark
+    /// Automatic exposure of the variant auto: maximum stops of longer exposure (shutter), then of gain; at L0 the
+    /// system gain is base-gain (ADU per electron) and the exposure time base-time (seconds); the rest of the drop
+    /// stays dark
     ///
-    /// Defaults of gain and base-gain follow from the sensor of --noise camera: gain ends at its largest K and starts 4 stops below, or at
-    /// its smallest K (for the paper's sensor gain=4,base-gain=0.375). The noise is that of the noise profile physical at this gain, in
-    /// this sensor.
+    /// Defaults of gain and base-gain follow from the sensor of --noise camera: gain ends at its largest K and starts 4
+    /// stops below, or at its smallest K (for the paper's sensor gain=4,base-gain=0.375). The noise is that of the
+    /// noise profile physical at this gain, in this sensor.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = AutoSettings::default(), add = Decides::Pixels)]
     pub auto: AutoSettings,
-    /// Camera rotation during an exposure, in the variants motion and auto: speed in degrees per second, hfov (horizontal field of view,
-    /// degrees) for data without camera, angle in degrees (0: sideways, 90: up or down) or random for each image
+    /// Camera rotation during an exposure, in the variants motion and auto: speed in degrees per second, hfov
+    /// (horizontal field of view, degrees) for data without camera, angle in degrees (0: sideways, 90: up or down) or
+    /// random for each image
     ///
     /// Keys that are not given have their defaults.
     #[arg(long, value_name = "KEY=VALUE,…", default_value_t = Motion::default(), add = Decides::Pixels)]
@@ -81,11 +79,12 @@ pub struct SensorArgs {
     /// Seed of all random draws
     #[arg(long, value_name = "N", default_value_t = 0, add = Decides::Pixels)]
     pub seed: u64,
-    /// Noise profiles (interpretations of the paper's noise model), as paper,eld; amplify, tone, draws and coupling of --noise change a
-    /// single profile, which is then called custom, or by the name of an equal profile
+    /// Noise profiles (interpretations of the paper's noise model), as paper,eld; amplify, tone, draws and coupling of
+    /// --noise change a single profile, which is then called custom, or by the name of an equal profile
     ///
-    /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image at five
-    /// brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every profile of the paper.
+    /// By default the noise variant has the same signal-to-noise ratio at every level: the levels are one noisy image
+    /// at five brightnesses. `--profile physical` loses photons with the light; `--profile all` asks under every
+    /// profile of the paper.
     ///
     /// Names of noisy conditions end with the profile, as L3-noise@physical; for paper it is omitted: L3-noise.
     #[arg(
@@ -97,15 +96,16 @@ pub struct SensorArgs {
     pub profile: Vec<Profile>,
     /// Noise that the light ratio r amplifies; default: from --profile (paper: shot-only)
     ///
-    /// It is the choice that matters most. At grey 128, L1, K 0.77 and r 200, read, row and quantisation noise add 0.03, 0
-    /// and 0 codes of deviation with shot-only, and 9–19, 1–3 and 1–2 codes with all. shot-only is the default because it is
-    /// what the paper says, and because the paper's comparison with real images fits the weaker noise.
+    /// It is the choice that matters most. At grey 128, L1, K 0.77 and r 200, read, row and quantisation noise add
+    /// 0.03, 0 and 0 codes of deviation with shot-only, and 9–19, 1–3 and 1–2 codes with all. shot-only is the default
+    /// because it is what the paper says, and because the paper's comparison with real images fits the weaker noise.
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub amplify: Option<Amplify>,
     /// Where a forward tone curve is applied; default: from --profile (paper: none)
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub tone: Option<Tone>,
-    /// One noisy RAW image for all levels of a frame (shared), or one for each level (fresh); default: from --profile (paper: shared)
+    /// One noisy RAW image for all levels of a frame (shared), or one for each level (fresh); default: from --profile
+    /// (paper: shared)
     #[arg(long, value_enum, add = Decides::Pixels)]
     pub draws: Option<Draws>,
     /// Quantity that the light ratio r depends on; default: from --profile (paper: independent)
@@ -114,12 +114,12 @@ pub struct SensorArgs {
     /// The sensor: sony-a7s2, nikon-d850, canon-eos-5d4, canon-eos-70d, canon-eos-700d, or a TOML file of a calibration
     #[arg(long, value_name = "NAME|FILE", default_value = "sony-a7s2", add = Decides::Pixels)]
     pub camera: String,
-    /// Pin the system gain K of the noise variant's sensor, in ADU per electron; default: log-uniform in the camera's range (0.1–6
-    /// for sony-a7s2) for each image
+    /// Pin the system gain K of the noise variant's sensor, in ADU per electron; default: log-uniform in the camera's
+    /// range (0.1–6 for sony-a7s2) for each image
     #[arg(long, value_name = "K", add = Decides::Pixels)]
     pub gain: Option<f64>,
-    /// Pin the light ratio r of the sensor noise; not with --noise coupling=photon, where it is 2^EV; default: uniform in the camera's
-    /// range for each image (100–300 for the built-in ones)
+    /// Pin the light ratio r of the sensor noise; not with --noise coupling=photon, where it is 2^EV; default: uniform
+    /// in the camera's range for each image (100–300 for the built-in ones)
     #[arg(long, value_name = "R", add = Decides::Pixels)]
     pub ratio: Option<f64>,
     /// Take the middle of every distribution for each image, instead of a draw
@@ -232,20 +232,12 @@ impl LightSettings {
             let kinds = self.variants.kinds();
             for kind in kinds.filter(|kind| AxisLevel::new(*kind, severity) == *level) {
                 let readings: Vec<Option<ProfileName>> = if kind.has_profiles() {
-                    self.kinds
-                        .sensor
-                        .readings
-                        .iter()
-                        .map(|(name, _)| Some(name.clone()))
-                        .collect()
+                    self.kinds.sensor.readings.iter().map(|(name, _)| Some(name.clone())).collect()
                 } else {
                     vec![None]
                 };
                 all.extend(
-                    readings
-                        .into_iter()
-                        .filter_map(|reading| Degradation::new(kind, severity, reading).ok())
-                        .map(Some),
+                    readings.into_iter().filter_map(|reading| Degradation::new(kind, severity, reading).ok()).map(Some),
                 );
             }
         }
@@ -260,24 +252,15 @@ impl KindSettings {
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(sensor: &SensorArgs, camera: &CameraArgs) -> Result<Self> {
         let sensor = SensorSettings::resolve(sensor)?;
-        Ok(Self {
-            auto: camera.auto.for_camera(&sensor.readings.camera()),
-            sensor,
-            motion: camera.motion,
-        })
+        Ok(Self { auto: camera.auto.for_camera(&sensor.readings.camera()), sensor, motion: camera.motion })
     }
 
     /// Resolves a degradation for a frame.
     ///
     /// # Errors
-    /// If `--profile` does not include the noise profile, the sensor does not have the gain that automatic exposure needs, or the image
-    /// would move too far.
-    pub fn apply(
-        &self,
-        how: &Degradation,
-        view: FrameView,
-        key: &NoiseKey,
-    ) -> Result<AppliedDegradation> {
+    /// If `--profile` does not include the noise profile, the sensor does not have the gain that automatic exposure
+    /// needs, or the image would move too far.
+    pub fn apply(&self, how: &Degradation, view: FrameView, key: &NoiseKey) -> Result<AppliedDegradation> {
         let synthesis = self.sensor.readings.for_degradation(Some(how))?;
         AppliedDegradation::new(how, synthesis, &self.auto, &self.motion, view, key)
     }
@@ -301,10 +284,7 @@ impl SensorSettings {
     /// # Errors
     /// [`Error::Usage`] with the flag that cannot be used.
     pub fn resolve(args: &SensorArgs) -> Result<Self> {
-        Ok(Self {
-            seed: args.seed,
-            readings: readings(args)?,
-        })
+        Ok(Self { seed: args.seed, readings: readings(args)? })
     }
 }
 
@@ -331,9 +311,8 @@ fn readings(args: &SensorArgs) -> Result<NoiseProfiles> {
         return Err(Error::usage(flag, problem));
     }
     if args.ratio.is_some()
-        && let Some(reading) = chosen
-            .iter()
-            .find(|reading| Synthesis::new(**reading, camera.clone()).coupling == Coupling::Photon)
+        && let Some(reading) =
+            chosen.iter().find(|reading| Synthesis::new(**reading, camera.clone()).coupling == Coupling::Photon)
     {
         let name = reading.name();
         let problem = format!("the ratio of {name} is 2^EV; leave out --noise ratio or {name}");
@@ -352,7 +331,8 @@ fn synthesis(args: &SensorArgs, reading: Synthesis) -> Result<Synthesis> {
         camera: reading.camera,
     };
     if synthesis.coupling == Coupling::Photon && args.ratio.is_some() {
-        let problem = "with --noise coupling=photon, or a profile that has it, the ratio is 2^EV; leave out --noise ratio";
+        let problem =
+            "with --noise coupling=photon, or a profile that has it, the ratio is 2^EV; leave out --noise ratio";
         return Err(Error::usage("--noise ratio", problem));
     }
     Ok(synthesis)
@@ -388,20 +368,13 @@ mod tests {
     }
 
     fn profile_names(words: &[&str]) -> Result<Vec<String>> {
-        Ok(sensor(words)?
-            .readings
-            .iter()
-            .map(|(name, _)| name.to_string())
-            .collect())
+        Ok(sensor(words)?.readings.iter().map(|(name, _)| name.to_string()).collect())
     }
 
     #[test]
     fn profiles_are_a_list_and_flags_change_a_single_one() {
         for (words, expected) in [
-            (
-                &["--profile=physical,paper"][..],
-                &["paper", "physical"][..],
-            ),
+            (&["--profile=physical,paper"][..], &["paper", "physical"][..]),
             (&["--profile=all"], &["paper", "eld", "level", "physical"]),
             (&["--profile=physical", "--tone=none"], &["custom"]),
             (&["--profile=physical", "--tone=before-ev"], &["physical"]),
@@ -409,23 +382,11 @@ mod tests {
             assert_eq!(profile_names(words).unwrap(), expected, "{words:?}");
         }
         for (words, part) in [
-            (
-                &["--profile=paper,eld", "--tone=none"][..],
-                "--noise tone: cannot be combined with several profiles",
-            ),
-            (
-                &["--profile=paper,physical", "--ratio=200"],
-                "--noise ratio: the ratio of physical is 2^EV",
-            ),
-            (
-                &["--profile=physical", "--ratio=9"],
-                "--noise ratio: with --noise coupling=photon",
-            ),
+            (&["--profile=paper,eld", "--tone=none"][..], "--noise tone: cannot be combined with several profiles"),
+            (&["--profile=paper,physical", "--ratio=200"], "--noise ratio: the ratio of physical is 2^EV"),
+            (&["--profile=physical", "--ratio=9"], "--noise ratio: with --noise coupling=photon"),
             (&["--profile=papre"], "invalid value 'papre'"),
-            (
-                &["--camera=leica"],
-                "--noise camera: \"leica\" is not one of sony-a7s2",
-            ),
+            (&["--camera=leica"], "--noise camera: \"leica\" is not one of sony-a7s2"),
             (&["--camera=no/such.toml"], "no/such.toml"),
         ] {
             let error = profile_names(words).unwrap_err().to_string();
@@ -435,9 +396,7 @@ mod tests {
 
     #[test]
     fn a_flag_replaces_the_choice_of_the_profile() {
-        let readings = sensor(&["--profile=physical", "--tone=none"])
-            .unwrap()
-            .readings;
+        let readings = sensor(&["--profile=physical", "--tone=none"]).unwrap().readings;
         let synthesis = readings.only().unwrap();
         assert_eq!(synthesis.amplify, Amplify::All);
         assert_eq!(synthesis.tone, Tone::None);

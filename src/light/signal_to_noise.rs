@@ -1,8 +1,8 @@
-//! Tests of the signal-to-noise ratio of flat greys by level and noise profile: RAW samples against a formula, and codes against the
-//! documentation.
+//! Tests of the signal-to-noise ratio of flat greys by level and noise profile: RAW samples against a formula, and
+//! codes against the documentation.
 //!
-//! For a sample y in ADU and v = σ_TL² · var(λ) + σ_row² + 1/12, the variance of the noise is r · K · y + v, or r · K · y + r² · v if r
-//! amplifies all terms. If less light means fewer photons, r is 2^ΔEV.
+//! For a sample y in ADU and v = σ_TL² · var(λ) + σ_row² + 1/12, the variance of the noise is r · K · y + v, or r · K ·
+//! y + r² · v if r amplifies all terms. If less light means fewer photons, r is 2^ΔEV.
 
 use super::camera::{CameraModel, CameraState, Sampling};
 use super::raw::noise::{self, Term};
@@ -51,9 +51,7 @@ fn moments(numbers: impl Iterator<Item = f64> + Clone) -> [f64; 2] {
 
 /// The ratio by formula for a sample of `y` ADU.
 fn expected_ratio(amplify: Amplify, state: &CameraState, y: f64) -> f64 {
-    let after = state.read_scale.powi(2) * tukey_variance(state.read_shape)
-        + state.row_deviation.powi(2)
-        + 1.0 / 12.0;
+    let after = state.read_scale.powi(2) * tukey_variance(state.read_shape) + state.row_deviation.powi(2) + 1.0 / 12.0;
     let amplified = match amplify {
         Amplify::ShotOnly => 1.0,
         Amplify::All => state.ratio * state.ratio,
@@ -74,10 +72,7 @@ fn raw_ratios(reading: NoiseProfile, gain: f64, code: u8, level: Severity) -> [f
         .flat_map(|row| (0..SIZE / 2).map(move |column| [row, column]))
         .map(|[row, column]| f64::from(raw.sample(2 * row, 2 * column + 1)));
     let [_, deviation] = moments(greens);
-    [
-        y / (deviation * state.adu_range),
-        expected_ratio(synthesis.amplify, &state, y),
-    ]
+    [y / (deviation * state.adu_range), expected_ratio(synthesis.amplify, &state, y)]
 }
 
 /// The ratio of green codes: mean over standard deviation.
@@ -117,9 +112,7 @@ fn raw_ratios_follow_the_formula() {
                 }
                 // The ratio falls at least with the square root of the light.
                 NoiseProfile::Level | NoiseProfile::Physical => {
-                    let steps = Severity::LADDER
-                        .windows(2)
-                        .map(|pair| pair[1].value() - pair[0].value());
+                    let steps = Severity::LADDER.windows(2).map(|pair| pair[1].value() - pair[0].value());
                     for (fall, step) in falls.iter().zip(steps) {
                         let root = libm::exp2(step / 2.0);
                         assert!(*fall > 0.98 * root, "{reading:?}: {fall} against {root}");
@@ -135,17 +128,14 @@ fn raw_ratios_follow_the_formula() {
 fn the_formula_distinguishes_profiles() {
     let (grey, level) = (GREYS[0], Severity::L5);
     let [paper, _] = raw_ratios(NoiseProfile::Paper, middle_gain(), grey, level);
-    for other in [
-        NoiseProfile::Eld,
-        NoiseProfile::Level,
-        NoiseProfile::Physical,
-    ] {
+    for other in [NoiseProfile::Eld, NoiseProfile::Level, NoiseProfile::Physical] {
         let [_, expected] = raw_ratios(other, middle_gain(), grey, level);
         assert!((paper / expected - 1.0).abs() > 0.2, "{other:?}");
     }
 }
 
-/// The rows of the table in `src/docs/light.md`: the name of a noise profile, and RAW and code ratios at L1 to L5 of both greys.
+/// The rows of the table in `src/docs/light.md`: the name of a noise profile, and RAW and code ratios at L1 to L5 of
+/// both greys.
 fn documented_ratios() -> Vec<(String, [[f64; 5]; 4])> {
     let place = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/light.md");
     let page = std::fs::read_to_string(place).unwrap();
@@ -158,11 +148,7 @@ fn documented_ratios() -> Vec<(String, [[f64; 5]; 4])> {
             let numbers: Vec<[f64; 5]> = numbers
                 .iter()
                 .map(|cell| -> Option<[f64; 5]> {
-                    cell.split(' ')
-                        .map(|word| word.parse().ok())
-                        .collect::<Option<Vec<f64>>>()?
-                        .try_into()
-                        .ok()
+                    cell.split(' ').map(|word| word.parse().ok()).collect::<Option<Vec<f64>>>()?.try_into().ok()
                 })
                 .collect::<Option<_>>()?;
             Some((name.trim_matches('`').to_owned(), numbers.try_into().ok()?))
@@ -178,18 +164,10 @@ fn documented_ratios_equal_the_measured_ones() {
     let names = NoiseProfile::ALL.map(|reading| reading.name().to_string());
     assert!(documented.iter().map(|(name, _)| name).eq(&names));
     for (reading, (_, rows)) in NoiseProfile::ALL.into_iter().zip(documented) {
-        let raw = GREYS.map(|grey| {
-            Severity::LADDER.map(|level| raw_ratios(reading, middle_gain(), grey, level)[0])
-        });
-        let code = GREYS.map(|grey| {
-            Severity::LADDER.map(|level| code_ratio(reading, middle_gain(), grey, level))
-        });
+        let raw = GREYS.map(|grey| Severity::LADDER.map(|level| raw_ratios(reading, middle_gain(), grey, level)[0]));
+        let code = GREYS.map(|grey| Severity::LADDER.map(|level| code_ratio(reading, middle_gain(), grey, level)));
         for (found, row) in raw.iter().chain(&code).zip(rows) {
-            if found
-                .iter()
-                .zip(row)
-                .any(|(found, stated)| f64::abs(found / stated - 1.0) > 0.02)
-            {
+            if found.iter().zip(row).any(|(found, stated)| f64::abs(found / stated - 1.0) > 0.02) {
                 off.push(format!("{reading:?} {found:.2?}, stated {row:?}"));
             }
         }

@@ -5,9 +5,7 @@ use rand_distr::Distribution;
 use rayon::prelude::*;
 
 use super::camera::tests::median;
-use super::draws::{
-    Component, LANES, Lanes, NoiseKey, Quantile, RandomField, Site, Stream, poisson, tukey_lambda,
-};
+use super::draws::{Component, LANES, Lanes, NoiseKey, Quantile, RandomField, Site, Stream, poisson, tukey_lambda};
 use super::raw::noise;
 use darkqa_base::types::FrameId;
 
@@ -21,7 +19,8 @@ fn stream(component: Component) -> Stream {
     NoiseKey::new(21, &FrameId("noise".to_owned())).stream(component)
 }
 
-/// Histogram of `n` draws (rounded up to whole batches), computed in parallel by rows of a thousand batches. `tally` counts one batch.
+/// Histogram of `n` draws (rounded up to whole batches), computed in parallel by rows of a thousand batches. `tally`
+/// counts one batch.
 fn histogram(n: usize, bins: usize, tally: impl Fn(&RandomField, &mut [u64]) + Sync) -> Vec<u64> {
     let field = stream(Component::RandomField);
     let rows = n.div_ceil(1000 * LANES);
@@ -92,11 +91,10 @@ fn moments(counts: &[u64], value_at: impl Fn(usize) -> f64) -> [f64; 2] {
     [mean, squares / n]
 }
 
-/// Means on both sides of every boundary of the sampler: multiples of ½, the start of the expansion, the ranges of K and r.
-const MEANS: [f64; 16] = [
-    0.01, 0.1, 0.3, 0.5, 0.999, 1.75, 4.2, 9.99, 15.5, 31.25, 47.98, 48.0, 64.0, 120.5, 200.0,
-    1587.1,
-];
+/// Means on both sides of every boundary of the sampler: multiples of ½, the start of the expansion, the ranges of K
+/// and r.
+const MEANS: [f64; 16] =
+    [0.01, 0.1, 0.3, 0.5, 0.999, 1.75, 4.2, 9.99, 15.5, 31.25, 47.98, 48.0, 64.0, 120.5, 200.0, 1587.1];
 
 fn assert_poisson_distribution(n: usize) {
     for mean in MEANS {
@@ -108,15 +106,9 @@ fn assert_poisson_distribution(n: usize) {
         assert!(off.abs() < BOUND, "mean {mean}: χ² is {off} deviations off");
         let [found, variance] = moments(&counts, |count| count as f64);
         let off = (found - mean) / f64::sqrt(mean / n);
-        assert!(
-            off.abs() < BOUND,
-            "mean {mean}: the mean is {off} errors off"
-        );
+        assert!(off.abs() < BOUND, "mean {mean}: the mean is {off} errors off");
         let off = (variance / mean - 1.0) / f64::sqrt((2.0 + 1.0 / mean) / n);
-        assert!(
-            off.abs() < BOUND,
-            "mean {mean}: the variance is {off} errors off"
-        );
+        assert!(off.abs() < BOUND, "mean {mean}: the variance is {off} errors off");
     }
 }
 
@@ -175,10 +167,7 @@ fn an_independent_sampler_agrees() {
         let n = ours.iter().sum::<u64>() as usize;
         let mut theirs = vec![0; ours.len()];
         let poisson = rand_distr::Poisson::new(f64::from(mean)).unwrap();
-        for number in poisson
-            .sample_iter(ReferenceRng(stream(Component::Camera), 0))
-            .take(n)
-        {
+        for number in poisson.sample_iter(ReferenceRng(stream(Component::Camera), 0)).take(n) {
             theirs[number as usize] += 1;
         }
         let off = chi_square_of_two(&ours, &theirs);
@@ -188,12 +177,7 @@ fn an_independent_sampler_agrees() {
 
 #[test]
 fn shot_noise_keeps_the_mean_and_its_variance_is_k_times_the_mean() {
-    for (gain, y) in [
-        (0.1_f32, 28.57_f32),
-        (1.0, 14.28),
-        (6.0, 9.52),
-        (0.1, 158.71),
-    ] {
+    for (gain, y) in [(0.1_f32, 28.57_f32), (1.0, 14.28), (6.0, 9.52), (0.1, 158.71)] {
         let counts = histogram(1_000_000, 4000, |field, counts| {
             let mut adu = [y; LANES];
             noise::shot(&mut adu, gain, [&field.shot[0], &field.shot[1]]);
@@ -206,15 +190,9 @@ fn shot_noise_keeps_the_mean_and_its_variance_is_k_times_the_mean() {
         let (gain, y) = (f64::from(gain), f64::from(y));
         let [mean, variance] = moments(&counts, |photons| gain * photons as f64);
         let n = counts.iter().sum::<u64>() as f64;
-        assert!(
-            (mean - y).abs() < BOUND * f64::sqrt(gain * y / n),
-            "K = {gain}"
-        );
+        assert!((mean - y).abs() < BOUND * f64::sqrt(gain * y / n), "K = {gain}");
         let spread = f64::sqrt((2.0 + gain / y) / n);
-        assert!(
-            (variance / (gain * y) - 1.0).abs() < BOUND * spread,
-            "K = {gain}"
-        );
+        assert!((variance / (gain * y) - 1.0).abs() < BOUND * spread, "K = {gain}");
     }
 }
 
@@ -228,10 +206,7 @@ fn assert_read_noise_quantiles(n: usize) {
     let levels: Vec<f64> = lower.iter().copied().chain(upper).collect();
     for shape in SHAPES.map(|shape| shape / 70.0) {
         let table = Quantile::tukey_lambda(shape);
-        let quantiles: Vec<f32> = levels
-            .iter()
-            .map(|u| tukey_lambda(*u, shape) as f32)
-            .collect();
+        let quantiles: Vec<f32> = levels.iter().map(|u| tukey_lambda(*u, shape) as f32).collect();
         let counts = histogram(n, levels.len() + 1, |field, counts| {
             let mut adu = [0.0; LANES];
             noise::read(&mut adu, 1.0, &table, 0.0, &field.read);
@@ -290,18 +265,12 @@ fn read_noise_has_its_spread_and_its_offset() {
         let n = (batches * LANES) as f64;
         let mean = sum / n;
         let off = (mean + 1.25) / (deviation / n.sqrt());
-        assert!(
-            off.abs() < BOUND,
-            "λ {shape}: the offset is {off} errors off"
-        );
+        assert!(off.abs() < BOUND, "λ {shape}: the offset is {off} errors off");
         let variance = squares / n - mean * mean;
         let spread = f64::sqrt((kurtosis + 2.0) / n);
         // The deviations above have four digits.
         let off = variance / (deviation * deviation) - 1.0;
-        assert!(
-            off.abs() < BOUND * spread + 2e-4,
-            "λ {shape}: variance {variance}"
-        );
+        assert!(off.abs() < BOUND * spread + 2e-4, "λ {shape}: variance {variance}");
     }
 }
 
@@ -318,15 +287,11 @@ fn normal_histogram(numbers: impl Iterator<Item = f64>) -> Vec<u64> {
 fn row_noise_is_normal_and_uncorrelated_between_rows() {
     let deviation = 0.6;
     let stream = stream(Component::Row);
-    let rows: Vec<f64> = (0..TEN_MILLION)
-        .into_par_iter()
-        .map(|at| f64::from(noise::row(deviation, stream, at)) / deviation)
-        .collect();
+    let rows: Vec<f64> =
+        (0..TEN_MILLION).into_par_iter().map(|at| f64::from(noise::row(deviation, stream, at)) / deviation).collect();
     let n = rows.len() as f64;
     // Mean, variance, skewness and fourth moment; the variances of these sample moments are 1, 2, 15 and 96 over n.
-    for (power, expected, variance) in
-        [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)]
-    {
+    for (power, expected, variance) in [(1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0)] {
         let moment = rows.iter().map(|z| z.powi(power)).sum::<f64>() / n;
         let off = (moment - expected) / f64::sqrt(variance / n);
         assert!(off.abs() < BOUND, "moment {power}: {off} errors off");
@@ -338,11 +303,7 @@ fn row_noise_is_normal_and_uncorrelated_between_rows() {
     }
     let ours = normal_histogram(rows.iter().take(1_000_000).copied());
     let words = ReferenceRng(self::stream(Component::Camera), 0);
-    let theirs = normal_histogram(
-        rand_distr::StandardNormal
-            .sample_iter(words)
-            .take(1_000_000),
-    );
+    let theirs = normal_histogram(rand_distr::StandardNormal.sample_iter(words).take(1_000_000));
     assert!(chi_square_of_two(&ours, &theirs).abs() < BOUND);
 }
 
@@ -392,9 +353,6 @@ fn terms_of_one_site_are_uncorrelated() {
     let n = (batches * LANES) as f64;
     for (product, pair) in products.iter().zip([[0, 1], [1, 2], [2, 0]]) {
         let correlation = product / f64::sqrt(squares[pair[0]] * squares[pair[1]]);
-        assert!(
-            correlation.abs() < BOUND / n.sqrt(),
-            "{pair:?}: {correlation}"
-        );
+        assert!(correlation.abs() < BOUND / n.sqrt(), "{pair:?}: {correlation}");
     }
 }

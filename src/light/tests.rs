@@ -41,13 +41,7 @@ fn ramp_code(position: usize, size: usize) -> u8 {
 fn statistics(image: &Rgb) -> [[f64; 2]; 3] {
     let n = (image.height() * image.width()) as f64;
     std::array::from_fn(|channel| {
-        let codes: Vec<f64> = image
-            .samples()
-            .iter()
-            .skip(channel)
-            .step_by(3)
-            .map(|code| f64::from(*code))
-            .collect();
+        let codes: Vec<f64> = image.samples().iter().skip(channel).step_by(3).map(|code| f64::from(*code)).collect();
         let mean = codes.iter().sum::<f64>() / n;
         let variance = codes.iter().map(|code| (code - mean).powi(2)).sum::<f64>() / n;
         [mean, variance.sqrt()]
@@ -91,14 +85,8 @@ fn bytes_match_this_version() {
     }
     let sensor = Digest::from_bytes(&bytes).to_string();
     assert_eq!(VERSION, 2);
-    assert_eq!(
-        exposure,
-        "ef493dc91ffe0b7f1558f10c2c581c4419340505a34a969706ef98b04cf79a9e"
-    );
-    assert_eq!(
-        sensor,
-        "17eaa7dfafd65e100705809ef73a8dc5d8b77f97f6429524752b72b3fc52c72c"
-    );
+    assert_eq!(exposure, "ef493dc91ffe0b7f1558f10c2c581c4419340505a34a969706ef98b04cf79a9e");
+    assert_eq!(sensor, "17eaa7dfafd65e100705809ef73a8dc5d8b77f97f6429524752b72b3fc52c72c");
 }
 
 /// Bytes of other choices than the default, including another camera.
@@ -109,22 +97,12 @@ fn bytes_of_other_choices_match_this_version() {
     let choices = [
         Synthesis::new(NoiseProfile::Physical, CameraModel::default()),
         Synthesis::new(NoiseProfile::Physical, camera.clone()),
-        Synthesis {
-            draws: Draws::Fresh,
-            tone: Tone::AfterEv,
-            ..Synthesis::new(NoiseProfile::Paper, camera)
-        },
+        Synthesis { draws: Draws::Fresh, tone: Tone::AfterEv, ..Synthesis::new(NoiseProfile::Paper, camera) },
     ];
     let mut bytes = Vec::new();
     for synthesis in &choices {
         let mut images = Severity::LADDER.map(|_| Rgb::black(37, 130));
-        ladder(
-            &clean,
-            &key(20, "frame"),
-            synthesis,
-            &Severity::LADDER,
-            &mut images.each_mut().map(Rgb::samples_mut),
-        );
+        ladder(&clean, &key(20, "frame"), synthesis, &Severity::LADDER, &mut images.each_mut().map(Rgb::samples_mut));
         for image in &images {
             bytes.extend_from_slice(image.samples());
         }
@@ -139,12 +117,7 @@ fn the_number_of_threads_does_not_change_the_image() {
     let [one, two, five] = [1, 2, 5].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
         pool.build().unwrap().install(|| {
-            let negative = Negative::new(
-                &ramps(61, 40),
-                &key(3, "a"),
-                &Synthesis::default(),
-                Severity::L1,
-            );
+            let negative = Negative::new(&ramps(61, 40), &key(3, "a"), &Synthesis::default(), Severity::L1);
             Severity::LADDER.map(|level| negative.develop(level))
         })
     });
@@ -156,40 +129,19 @@ fn the_number_of_threads_does_not_change_the_image() {
 fn seed_and_frame_change_the_image() {
     let clean = flat(128, 64);
     let [first, other_seed, other_frame] = [(1, "a"), (2, "a"), (1, "b")].map(|(seed, frame)| {
-        let negative = Negative::with_state(
-            &clean,
-            &key(seed, frame),
-            &median(),
-            Amplify::ShotOnly,
-            Tone::None,
-            &Term::ALL,
-            0.0,
-        );
+        let negative =
+            Negative::with_state(&clean, &key(seed, frame), &median(), Amplify::ShotOnly, Tone::None, &Term::ALL, 0.0);
         negative.develop(Severity::L1)
     });
     for other in [other_seed, other_frame] {
-        let changed = first
-            .samples()
-            .chunks(3)
-            .zip(other.samples().chunks(3))
-            .filter(|(a, b)| a != b)
-            .count();
+        let changed = first.samples().chunks(3).zip(other.samples().chunks(3)).filter(|(a, b)| a != b).count();
         assert!(changed * 10 > 64 * 64 * 9, "{changed} changed");
     }
 }
 
 #[test]
 fn the_size_never_changes() {
-    for (height, width) in [
-        (1, 1),
-        (1, 2),
-        (1, 9),
-        (2, 1),
-        (9, 1),
-        (3, 5),
-        (4, 5),
-        (5, 4),
-    ] {
+    for (height, width) in [(1, 1), (1, 2), (1, 9), (2, 1), (9, 1), (3, 5), (4, 5), (5, 4)] {
         let clean = ramps(height, width);
         let how = sensor(Severity::L2);
         let degraded = degrade(&clean, Some(&how), &key(1, "a"), &Synthesis::default()).unwrap();
@@ -208,39 +160,22 @@ fn flat_greys_have_the_documented_figures() {
     ];
     for (code, level, expected) in cases {
         let clean = flat(code, 512);
-        let negative = Negative::with_state(
-            &clean,
-            &key(4, "flat"),
-            &median(),
-            Amplify::ShotOnly,
-            Tone::None,
-            &Term::ALL,
-            0.0,
-        );
+        let negative =
+            Negative::with_state(&clean, &key(4, "flat"), &median(), Amplify::ShotOnly, Tone::None, &Term::ALL, 0.0);
         let found = statistics(&negative.develop(level));
         for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
             let is_close = (found - expected).abs() < 0.01 * expected + 0.07;
-            assert!(
-                is_close,
-                "grey {code}, {level:?}: {found} against {expected}"
-            );
+            assert!(is_close, "grey {code}, {level:?}: {found} against {expected}");
         }
     }
 }
 
 #[test]
 fn noise_shrinks_with_the_light() {
-    let negative = Negative::with_state(
-        &flat(128, 256),
-        &key(5, "a"),
-        &median(),
-        Amplify::ShotOnly,
-        Tone::None,
-        &Term::ALL,
-        0.0,
-    );
-    let [lower, higher] = [Severity::L1, Severity::L2]
-        .map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
+    let negative =
+        Negative::with_state(&flat(128, 256), &key(5, "a"), &median(), Amplify::ShotOnly, Tone::None, &Term::ALL, 0.0);
+    let [lower, higher] =
+        [Severity::L1, Severity::L2].map(|level| statistics(&negative.develop(level)).map(|[_, deviation]| deviation));
     for (lower, higher) in lower.iter().zip(higher) {
         assert!((higher / lower * f64::exp2(2.0 / 2.2) - 1.0).abs() < 0.02);
     }
@@ -257,21 +192,9 @@ fn without_noise_mid_grey_and_white_equal_the_exposure_branch() {
             if code == 255 && state.rgb_gain < 1.0 {
                 continue;
             }
-            let negative = Negative::with_state(
-                &clean,
-                &key,
-                &state,
-                Amplify::ShotOnly,
-                Tone::None,
-                &[],
-                0.0,
-            );
+            let negative = Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, Tone::None, &[], 0.0);
             for level in Severity::LADDER {
-                assert_eq!(
-                    negative.develop(level),
-                    expose(&clean, level),
-                    "{code}, {level:?}"
-                );
+                assert_eq!(negative.develop(level), expose(&clean, level), "{code}, {level:?}");
             }
         }
     }
@@ -286,44 +209,30 @@ fn a_grey_ramp_is_unchanged_with_the_tone_curve() {
         let state = CameraState::draw(&key(seed, "a"), &CameraModel::default());
         let tone = Tone::BeforeEv;
         let key = key(seed, "a");
-        let negative =
-            Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, tone, &[], 0.0);
+        let negative = Negative::with_state(&clean, &key, &state, Amplify::ShotOnly, tone, &[], 0.0);
         let developed = negative.develop_by(0.0);
         for (column, codes) in developed.samples().chunks(3).enumerate() {
             for code in codes {
-                assert!(
-                    code.abs_diff((column % 256) as u8) <= 2,
-                    "{column} became {code}"
-                );
+                assert!(code.abs_diff((column % 256) as u8) <= 2, "{column} became {code}");
             }
         }
     }
 }
 
-/// Before the drop, the tone curve gives the greys of the exposure branch; after the drop, it is applied to the degraded image.
+/// Before the drop, the tone curve gives the greys of the exposure branch; after the drop, it is applied to the
+/// degraded image.
 #[test]
 fn the_tone_curve_is_applied_where_it_is_set() {
     let clean = flat(100, 4);
     let [none, before, after] = [Tone::None, Tone::BeforeEv, Tone::AfterEv].map(|tone| {
-        let negative = Negative::with_state(
-            &clean,
-            &key(1, "a"),
-            &median(),
-            Amplify::All,
-            tone,
-            &[],
-            0.0,
-        );
+        let negative = Negative::with_state(&clean, &key(1, "a"), &median(), Amplify::All, tone, &[], 0.0);
         negative.develop(Severity::L1)
     });
     assert_eq!(before, expose(&clean, Severity::L1));
     let degraded = f64::from(none.samples()[0]) / 255.0;
     let after = after.samples()[0];
     let expected = degraded * degraded * (3.0 - 2.0 * degraded) * 255.0;
-    assert!(
-        (f64::from(after) - expected).abs() < 1.0,
-        "{after} for {expected}"
-    );
+    assert!((f64::from(after) - expected).abs() < 1.0, "{after} for {expected}");
 }
 
 /// With [`Coupling::Photon`], the ratio is 2^ΔEV; in the paper's profile it does not depend on the level.
@@ -348,11 +257,7 @@ fn ladders_equal_single_negatives() {
     let settings = [
         Synthesis::default(),
         Synthesis::new(NoiseProfile::Physical, CameraModel::default()),
-        Synthesis {
-            draws: Draws::Fresh,
-            tone: Tone::AfterEv,
-            ..Synthesis::default()
-        },
+        Synthesis { draws: Draws::Fresh, tone: Tone::AfterEv, ..Synthesis::default() },
     ];
     for (height, width) in [(1, 1), (2, 3), (33, 130), (64, 129), (67, 300)] {
         let (clean, key) = (ramps(height, width), key(6, "a"));
@@ -363,11 +268,7 @@ fn ladders_equal_single_negatives() {
             for (level, image) in Severity::LADDER.into_iter().zip(&images) {
                 let negative = Negative::new(&clean, &key, synthesis, level);
                 assert!(negative.can_develop(level));
-                assert_eq!(
-                    negative.develop(level),
-                    *image,
-                    "{height} × {width}, {level:?}"
-                );
+                assert_eq!(negative.develop(level), *image, "{height} × {width}, {level:?}");
             }
         }
     }
@@ -375,10 +276,7 @@ fn ladders_equal_single_negatives() {
 
 #[test]
 fn fresh_draws_differ_between_levels() {
-    let fresh = Synthesis {
-        draws: Draws::Fresh,
-        ..Synthesis::default()
-    };
+    let fresh = Synthesis { draws: Draws::Fresh, ..Synthesis::default() };
     let clean = flat(128, 32);
     let levels = [Severity::L1, Severity::L2];
     let [first, second] = levels.map(|level| Negative::new(&clean, &key(1, "a"), &fresh, level));

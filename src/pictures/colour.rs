@@ -1,8 +1,8 @@
 //! Colour space of an image: the colour information in its file ([`ColourTag`]) and its interpretation ([`Meaning`]).
 //!
-//! A PNG file may have several kinds of colour information. In order of priority (PNG specification, third edition, section 4.3): code
-//! points (`cICP`), an ICC profile, the chunk `sRGB`, gamma and primaries (`gAMA`, `cHRM`). Without any, codes are sRGB. Other formats have
-//! only profiles.
+//! A PNG file may have several kinds of colour information. In order of priority (PNG specification, third edition,
+//! section 4.3): code points (`cICP`), an ICC profile, the chunk `sRGB`, gamma and primaries (`gAMA`, `cHRM`). Without
+//! any, codes are sRGB. Other formats have only profiles.
 
 mod code_points;
 mod conversion;
@@ -27,7 +27,8 @@ use self::space::{REMEDY, rgb_space};
 use darkqa_base::types::values::Recent;
 use darkqa_base::types::{ColourHandling, Digest};
 
-/// Maximum size of an ICC profile, in bytes; chosen. Matrix profiles have a few thousand bytes, printer profiles up to a few million.
+/// Maximum size of an ICC profile, in bytes; chosen. Matrix profiles have a few thousand bytes, printer profiles up to
+/// a few million.
 const MAX_PROFILE_BYTES: usize = 4 << 20;
 
 /// Number of profiles whose conversions are cached; chosen. The images of a data set usually share one profile.
@@ -71,9 +72,7 @@ impl ColourTag {
             Self::None | Self::Srgb => Ok(Meaning::Srgb),
             Self::CodePoints(points) => meaning_from_code_points(*points, depth),
             Self::Profile(profile) => meaning_from_profile(profile, depth),
-            Self::DeflatedProfile(chunk) => {
-                meaning_from_profile(&decompress_profile(chunk)?, depth)
-            }
+            Self::DeflatedProfile(chunk) => meaning_from_profile(&decompress_profile(chunk)?, depth),
             Self::Gamma(gamma) => gamma.meaning(depth),
             Self::Primaries(primaries) => Ok(meaning_from_primaries(primaries)),
         }
@@ -94,51 +93,32 @@ impl ColourTag {
 
 /// The colour space of linear light with these primaries.
 fn meaning_from_primaries(primaries: &Primaries) -> Meaning {
-    let Primaries {
-        red,
-        green,
-        blue,
-        white,
-    } = primaries;
-    let [red, green, blue, white] =
-        [red, green, blue, white].map(|[x, y]| format!("{x:.4} {y:.4}"));
+    let Primaries { red, green, blue, white } = primaries;
+    let [red, green, blue, white] = [red, green, blue, white].map(|[x, y]| format!("{x:.4} {y:.4}"));
     let name = format!("primaries {red}, {green}, {blue}, white {white}");
-    Meaning::Other(Arc::new(rgb_space(
-        name,
-        ToneCurve::Gamma(1.0),
-        primaries,
-        ColourHandling::Converted,
-    )))
+    Meaning::Other(Arc::new(rgb_space(name, ToneCurve::Gamma(1.0), primaries, ColourHandling::Converted)))
 }
 
 /// Interprets code points of H.273: primaries, transfer, matrix, and 1 for the full range.
 fn meaning_from_code_points(points: [u8; 4], depth: CodeDepth) -> Result<Meaning, String> {
     let [primaries, transfer, matrix, range] = points;
     if range == 0 {
-        return Err(format!(
-            "the codes have the narrow range of video; {REMEDY}"
-        ));
+        return Err(format!("the codes have the narrow range of video; {REMEDY}"));
     }
     if matrix != 0 || range != 1 {
         return Err(format!(
             "the colours have the code points {primaries}/{transfer}/{matrix}/{range} (cICP); matrix 0 (RGB) and range 1 (full) expected: {REMEDY}"
         ));
     }
-    let points = CodePoints {
-        primaries,
-        transfer,
-    };
-    points
-        .meaning(depth)
-        .map_err(|problem| format!("{problem} (cICP {primaries}/{transfer}); {REMEDY}"))
+    let points = CodePoints { primaries, transfer };
+    points.meaning(depth).map_err(|problem| format!("{problem} (cICP {primaries}/{transfer}); {REMEDY}"))
 }
 
 /// Interprets an ICC profile. The most recent profiles are cached by their digests.
 ///
 /// Of HDR profiles, which convert by tables, the code points are used.
 fn meaning_from_profile(profile: &[u8], depth: CodeDepth) -> Result<Meaning, String> {
-    static CACHE: LazyLock<Recent<Digest, Meaning>> =
-        LazyLock::new(|| Recent::new(CACHED_PROFILES));
+    static CACHE: LazyLock<Recent<Digest, Meaning>> = LazyLock::new(|| Recent::new(CACHED_PROFILES));
     if profile.len() > MAX_PROFILE_BYTES {
         return Err(profile_too_large());
     }
@@ -147,12 +127,8 @@ fn meaning_from_profile(profile: &[u8], depth: CodeDepth) -> Result<Meaning, Str
     }
     let digest = Digest::from_bytes(profile);
     CACHE.get(&digest, || {
-        let Profile {
-            name,
-            conversion,
-            is_grey,
-            is_video,
-        } = Profile::read(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
+        let Profile { name, conversion, is_grey, is_video } =
+            Profile::read(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
         if conversion.is_identity() {
             return Ok(Meaning::Srgb);
         }
@@ -161,28 +137,19 @@ fn meaning_from_profile(profile: &[u8], depth: CodeDepth) -> Result<Meaning, Str
             name,
             profile: Some(digest),
             is_grey,
-            handling: if is_video {
-                ColourHandling::Video
-            } else {
-                ColourHandling::Converted
-            },
+            handling: if is_video { ColourHandling::Video } else { ColourHandling::Converted },
         })))
     })
 }
 
-/// Decompresses the profile in a PNG chunk `iCCP`, up to [`MAX_PROFILE_BYTES`], because a small chunk may expand to any size.
+/// Decompresses the profile in a PNG chunk `iCCP`, up to [`MAX_PROFILE_BYTES`], because a small chunk may expand to any
+/// size.
 fn decompress_profile(chunk: &[u8]) -> Result<Vec<u8>, String> {
-    let end = chunk
-        .iter()
-        .position(|byte| *byte == 0)
-        .ok_or_else(broken_compression)?;
+    let end = chunk.iter().position(|byte| *byte == 0).ok_or_else(broken_compression)?;
     let data = chunk.get(end + 2..).ok_or_else(broken_compression)?;
     let mut profile = Vec::new();
     let bound = MAX_PROFILE_BYTES as u64 + 1;
-    flate2::read::ZlibDecoder::new(data)
-        .take(bound)
-        .read_to_end(&mut profile)
-        .map_err(|_| broken_compression())?;
+    flate2::read::ZlibDecoder::new(data).take(bound).read_to_end(&mut profile).map_err(|_| broken_compression())?;
     if profile.len() > MAX_PROFILE_BYTES {
         return Err(profile_too_large());
     }
@@ -194,15 +161,12 @@ fn broken_compression() -> String {
 }
 
 fn profile_too_large() -> String {
-    format!(
-        "the ICC profile has more than {} MB; {REMEDY}",
-        MAX_PROFILE_BYTES >> 20
-    )
+    format!("the ICC profile has more than {} MB; {REMEDY}", MAX_PROFILE_BYTES >> 20)
 }
 
 impl Gamma {
-    /// Exponents with their transfers in H.273: 1/2.2 for sRGB, 1/1.961 for BT.709 as ffmpeg up to version 7 writes it, 1/2.8, and linear
-    /// light.
+    /// Exponents with their transfers in H.273: 1/2.2 for sRGB, 1/1.961 for BT.709 as ffmpeg up to version 7 writes it,
+    /// 1/2.8, and linear light.
     const TRANSFERS: [(u32, u8); 4] = [(Self::SRGB, 13), (50_994, 1), (35_714, 5), (100_000, 8)];
     /// Exponent of the approximation of sRGB, 1/2.2.
     const SRGB: u32 = 45_455;
@@ -229,12 +193,7 @@ impl Gamma {
                     )
                 })?,
         };
-        CodePoints {
-            primaries,
-            transfer,
-        }
-        .meaning(depth)
-        .map_err(|problem| format!("{problem} (gAMA, cHRM); {REMEDY}"))
+        CodePoints { primaries, transfer }.meaning(depth).map_err(|problem| format!("{problem} (gAMA, cHRM); {REMEDY}"))
     }
 }
 

@@ -28,15 +28,11 @@ pub struct DecodeRule {
 
 impl DecodeRule {
     /// The default without a limit, for files of which only the headers are read.
-    pub(super) const UNBOUNDED: Self = Self {
-        max_pixels: u64::MAX,
-        colour: ColourRule::Convert,
-        transfer: Transfer::Srgb,
-        exposure_ev: None,
-    };
+    pub(super) const UNBOUNDED: Self =
+        Self { max_pixels: u64::MAX, colour: ColourRule::Convert, transfer: Transfer::Srgb, exposure_ev: None };
 
-    /// Checks the width and height of an image, in pixels. The aspect ratio is limited because scaling a very narrow image can take far
-    /// more memory than the image itself.
+    /// Checks the width and height of an image, in pixels. The aspect ratio is limited because scaling a very narrow
+    /// image can take far more memory than the image itself.
     ///
     /// # Errors
     /// If it has too many pixels, or if `max_pixels` is the default and the aspect ratio is too large.
@@ -58,17 +54,14 @@ impl DecodeRule {
         Ok(())
     }
 
-    /// Changes that reading makes to an image, except colours and orientation. `is_light` is true for linear light, false for codes.
+    /// Changes that reading makes to an image, except colours and orientation. `is_light` is true for linear light,
+    /// false for codes.
     #[must_use]
     pub fn input_note(&self, is_light: bool) -> InputNote {
         InputNote {
             depth: is_light.then_some(DepthNote::Light),
             exposure_ev: self.exposure_ev.filter(|_| is_light),
-            no_light: if is_light {
-                Vec::new()
-            } else {
-                self.linear_flags()
-            },
+            no_light: if is_light { Vec::new() } else { self.linear_flags() },
             ..InputNote::default()
         }
     }
@@ -92,11 +85,7 @@ impl DecodeRule {
     fn linear_flags(&self) -> Vec<String> {
         let linear = (self.transfer == Transfer::Linear).then_some("--decode transfer=linear");
         let exposure = self.exposure_ev.map(|_| "--decode exposure");
-        [linear, exposure]
-            .into_iter()
-            .flatten()
-            .map(str::to_owned)
-            .collect()
+        [linear, exposure].into_iter().flatten().map(str::to_owned).collect()
     }
 }
 
@@ -126,12 +115,7 @@ flag_words!(ColourRule, Transfer);
 
 impl Default for DecodeRule {
     fn default() -> Self {
-        Self {
-            max_pixels: MAX_PIXELS,
-            colour: ColourRule::default(),
-            transfer: Transfer::default(),
-            exposure_ev: None,
-        }
+        Self { max_pixels: MAX_PIXELS, colour: ColourRule::default(), transfer: Transfer::default(), exposure_ev: None }
     }
 }
 
@@ -152,10 +136,7 @@ mod tests {
             let found = rule.check_size(width, height);
             assert_eq!(found.is_ok(), fits, "{width} × {height}: {found:?}");
         }
-        let user_limit = DecodeRule {
-            max_pixels: MAX_PIXELS - 1,
-            ..rule
-        };
+        let user_limit = DecodeRule { max_pixels: MAX_PIXELS - 1, ..rule };
         assert_eq!(user_limit.check_size(1, 1_001), Ok(()));
     }
 }

@@ -16,8 +16,7 @@ pub fn fitted_size(width: u32, height: u32, max_side: NonZeroU32) -> (u32, u32) 
     if longer <= max {
         return (width, height);
     }
-    let [width, height] =
-        [width, height].map(|side| ((u64::from(side) * max + longer / 2) / longer).max(1) as u32);
+    let [width, height] = [width, height].map(|side| ((u64::from(side) * max + longer / 2) / longer).max(1) as u32);
     (width, height)
 }
 

@@ -1,8 +1,9 @@
 //! Two-dimensional arrays in HDF5 files written by h5py: [`Hdf5Array`].
 //!
-//! Supports the default output of h5py (HDF5 File Format Specification, version 3.0): superblock versions 0 and 1, symbol-table groups,
-//! version 1 object headers, integers and floats, contiguous and chunked storage, the filters deflate, shuffle and fletcher32, and user
-//! blocks. Files of `libver="latest"` are refused with a message that says so.
+//! Supports the default output of h5py (HDF5 File Format Specification, version 3.0): superblock versions 0 and 1,
+//! symbol-table groups, version 1 object headers, integers and floats, contiguous and chunked storage, the filters
+//! deflate, shuffle and fletcher32, and user blocks. Files of `libver="latest"` are refused with a message that says
+//! so.
 
 use std::io::Read as _;
 
@@ -40,9 +41,7 @@ impl Hdf5Array {
             _ => {
                 let names: Vec<&str> = objects.iter().take(8).map(|object| &*object.name).collect();
                 let names = names.join(", ");
-                return Err(format!(
-                    "no array {name:?} in the HDF5 file; it holds {names}"
-                ));
+                return Err(format!("no array {name:?} in the HDF5 file; it holds {names}"));
             }
         };
         ArrayLayout::read(&file, array)?.read_array(&file)
@@ -74,13 +73,11 @@ struct Message<'a> {
     data: Bytes<'a>,
 }
 
-/// The file from its signature on, to which its addresses are relative. A user block of 512 bytes, or of a power of two above, may come
-/// before it.
+/// The file from its signature on, to which its addresses are relative. A user block of 512 bytes, or of a power of two
+/// above, may come before it.
 fn without_user_block(file: &[u8]) -> Option<&[u8]> {
     let starts = std::iter::once(0).chain((9..usize::BITS).map(|exponent| 1 << exponent));
-    starts
-        .map_while(|start| file.get(start..))
-        .find(|rest| rest.starts_with(SIGNATURE))
+    starts.map_while(|start| file.get(start..)).find(|rest| rest.starts_with(SIGNATURE))
 }
 
 fn truncated() -> String {
@@ -100,10 +97,7 @@ impl<'a> Bytes<'a> {
     /// An unsigned integer of at most 8 bytes.
     fn number(self, at: u64, length: u64) -> Result<u64, String> {
         let bytes = self.slice(at, length)?;
-        Ok(bytes
-            .iter()
-            .rev()
-            .fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
+        Ok(bytes.iter().rev().fold(0, |sum, byte| sum << 8 | u64::from(*byte)))
     }
 
     /// An unsigned integer of 8 bytes as an index; `usize::MAX` if it does not fit.
@@ -181,10 +175,7 @@ impl<'a> Bytes<'a> {
             for entry in 0..self.number(leaf.address + 6, 2)? {
                 let at = leaf.address + 8 + 40 * entry;
                 let start = names.saturating_add(self.number(at, 8)?);
-                let name = self
-                    .0
-                    .get(usize::try_from(start).map_err(|_| truncated())?..)
-                    .ok_or_else(truncated)?;
+                let name = self.0.get(usize::try_from(start).map_err(|_| truncated())?..).ok_or_else(truncated)?;
                 let name = name.split(|byte| *byte == 0).next().unwrap_or_default();
                 objects.push(Object {
                     name: String::from_utf8_lossy(&name[..name.len().min(255)]).into_owned(),
@@ -269,12 +260,7 @@ struct ArrayLayout {
 impl ArrayLayout {
     fn read(file: &Bytes<'_>, header: u64) -> Result<Self, String> {
         let messages = file.messages(header)?;
-        let message = |kind| {
-            messages
-                .iter()
-                .find(|message| message.kind == kind)
-                .map(|message| message.data)
-        };
+        let message = |kind| messages.iter().find(|message| message.kind == kind).map(|message| message.data);
         let size = size(message(DATASPACE).ok_or_else(not_an_array)?)?;
         let (descr, number_size) = number_type(message(DATATYPE).ok_or_else(not_an_array)?)?;
         let layout = message(LAYOUT).ok_or_else(not_an_array)?;
@@ -286,10 +272,7 @@ impl ArrayLayout {
                 }
                 Storage::Chunked {
                     tree: layout.number(3, 8)?,
-                    chunk: (
-                        layout.number(11, 4)? as usize,
-                        layout.number(15, 4)? as usize,
-                    ),
+                    chunk: (layout.number(11, 4)? as usize, layout.number(15, 4)? as usize),
                 }
             }
             (version, class) => {
@@ -314,20 +297,11 @@ impl ArrayLayout {
             Storage::Contiguous(at) => file.slice(at, bytes as u64)?.to_vec(),
             Storage::Chunked { tree, chunk } => self.read_chunks(file, tree, chunk)?,
         };
-        Ok(Hdf5Array {
-            size: self.size,
-            descr: self.descr,
-            data,
-        })
+        Ok(Hdf5Array { size: self.size, descr: self.descr, data })
     }
 
     /// Reads all chunks and returns the numbers row by row.
-    fn read_chunks(
-        &self,
-        file: &Bytes<'_>,
-        tree: u64,
-        chunk: (usize, usize),
-    ) -> Result<Vec<u8>, String> {
+    fn read_chunks(&self, file: &Bytes<'_>, tree: u64, chunk: (usize, usize)) -> Result<Vec<u8>, String> {
         let ((rows, columns), (chunk_height, chunk_width)) = (self.size, chunk);
         let pixels = (chunk_height as u64).saturating_mul(chunk_width as u64);
         if pixels == 0 || pixels > MAX_PIXELS {
@@ -336,7 +310,8 @@ impl ArrayLayout {
         let chunk_size = chunk_height * chunk_width * self.number_size;
         let mut filled = 0;
         let mut data = vec![0; rows * columns * self.number_size];
-        // A key contains the stored length of the chunk, a bit mask of skipped filters, and the offset along each dimension.
+        // A key contains the stored length of the chunk, a bit mask of skipped filters, and the offset along each
+        // dimension.
         for leaf in file.leaves(tree, 1, 32)? {
             let (top, left) = (leaf.key.index(8)?, leaf.key.index(16)?);
             if top >= rows || left >= columns {
@@ -362,20 +337,9 @@ impl ArrayLayout {
     }
 
     /// Undoes the filters of a chunk and checks its length. Bit i of `skipped` is set if filter i was not used.
-    fn undo_filters(
-        &self,
-        stored: &[u8],
-        skipped: u64,
-        chunk_size: usize,
-    ) -> Result<Vec<u8>, String> {
+    fn undo_filters(&self, stored: &[u8], skipped: u64, chunk_size: usize) -> Result<Vec<u8>, String> {
         let mut bytes = stored.to_vec();
-        for (_, filter) in self
-            .filters
-            .iter()
-            .enumerate()
-            .rev()
-            .filter(|(index, _)| skipped >> index & 1 == 0)
-        {
+        for (_, filter) in self.filters.iter().enumerate().rev().filter(|(index, _)| skipped >> index & 1 == 0) {
             bytes = match filter {
                 Filter::Checksum => {
                     bytes.truncate(bytes.len().saturating_sub(4));
@@ -402,27 +366,19 @@ fn size(message: Bytes<'_>) -> Result<(usize, usize), String> {
     let (version, rank) = (message.number(0, 1)?, message.number(1, 1)?);
     let first = if version == 1 { 8 } else { 4 };
     if rank != 2 {
-        return Err(format!(
-            "its array has {rank} dimensions; height and width expected"
-        ));
+        return Err(format!("its array has {rank} dimensions; height and width expected"));
     }
     let (rows, columns) = (message.number(first, 8)?, message.number(first + 8, 8)?);
     let pixels = rows.saturating_mul(columns);
     if pixels == 0 || pixels > MAX_PIXELS {
-        return Err(format!(
-            "its array has {rows} × {columns} numbers; 1 to {MAX_PIXELS} expected"
-        ));
+        return Err(format!("its array has {rows} × {columns} numbers; 1 to {MAX_PIXELS} expected"));
     }
     Ok((rows as usize, columns as usize))
 }
 
 /// The number type in a datatype message, in the notation of `.npy` files, and its size in bytes.
 fn number_type(message: Bytes<'_>) -> Result<(String, usize), String> {
-    let (class, bits, width) = (
-        message.number(0, 1)? & 15,
-        message.number(1, 3)?,
-        message.number(4, 4)?,
-    );
+    let (class, bits, width) = (message.number(0, 1)? & 15, message.number(1, 3)?, message.number(4, 4)?);
     let letter = match class {
         0 if bits & 8 == 8 => 'i',
         0 => 'u',
@@ -454,11 +410,7 @@ fn filters(message: Bytes<'_>) -> Result<Vec<Filter>, String> {
             }
         });
         let has_name = version == 1 || id >= 256;
-        let (name, rest) = if has_name {
-            (message.number(at + 2, 2)?, at + 4)
-        } else {
-            (0, at + 2)
-        };
+        let (name, rest) = if has_name { (message.number(at + 2, 2)?, at + 4) } else { (0, at + 2) };
         let values = message.number(rest + 2, 2)?;
         at = rest + 4 + name + 4 * values;
         if version == 1 && values % 2 == 1 {

@@ -28,9 +28,7 @@ use super::decode_rule::{ColourRule, DecodeRule, Transfer};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files::guarded::guarded;
 use darkqa_base::files::reading;
-use darkqa_base::types::{
-    ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb, Rgb16Image,
-};
+use darkqa_base::types::{ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb, Rgb16Image};
 
 /// A PNG, JPEG, WebP, TIFF, BMP or OpenEXR file in memory, not decoded.
 #[derive(Debug)]
@@ -65,13 +63,7 @@ impl ImageFile {
     /// An image file with these bytes. `place` is its path, and line if any, for messages.
     #[must_use]
     pub fn new(bytes: Vec<u8>, place: String, rule: DecodeRule) -> Self {
-        Self {
-            bytes,
-            place,
-            rule,
-            orientation_use: OrientationUse::Apply,
-            facts: OnceLock::new(),
-        }
+        Self { bytes, place, rule, orientation_use: OrientationUse::Apply, facts: OnceLock::new() }
     }
 
     /// Reads the file at a path.
@@ -86,22 +78,17 @@ impl ImageFile {
     /// The same file, decoded without applying its EXIF orientation.
     #[must_use]
     pub fn ignoring_orientation(self) -> Self {
-        Self {
-            orientation_use: OrientationUse::Ignore,
-            ..self
-        }
+        Self { orientation_use: OrientationUse::Ignore, ..self }
     }
 
     /// The same file, decoded with its EXIF orientation applied.
     #[must_use]
     pub fn applying_orientation(self) -> Self {
-        Self {
-            orientation_use: OrientationUse::Apply,
-            ..self
-        }
+        Self { orientation_use: OrientationUse::Apply, ..self }
     }
 
-    /// The EXIF orientation of the file and its size as stored; `None` if the image need not be turned or the file is broken.
+    /// The EXIF orientation of the file and its size as stored; `None` if the image need not be turned or the file is
+    /// broken.
     #[must_use]
     pub fn stated_orientation(&self) -> Option<StatedOrientation> {
         let orientation = self.facts().orientation;
@@ -110,10 +97,7 @@ impl ImageFile {
         }
         // Decoding reports a broken image.
         let (width, height) = self.decoder().ok()?.dimensions();
-        Some(StatedOrientation {
-            orientation: orientation.to_exif(),
-            stored_size: (height as usize, width as usize),
-        })
+        Some(StatedOrientation { orientation: orientation.to_exif(), stored_size: (height as usize, width as usize) })
     }
 
     /// Path of the file, and line if any, for messages.
@@ -128,15 +112,14 @@ impl ImageFile {
         &self.bytes
     }
 
-    /// The digest of the file and of the changes that reading makes to its codes. Without changes, the digest of the file alone.
+    /// The digest of the file and of the changes that reading makes to its codes. Without changes, the digest of the
+    /// file alone.
     #[must_use]
     pub fn digest(&self) -> Digest {
         let file = Digest::from_bytes(&self.bytes);
         match self.note().rule() {
             None => file,
-            Some(rule) => {
-                Digest::from_parts([&b"darkqa.reading/1"[..], file.as_bytes(), rule.as_bytes()])
-            }
+            Some(rule) => Digest::from_parts([&b"darkqa.reading/1"[..], file.as_bytes(), rule.as_bytes()]),
         }
     }
 
@@ -144,8 +127,7 @@ impl ImageFile {
     #[must_use]
     pub fn note(&self) -> InputNote {
         let facts = self.facts();
-        let stated =
-            (facts.orientation != Orientation::NoTransforms).then(|| facts.orientation.to_exif());
+        let stated = (facts.orientation != Orientation::NoTransforms).then(|| facts.orientation.to_exif());
         let (orientation, orientation_ignored) = match self.orientation_use {
             OrientationUse::Apply => (stated, None),
             OrientationUse::Ignore => (None, stated),
@@ -174,18 +156,13 @@ impl ImageFile {
             return self.ink_colours().ok().map(|inks| inks.note());
         }
         match (self.rule.colour, colour.meaning(depth.code_depth())) {
-            (ColourRule::Ignore, Ok(Meaning::Other(space))) => {
-                Some(space.note(ColourHandling::Ignored))
+            (ColourRule::Ignore, Ok(Meaning::Other(space))) => Some(space.note(ColourHandling::Ignored)),
+            (ColourRule::Ignore, Ok(Meaning::Linear) | Err(_)) => {
+                Some(ColourNote { from: colour.kind().to_owned(), profile: None, handling: ColourHandling::Ignored })
             }
-            (ColourRule::Ignore, Ok(Meaning::Linear) | Err(_)) => Some(ColourNote {
-                from: colour.kind().to_owned(),
-                profile: None,
-                handling: ColourHandling::Ignored,
-            }),
             (_, Err(_) | Ok(Meaning::Linear | Meaning::Srgb)) => None,
             (rule, Ok(Meaning::Other(space))) => {
-                let is_refused =
-                    rule == ColourRule::Convert && space.handling == ColourHandling::Clipped;
+                let is_refused = rule == ColourRule::Convert && space.handling == ColourHandling::Clipped;
                 (!is_refused).then(|| space.note(space.handling))
             }
         }
@@ -196,17 +173,13 @@ impl ImageFile {
     /// # Errors
     /// If the colour space is not supported, or the file and the rule contradict each other.
     fn interpretation(&self, facts: &FileFacts) -> Result<Interpretation, String> {
-        let DecodeRule {
-            colour, transfer, ..
-        } = self.rule;
+        let DecodeRule { colour, transfer, .. } = self.rule;
         if facts.inks.is_some() {
             return Ok(Interpretation::Codes(None));
         }
         let meaning = match colour {
             ColourRule::Ignore => Meaning::Srgb,
-            ColourRule::Convert | ColourRule::Clip => {
-                facts.colour.meaning(facts.depth.code_depth())?
-            }
+            ColourRule::Convert | ColourRule::Clip => facts.colour.meaning(facts.depth.code_depth())?,
         };
         if let Meaning::Other(space) = &meaning
             && space.handling == ColourHandling::Clipped
@@ -238,8 +211,9 @@ impl ImageFile {
 
     /// Checks that the file can be decoded; returns its width and height, in pixels.
     ///
-    /// For an RGB PNG file only the checksums are verified: they find any damage at a hundredth of the cost of decompression. Every
-    /// other file is decoded, because JPEG has no checksums and an alpha channel may be transparent.
+    /// For an RGB PNG file only the checksums are verified: they find any damage at a hundredth of the cost of
+    /// decompression. Every other file is decoded, because JPEG has no checksums and an alpha channel may be
+    /// transparent.
     pub fn check(&self) -> Result<(u32, u32)> {
         if FileFormat::detect(&self.bytes) == Ok(FileFormat::Png) {
             let decoder = self.decoder()?;
@@ -276,9 +250,10 @@ impl ImageFile {
 
     /// Decodes the file in its own bit depth.
     ///
-    /// Grey becomes three equal channels, and a palette becomes its colours. An opaque alpha channel is dropped; transparency is refused,
-    /// because the background is unknown. The EXIF orientation is applied, unless the file was opened without it. Colours are converted to
-    /// sRGB if the rule asks for it, and CMYK by its profile or, without one, by a formula.
+    /// Grey becomes three equal channels, and a palette becomes its colours. An opaque alpha channel is dropped;
+    /// transparency is refused, because the background is unknown. The EXIF orientation is applied, unless the file was
+    /// opened without it. Colours are converted to sRGB if the rule asks for it, and CMYK by its profile or, without
+    /// one, by a formula.
     ///
     /// # Errors
     /// If the file is truncated, damaged or unsupported; the error names the file.
@@ -292,13 +267,9 @@ impl ImageFile {
         let decoder = self.decoder()?;
         // The PNG decoder stops after the last sample, and the JPEG decoder accepts missing samples.
         self.check_complete()?;
-        let mut image = guarded(|| {
-            DynamicImage::from_decoder(decoder).map_err(|e| format!("not a whole image: {e}"))
-        })
-        .map_err(|problem| self.error(problem))?;
-        if image.color().has_alpha()
-            && !image.to_rgba8().pixels().all(|pixel| pixel.0[3] == u8::MAX)
-        {
+        let mut image = guarded(|| DynamicImage::from_decoder(decoder).map_err(|e| format!("not a whole image: {e}")))
+            .map_err(|problem| self.error(problem))?;
+        if image.color().has_alpha() && !image.to_rgba8().pixels().all(|pixel| pixel.0[3] == u8::MAX) {
             return Err(self.error("the image is transparent in places; flatten it first"));
         }
         let interpretation = self.checked_interpretation(!image.color().has_color())?;
@@ -311,8 +282,7 @@ impl ImageFile {
                 if let Some(space) = space {
                     space.conversion.convert_16(&mut codes);
                 }
-                Rgb16Image::new(height, width, codes)
-                    .map(|codes| Pixels::Rgb16Image(Arc::new(codes)))
+                Rgb16Image::new(height, width, codes).map(|codes| Pixels::Rgb16Image(Arc::new(codes)))
             }
             Interpretation::Codes(space) => {
                 let mut codes = image.into_rgb8().into_raw();
@@ -322,12 +292,7 @@ impl ImageFile {
                 Rgb::new(height, width, codes).map(|codes| Pixels::Codes8(Arc::new(codes)))
             }
             Interpretation::Light(_) => {
-                let light = image
-                    .into_rgb16()
-                    .into_raw()
-                    .into_iter()
-                    .map(|code| f32::from(code) / 65_535.0)
-                    .collect();
+                let light = image.into_rgb16().into_raw().into_iter().map(|code| f32::from(code) / 65_535.0).collect();
                 self.light_pixels(height, width, light)
             }
         };
@@ -351,8 +316,7 @@ impl ImageFile {
         let mut image = DynamicImage::from(image);
         image.apply_orientation(self.orientation());
         let (width, height) = (image.width() as usize, image.height() as usize);
-        let codes =
-            Rgb::new(height, width, image.into_rgb8().into_raw()).map_err(|e| self.error(e))?;
+        let codes = Rgb::new(height, width, image.into_rgb8().into_raw()).map_err(|e| self.error(e))?;
         Ok(Pixels::Codes8(Arc::new(codes)))
     }
 
@@ -363,19 +327,14 @@ impl ImageFile {
 
     /// Decodes an OpenEXR file.
     fn decode_exr(&self) -> Result<Pixels> {
-        let file = guarded(|| ExrFile::open(&self.bytes, &self.rule))
-            .map_err(|problem| self.error(problem))?;
-        let interpretation = self
-            .interpretation(self.facts())
-            .map_err(|problem| self.error(problem))?;
-        let mut light =
-            guarded(|| file.light(&self.bytes)).map_err(|problem| self.error(problem))?;
+        let file = guarded(|| ExrFile::open(&self.bytes, &self.rule)).map_err(|problem| self.error(problem))?;
+        let interpretation = self.interpretation(self.facts()).map_err(|problem| self.error(problem))?;
+        let mut light = guarded(|| file.light(&self.bytes)).map_err(|problem| self.error(problem))?;
         if let Interpretation::Light(Some(space)) = interpretation {
             space.conversion.convert_light(&mut light);
         }
         let (width, height) = (file.size.0 as usize, file.size.1 as usize);
-        self.light_pixels(height, width, light)
-            .map_err(|e| self.error(e))
+        self.light_pixels(height, width, light).map_err(|e| self.error(e))
     }
 
     /// Linear light as pixels, after `--decode exposure`.
@@ -386,13 +345,9 @@ impl ImageFile {
 
     /// Interpretation of the samples, after a check that a colour image has no grey profile.
     fn checked_interpretation(&self, is_grey: bool) -> Result<Interpretation> {
-        let interpretation = self
-            .interpretation(self.facts())
-            .map_err(|problem| self.error(problem))?;
+        let interpretation = self.interpretation(self.facts()).map_err(|problem| self.error(problem))?;
         if let Interpretation::Codes(Some(space)) = &interpretation {
-            space
-                .check(is_grey)
-                .map_err(|problem| self.error(problem))?;
+            space.check(is_grey).map_err(|problem| self.error(problem))?;
         }
         Ok(interpretation)
     }
@@ -411,11 +366,10 @@ impl ImageFile {
 
     /// The facts from the headers of the file; [`FileFacts::NONE`] if the file is not an image.
     fn facts(&self) -> &FileFacts {
-        self.facts
-            .get_or_init(|| match FileFormat::detect(&self.bytes) {
-                Ok(format) => FileFacts::read(&self.bytes, format),
-                Err(_) => FileFacts::NONE,
-            })
+        self.facts.get_or_init(|| match FileFormat::detect(&self.bytes) {
+            Ok(format) => FileFacts::read(&self.bytes, format),
+            Err(_) => FileFacts::NONE,
+        })
     }
 
     /// The decoder of a file of integer samples.
@@ -437,26 +391,17 @@ impl ImageFile {
         // 8 bytes per pixel: RGBA with 16 bits per channel.
         limits.max_alloc = Some(self.rule.max_pixels.saturating_mul(8));
         reader.limits(limits);
-        let decoder = guarded(|| {
-            reader
-                .into_decoder()
-                .map_err(|e| format!("not a readable image: {e}"))
-        })
-        .map_err(|problem| self.error(problem))?;
-        let (width, height) = decoder.dimensions();
-        self.rule
-            .check_size(width as usize, height as usize)
+        let decoder = guarded(|| reader.into_decoder().map_err(|e| format!("not a readable image: {e}")))
             .map_err(|problem| self.error(problem))?;
+        let (width, height) = decoder.dimensions();
+        self.rule.check_size(width as usize, height as usize).map_err(|problem| self.error(problem))?;
         Ok(decoder)
     }
 
     /// Checks that the file is not truncated, and verifies the checksums of a PNG file.
     fn check_complete(&self) -> Result<()> {
-        match FileFormat::detect(&self.bytes).map(|format| fault(&self.bytes, format, self.facts()))
-        {
-            Ok(Some(fault)) => Err(self.error(format_args!(
-                "not a whole image: {fault}; copy or export it again"
-            ))),
+        match FileFormat::detect(&self.bytes).map(|format| fault(&self.bytes, format, self.facts())) {
+            Ok(Some(fault)) => Err(self.error(format_args!("not a whole image: {fault}; copy or export it again"))),
             _ => Ok(()),
         }
     }

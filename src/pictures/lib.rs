@@ -5,8 +5,8 @@
 //! Rgb ─ Scaling ─ PayloadFormat ─ Payload ─ data URL         sent to a model
 //! ```
 //!
-//! [`raw_image`] decodes images of camera drivers, which have no file format. [`raw_png`], [`npy`] and [`hdf5`] read maps of numbers, such
-//! as depth or labels.
+//! [`raw_image`] decodes images of camera drivers, which have no file format. [`raw_png`], [`npy`] and [`hdf5`] read
+//! maps of numbers, such as depth or labels.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 

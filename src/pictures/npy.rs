@@ -1,11 +1,12 @@
-//! Two-dimensional arrays in the `.npy` format of NumPy: [`Npy`]. A third dimension of 1, as sensors of habitat-lab give it, is dropped.
+//! Two-dimensional arrays in the `.npy` format of NumPy: [`Npy`]. A third dimension of 1, as sensors of habitat-lab
+//! give it, is dropped.
 //!
-//! A file (`numpy.lib.format`) consists of `\x93NUMPY`, a version, the length of the header, the header, and the numbers row by
-//! row. The header is a Python dictionary with `descr`, `fortran_order` and `shape`. Versions 1 to 3 differ only in the
-//! width of the length field and the encoding of the header.
+//! A file (`numpy.lib.format`) consists of `\x93NUMPY`, a version, the length of the header, the header, and the
+//! numbers row by row. The header is a Python dictionary with `descr`, `fortran_order` and `shape`. Versions 1 to 3
+//! differ only in the width of the length field and the encoding of the header.
 //!
-//! The numbers are not copied, so a header that states too large a shape allocates nothing. The crate `ndarray-npy` was not used because it
-//! parses headers as arbitrary Python literals and adds eight more crates.
+//! The numbers are not copied, so a header that states too large a shape allocates nothing. The crate `ndarray-npy` was
+//! not used because it parses headers as arbitrary Python literals and adds eight more crates.
 
 use std::sync::LazyLock;
 
@@ -35,10 +36,7 @@ impl NumberForm {
     /// The size of one number in bytes, and its type; `None` unless `descr` is a little-endian or one-byte type.
     fn from_descr(descr: &str) -> Option<(usize, Self)> {
         Some(match descr {
-            "<f2" => (
-                2,
-                Self::Floats(|b| half::f16::from_le_bytes(sized(b)).into()),
-            ),
+            "<f2" => (2, Self::Floats(|b| half::f16::from_le_bytes(sized(b)).into())),
             "<f4" => (4, Self::Floats(|b| f32::from_le_bytes(sized(b)).into())),
             "<f8" => (8, Self::Floats(|b| f64::from_le_bytes(sized(b)))),
             "|i1" => (1, Self::Integers(|b| i8::from_le_bytes(sized(b)).into())),
@@ -73,9 +71,7 @@ pub struct Npy<'a> {
 impl<'a> Npy<'a> {
     /// Reads the header and checks that no number is missing.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, String> {
-        let rest = bytes
-            .strip_prefix(MAGIC)
-            .ok_or("not a .npy file: it does not begin with \\x93NUMPY")?;
+        let rest = bytes.strip_prefix(MAGIC).ok_or("not a .npy file: it does not begin with \\x93NUMPY")?;
         let (header, data) = split_header(rest)?;
         let header = String::from_utf8_lossy(header);
         let (descr, fortran, shape) = fields(&header).ok_or_else(|| {
@@ -83,9 +79,7 @@ impl<'a> Npy<'a> {
             format!("its header is not that of a .npy array: {header:.200}")
         })?;
         if fortran == "True" {
-            return Err(
-                "it is in Fortran order; save numpy.ascontiguousarray(array) instead".to_owned(),
-            );
+            return Err("it is in Fortran order; save numpy.ascontiguousarray(array) instead".to_owned());
         }
         let ([rows, columns] | [rows, columns, 1] | [1, rows, columns]) = shape[..] else {
             return Err(format!(
@@ -99,50 +93,34 @@ impl<'a> Npy<'a> {
     ///
     /// # Errors
     /// If the type is not supported, or `data` has another length than the array.
-    pub(crate) fn new(
-        descr: &str,
-        rows: usize,
-        columns: usize,
-        data: &'a [u8],
-    ) -> Result<Self, String> {
+    pub(crate) fn new(descr: &str, rows: usize, columns: usize, data: &'a [u8]) -> Result<Self, String> {
         let (number_size, numbers) = NumberForm::from_descr(descr).ok_or_else(|| {
             format!("its numbers are {descr:?}; little-endian integers or floats of 2, 4 or 8 bytes expected")
         })?;
-        let length = rows
-            .checked_mul(columns)
-            .and_then(|count| count.checked_mul(number_size));
+        let length = rows.checked_mul(columns).and_then(|count| count.checked_mul(number_size));
         if length != Some(data.len()) {
             return Err(format!(
                 "not a whole .npy file: {} bytes follow its header, which do not make {rows} × {columns} {descr:?}",
                 data.len()
             ));
         }
-        Ok(Self {
-            numbers,
-            number_size,
-            size: (rows, columns),
-            data,
-        })
+        Ok(Self { numbers, number_size, size: (rows, columns), data })
     }
 
     /// The floating-point numbers, row by row; an error for integers.
     pub fn floats(self) -> Result<impl Iterator<Item = f64>, String> {
         match self.numbers {
             NumberForm::Floats(read) => Ok(self.data.chunks_exact(self.number_size).map(read)),
-            NumberForm::Integers(_) => {
-                Err("it holds integers; floats of 2, 4 or 8 bytes expected".to_owned())
-            }
+            NumberForm::Integers(_) => Err("it holds integers; floats of 2, 4 or 8 bytes expected".to_owned()),
         }
     }
 
     /// The numbers, row by row, whatever their type.
     pub fn numbers(self) -> impl Iterator<Item = f64> {
-        self.data
-            .chunks_exact(self.number_size)
-            .map(move |bytes| match self.numbers {
-                NumberForm::Floats(read) => read(bytes),
-                NumberForm::Integers(read) => read(bytes) as f64,
-            })
+        self.data.chunks_exact(self.number_size).map(move |bytes| match self.numbers {
+            NumberForm::Floats(read) => read(bytes),
+            NumberForm::Integers(read) => read(bytes) as f64,
+        })
     }
 
     /// The integers, row by row; an error for floating-point numbers.
@@ -167,9 +145,7 @@ fn split_header(rest: &[u8]) -> Result<(&[u8], &[u8]), String> {
             (u32::from_le_bytes(*length) as usize, rest)
         }
         _ => {
-            return Err(format!(
-                "its format is version {major}; versions 1 to 3 of .npy are read"
-            ));
+            return Err(format!("its format is version {major}; versions 1 to 3 of .npy are read"));
         }
     };
     rest.split_at_checked(length).ok_or_else(truncated)

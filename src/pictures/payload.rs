@@ -41,17 +41,13 @@ impl Payload {
         Ok(Self::from_file(file, width, height, format))
     }
 
-    /// Takes a PNG file unchanged if it contains only plain 8-bit RGB pixels and no chunk that changes their display or adds information;
-    /// otherwise returns `None`. The file is not checked for damage: it must have been decoded before.
+    /// Takes a PNG file unchanged if it contains only plain 8-bit RGB pixels and no chunk that changes their display or
+    /// adds information; otherwise returns `None`. The file is not checked for damage: it must have been decoded
+    /// before.
     #[must_use]
     pub fn from_plain_png(file: &[u8]) -> Option<Self> {
         let (width, height) = plain_png::plain_size(file)?;
-        Some(Self::from_file(
-            file.to_vec(),
-            width,
-            height,
-            PayloadFormat::Png,
-        ))
+        Some(Self::from_file(file.to_vec(), width, height, PayloadFormat::Png))
     }
 
     /// A file that was encoded in this format, with its width and height in pixels.
@@ -115,11 +111,7 @@ impl Payload {
     /// Extension for a file name, without the dot.
     #[must_use]
     pub fn extension(&self) -> &'static str {
-        if self.facts.format == PayloadFormat::Png.name() {
-            "png"
-        } else {
-            "jpg"
-        }
+        if self.facts.format == PayloadFormat::Png.name() { "png" } else { "jpg" }
     }
 
     /// The bytes of the encoded file.
@@ -133,14 +125,13 @@ impl Payload {
     /// # Errors
     /// If memory is insufficient, or the file of [`Self::from_file`] is damaged.
     pub fn decode(&self) -> Result<Rgb> {
-        let image = image::load_from_memory(&self.file)
-            .map_err(image_error)?
-            .into_rgb8();
+        let image = image::load_from_memory(&self.file).map_err(image_error)?.into_rgb8();
         let (height, width) = (image.height() as usize, image.width() as usize);
         Rgb::new(height, width, image.into_raw())
     }
 
-    /// The pixels that the receiver gets, decoded once and kept as long as the payload, for several models of this process.
+    /// The pixels that the receiver gets, decoded once and kept as long as the payload, for several models of this
+    /// process.
     ///
     /// # Errors
     /// See [`Self::decode`].
@@ -158,9 +149,7 @@ impl Payload {
     /// See [`Self::decode`].
     pub fn received_pixels<'a>(&self, encoded: Option<&'a Rgb>) -> Result<Cow<'a, Rgb>> {
         match encoded {
-            Some(pixels) if self.facts.format == PayloadFormat::Png.name() => {
-                Ok(Cow::Borrowed(pixels))
-            }
+            Some(pixels) if self.facts.format == PayloadFormat::Png.name() => Ok(Cow::Borrowed(pixels)),
             _ => self.decode().map(Cow::Owned),
         }
     }
@@ -190,9 +179,8 @@ impl fmt::Debug for Payload {
 /// # Errors
 /// If the text is not such a URL, the file is not a complete JPEG, or a side has more than `max_side` pixels.
 pub fn decode_data_url(url: &str, max_side: u32) -> Result<Rgb> {
-    let base64 = url
-        .strip_prefix("data:image/jpeg;base64,")
-        .ok_or_else(|| image_error("no JPEG as a run stores it"))?;
+    let base64 =
+        url.strip_prefix("data:image/jpeg;base64,").ok_or_else(|| image_error("no JPEG as a run stores it"))?;
     let file = STANDARD.decode(base64).map_err(image_error)?;
     let mut reader = ImageReader::with_format(Cursor::new(file), ImageFormat::Jpeg);
     let mut limits = Limits::default();
@@ -218,10 +206,7 @@ mod tests {
         let url = payload.data_url();
         let url = std::str::from_utf8(&url).unwrap();
         let (head, base64) = url.split_once(',').unwrap();
-        assert_eq!(
-            head,
-            format!("data:image/{};base64", payload.facts().format)
-        );
+        assert_eq!(head, format!("data:image/{};base64", payload.facts().format));
         STANDARD.decode(base64).unwrap()
     }
 
@@ -244,8 +229,7 @@ mod tests {
         let image = Rgb::new(16, 16, red_and_blue).unwrap();
         let format = PayloadFormat::Jpeg(Quality::new(100).unwrap());
         let payload = Payload::encode(&image, format).unwrap();
-        let read =
-            image::load_from_memory_with_format(&file(&payload), image::ImageFormat::Jpeg).unwrap();
+        let read = image::load_from_memory_with_format(&file(&payload), image::ImageFormat::Jpeg).unwrap();
         let (a, b) = (image.samples(), read.to_rgb8());
         let worst = a.iter().zip(b.as_raw()).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(worst < Some(10), "{worst:?}");

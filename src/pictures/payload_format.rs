@@ -66,9 +66,7 @@ impl FromStr for PayloadFormat {
         text.strip_prefix("jpeg:")
             .and_then(|quality| Quality::new(quality.parse().ok()?))
             .map(Self::Jpeg)
-            .ok_or_else(|| {
-                "png, or jpeg:QUALITY with a quality from 1 to 100, as jpeg:95, expected".to_owned()
-            })
+            .ok_or_else(|| "png, or jpeg:QUALITY with a quality from 1 to 100, as jpeg:95, expected".to_owned())
     }
 }
 
@@ -81,9 +79,7 @@ mod tests {
         for text in ["png", "jpeg:1", "jpeg:95", "jpeg:100"] {
             assert_eq!(text.parse::<PayloadFormat>().unwrap().to_string(), text);
         }
-        for wrong in [
-            "", "PNG", "jpeg", "jpeg:", "jpeg:0", "jpeg:101", "jpeg:-1", "webp",
-        ] {
+        for wrong in ["", "PNG", "jpeg", "jpeg:", "jpeg:0", "jpeg:101", "jpeg:-1", "webp"] {
             assert!(wrong.parse::<PayloadFormat>().is_err(), "{wrong}");
         }
     }

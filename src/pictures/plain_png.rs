@@ -4,8 +4,9 @@ const SIGNATURE: &[u8] = b"\x89PNG\r\n\x1a\n";
 
 /// Width and height of a PNG file that contains only plain 8-bit RGB pixels, in pixels; `None` for other files.
 ///
-/// Besides header, image data and end, only chunks without effect are accepted (`sRGB`, and `pHYs` with square pixels). Other chunks
-/// (transparency, gamma, profiles, orientation, frames, text) could change the display, or send more than the pixels.
+/// Besides header, image data and end, only chunks without effect are accepted (`sRGB`, and `pHYs` with square pixels).
+/// Other chunks (transparency, gamma, profiles, orientation, frames, text) could change the display, or send more than
+/// the pixels.
 pub(super) fn plain_size(file: &[u8]) -> Option<(u32, u32)> {
     let mut rest = file.strip_prefix(SIGNATURE)?;
     let (first, header, after) = chunk(rest)?;
@@ -39,8 +40,8 @@ fn plain_header(header: &[u8]) -> Option<(u32, u32)> {
     is_plain.then_some(size)
 }
 
-/// The type and content of the first chunk, and the bytes after it; `None` if the file ends too early. Checksums are not
-/// verified, because the caller has decoded the file before.
+/// The type and content of the first chunk, and the bytes after it; `None` if the file ends too early. Checksums are
+/// not verified, because the caller has decoded the file before.
 fn chunk(bytes: &[u8]) -> Option<([u8; 4], &[u8], &[u8])> {
     let (length, rest) = bytes.split_first_chunk::<4>()?;
     let (kind, rest) = rest.split_first_chunk::<4>()?;
@@ -91,31 +92,15 @@ mod tests {
 
     #[test]
     fn everything_else_is_refused() {
-        for other in [
-            [16, 2, 0, 0, 0],
-            [8, 6, 0, 0, 0],
-            [8, 0, 0, 0, 0],
-            [8, 3, 0, 0, 0],
-            [8, 2, 0, 0, 1],
-        ] {
-            let file = png(&[
-                (b"IHDR", &header(other)),
-                (b"IDAT", &[1; 9]),
-                (b"IEND", &[]),
-            ]);
+        for other in [[16, 2, 0, 0, 0], [8, 6, 0, 0, 0], [8, 0, 0, 0, 0], [8, 3, 0, 0, 0], [8, 2, 0, 0, 1]] {
+            let file = png(&[(b"IHDR", &header(other)), (b"IDAT", &[1; 9]), (b"IEND", &[])]);
             assert_eq!(plain_size(&file), None, "{other:?}");
         }
         let rgb = header([8, 2, 0, 0, 0]);
-        for kind in [
-            b"tRNS", b"gAMA", b"cHRM", b"iCCP", b"sBIT", b"eXIf", b"acTL", b"cICP", b"PLTE",
-            b"tEXt", b"fcTL", b"IHDR",
-        ] {
-            let file = png(&[
-                (b"IHDR", &rgb),
-                (kind, &[1, 2, 3]),
-                (b"IDAT", &[1; 9]),
-                (b"IEND", &[]),
-            ]);
+        for kind in
+            [b"tRNS", b"gAMA", b"cHRM", b"iCCP", b"sBIT", b"eXIf", b"acTL", b"cICP", b"PLTE", b"tEXt", b"fcTL", b"IHDR"]
+        {
+            let file = png(&[(b"IHDR", &rgb), (kind, &[1, 2, 3]), (b"IDAT", &[1; 9]), (b"IEND", &[])]);
             assert_eq!(plain_size(&file), None, "{}", String::from_utf8_lossy(kind));
         }
         assert_eq!(plain_size(&png(&[(b"IHDR", &rgb), (b"IEND", &[])])), None);

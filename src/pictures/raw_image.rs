@@ -84,7 +84,8 @@ impl RawPixels {
     }
 }
 
-/// True for the name of an encoding in YUV, such as `yuv422_yuy2` or `nv12`. Messages do not state its matrix and range.
+/// True for the name of an encoding in YUV, such as `yuv422_yuy2` or `nv12`. Messages do not state its matrix and
+/// range.
 pub fn is_yuv(encoding: &str) -> bool {
     YuvLayout::from_encoding(encoding).is_some()
 }
@@ -100,8 +101,8 @@ impl RawImage<'_> {
         is_yuv(&self.encoding)
     }
 
-    /// Converts the image to RGB: grey becomes three equal channels, alpha is dropped, a mosaic is interpolated bilinearly, and YUV is
-    /// converted by the matrix of BT.601 for the limited range.
+    /// Converts the image to RGB: grey becomes three equal channels, alpha is dropped, a mosaic is interpolated
+    /// bilinearly, and YUV is converted by the matrix of BT.601 for the limited range.
     ///
     /// # Errors
     /// If the encoding is unknown, or the data are shorter than the size requires.
@@ -138,34 +139,20 @@ impl RawImage<'_> {
         let (width, height) = (self.width, self.height);
         let pixels = (width as u64).saturating_mul(height as u64);
         if pixels == 0 || pixels > MAX_PIXELS {
-            return Err(format!(
-                "{width} × {height} pixels; 1 to {MAX_PIXELS} pixels expected"
-            ));
+            return Err(format!("{width} × {height} pixels; 1 to {MAX_PIXELS} pixels expected"));
         }
         Ok(())
     }
 
     /// The rows without their padding. `row` is the length of a row in bytes.
     fn rows_of(&self, row: usize) -> Result<impl Iterator<Item = &[u8]>, String> {
-        let Self {
-            width,
-            height,
-            step,
-            ref data,
-            ..
-        } = *self;
+        let Self { width, height, step, ref data, .. } = *self;
         if step < row {
-            return Err(format!(
-                "rows of {step} bytes; {width} pixels of {} need {row}",
-                self.encoding
-            ));
+            return Err(format!("rows of {step} bytes; {width} pixels of {} need {row}", self.encoding));
         }
         let needed = step.saturating_mul(height - 1).saturating_add(row);
         if data.len() < needed {
-            return Err(format!(
-                "{} bytes; {height} rows of {step} bytes expected",
-                data.len()
-            ));
+            return Err(format!("{} bytes; {height} rows of {step} bytes expected", data.len()));
         }
         Ok(data.chunks(step).take(height).map(move |line| &line[..row]))
     }
@@ -256,9 +243,7 @@ mod tests {
         assert_eq!(little.peak_16(), Some(0x1234));
         raw.is_big_endian = true;
         assert_eq!(raw.decode().unwrap().peak_16(), Some(0xff0f));
-        let RawPixels::Rgb16Image(scaled) = little.with_white(4095) else {
-            panic!("16 bits expected")
-        };
+        let RawPixels::Rgb16Image(scaled) = little.with_white(4095) else { panic!("16 bits expected") };
         assert_eq!(scaled.samples()[3..], [65535; 3]);
     }
 
@@ -266,20 +251,8 @@ mod tests {
     fn sizes_that_do_not_fit_are_refused() {
         for (encoding, size, step, bytes, expected) in [
             ("rgb8", [0, 1], 3, 3, "0 × 1 pixels"),
-            (
-                "rgb8",
-                [2, 1],
-                3,
-                6,
-                "rows of 3 bytes; 2 pixels of rgb8 need 6",
-            ),
-            (
-                "mono16",
-                [2, 2],
-                4,
-                7,
-                "7 bytes; 2 rows of 4 bytes expected",
-            ),
+            ("rgb8", [2, 1], 3, 6, "rows of 3 bytes; 2 pixels of rgb8 need 6"),
+            ("mono16", [2, 2], 4, 7, "7 bytes; 2 rows of 4 bytes expected"),
             ("rgb8", [usize::MAX, 2], usize::MAX, 9, "pixels; 1 to"),
             ("rgb8", [1, 9], usize::MAX, 9, "9 bytes; 9 rows"),
             ("16UC1", [1, 1], 2, 2, "depth"),

@@ -1,6 +1,7 @@
 //! PNG files whose samples are numbers such as ids, not colours: [`RawPng`].
 //!
-//! Samples are used as stored: a palette index is not replaced by its colour, and values are not scaled to a larger range.
+//! Samples are used as stored: a palette index is not replaced by its colour, and values are not scaled to a larger
+//! range.
 
 use std::fmt;
 use std::io::Cursor;
@@ -63,23 +64,15 @@ impl<'a> RawPng<'a> {
     ///
     /// # Errors
     /// If the file is not a PNG file, its form is not one of `forms`, or it has more than `max_pixels` pixels.
-    pub fn open(
-        bytes: &'a [u8],
-        forms: &[SampleForm],
-        max_pixels: u64,
-    ) -> Result<Self, RawPngError> {
+    pub fn open(bytes: &'a [u8], forms: &[SampleForm], max_pixels: u64) -> Result<Self, RawPngError> {
         let mut decoder = Decoder::new(Cursor::new(bytes));
         decoder.set_transformations(Transformations::IDENTITY);
         decoder.set_ignore_text_chunk(true);
         decoder.set_ignore_iccp_chunk(true);
-        let expected = forms
-            .iter()
-            .map(SampleForm::to_string)
-            .collect::<Vec<_>>()
-            .join(" or ");
-        let reader = decoder.read_info().map_err(|e| {
-            RawPngError::Broken(format!("not a readable PNG ({e}); {expected} PNG expected"))
-        })?;
+        let expected = forms.iter().map(SampleForm::to_string).collect::<Vec<_>>().join(" or ");
+        let reader = decoder
+            .read_info()
+            .map_err(|e| RawPngError::Broken(format!("not a readable PNG ({e}); {expected} PNG expected")))?;
         let info = reader.info();
         let (width, height) = (info.width, info.height);
         if u64::from(width) * u64::from(height) > max_pixels {
@@ -95,10 +88,7 @@ impl<'a> RawPng<'a> {
                 info.bit_depth as u8
             )));
         }
-        Ok(Self {
-            reader,
-            size: (height as usize, width as usize),
-        })
+        Ok(Self { reader, size: (height as usize, width as usize) })
     }
 
     /// Decompresses the samples, row by row, each converted by `convert`.
@@ -106,30 +96,17 @@ impl<'a> RawPng<'a> {
         let bits = self.reader.info().bit_depth;
         let (height, width) = self.size;
         let mut samples = Vec::with_capacity(height * width);
-        let row_size = self
-            .reader
-            .output_line_size(self.reader.info().width)
-            .ok_or("too large for this machine")?;
+        let row_size = self.reader.output_line_size(self.reader.info().width).ok_or("too large for this machine")?;
         if self.reader.info().interlaced {
-            let size = self
-                .reader
-                .output_buffer_size()
-                .ok_or("too large for this machine")?;
+            let size = self.reader.output_buffer_size().ok_or("too large for this machine")?;
             let mut bytes = vec![0; size];
-            self.reader
-                .next_frame(&mut bytes)
-                .map_err(|e| decoding_error(&e))?;
+            self.reader.next_frame(&mut bytes).map_err(|e| decoding_error(&e))?;
             for row in bytes.chunks_exact(row_size) {
                 append_row(row, width, bits, &convert, &mut samples);
             }
         } else {
             let mut row = vec![0; row_size];
-            while self
-                .reader
-                .read_row(&mut row)
-                .map_err(|e| decoding_error(&e))?
-                .is_some()
-            {
+            while self.reader.read_row(&mut row).map_err(|e| decoding_error(&e))?.is_some() {
                 append_row(&row, width, bits, &convert, &mut samples);
             }
         }
@@ -145,13 +122,7 @@ fn decoding_error(e: &DecodingError) -> String {
 }
 
 /// Appends the `width` samples of a row, each converted by `convert`.
-fn append_row<T>(
-    row: &[u8],
-    width: usize,
-    bits: BitDepth,
-    convert: impl Fn(u16) -> T,
-    samples: &mut Vec<T>,
-) {
+fn append_row<T>(row: &[u8], width: usize, bits: BitDepth, convert: impl Fn(u16) -> T, samples: &mut Vec<T>) {
     match bits {
         BitDepth::Sixteen => {
             let (pairs, _) = row.as_chunks::<2>();
@@ -173,7 +144,8 @@ fn packed_sample(row: &[u8], x: usize, bits: BitDepth) -> u16 {
 
 /// The form of the samples of a PNG file; `None` if they are unsuitable as ids.
 ///
-/// Grey of fewer than 8 bits is refused: an optimiser may have packed an 8-bit file, so that 1 stands for 255, 85 or 17.
+/// Grey of fewer than 8 bits is refused: an optimiser may have packed an 8-bit file, so that 1 stands for 255, 85 or
+/// 17.
 fn sample_form(color: ColorType, bits: BitDepth) -> Option<SampleForm> {
     match (color, bits) {
         (ColorType::Grayscale, BitDepth::Eight) => Some(SampleForm::Grey8),

@@ -5,8 +5,8 @@ use std::sync::Arc;
 use crate::colour::{CodeDepth, CodePoints, ColourSpace, Meaning};
 use darkqa_base::types::ColourHandling;
 
-/// Primaries and transfer that a video states, by the numbers of ITU-T H.273, tables 2 and 3. The same rules hold for images: the numbers
-/// in `cICP` of a PNG file have the same meaning.
+/// Primaries and transfer that a video states, by the numbers of ITU-T H.273, tables 2 and 3. The same rules hold for
+/// images: the numbers in `cICP` of a PNG file have the same meaning.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct StatedColours {
     /// Number of the primaries; 2 if they are not stated.
@@ -29,17 +29,13 @@ impl StatedColours {
     /// # Errors
     /// If these colours are not converted. The error names the reason, without a remedy.
     pub fn conversion(self) -> Result<Option<FrameConversion>, String> {
-        let points = CodePoints {
-            primaries: self.primaries,
-            transfer: self.transfer,
-        };
+        let points = CodePoints { primaries: self.primaries, transfer: self.transfer };
         // Frames have 8 bits at the end, in which linear light has too few codes.
         match points.meaning(CodeDepth::Eight)? {
             Meaning::Srgb | Meaning::Linear => Ok(None),
-            Meaning::Other(space) => Ok(Some(FrameConversion {
-                tables: space.conversion.tables(u16::MAX.into()),
-                space,
-            })),
+            Meaning::Other(space) => {
+                Ok(Some(FrameConversion { tables: space.conversion.tables(u16::MAX.into()), space }))
+            }
         }
     }
 }
@@ -78,12 +74,7 @@ mod tests {
     use super::*;
 
     fn conversion(primaries: u8, transfer: u8) -> Option<FrameConversion> {
-        StatedColours {
-            primaries,
-            transfer,
-        }
-        .conversion()
-        .unwrap()
+        StatedColours { primaries, transfer }.conversion().unwrap()
     }
 
     #[test]
@@ -91,10 +82,7 @@ mod tests {
         let samples: Vec<u16> = (0..3000_u32).map(|i| (i * 7919 % 65_536) as u16).collect();
         for (primaries, transfer) in [(9, 16), (9, 18), (9, 1), (12, 13), (1, 5)] {
             let (frame, _) = conversion(primaries, transfer).unwrap().convert(&samples);
-            let points = CodePoints {
-                primaries,
-                transfer,
-            };
+            let points = CodePoints { primaries, transfer };
             let Ok(Meaning::Other(space)) = points.meaning(CodeDepth::Sixteen) else {
                 panic!("{primaries}/{transfer}")
             };

@@ -15,20 +15,15 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
         .activity
         .iter()
         .flat_map(|activity| {
-            [
-                (true, suitable(context, activity)),
-                (false, unsuitable(context, activity)),
-            ]
-            .map(|(answer, result)| {
-                result.unwrap_or_else(|reason| {
-                    rejected(Family::Affordance, &activity.activity, Some(answer), reason)
-                })
+            [(true, suitable(context, activity)), (false, unsuitable(context, activity))].map(|(answer, result)| {
+                result.unwrap_or_else(|reason| rejected(Family::Affordance, &activity.activity, Some(answer), reason))
             })
         })
         .collect()
 }
 
-/// Candidate with the answer yes: the activity belongs to this type of room, and all objects of one of its enablers are evidence.
+/// Candidate with the answer yes: the activity belongs to this type of room, and all objects of one of its enablers are
+/// evidence.
 fn suitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
     let Some(room) = context.any_room else {
         return Err(Reason::NoRoom);
@@ -44,9 +39,10 @@ fn suitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleRe
         tokens
             .iter()
             .map(|token| {
-                evidence.iter().copied().find(|segment| {
-                    segment.token(context.book) == token && is_typical(context, segment)
-                })
+                evidence
+                    .iter()
+                    .copied()
+                    .find(|segment| segment.token(context.book) == token && is_typical(context, segment))
             })
             .collect::<Option<Vec<&Segment>>>()
     });
@@ -56,23 +52,20 @@ fn suitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleRe
     Ok(candidate(context, activity, room, 0, &segments))
 }
 
-/// True if the data set has words for all objects of one enabler. Otherwise, "no" would be the answer to every question about the activity.
+/// True if the data set has words for all objects of one enabler. Otherwise, "no" would be the answer to every question
+/// about the activity.
 fn can_be_enabled(context: &RuleContext<'_>, activity: &ActivityRule) -> bool {
-    activity.enablers.iter().any(|tokens| {
-        tokens
-            .iter()
-            .all(|token| context.vocabulary.has_token(token))
-    })
+    activity.enablers.iter().any(|tokens| tokens.iter().all(|token| context.vocabulary.has_token(token)))
 }
 
-/// True if a segment is a typical member of its class: it has a token of its own, or questions use its word. Counterexample: the sofa of a
-/// coarse label space may be an armchair.
+/// True if a segment is a typical member of its class: it has a token of its own, or questions use its word.
+/// Counterexample: the sofa of a coarse label space may be an armchair.
 fn is_typical(context: &RuleContext<'_>, segment: &Segment) -> bool {
     segment.token(context.book) != segment.class || segment.question_word(context.book).is_some()
 }
 
-/// Candidate with the answer no: the room is of another, known type, and no object that the activity needs, or a substitute for one, has a
-/// pixel.
+/// Candidate with the answer no: the room is of another, known type, and no object that the activity needs, or a
+/// substitute for one, has a pixel.
 fn unsuitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<RuleResult, Reason> {
     let Some(room) = context.room else {
         return Err(Reason::NoRoom);
@@ -96,19 +89,10 @@ fn unsuitable(context: &RuleContext<'_>, activity: &ActivityRule) -> Result<Rule
     if tokens.iter().any(|token| context.may_be_hidden(token)) {
         return Err(Reason::Hidden);
     }
-    if tokens
-        .iter()
-        .any(|token| context.statistics.has_token(token, context.book))
-    {
+    if tokens.iter().any(|token| context.statistics.has_token(token, context.book)) {
         return Err(Reason::Seen);
     }
-    Ok(candidate(
-        context,
-        activity,
-        room,
-        1,
-        &context.room_evidence(room),
-    ))
+    Ok(candidate(context, activity, room, 1, &context.room_evidence(room)))
 }
 
 fn candidate(
@@ -118,11 +102,7 @@ fn candidate(
     truth: usize,
     segments: &[&Segment],
 ) -> RuleResult {
-    let text = context
-        .book
-        .affordance
-        .text
-        .replace("{activity}", &activity.activity);
+    let text = context.book.affordance.text.replace("{activity}", &activity.activity);
     let evidence = json!({
         "room": room,
         "scores": context.signs.scores,

@@ -6,8 +6,8 @@ use super::colors::{BINS, Palette};
 use super::statistics::ppm;
 use darkqa_base::types::{Frame, Rgb};
 
-/// Maximum number of rows for detecting edges (chosen). Higher images are reduced, because the luma of a large image changes less from
-/// pixel to pixel.
+/// Maximum number of rows for detecting edges (chosen). Higher images are reduced, because the luma of a large image
+/// changes less from pixel to pixel.
 const MAX_ROWS: usize = 480;
 
 /// Minimum gradient of an edge, in codes of luma per pixel (chosen).
@@ -58,44 +58,34 @@ impl FrameAppearance {
 fn mean_light(codes: &[[u8; 3]]) -> f64 {
     let light: [f64; 256] = std::array::from_fn(|code| {
         let value = code as f64 / 255.0;
-        if value <= 0.04045 {
-            value / 12.92
-        } else {
-            libm::pow((value + 0.055) / 1.055, 2.4)
-        }
+        if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }
     });
     let sum: f64 = codes
         .iter()
         .map(|code: &[u8; 3]| -> f64 {
-            code.iter()
-                .zip(WEIGHTS)
-                .map(|(code, weight)| light[usize::from(*code)] * f64::from(weight))
-                .sum()
+            code.iter().zip(WEIGHTS).map(|(code, weight)| light[usize::from(*code)] * f64::from(weight)).sum()
         })
         .sum();
     (sum / codes.len().max(1) as f64).max(light[1] / 2.0)
 }
 
-/// Share of pixels whose luma changes by at least [`MIN_EDGE_GRADIENT`] codes per pixel, by the magnitude of the Sobel gradient (I. Sobel
-/// and G. Feldman 1968): an eighth of the response of its kernels. Images of more than [`MAX_ROWS`] rows are reduced first.
+/// Share of pixels whose luma changes by at least [`MIN_EDGE_GRADIENT`] codes per pixel, by the magnitude of the Sobel
+/// gradient (I. Sobel and G. Feldman 1968): an eighth of the response of its kernels. Images of more than [`MAX_ROWS`]
+/// rows are reduced first.
 fn edges(image: &Rgb) -> f64 {
     let luma = reduce(&luma(image));
     let (height, width) = luma.dim();
     let at = |y: usize, x: usize, down: usize, right: usize| {
-        let near =
-            |index: usize, step: usize, end: usize| (index + step).saturating_sub(1).min(end - 1);
+        let near = |index: usize, step: usize, end: usize| (index + step).saturating_sub(1).min(end - 1);
         luma[(near(y, down, height), near(x, right, width))]
     };
     let mut steep = 0_usize;
     for y in 0..height {
         for x in 0..width {
-            let [left, right] =
-                [0, 2].map(|dx| at(y, x, 0, dx) + 2.0 * at(y, x, 1, dx) + at(y, x, 2, dx));
-            let [above, below] =
-                [0, 2].map(|dy| at(y, x, dy, 0) + 2.0 * at(y, x, dy, 1) + at(y, x, dy, 2));
+            let [left, right] = [0, 2].map(|dx| at(y, x, 0, dx) + 2.0 * at(y, x, 1, dx) + at(y, x, 2, dx));
+            let [above, below] = [0, 2].map(|dy| at(y, x, dy, 0) + 2.0 * at(y, x, dy, 1) + at(y, x, dy, 2));
             let (across, along) = (right - left, below - above);
-            steep +=
-                usize::from((across * across + along * along).sqrt() / 8.0 >= MIN_EDGE_GRADIENT);
+            steep += usize::from((across * across + along * along).sqrt() / 8.0 >= MIN_EDGE_GRADIENT);
         }
     }
     steep as f64 / (height * width).max(1) as f64
@@ -106,11 +96,7 @@ fn luma(image: &Rgb) -> Array2<f32> {
     let (codes, _) = image.samples().as_chunks::<3>();
     let width = image.width();
     Array2::from_shape_fn((image.height(), width), |(y, x)| {
-        codes[y * width + x]
-            .iter()
-            .zip(WEIGHTS)
-            .map(|(code, weight)| f32::from(*code) * weight)
-            .sum()
+        codes[y * width + x].iter().zip(WEIGHTS).map(|(code, weight)| f32::from(*code) * weight).sum()
     })
 }
 
@@ -134,9 +120,7 @@ fn resize_rows(map: &Array2<f32>, rows: usize) -> Array2<f32> {
         let (from, to) = (row as f32 * step, (row + 1) as f32 * step);
         for y in from as usize..(to.ceil() as usize).min(height) {
             let covered = to.min(y as f32 + 1.0) - from.max(y as f32);
-            shrunk
-                .row_mut(row)
-                .scaled_add(covered.max(0.0) / step, &map.row(y));
+            shrunk.row_mut(row).scaled_add(covered.max(0.0) / step, &map.row(y));
         }
     }
     shrunk
@@ -149,10 +133,7 @@ fn segments(map: &Array2<u32>) -> usize {
         *counts.entry(*number).or_insert(0) += 1;
     }
     let whole = map.len() as u64;
-    counts
-        .values()
-        .filter(|count| ppm(**count, whole) >= MIN_SEGMENT_PPM)
-        .count()
+    counts.values().filter(|count| ppm(**count, whole) >= MIN_SEGMENT_PPM).count()
 }
 
 /// 10 %, 50 % and 90 % quantiles of depth in metres; `None` if no pixel has depth.
@@ -194,15 +175,10 @@ mod tests {
     #[test]
     fn a_large_picture_has_the_edges_of_the_small_one() {
         let [small, large] = [1, 2].map(|scale| {
-            let bars = image(480 * scale, 640 * scale, |_, x| {
-                [40, 200][x / (16 * scale) % 2]
-            });
+            let bars = image(480 * scale, 640 * scale, |_, x| [40, 200][x / (16 * scale) % 2]);
             edges(&bars)
         });
-        assert!(
-            (small - large).abs() < 1e-9 && small > 0.1,
-            "{small} {large}"
-        );
+        assert!((small - large).abs() < 1e-9 && small > 0.1, "{small} {large}");
         let odd = reduce(&luma(&image(720, 960, |_, _| 77)));
         assert_eq!(odd.dim(), (480, 640));
         assert!(odd.iter().all(|luma| (luma - 77.0).abs() < 1e-3));

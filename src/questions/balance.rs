@@ -32,13 +32,9 @@ pub(super) struct BalancedSet {
     pub(super) uneven: Vec<String>,
 }
 
-/// Drops questions until the answers are balanced. Among questions with the same answer, those with the largest digests of their ids are
-/// dropped.
-pub(super) fn balance(
-    asked: Vec<GeneratedQuestion>,
-    mode: BalanceMode,
-    rule: &BalanceRule,
-) -> BalancedSet {
+/// Drops questions until the answers are balanced. Among questions with the same answer, those with the largest digests
+/// of their ids are dropped.
+pub(super) fn balance(asked: Vec<GeneratedQuestion>, mode: BalanceMode, rule: &BalanceRule) -> BalancedSet {
     let mut dropped: BTreeSet<usize> = BTreeSet::new();
     let mut uneven = Vec::new();
     if rule.max_repeat > 0 {
@@ -55,9 +51,7 @@ pub(super) fn balance(
     }
     if mode != BalanceMode::None {
         for (_, list) in groups(&asked, &dropped, binary_key) {
-            let (yes, no) = list
-                .into_iter()
-                .partition::<Vec<_>, _>(|i| asked[*i].question.choices.truth() == Some(0));
+            let (yes, no) = list.into_iter().partition::<Vec<_>, _>(|i| asked[*i].question.choices.truth() == Some(0));
             let max = yes.len().min(no.len()) + 1;
             dropped.extend(yes.into_iter().skip(max));
             dropped.extend(no.into_iter().skip(max));
@@ -66,17 +60,9 @@ pub(super) fn balance(
     if mode == BalanceMode::Full {
         uneven = cap_shares(&asked, &mut dropped, rule);
     }
-    let families = dropped
-        .iter()
-        .map(|i| asked[*i].question.family.clone())
-        .collect();
+    let families = dropped.iter().map(|i| asked[*i].question.family.clone()).collect();
     BalancedSet {
-        asked: asked
-            .into_iter()
-            .enumerate()
-            .filter(|(i, _)| !dropped.contains(i))
-            .map(|(_, asked)| asked)
-            .collect(),
+        asked: asked.into_iter().enumerate().filter(|(i, _)| !dropped.contains(i)).map(|(_, asked)| asked).collect(),
         dropped: families,
         uneven,
     }
@@ -85,31 +71,18 @@ pub(super) fn balance(
 /// Family and text of a yes-no question; `None` for other questions.
 fn binary_key(asked: &GeneratedQuestion) -> Option<(Family, String)> {
     let family = &asked.question.family;
-    matches!(family, Family::Affordance | Family::Presence)
-        .then(|| (family.clone(), asked.question.text.clone()))
+    matches!(family, Family::Affordance | Family::Presence).then(|| (family.clone(), asked.question.text.clone()))
 }
 
-/// Drops questions whose room type or colour exceeds its share of the answers. Returns a warning for each family that cannot
-/// be balanced.
-fn cap_shares(
-    asked: &[GeneratedQuestion],
-    dropped: &mut BTreeSet<usize>,
-    rule: &BalanceRule,
-) -> Vec<String> {
+/// Drops questions whose room type or colour exceeds its share of the answers. Returns a warning for each family that
+/// cannot be balanced.
+fn cap_shares(asked: &[GeneratedQuestion], dropped: &mut BTreeSet<usize>, rule: &BalanceRule) -> Vec<String> {
     let mut uneven = Vec::new();
-    for (family, share) in [
-        (Family::RoomType, rule.room_type_share_ppm),
-        (Family::Color, rule.color_share_ppm),
-    ] {
-        let lists = groups(asked, dropped, |asked| {
-            (asked.question.family == family).then(|| asked.answer().to_owned())
-        });
+    for (family, share) in [(Family::RoomType, rule.room_type_share_ppm), (Family::Color, rule.color_share_ppm)] {
+        let lists =
+            groups(asked, dropped, |asked| (asked.question.family == family).then(|| asked.answer().to_owned()));
         match max_per_answer(&lists, share) {
-            Some(max) => dropped.extend(
-                lists
-                    .into_values()
-                    .flat_map(|list| list.into_iter().skip(max)),
-            ),
+            Some(max) => dropped.extend(lists.into_values().flat_map(|list| list.into_iter().skip(max))),
             None if lists.is_empty() => {}
             None => uneven.push(format!(
                 "{family}: too few different answers ({}) to limit each to {} % of the questions",
@@ -139,7 +112,8 @@ fn groups<K: Ord>(
     groups
 }
 
-/// Maximum number of questions with the same answer that keeps every answer within its share of all. `None` with too few different answers.
+/// Maximum number of questions with the same answer that keeps every answer within its share of all. `None` with too
+/// few different answers.
 fn max_per_answer(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Option<usize> {
     let total: usize = lists.values().map(Vec::len).sum();
     (1..=total)
@@ -152,8 +126,8 @@ fn max_per_answer(lists: &BTreeMap<String, Vec<usize>>, share_ppm: u64) -> Optio
         .map(|(_, max)| max)
 }
 
-/// True if a question occurs in enough scenes and the entropy of its answers, relative to that of uniform answers, is high enough
-/// (EmbodiedQA, `entropy_based_filtering.py`).
+/// True if a question occurs in enough scenes and the entropy of its answers, relative to that of uniform answers, is
+/// high enough (EmbodiedQA, `entropy_based_filtering.py`).
 fn is_varied(asked: &[GeneratedQuestion], list: &[usize], rule: &BalanceRule) -> bool {
     let scenes: BTreeSet<&str> = list.iter().map(|i| asked[*i].scene.as_str()).collect();
     if scenes.len() < rule.least_scenes {
@@ -164,16 +138,8 @@ fn is_varied(asked: &[GeneratedQuestion], list: &[usize], rule: &BalanceRule) ->
         *counts.entry(asked[*i].answer()).or_insert(0) += 1;
     }
     let total = list.len() as f64;
-    let entropy: f64 = counts
-        .values()
-        .map(|count| *count as f64 / total)
-        .map(|share| -share * libm::log2(share))
-        .sum();
-    let possible = list
-        .iter()
-        .map(|i| asked[*i].question.choices.len())
-        .max()
-        .unwrap_or(2);
+    let entropy: f64 = counts.values().map(|count| *count as f64 / total).map(|share| -share * libm::log2(share)).sum();
+    let possible = list.iter().map(|i| asked[*i].question.choices.len()).max().unwrap_or(2);
     entropy >= libm::log2(possible as f64) * rule.least_entropy_ppm as f64 / 1e6
 }
 
@@ -195,26 +161,15 @@ mod tests {
             group: None,
             evidence: Value::Null,
         };
-        GeneratedQuestion {
-            question,
-            about: about.to_owned(),
-            scene: format!("s{}", number % 5),
-        }
+        GeneratedQuestion { question, about: about.to_owned(), scene: format!("s{}", number % 5) }
     }
 
     fn rule() -> BalanceRule {
-        super::super::rules::Rules::built_in()
-            .unwrap()
-            .book()
-            .balance
-            .clone()
+        super::super::rules::Rules::built_in().unwrap().book().balance.clone()
     }
 
     fn count(questions: &[GeneratedQuestion], about: &str, answer: &str) -> usize {
-        questions
-            .iter()
-            .filter(|asked| asked.about == about && asked.answer() == answer)
-            .count()
+        questions.iter().filter(|asked| asked.about == about && asked.answer() == answer).count()
     }
 
     fn chairs_and_beds(family: &Family) -> Vec<GeneratedQuestion> {
@@ -228,28 +183,15 @@ mod tests {
 
     #[test]
     fn yes_and_no_differ_by_at_most_one() {
-        let balanced = balance(
-            chairs_and_beds(&Family::Presence),
-            BalanceMode::Binary,
-            &rule(),
-        );
-        assert_eq!(
-            (
-                count(&balanced.asked, "chair", "yes"),
-                count(&balanced.asked, "chair", "no")
-            ),
-            (3, 2)
-        );
+        let balanced = balance(chairs_and_beds(&Family::Presence), BalanceMode::Binary, &rule());
+        assert_eq!((count(&balanced.asked, "chair", "yes"), count(&balanced.asked, "chair", "no")), (3, 2));
         assert_eq!((balanced.asked.len(), balanced.dropped.len()), (6, 6));
         let mut reversed = chairs_and_beds(&Family::Presence);
         reversed.reverse();
         let mut other = balance(reversed, BalanceMode::Binary, &rule()).asked;
         other.reverse();
         assert_eq!(other, balanced.asked);
-        for (family, mode) in [
-            (Family::Presence, BalanceMode::None),
-            (Family::Color, BalanceMode::Binary),
-        ] {
+        for (family, mode) in [(Family::Presence, BalanceMode::None), (Family::Color, BalanceMode::Binary)] {
             let balanced = balance(chairs_and_beds(&family), mode, &rule());
             assert_eq!(balanced.asked.len(), 12);
         }
@@ -265,45 +207,23 @@ mod tests {
                 (0..*count).map(move |i| asked(answer * 100 + i, Family::Color, "sofa", answer))
             })
             .collect();
-        let half = BalanceRule {
-            color_share_ppm: 500_000,
-            ..rule()
-        };
+        let half = BalanceRule { color_share_ppm: 500_000, ..rule() };
         let balanced = balance(list.clone(), BalanceMode::Full, &half);
-        assert_eq!(
-            (count(&balanced.asked, "sofa", "yes"), balanced.asked.len()),
-            (20, 40)
-        );
+        assert_eq!((count(&balanced.asked, "sofa", "yes"), balanced.asked.len()), (20, 40));
         let fifth = balance(list, BalanceMode::Full, &rule());
         assert_eq!((fifth.asked.len(), fifth.uneven.len()), (60, 1));
     }
 
     #[test]
     fn repeats_and_questions_with_one_usual_answer_are_dropped() {
-        let list: Vec<GeneratedQuestion> = (0..30)
-            .map(|i| asked(i, Family::Color, "sofa", usize::from(i < 3)))
-            .collect();
-        let few = BalanceRule {
-            max_repeat: 2,
-            ..rule()
-        };
+        let list: Vec<GeneratedQuestion> =
+            (0..30).map(|i| asked(i, Family::Color, "sofa", usize::from(i < 3))).collect();
+        let few = BalanceRule { max_repeat: 2, ..rule() };
         // Five scenes; three of the thirty answers are "no", each in its own scene.
-        assert_eq!(
-            balance(list.clone(), BalanceMode::None, &few).asked.len(),
-            13
-        );
+        assert_eq!(balance(list.clone(), BalanceMode::None, &few).asked.len(), 13);
         for (ppm, expected) in [(200_000, 30), (500_000, 0)] {
-            let varied = BalanceRule {
-                least_entropy_ppm: ppm,
-                ..rule()
-            };
-            assert_eq!(
-                balance(list.clone(), BalanceMode::None, &varied)
-                    .asked
-                    .len(),
-                expected,
-                "{ppm}"
-            );
+            let varied = BalanceRule { least_entropy_ppm: ppm, ..rule() };
+            assert_eq!(balance(list.clone(), BalanceMode::None, &varied).asked.len(), expected, "{ppm}");
         }
     }
 }

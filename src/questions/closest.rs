@@ -46,9 +46,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     };
     let second = match book.closest.gap_scope {
         GapScope::Instances => rest.first(),
-        GapScope::Classes => rest
-            .iter()
-            .find(|other| other.segment.class != first.segment.class),
+        GapScope::Classes => rest.iter().find(|other| other.segment.class != first.segment.class),
     };
     let second = second.ok_or(Reason::Few)?;
     let mut classes = classes(&objects, book);
@@ -62,10 +60,7 @@ fn candidate(context: &RuleContext<'_>) -> Result<RuleResult, Reason> {
     classes.truncate(book.closest.choices);
     let about = winner.0.to_owned();
     context.picker.shuffle("closest", &mut classes);
-    let truth = classes
-        .iter()
-        .position(|class| *class == winner)
-        .unwrap_or(0);
+    let truth = classes.iter().position(|class| *class == winner).unwrap_or(0);
     let choices = classes.iter().map(|(_, word)| (*word).to_owned()).collect();
     let segments: Vec<&Segment> = objects.iter().map(|object| object.segment).collect();
     Ok(context.viable(
@@ -92,10 +87,7 @@ fn classes<'a>(objects: &[NearObject<'a>], book: &'a RuleBook) -> Vec<(&'a str, 
         let Some(word) = segment.question_word(book) else {
             continue;
         };
-        if classes
-            .iter()
-            .all(|(class, known)| *class != segment.class && *known != word)
-        {
+        if classes.iter().all(|(class, known)| *class != segment.class && *known != word) {
             classes.push((&segment.class, word));
         }
     }
@@ -112,14 +104,11 @@ fn is_eligible(context: &RuleContext<'_>, segment: &Segment) -> bool {
         && context.statistics.area_ppm(segment) >= book.closest.area_ppm
 }
 
-/// Distance in mm from the first object's 10 % depth quantile to the smallest one of the others. `None` if another object is nearer, or
-/// without other objects.
+/// Distance in mm from the first object's 10 % depth quantile to the smallest one of the others. `None` if another
+/// object is nearer, or without other objects.
 fn near_gap(objects: &[NearObject<'_>], first: NearObject<'_>) -> Option<u32> {
-    let nearest = objects
-        .iter()
-        .filter(|object| object.segment.id != first.segment.id)
-        .map(|object| object.depth.p10)
-        .min()?;
+    let nearest =
+        objects.iter().filter(|object| object.segment.id != first.segment.id).map(|object| object.depth.p10).min()?;
     nearest.checked_sub(first.depth.p10)
 }
 
@@ -131,19 +120,14 @@ fn check_gap(
     second: NearObject<'_>,
 ) -> Result<(), Reason> {
     let rule = &context.book.closest;
-    let (near, far) = (
-        u64::from(first.depth.median),
-        u64::from(second.depth.median),
-    );
+    let (near, far) = (u64::from(first.depth.median), u64::from(second.depth.median));
     let gap = far - near;
     if gap < rule.gap_mm.into() || gap * 1_000_000 < near * rule.gap_ppm {
         return Err(Reason::Gap);
     }
     let others: Vec<NearObject<'_>> = objects
         .iter()
-        .filter(|other| {
-            rule.gap_scope == GapScope::Instances || other.segment.class != first.segment.class
-        })
+        .filter(|other| rule.gap_scope == GapScope::Instances || other.segment.class != first.segment.class)
         .copied()
         .collect();
     match near_gap(&others, first) {
@@ -157,8 +141,8 @@ fn is_background_class(book: &RuleBook, class: &str) -> bool {
     book.has_flag(class, ClassFlag::Structural) || book.has_flag(class, ClassFlag::Flat)
 }
 
-/// Checks the objects that are not among the choices: none may have a smaller median depth than `second`, or a smaller 10 % quantile than
-/// `nearest`, both in millimetres.
+/// Checks the objects that are not among the choices: none may have a smaller median depth than `second`, or a smaller
+/// 10 % quantile than `nearest`, both in millimetres.
 fn check_rivals(
     context: &RuleContext<'_>,
     objects: &[NearObject<'_>],
@@ -168,29 +152,22 @@ fn check_rivals(
     let (book, statistics) = (context.book, context.statistics);
     for segment in &statistics.segments {
         // A segment of several classes may be any object.
-        let is_background = (is_background_class(book, &segment.class) || segment.is_flat(book))
-            && !segment.is_mixed(book);
+        let is_background =
+            (is_background_class(book, &segment.class) || segment.is_flat(book)) && !segment.is_mixed(book);
         if is_background || objects.iter().any(|object| object.segment.id == segment.id) {
             continue;
         }
         let area = statistics.area_ppm(segment);
         match segment.reliable_depth(book) {
             None if area >= book.closest.unmeasured_ppm => return Err(Reason::Unmeasured),
-            Some(depth)
-                if area >= book.closest.rival_ppm
-                    && (depth.median < second || depth.p10 < nearest) =>
-            {
+            Some(depth) if area >= book.closest.rival_ppm && (depth.median < second || depth.p10 < nearest) => {
                 return Err(Reason::Rival);
             }
             _ => {}
         }
     }
-    let loose: u64 = statistics
-        .loose
-        .iter()
-        .filter(|(class, _)| !is_background_class(book, class))
-        .map(|(_, pixels)| pixels)
-        .sum();
+    let loose: u64 =
+        statistics.loose.iter().filter(|(class, _)| !is_background_class(book, class)).map(|(_, pixels)| pixels).sum();
     if statistics.ppm(loose) >= book.closest.rival_ppm {
         return Err(Reason::Rival);
     }

@@ -24,11 +24,7 @@ pub(super) fn candidates(context: &RuleContext<'_>, palette: &Palette) -> Vec<Ru
         .collect()
 }
 
-fn candidate(
-    context: &RuleContext<'_>,
-    segment: &Segment,
-    palette: &Palette,
-) -> Result<RuleResult, Reason> {
+fn candidate(context: &RuleContext<'_>, segment: &Segment, palette: &Palette) -> Result<RuleResult, Reason> {
     let rule = &context.book.color;
     if let Some(reason) = context.statistics.evidence_flaw(segment, context.book) {
         return Err(reason);
@@ -39,15 +35,10 @@ fn candidate(
     if !is_unique(context, segment) {
         return Err(Reason::NotUnique);
     }
-    let word = segment
-        .question_word(context.book)
-        .ok_or(Reason::Wordless)?;
+    let word = segment.question_word(context.book).ok_or(Reason::Wordless)?;
     let color = dominant_color(segment, rule, palette)?;
     check_light(context, segment, color, palette)?;
-    if context
-        .views
-        .has_other_color(context.statistics, segment, color)
-    {
+    if context.views.has_other_color(context.statistics, segment, color) {
         return Err(Reason::Disagreed);
     }
     let (choices, truth) = choices(context, color).ok_or(Reason::NotOffered)?;
@@ -64,27 +55,20 @@ fn candidate(
     });
     let text = context.book.fill_template(&rule.text, &rule.plural, word);
     Ok(context.viable(
-        Candidate {
-            family: Family::Color,
-            about: segment.class.clone(),
-            text,
-            choices,
-            truth,
-            evidence,
-        },
+        Candidate { family: Family::Color, about: segment.class.clone(), text, choices, truth, evidence },
         &[segment],
     ))
 }
 
-/// True if a segment is the only visible one of its class. Pixels of the class outside all segments count as another segment.
+/// True if a segment is the only visible one of its class. Pixels of the class outside all segments count as another
+/// segment.
 fn is_unique(context: &RuleContext<'_>, segment: &Segment) -> bool {
     let (statistics, min_ppm) = (context.statistics, context.book.color.lone_ppm);
     let loose = statistics.loose.get(&segment.class).copied().unwrap_or(0);
-    let has_other = statistics.segments.iter().any(|other| {
-        other.class == segment.class
-            && other.id != segment.id
-            && statistics.area_ppm(other) >= min_ppm
-    });
+    let has_other = statistics
+        .segments
+        .iter()
+        .any(|other| other.class == segment.class && other.id != segment.id && statistics.area_ppm(other) >= min_ppm);
     !has_other && statistics.ppm(loose) < min_ppm
 }
 
@@ -109,22 +93,13 @@ fn dominant_color(segment: &Segment, rule: &ColorRule, palette: &Palette) -> Res
     Ok(color)
 }
 
-/// Checks that the colour keeps its name relative to the light of the frame, channel by channel, and relative to the luma around the
-/// segment. The colour around the segment is ignored, because it is that of its neighbours.
-fn check_light(
-    context: &RuleContext<'_>,
-    segment: &Segment,
-    color: Color,
-    palette: &Palette,
-) -> Result<(), Reason> {
-    let lights = [
-        Some(context.statistics.light),
-        segment.around.map(|luma| [luma; 3]),
-    ];
+/// Checks that the colour keeps its name relative to the light of the frame, channel by channel, and relative to the
+/// luma around the segment. The colour around the segment is ignored, because it is that of its neighbours.
+fn check_light(context: &RuleContext<'_>, segment: &Segment, color: Color, palette: &Palette) -> Result<(), Reason> {
+    let lights = [Some(context.statistics.light), segment.around.map(|luma| [luma; 3])];
     if lights.into_iter().flatten().all(|light: [u8; 3]| {
-        palette.color(
-            [0, 1, 2].map(|channel: usize| relative_code(segment.median[channel], light[channel])),
-        ) == Some(color)
+        palette.color([0, 1, 2].map(|channel: usize| relative_code(segment.median[channel], light[channel])))
+            == Some(color)
     }) {
         Ok(())
     } else {
@@ -143,8 +118,7 @@ fn choices(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usiz
                 .into_iter()
                 .filter(|color| *color != truth)
                 .filter(|color| {
-                    !rule.neighbours.contains(&[*color, truth])
-                        && !rule.neighbours.contains(&[truth, *color])
+                    !rule.neighbours.contains(&[*color, truth]) && !rule.neighbours.contains(&[truth, *color])
                 })
                 .collect();
             context.picker.shuffle("color", &mut others);
@@ -157,11 +131,5 @@ fn choices(context: &RuleContext<'_>, truth: Color) -> Option<(Vec<String>, usiz
         colors.sort_unstable();
     }
     let index = colors.iter().position(|color| *color == truth)?;
-    Some((
-        colors
-            .into_iter()
-            .map(|color| color.name().to_owned())
-            .collect(),
-        index,
-    ))
+    Some((colors.into_iter().map(|color| color.name().to_owned()).collect(), index))
 }

@@ -12,8 +12,7 @@ pub(super) fn name(rgb: [u8; 3]) -> Option<Color> {
     if lightness < 16.0 {
         return Some(Color::Black);
     }
-    let achromatic =
-        chroma < 9.0 || lightness < 50.0 && chroma < 12.0 || lightness > 88.0 && chroma < 11.0;
+    let achromatic = chroma < 9.0 || lightness < 50.0 && chroma < 12.0 || lightness > 88.0 && chroma < 11.0;
     if achromatic {
         return match lightness {
             l if l < 22.0 => Some(Color::Black),
@@ -72,21 +71,12 @@ fn chromatic(lightness: f64, chroma: f64, hue: f64) -> Option<Color> {
 fn lab(rgb: [u8; 3]) -> [f64; 3] {
     let [red, green, blue] = rgb.map(|code| {
         let value = f64::from(code) / 255.0;
-        if value > 0.04045 {
-            libm::pow((value + 0.055) / 1.055, 2.4)
-        } else {
-            value / 12.92
-        }
+        if value > 0.04045 { libm::pow((value + 0.055) / 1.055, 2.4) } else { value / 12.92 }
     });
     let x = (0.412453 * red + 0.357580 * green + 0.180423 * blue) / 0.95047;
     let y = 0.212671 * red + 0.715160 * green + 0.072169 * blue;
     let z = (0.019334 * red + 0.119193 * green + 0.950227 * blue) / 1.08883;
-    let [x, y, z] = [x, y, z].map(|value| {
-        if value > 0.008856 {
-            libm::cbrt(value)
-        } else {
-            7.787 * value + 16.0 / 116.0
-        }
-    });
+    let [x, y, z] =
+        [x, y, z].map(|value| if value > 0.008856 { libm::cbrt(value) } else { 7.787 * value + 16.0 / 116.0 });
     [116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)]
 }

@@ -29,39 +29,26 @@ impl Frequency {
         }
     }
 
-    /// Classes to expect in a room of a scene: the `max` most common ones in such rooms of other scenes, or in all frames if no other scene
-    /// has such a room. `None` if fewer than `max` classes occur, which is too little evidence.
+    /// Classes to expect in a room of a scene: the `max` most common ones in such rooms of other scenes, or in all
+    /// frames if no other scene has such a room. `None` if fewer than `max` classes occur, which is too little
+    /// evidence.
     #[must_use]
     pub fn expected(&self, room: &str, scene: &str, max: usize) -> Option<BTreeSet<String>> {
         let elsewhere = self.total(room, Some(scene));
-        let counts = if elsewhere.is_empty() {
-            self.total("", None)
-        } else {
-            elsewhere
-        };
+        let counts = if elsewhere.is_empty() { self.total("", None) } else { elsewhere };
         if counts.len() < max {
             return None;
         }
         let mut ranked: Vec<(&str, u64)> = counts.into_iter().collect();
         ranked.sort_by_key(|&(class, count)| (std::cmp::Reverse(count), class));
-        Some(
-            ranked
-                .into_iter()
-                .take(max)
-                .map(|(class, _)| class.to_owned())
-                .collect(),
-        )
+        Some(ranked.into_iter().take(max).map(|(class, _)| class.to_owned()).collect())
     }
 
     /// Number of frames that show each class in a type of room, over all scenes but one.
     fn total(&self, room: &str, except: Option<&str>) -> BTreeMap<&str, u64> {
         let mut total = BTreeMap::new();
-        for (_, counts) in self
-            .counts
-            .get(room)
-            .into_iter()
-            .flatten()
-            .filter(|(scene, _)| Some(scene.as_str()) != except)
+        for (_, counts) in
+            self.counts.get(room).into_iter().flatten().filter(|(scene, _)| Some(scene.as_str()) != except)
         {
             for (class, count) in counts {
                 *total.entry(class.as_str()).or_insert(0) += count;

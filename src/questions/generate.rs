@@ -119,9 +119,7 @@ pub fn generate(
     let mut frames: Vec<&FrameStatistics> = frames.iter().collect();
     frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
     let mut generated = Generated::default();
-    let (dark, light) = frames
-        .into_iter()
-        .partition::<Vec<_>, _>(|frame| frame.luma[1] < book.measure.dark_luma);
+    let (dark, light) = frames.into_iter().partition::<Vec<_>, _>(|frame| frame.luma[1] < book.measure.dark_luma);
     generated.dark = dark.iter().map(|frame| frame.frame.clone()).collect();
 
     let mut frequency = Frequency::default();
@@ -147,17 +145,9 @@ pub fn generate(
             vocabulary: &vocabulary,
             views: &views,
             frequency: &frequency,
-            picker: Picker {
-                seed: book.seed,
-                dataset: request.dataset,
-                frame: &frame.frame,
-            },
+            picker: Picker { seed: book.seed, dataset: request.dataset, frame: &frame.frame },
         };
-        for family in request
-            .families
-            .iter()
-            .filter(|family| Family::PAPER.contains(family))
-        {
+        for family in request.families.iter().filter(|family| Family::PAPER.contains(family)) {
             let results = apply_rules(family, &context, request.palette);
             let counts = generated.counts.entry(family.clone()).or_default();
             for result in &results {
@@ -177,21 +167,13 @@ pub fn generate(
             }
         }
     }
-    generated.rooms = light
-        .iter()
-        .zip(rooms)
-        .map(|(frame, (signs, _))| (frame.frame.clone(), signs))
-        .collect();
+    generated.rooms = light.iter().zip(rooms).map(|(frame, (signs, _))| (frame.frame.clone(), signs)).collect();
     Ok(balance_answers(generated, request))
 }
 
 /// Balances the answers and completes the counts.
 fn balance_answers(mut generated: Generated, request: &QuestionRequest<'_>) -> Generated {
-    let balanced = balance(
-        std::mem::take(&mut generated.asked),
-        request.balance,
-        &request.rules.book().balance,
-    );
+    let balanced = balance(std::mem::take(&mut generated.asked), request.balance, &request.rules.book().balance);
     for family in balanced.dropped {
         let counts = generated.counts.entry(family).or_default();
         counts.omit(OmissionReason::Unbalanced, 1);
@@ -205,12 +187,7 @@ fn balance_answers(mut generated: Generated, request: &QuestionRequest<'_>) -> G
 }
 
 /// Room type of a frame; `None` if it is unknown or if questions do not ask about it.
-fn asked_room(
-    frame: &FrameStatistics,
-    signs: &RoomSigns,
-    source: RoomSource,
-    book: &RuleBook,
-) -> Option<String> {
+fn asked_room(frame: &FrameStatistics, signs: &RoomSigns, source: RoomSource, book: &RuleBook) -> Option<String> {
     match source {
         RoomSource::Signature => signs.room.clone().ok(),
         RoomSource::Stated => stated_room(frame, book),
@@ -218,11 +195,7 @@ fn asked_room(
 }
 
 /// Room type of a frame, even if questions do not ask about it; `None` if it is unknown.
-fn any_room<'a>(
-    frame: &'a FrameStatistics,
-    signs: &'a RoomSigns,
-    source: RoomSource,
-) -> Option<&'a str> {
+fn any_room<'a>(frame: &'a FrameStatistics, signs: &'a RoomSigns, source: RoomSource) -> Option<&'a str> {
     match source {
         RoomSource::Signature => signs.winner.as_deref(),
         RoomSource::Stated => frame.room.as_deref(),
@@ -232,16 +205,8 @@ fn any_room<'a>(
 /// Room type that the data set states for a frame; `None` if questions do not ask about such rooms.
 #[must_use]
 pub fn stated_room(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
-    let stated = frame
-        .room
-        .as_deref()?
-        .to_lowercase()
-        .replace(['_', '-'], " ");
-    book.room
-        .order
-        .iter()
-        .find(|room| **room == stated)
-        .cloned()
+    let stated = frame.room.as_deref()?.to_lowercase().replace(['_', '-'], " ");
+    book.room.order.iter().find(|room| **room == stated).cloned()
 }
 
 fn apply_rules(family: &Family, context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
@@ -262,25 +227,17 @@ struct AnswerCounts(BTreeMap<(Family, String), [u64; 2]>);
 impl AnswerCounts {
     /// Chooses one of a family's candidates.
     ///
-    /// For yes-no families, the answer is picked first, if both are possible. Among the candidates with this answer, the question whose
-    /// answers it balances best is preferred, then the question asked least. Hashes break ties.
-    fn choose(
-        &mut self,
-        candidates: Vec<Candidate>,
-        context: &RuleContext<'_>,
-    ) -> Option<Candidate> {
+    /// For yes-no families, the answer is picked first, if both are possible. Among the candidates with this answer,
+    /// the question whose answers it balances best is preferred, then the question asked least. Hashes break ties.
+    fn choose(&mut self, candidates: Vec<Candidate>, context: &RuleContext<'_>) -> Option<Candidate> {
         let family = candidates.first()?.family.clone();
         let binary = matches!(family, Family::Affordance | Family::Presence);
         if !binary {
-            let chosen = context
-                .picker
-                .pick(family.name(), "candidate", candidates.len());
+            let chosen = context.picker.pick(family.name(), "candidate", candidates.len());
             return candidates.into_iter().nth(chosen);
         }
         let answer = context.picker.pick(family.name(), "polarity", 2);
-        let (wanted, others) = candidates
-            .into_iter()
-            .partition::<Vec<_>, _>(|candidate| candidate.truth == answer);
+        let (wanted, others) = candidates.into_iter().partition::<Vec<_>, _>(|candidate| candidate.truth == answer);
         let eligible = if wanted.is_empty() { others } else { wanted };
         let chosen = eligible.into_iter().min_by_key(|candidate| {
             let counts = self.0.get(&(family.clone(), candidate.text.clone()));
@@ -323,27 +280,17 @@ fn into_question(
         group: None,
         evidence: Value::clone(&evidence),
     };
-    Ok(GeneratedQuestion {
-        question,
-        about: candidate.about,
-        scene: frame.scene.clone(),
-    })
+    Ok(GeneratedQuestion { question, about: candidate.about, scene: frame.scene.clone() })
 }
 
-/// Id of a question: the family and a digest of frame, text, choices and answer. It depends neither on the position in the file nor on the
-/// evidence or the rulebook.
+/// Id of a question: the family and a digest of frame, text, choices and answer. It depends neither on the position in
+/// the file nor on the evidence or the rulebook.
 fn question_id(candidate: &Candidate, frame: &FrameStatistics, dataset: &str) -> QuestionId {
-    let parts = [
-        dataset,
-        &frame.scene,
-        &frame.frame.0,
-        candidate.family.name(),
-        &candidate.text,
-    ]
-    .into_iter()
-    .chain(candidate.choices.iter().map(String::as_str))
-    .chain([candidate.answer()])
-    .map(str::as_bytes);
+    let parts = [dataset, &frame.scene, &frame.frame.0, candidate.family.name(), &candidate.text]
+        .into_iter()
+        .chain(candidate.choices.iter().map(String::as_str))
+        .chain([candidate.answer()])
+        .map(str::as_bytes);
     let digest = Digest::from_parts(parts).to_string();
     QuestionId(format!("{}-{}", candidate.family, &digest[..16]))
 }

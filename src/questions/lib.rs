@@ -1,13 +1,11 @@
 //! Stage 2a, WORDS: frames → questions, by rule (DarkQA, arXiv 2512.24985, Algorithm 1).
 //!
-//! Each frame is first measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) use only these measurements: they
-//! classify the room ([`room`]) and then generate the questions, one file per family. [`generate()`] is the entry point. Random picks are
-//! hashes of the frame's name ([`pick`]), so the order of the frames does not matter.
+//! Each frame is first measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) use only
+//! these measurements: they classify the room ([`room`]) and then generate the questions, one file per family.
+//! [`generate()`] is the entry point. Random picks are hashes of the frame's name ([`pick`]), so the order of the
+//! frames does not matter.
 
-#![allow(
-    missing_docs,
-    reason = "fields and variants of this workspace's own use, whose names say what they are"
-)]
+#![allow(missing_docs, reason = "fields and variants of this workspace's own use, whose names say what they are")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod affordance;

@@ -7,8 +7,8 @@ const DOMAIN: &[u8] = b"darkqa-eval questions 1";
 
 /// Pseudo-random picks for one frame.
 ///
-/// There is no state: a pick is the BLAKE3 digest of seed, data set, frame, family and purpose, scaled to the range. The order of the
-/// frames therefore does not matter.
+/// There is no state: a pick is the BLAKE3 digest of seed, data set, frame, family and purpose, scaled to the range.
+/// The order of the frames therefore does not matter.
 #[derive(Debug, Clone, Copy)]
 pub struct Picker<'a> {
     /// Seed of the rulebook.
@@ -23,19 +23,9 @@ impl Picker<'_> {
     #[must_use]
     pub fn bits(&self, family: &str, purpose: &str) -> u64 {
         let seed = self.seed.to_le_bytes();
-        let parts = [
-            DOMAIN,
-            &seed,
-            self.dataset.as_bytes(),
-            self.frame.0.as_bytes(),
-            family.as_bytes(),
-            purpose.as_bytes(),
-        ];
-        Digest::from_parts(parts)
-            .as_bytes()
-            .iter()
-            .take(8)
-            .fold(0, |bits, byte| (bits << 8) | u64::from(*byte))
+        let parts =
+            [DOMAIN, &seed, self.dataset.as_bytes(), self.frame.0.as_bytes(), family.as_bytes(), purpose.as_bytes()];
+        Digest::from_parts(parts).as_bytes().iter().take(8).fold(0, |bits, byte| (bits << 8) | u64::from(*byte))
     }
 
     /// Picks a number from 0 to `count` − 1; `count` must be above 0.
@@ -63,55 +53,27 @@ mod tests {
         let mut orders = std::collections::BTreeMap::new();
         for i in 0..6_000 {
             let frame = FrameId(format!("scene/{i}"));
-            let picker = Picker {
-                seed: 0,
-                dataset: "d",
-                frame: &frame,
-            };
+            let picker = Picker { seed: 0, dataset: "d", frame: &frame };
             counts[picker.pick("color", "segment", 6)] += 1;
             let mut list = [0, 1, 2];
             picker.shuffle("closest", &mut list);
             *orders.entry(list).or_insert(0) += 1;
         }
         // Expected: 1,000 each, with a standard deviation of 29.
-        assert!(
-            counts.iter().all(|count| (880..1120).contains(count)),
-            "{counts:?}"
-        );
+        assert!(counts.iter().all(|count| (880..1120).contains(count)), "{counts:?}");
         assert_eq!(orders.len(), 6);
-        assert!(
-            orders.values().all(|count| (880..1120).contains(count)),
-            "{orders:?}"
-        );
+        assert!(orders.values().all(|count| (880..1120).contains(count)), "{orders:?}");
         let frame = FrameId("scene/0".into());
-        let picker = Picker {
-            seed: 0,
-            dataset: "d",
-            frame: &frame,
-        };
+        let picker = Picker { seed: 0, dataset: "d", frame: &frame };
         assert_eq!(picker.bits("color", "segment"), 13977079698431977642);
     }
 
     #[test]
     fn every_part_counts() {
         let (here, there) = (FrameId("a".into()), FrameId("b".into()));
-        let one = Picker {
-            seed: 0,
-            dataset: "d",
-            frame: &here,
-        };
+        let one = Picker { seed: 0, dataset: "d", frame: &here };
         let bits = one.bits("color", "x");
-        for other in [
-            Picker { seed: 1, ..one },
-            Picker {
-                dataset: "e",
-                ..one
-            },
-            Picker {
-                frame: &there,
-                ..one
-            },
-        ] {
+        for other in [Picker { seed: 1, ..one }, Picker { dataset: "e", ..one }, Picker { frame: &there, ..one }] {
             assert_ne!(bits, other.bits("color", "x"));
         }
         assert_ne!(bits, one.bits("closest", "x"));

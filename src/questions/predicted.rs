@@ -1,7 +1,7 @@
 //! Answers from the maps that a network predicts for an image: [`PredictedMaps`], [`PredictedFrame`].
 //!
-//! The predicted maps are measured like those of a frame, and each family of questions is answered from the measurements. Only the text and
-//! the choices of a question are used.
+//! The predicted maps are measured like those of a frame, and each family of questions is answered from the
+//! measurements. Only the text and the choices of a question are used.
 
 use std::cmp::Reverse;
 use std::sync::Arc;
@@ -20,8 +20,8 @@ use crate::statistics::{FrameStatistics, Segment, measure};
 /// Label space of predicted classes.
 const SPACE: &str = "mpcat40";
 
-/// Minimum area of a class that counts as present, in millionths of the image: half of the area that a question about presence needs
-/// (chosen).
+/// Minimum area of a class that counts as present, in millionths of the image: half of the area that a question about
+/// presence needs (chosen).
 const PRESENT_PPM: u64 = 1_500;
 
 /// Maps that a network predicted for an image.
@@ -65,17 +65,14 @@ impl PredictedFrame {
             names: Arc::default(),
             room: None,
         };
-        let labels = labels::space(SPACE)
-            .ok_or_else(|| Error::data("predicted maps", "no label space of this name"))?;
+        let labels =
+            labels::space(SPACE).ok_or_else(|| Error::data("predicted maps", "no label space of this name"))?;
         let key = Digest::from_bytes(&[]);
-        Ok(Self {
-            statistics: measure(&frame, &labels, rules, palette, key)?,
-            rooms: maps.rooms,
-        })
+        Ok(Self { statistics: measure(&frame, &labels, rules, palette, key)?, rooms: maps.rooms })
     }
 
-    /// Answers a question with the index of a choice. `None` if the subject of the question is not found in the image, or if the question
-    /// is not one of the rulebook.
+    /// Answers a question with the index of a choice. `None` if the subject of the question is not found in the image,
+    /// or if the question is not one of the rulebook.
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
         let book = rules.book();
@@ -109,49 +106,33 @@ impl PredictedFrame {
     }
 
     fn segments(&self, class: &str) -> impl Iterator<Item = &Segment> {
-        self.statistics
-            .segments
-            .iter()
-            .filter(move |segment| segment.class == class)
+        self.statistics.segments.iter().filter(move |segment| segment.class == class)
     }
 
-    /// Colour of the largest segment of a class: the name of its median if that is offered, else the most common offered name of its
-    /// pixels.
+    /// Colour of the largest segment of a class: the name of its median if that is offered, else the most common
+    /// offered name of its pixels.
     fn color(&self, class: &str, offered: &[String], palette: &Palette) -> Option<&'static str> {
         let is_offered = |name: &str| offered.iter().any(|text| text == name);
-        let largest = self
-            .segments(class)
-            .max_by_key(|segment| (segment.area, Reverse(segment.id)))?;
-        palette
-            .color(largest.median)
-            .map(Color::name)
-            .filter(|name| is_offered(name))
-            .or_else(|| {
-                Color::ALL
-                    .into_iter()
-                    .zip(largest.colors)
-                    .filter(|(color, pixels)| *pixels > 0 && is_offered(color.name()))
-                    .max_by_key(|(_, pixels)| *pixels)
-                    .map(|(color, _)| color.name())
-            })
+        let largest = self.segments(class).max_by_key(|segment| (segment.area, Reverse(segment.id)))?;
+        palette.color(largest.median).map(Color::name).filter(|name| is_offered(name)).or_else(|| {
+            Color::ALL
+                .into_iter()
+                .zip(largest.colors)
+                .filter(|(color, pixels)| *pixels > 0 && is_offered(color.name()))
+                .max_by_key(|(_, pixels)| *pixels)
+                .map(|(color, _)| color.name())
+        })
     }
 
-    /// Index of the choice whose nearest segment has the smallest median distance; `None` unless at least two of the offered things are
-    /// found.
+    /// Index of the choice whose nearest segment has the smallest median distance; `None` unless at least two of the
+    /// offered things are found.
     fn closest(&self, choices: &[String], rules: &Rules) -> Option<usize> {
         let found: Vec<(u32, usize)> = choices
             .iter()
             .enumerate()
             .filter_map(|(choice, word)| {
-                let (class, _) = rules
-                    .book()
-                    .class
-                    .iter()
-                    .find(|(_, rule)| rule.words.contains(word))?;
-                let nearest = self
-                    .segments(class)
-                    .filter_map(|segment| Some(segment.depth?.median))
-                    .min()?;
+                let (class, _) = rules.book().class.iter().find(|(_, rule)| rule.words.contains(word))?;
+                let nearest = self.segments(class).filter_map(|segment| Some(segment.depth?.median)).min()?;
                 Some((nearest, choice))
             })
             .collect();

@@ -54,7 +54,8 @@ pub enum Reason {
     Motley,
     /// People do not agree on a name for the colour.
     Nameless,
-    /// Relative to the light of the frame or around the object, the colour has another name: a white object in shade looks grey.
+    /// Relative to the light of the frame or around the object, the colour has another name: a white object in shade
+    /// looks grey.
     Lit,
     /// The object has another colour in another view.
     Disagreed,

@@ -46,9 +46,9 @@ pub enum RoomSource {
 
 /// Classifies the room of a frame by the objects visible in it.
 ///
-/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and it has no rival. If it
-/// has a single rival, a contest of the rulebook decides between the two. Without a decision, one wins if the segments of the other are
-/// small and far behind, because that room is seen through a door.
+/// Each clue of the rulebook counts once. The room type with the highest score wins if the score is high enough and it
+/// has no rival. If it has a single rival, a contest of the rulebook decides between the two. Without a decision, one
+/// wins if the segments of the other are small and far behind, because that room is seen through a door.
 #[must_use]
 pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
     let evidence = Evidence::new(statistics, book);
@@ -64,19 +64,9 @@ pub fn classify(statistics: &FrameStatistics, book: &RuleBook) -> RoomSigns {
         }
     }
     let winner = find_winner(&evidence, &scores, &segments);
-    let room = winner.clone().and_then(|room| {
-        if book.room.order.contains(&room) {
-            Ok(room)
-        } else {
-            Err(NoRoom::NotAsked)
-        }
-    });
-    RoomSigns {
-        scores,
-        segments,
-        room,
-        winner: winner.ok(),
-    }
+    let room =
+        winner.clone().and_then(|room| if book.room.order.contains(&room) { Ok(room) } else { Err(NoRoom::NotAsked) });
+    RoomSigns { scores, segments, room, winner: winner.ok() }
 }
 
 /// Segments that are evidence, by token.
@@ -92,20 +82,12 @@ impl<'a> Evidence<'a> {
         for segment in statistics.evidence(book) {
             tokens.entry(segment.token(book)).or_default().push(segment);
         }
-        Self {
-            statistics,
-            book,
-            tokens,
-        }
+        Self { statistics, book, tokens }
     }
 
     /// Segments that match a clue; `None` if it does not match.
     fn matching_segments(&self, clue: &Clue) -> Option<Vec<&'a Segment>> {
-        if clue
-            .unseen
-            .iter()
-            .any(|token| self.statistics.has_token(token, self.book))
-        {
+        if clue.unseen.iter().any(|token| self.statistics.has_token(token, self.book)) {
             return None;
         }
         let mut matched = Vec::new();
@@ -118,63 +100,40 @@ impl<'a> Evidence<'a> {
     /// Segments that match a sign of a clue; `None` if their number is out of its range.
     fn segments_of_sign(&self, sign: &Sign) -> Option<Vec<&'a Segment>> {
         let segments = self.tokens.get(sign.token.as_str())?;
-        let large: Vec<&Segment> = segments
-            .iter()
-            .filter(|segment| self.statistics.area_ppm(segment) >= sign.area_ppm)
-            .copied()
-            .collect();
-        let in_range =
-            large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
+        let large: Vec<&Segment> =
+            segments.iter().filter(|segment| self.statistics.area_ppm(segment) >= sign.area_ppm).copied().collect();
+        let in_range = large.len() >= sign.least && sign.most.is_none_or(|most| large.len() <= most);
         in_range.then_some(large)
     }
 
     /// Total area of the segments of a token, in pixels.
     fn area(&self, token: &str) -> u64 {
-        self.tokens
-            .get(token)
-            .into_iter()
-            .flatten()
-            .map(|segment| segment.area)
-            .sum()
+        self.tokens.get(token).into_iter().flatten().map(|segment| segment.area).sum()
     }
 
     /// True if the winner of a contest, with this score, meets its conditions.
     fn wins(&self, contest: &Contest, score: u32) -> bool {
-        let is_larger = contest
-            .tokens
-            .as_ref()
-            .is_none_or(|[own, other]| self.area(own) >= contest.area_ratio * self.area(other));
+        let is_larger =
+            contest.tokens.as_ref().is_none_or(|[own, other]| self.area(own) >= contest.area_ratio * self.area(other));
         score >= contest.least_score
             && is_larger
-            && !contest
-                .unseen
-                .iter()
-                .any(|token| self.statistics.has_token(token, self.book))
+            && !contest.unseen.iter().any(|token| self.statistics.has_token(token, self.book))
     }
 
     /// True if the second room is seen through a door: its segments are small and all far behind the first's.
     fn is_behind(&self, first: &[u32], second: &[u32]) -> bool {
         let rule = &self.book.doorway;
-        let lists = [first, second].map(|ids| {
-            self.statistics
-                .segments
-                .iter()
-                .filter(|segment| ids.contains(&segment.id))
-        });
-        let [first_area, second_area]: [u64; 2] = lists
-            .clone()
-            .map(|list| list.map(|segment| segment.area).sum());
-        let [near, far]: [Option<Vec<u64>>; 2] = lists.map(|list| {
-            list.map(|segment| Some(segment.reliable_depth(self.book)?.median.into()))
-                .collect()
-        });
+        let lists =
+            [first, second].map(|ids| self.statistics.segments.iter().filter(|segment| ids.contains(&segment.id)));
+        let [first_area, second_area]: [u64; 2] = lists.clone().map(|list| list.map(|segment| segment.area).sum());
+        let [near, far]: [Option<Vec<u64>>; 2] =
+            lists.map(|list| list.map(|segment| Some(segment.reliable_depth(self.book)?.median.into())).collect());
         let near = near.and_then(|depths| depths.into_iter().max());
         let far = far.and_then(|depths| depths.into_iter().min());
         let (Some(near), Some(far)) = (near, far) else {
             return false;
         };
-        first_area >= rule.area_ratio * second_area
-            && far * 1_000_000 >= near * rule.depth_ratio_ppm
+        first_area >= rule.area_ratio * second_area && far * 1_000_000 >= near * rule.depth_ratio_ppm
     }
 }
 
@@ -185,8 +144,7 @@ fn find_winner(
     segments: &BTreeMap<String, Vec<u32>>,
 ) -> Result<String, NoRoom> {
     let rule = &evidence.book.room;
-    let mut ranked: Vec<(&String, u32)> =
-        scores.iter().map(|(room, score)| (room, *score)).collect();
+    let mut ranked: Vec<(&String, u32)> = scores.iter().map(|(room, score)| (room, *score)).collect();
     ranked.sort_by_key(|(room, score)| {
         let position = rule.order.iter().position(|other| other == *room);
         let position = position.unwrap_or(usize::MAX);
@@ -204,11 +162,7 @@ fn find_winner(
         .filter(|(_, other)| *other >= rule.least_score || score - other < rule.least_lead)
         .collect();
     let [(second, other)] = rivals[..] else {
-        return if rivals.is_empty() {
-            Ok(first.clone())
-        } else {
-            Err(NoRoom::Contested)
-        };
+        return if rivals.is_empty() { Ok(first.clone()) } else { Err(NoRoom::Contested) };
     };
     for contest in &evidence.book.contest {
         let pair = [(first, second, score), (second, first, other)];
@@ -219,8 +173,7 @@ fn find_winner(
             }
         }
     }
-    let [first_ids, second_ids] =
-        [first, second].map(|room| segments.get(room).map_or(&[][..], Vec::as_slice));
+    let [first_ids, second_ids] = [first, second].map(|room| segments.get(room).map_or(&[][..], Vec::as_slice));
     if evidence.is_behind(first_ids, second_ids) {
         Ok(first.clone())
     } else if score == other && evidence.is_behind(second_ids, first_ids) {

@@ -19,13 +19,9 @@ pub(super) fn candidates(context: &RuleContext<'_>) -> Vec<RuleResult> {
     if statistics.ppm(statistics.pixels() - statistics.void) < rule.labelled_ppm {
         return reject(Reason::Unlabelled);
     }
-    let asked: Vec<&Segment> = statistics
-        .evidence(book)
-        .filter(|segment| book.has_flag(&segment.class, ClassFlag::Asked))
-        .collect();
-    let has_large = asked
-        .iter()
-        .any(|segment| statistics.area_ppm(segment) >= rule.large_ppm);
+    let asked: Vec<&Segment> =
+        statistics.evidence(book).filter(|segment| book.has_flag(&segment.class, ClassFlag::Asked)).collect();
+    let has_large = asked.iter().any(|segment| statistics.area_ppm(segment) >= rule.large_ppm);
     if asked.len() < rule.least_asked && !has_large {
         return reject(Reason::Bare);
     }

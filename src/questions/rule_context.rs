@@ -20,7 +20,8 @@ pub struct RuleContext<'a> {
     pub labels: &'a Labels,
     pub statistics: &'a FrameStatistics,
     pub signs: &'a RoomSigns,
-    /// Room type of the frame, from `signs` or from the data set; `None` if it is unknown or if questions do not ask about it.
+    /// Room type of the frame, from `signs` or from the data set; `None` if it is unknown or if questions do not ask
+    /// about it.
     pub room: Option<&'a str>,
     /// Room type of the frame, even if questions do not ask about it, such as a laundry room.
     pub any_room: Option<&'a str>,
@@ -72,10 +73,7 @@ impl GeneratedQuestion {
     /// The text of the true choice.
     #[must_use]
     pub fn answer(&self) -> &str {
-        self.question
-            .choices
-            .truth()
-            .map_or("", |truth| &self.question.choices.texts()[truth])
+        self.question.choices.truth().map_or("", |truth| &self.question.choices.texts()[truth])
     }
 
     /// Scene, text and answer; two questions that share all three repeat each other.
@@ -109,10 +107,7 @@ pub struct Rejection {
 impl RuleContext<'_> {
     /// Returns a viable candidate, with these segments added to its evidence.
     pub(super) fn viable(&self, mut candidate: Candidate, segments: &[&Segment]) -> RuleResult {
-        let list: Vec<Value> = segments
-            .iter()
-            .map(|segment| self.segment_json(segment))
-            .collect();
+        let list: Vec<Value> = segments.iter().map(|segment| self.segment_json(segment)).collect();
         if let Some(evidence) = candidate.evidence.as_object_mut() {
             evidence.insert("segments".to_owned(), json!(list));
         }
@@ -129,10 +124,7 @@ impl RuleContext<'_> {
             "bbox": segment.bbox,
         });
         if let (Some(depth), Some(json)) = (segment.depth, json.as_object_mut()) {
-            json.insert(
-                "depth_mm".to_owned(),
-                json!([depth.p10, depth.median, depth.p90]),
-            );
+            json.insert("depth_mm".to_owned(), json!([depth.p10, depth.median, depth.p90]));
         }
         json
     }
@@ -159,7 +151,8 @@ impl RuleContext<'_> {
         }
     }
 
-    /// True if an object of a class may be hidden among the unnamed pixels of a coarse class. False for a token that is a word.
+    /// True if an object of a class may be hidden among the unnamed pixels of a coarse class. False for a token that is
+    /// a word.
     pub(super) fn may_be_hidden(&self, class: &str) -> bool {
         self.book
             .class
@@ -170,20 +163,15 @@ impl RuleContext<'_> {
             .any(|other| self.statistics.unnamed.contains_key(other))
     }
 
-    /// True if the labels of the data set can show that a token is absent. A class must be expressible; a token that is a word always
-    /// passes, because its class is unknown.
+    /// True if the labels of the data set can show that a token is absent. A class must be expressible; a token that is
+    /// a word always passes, because its class is unknown.
     pub(super) fn is_expressible(&self, token: &str) -> bool {
         !self.book.class.contains_key(token) || self.labels.expressible.contains(token)
     }
 }
 
 /// Returns the result for a candidate that cannot be asked; `answer` is true for "yes".
-pub(super) fn rejected(
-    family: Family,
-    about: &str,
-    answer: Option<bool>,
-    reason: Reason,
-) -> RuleResult {
+pub(super) fn rejected(family: Family, about: &str, answer: Option<bool>, reason: Reason) -> RuleResult {
     RuleResult::Rejected(Rejection {
         family,
         about: about.to_owned(),

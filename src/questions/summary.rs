@@ -109,9 +109,10 @@ pub struct Baselines {
     pub chance: f64,
     /// Number of right answers if every reply is the most common answer of the family.
     pub majority: usize,
-    /// Expected number of right answers if a model knows the answers in other scenes. Among the choices of the question, it replies with
-    /// the most common answer to the same text. If no other scene has one of them for that text, it replies with the most common answer of
-    /// the family; if no other scene has one of them in the family, it guesses.
+    /// Expected number of right answers if a model knows the answers in other scenes. Among the choices of the
+    /// question, it replies with the most common answer to the same text. If no other scene has one of them for that
+    /// text, it replies with the most common answer of the family; if no other scene has one of them in the family, it
+    /// guesses.
     pub prior: f64,
 }
 
@@ -132,11 +133,7 @@ impl QuestionSummary {
             colors: request.palette.digest(),
             rules_version: request.rules.book().version.clone(),
             balance: request.balance.to_string(),
-            scenes: frames
-                .iter()
-                .map(|frame| &frame.scene)
-                .collect::<BTreeSet<_>>()
-                .len(),
+            scenes: frames.iter().map(|frame| &frame.scene).collect::<BTreeSet<_>>().len(),
             frames: frames.len(),
             failed,
             dark: generated.dark.len(),
@@ -170,10 +167,7 @@ impl QuestionSummary {
         for asked in asked {
             summary.add(asked);
         }
-        summary.repeats = count(asked, GeneratedQuestion::repeat_key)
-            .values()
-            .map(|count| count - 1)
-            .sum();
+        summary.repeats = count(asked, GeneratedQuestion::repeat_key).values().map(|count| count - 1).sum();
         summary
     }
 
@@ -189,30 +183,20 @@ impl QuestionSummary {
                 counts[truth] += 1;
             }
         }
-        if let Some(gap) = question
-            .evidence
-            .get("gap_mm")
-            .and_then(serde_json::Value::as_u64)
-        {
+        if let Some(gap) = question.evidence.get("gap_mm").and_then(serde_json::Value::as_u64) {
             *self.gaps.entry(gap / 250 * 250).or_insert(0) += 1;
         }
         if question.family == Family::RoomType {
-            self.rooms
-                .entry(asked.answer().to_owned())
-                .or_default()
-                .questions += 1;
+            self.rooms.entry(asked.answer().to_owned()).or_default().questions += 1;
         }
     }
 }
 
 impl CandidateCounts {
     fn new(counts: &FamilyCounts) -> Self {
-        let [not_chosen, rejected, unbalanced] = [
-            OmissionReason::NotChosen,
-            OmissionReason::Rejected,
-            OmissionReason::Unbalanced,
-        ]
-        .map(|reason| counts.omitted.get(&reason).copied().unwrap_or(0));
+        let [not_chosen, rejected, unbalanced] =
+            [OmissionReason::NotChosen, OmissionReason::Rejected, OmissionReason::Unbalanced]
+                .map(|reason| counts.omitted.get(&reason).copied().unwrap_or(0));
         Self {
             viable: counts.viable,
             asked: counts.asked,
@@ -238,17 +222,11 @@ fn count<'a, K: Ord>(
 
 /// Expected number of right answers of uniform guesses. `questions` maps a number of choices to a number of questions.
 fn expected_by_chance(questions: &BTreeMap<usize, usize>) -> f64 {
-    questions
-        .iter()
-        .map(|(choices, count)| *count as f64 / *choices as f64)
-        .sum()
+    questions.iter().map(|(choices, count)| *count as f64 / *choices as f64).sum()
 }
 
 /// Counts of each class in frames and questions.
-fn coverage(
-    frames: &[FrameStatistics],
-    asked: &[GeneratedQuestion],
-) -> BTreeMap<String, ClassCoverage> {
+fn coverage(frames: &[FrameStatistics], asked: &[GeneratedQuestion]) -> BTreeMap<String, ClassCoverage> {
     let mut classes: BTreeMap<String, ClassCoverage> = BTreeMap::new();
     for frame in frames {
         for (class, pixels) in &frame.classes {
@@ -261,10 +239,7 @@ fn coverage(
         }
     }
     for asked in asked {
-        if matches!(
-            asked.question.family,
-            Family::Presence | Family::Color | Family::Closest
-        ) {
+        if matches!(asked.question.family, Family::Presence | Family::Color | Family::Closest) {
             classes.entry(asked.about.clone()).or_default().questions += 1;
         }
     }
@@ -272,16 +247,8 @@ fn coverage(
 }
 
 /// Number of frames whose room type is both stated and classified, and number of these frames where both agree.
-fn room_agreement(
-    frames: &[FrameStatistics],
-    generated: &Generated,
-    book: &RuleBook,
-) -> [usize; 2] {
-    let signs: BTreeMap<_, _> = generated
-        .rooms
-        .iter()
-        .map(|(frame, signs)| (frame, signs))
-        .collect();
+fn room_agreement(frames: &[FrameStatistics], generated: &Generated, book: &RuleBook) -> [usize; 2] {
+    let signs: BTreeMap<_, _> = generated.rooms.iter().map(|(frame, signs)| (frame, signs)).collect();
     let mut agreement = [0, 0];
     for frame in frames {
         let signs = signs.get(&frame.frame);
@@ -297,11 +264,7 @@ fn room_agreement(
 /// Number of frames of each classified room type; the numbers of questions are 0.
 fn count_room_frames(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
     let mut rooms: BTreeMap<String, RoomCoverage> = BTreeMap::new();
-    for room in generated
-        .rooms
-        .iter()
-        .filter_map(|(_, signs)| signs.room.as_ref().ok())
-    {
+    for room in generated.rooms.iter().filter_map(|(_, signs)| signs.room.as_ref().ok()) {
         rooms.entry(room.clone()).or_default().frames += 1;
     }
     rooms
@@ -311,18 +274,13 @@ fn count_room_frames(generated: &Generated) -> BTreeMap<String, RoomCoverage> {
 fn baselines(asked: &[GeneratedQuestion]) -> BTreeMap<String, Baselines> {
     let mut families: BTreeMap<&Family, Vec<&GeneratedQuestion>> = BTreeMap::new();
     for asked in asked {
-        families
-            .entry(&asked.question.family)
-            .or_default()
-            .push(asked);
+        families.entry(&asked.question.family).or_default().push(asked);
     }
     let mut all: BTreeMap<String, Baselines> = BTreeMap::new();
     let mut total = Baselines::default();
     for (family, questions) in families {
         let answers = count(questions.iter().copied(), GeneratedQuestion::answer);
-        let by_choices = count(questions.iter().copied(), |asked| {
-            asked.question.choices.len()
-        });
+        let by_choices = count(questions.iter().copied(), |asked| asked.question.choices.len());
         let baselines = Baselines {
             questions: questions.len(),
             chance: expected_by_chance(&by_choices),
@@ -345,11 +303,7 @@ fn prior(questions: &[&GeneratedQuestion]) -> f64 {
     let mut counts: BTreeMap<&str, BTreeMap<&str, BTreeMap<&str, usize>>> = BTreeMap::new();
     for asked in questions {
         for text in ["", &asked.question.text] {
-            let scenes = counts
-                .entry(text)
-                .or_default()
-                .entry(asked.answer())
-                .or_default();
+            let scenes = counts.entry(text).or_default().entry(asked.answer()).or_default();
             *scenes.entry(&asked.scene).or_insert(0) += 1;
         }
     }
@@ -365,11 +319,8 @@ fn prior(questions: &[&GeneratedQuestion]) -> f64 {
                     choices.iter().any(|choice| choice == *answer)
                 })
                 .map(|(answer, scenes)| {
-                    let count: usize = scenes
-                        .iter()
-                        .filter(|(scene, _)| **scene != asked.scene)
-                        .map(|(_, count)| count)
-                        .sum();
+                    let count: usize =
+                        scenes.iter().filter(|(scene, _)| **scene != asked.scene).map(|(_, count)| count).sum();
                     (*answer, count)
                 })
                 .filter(|(_, count)| *count > 0)
@@ -414,7 +365,8 @@ mod tests {
             closest("d", ["sofa", "lamp"]),
             closest("e", ["chair", "lamp"]),
         ];
-        // In other scenes the chair is as common as the sofa, or more, but the questions about the sofa do not offer it.
+        // In other scenes the chair is as common as the sofa, or more, but the questions about the sofa do not offer
+        // it.
         let right = prior(&questions.iter().collect::<Vec<_>>());
         assert!((right - 5.0).abs() < 1e-12, "{right}");
     }

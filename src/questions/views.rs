@@ -6,11 +6,11 @@ use super::colors::{Color, Palette};
 use super::rules::RuleBook;
 use super::statistics::{FrameStatistics, Segment, WordSource};
 
-/// Colours of each object in all frames that show at least `color.view_px` core pixels, by scene, segment id and word. A colour is
-/// `None` if the palette has no name for it.
+/// Colours of each object in all frames that show at least `color.view_px` core pixels, by scene, segment id and word.
+/// A colour is `None` if the palette has no name for it.
 ///
-/// Only segments with names are matched across frames: their ids are the same in all frames of a scene. A connected component has a
-/// different id in each frame.
+/// Only segments with names are matched across frames: their ids are the same in all frames of a scene. A connected
+/// component has a different id in each frame.
 #[derive(Debug, Default)]
 pub struct Views(BTreeMap<(String, u32, String), BTreeSet<Option<Color>>>);
 
@@ -36,14 +36,9 @@ impl Views {
         (frame.scene.clone(), segment.id, segment.word.clone())
     }
 
-    /// True if any view of a named object has a colour other than `color`; `None` counts as another colour. False for segments without
-    /// names.
-    pub fn has_other_color(
-        &self,
-        frame: &FrameStatistics,
-        segment: &Segment,
-        color: Color,
-    ) -> bool {
+    /// True if any view of a named object has a colour other than `color`; `None` counts as another colour. False for
+    /// segments without names.
+    pub fn has_other_color(&self, frame: &FrameStatistics, segment: &Segment, color: Color) -> bool {
         let colors = self.0.get(&Self::key(frame, segment));
         segment.source == WordSource::Name
             && colors.is_some_and(|colors| colors.iter().any(|other| *other != Some(color)))

@@ -8,8 +8,9 @@ use darkqa_base::types::Labels;
 
 /// Words that a data set uses for objects: the names of its segments if they have any, otherwise its labels.
 ///
-/// A question whose answer is "no" uses only these words, and an activity is asked about only if these words could enable it. Otherwise,
-/// "no" would always be the answer to questions with a word that no annotator of the data set used.
+/// A question whose answer is "no" uses only these words, and an activity is asked about only if these words could
+/// enable it. Otherwise, "no" would always be the answer to questions with a word that no annotator of the data set
+/// used.
 #[derive(Debug, Default)]
 pub struct Vocabulary {
     /// Words used in questions, by class.
@@ -51,11 +52,7 @@ impl Vocabulary {
 
     /// Words that questions use for objects of a class.
     pub fn class_words(&self, class: &str) -> impl Iterator<Item = &str> {
-        self.words
-            .get(class)
-            .into_iter()
-            .flatten()
-            .map(String::as_str)
+        self.words.get(class).into_iter().flatten().map(String::as_str)
     }
 
     /// True if the data set has a word for objects with this token. A class is also a token.

@@ -24,9 +24,7 @@ impl<'a> ChoiceReport<'a> {
     #[must_use]
     pub fn new(findings: &'a Findings<'a>, alerts: Vec<Alert>) -> Self {
         let shown = findings.shown();
-        let notes = observer_notes(&findings.observer)
-            .into_iter()
-            .map(|note| Alert::new(AlertKind::Observer, note));
+        let notes = observer_notes(&findings.observer).into_iter().map(|note| Alert::new(AlertKind::Observer, note));
         Self {
             findings: shown,
             alerts: alerts.into_iter().chain(notes).collect(),

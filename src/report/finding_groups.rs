@@ -1,5 +1,5 @@
-//! Findings of a report by group: [`FindingGroups`]. The page, the terminal and Markdown all start with the same summary and the same
-//! main finding of each group, and list all findings in the same groups.
+//! Findings of a report by group: [`FindingGroups`]. The page, the terminal and Markdown all start with the same
+//! summary and the same main finding of each group, and list all findings in the same groups.
 
 use std::fmt::{self, Write as _};
 
@@ -17,31 +17,19 @@ struct GroupKinds {
 
 /// All groups in order. Sentences of any other kind are in the last group.
 const GROUPS: [GroupKinds; 7] = [
-    GroupKinds {
-        title: "Baseline",
-        leading: &["baseline"],
-        further: &[],
-    },
+    GroupKinds { title: "Baseline", leading: &["baseline"], further: &[] },
     GroupKinds {
         title: "Darkness",
         leading: &["darkness", "real darkness", "agreement_in_the_dark"],
         further: &["real against synthetic", "families", "best", "apart"],
     },
-    GroupKinds {
-        title: "Noise",
-        leading: &["noise"],
-        further: &["readings"],
-    },
+    GroupKinds { title: "Noise", leading: &["noise"], further: &["readings"] },
     GroupKinds {
         title: "Enhancers",
         leading: &["enhancer", "real enhanced", "agreement_enhanced"],
         further: &["fidelity"],
     },
-    GroupKinds {
-        title: "Without images",
-        leading: &["below blind", "images"],
-        further: &[],
-    },
+    GroupKinds { title: "Without images", leading: &["below blind", "images"], further: &[] },
     GroupKinds {
         title: "Failures",
         leading: &[
@@ -57,13 +45,7 @@ const GROUPS: [GroupKinds; 7] = [
     },
     GroupKinds {
         title: "Sample",
-        leading: &[
-            "no verdict",
-            "left out",
-            "bank_cannot_tell",
-            "models_in_light",
-            "power",
-        ],
+        leading: &["no verdict", "left out", "bank_cannot_tell", "models_in_light", "power"],
         further: &[],
     },
 ];
@@ -113,10 +95,8 @@ pub(super) enum Effect {
 impl<'a> FindingGroups<'a> {
     /// Groups the sentences of a report.
     pub(super) fn new(sentences: &'a [Sentence]) -> Self {
-        let mut groups: Vec<FindingGroup<'a>> = GROUPS
-            .iter()
-            .map(|kinds| FindingGroup::new(kinds, sentences))
-            .collect();
+        let mut groups: Vec<FindingGroup<'a>> =
+            GROUPS.iter().map(|kinds| FindingGroup::new(kinds, sentences)).collect();
         groups.retain(|group| !group.findings.is_empty());
         Self(groups)
     }
@@ -132,24 +112,18 @@ impl<'a> FindingGroups<'a> {
 
     /// Main findings at the start of a report, each with the title of its group.
     pub(super) fn main_findings(&self) -> Vec<(&'static str, &Finding<'a>)> {
-        self.0
-            .iter()
-            .filter_map(|group| Some((group.title, group.main_finding()?)))
-            .take(MAX_FIRST)
-            .collect()
+        self.0.iter().filter_map(|group| Some((group.title, group.main_finding()?))).take(MAX_FIRST).collect()
     }
 
     fn group(&self, title: &str) -> Option<&FindingGroup<'a>> {
         self.0.iter().find(|group| group.title == title)
     }
 
-    /// Summary of the report in one sentence: the effect of darkness, and the detected effects of enhancers. Without either, it is the
-    /// first main finding; without any finding, it is empty. A sentence about the training data of each enhancer with an effect follows.
+    /// Summary of the report in one sentence: the effect of darkness, and the detected effects of enhancers. Without
+    /// either, it is the first main finding; without any finding, it is empty. A sentence about the training data of
+    /// each enhancer with an effect follows.
     pub(super) fn summary(&self) -> String {
-        let darkness = self
-            .group("Darkness")
-            .and_then(FindingGroup::main_finding)
-            .map(Finding::claims);
+        let darkness = self.group("Darkness").and_then(FindingGroup::main_finding).map(Finding::claims);
         let enhancers = self.group("Enhancers");
         let clauses: Vec<String> = darkness
             .into_iter()
@@ -177,10 +151,7 @@ impl<'a> FindingGroups<'a> {
             .map(|light| format!("{light}: "))
             .find(|prefix| clauses[0].starts_with(prefix))
             .unwrap_or_default();
-        let clauses: Vec<&str> = clauses
-            .iter()
-            .map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause))
-            .collect();
+        let clauses: Vec<&str> = clauses.iter().map(|clause| clause.strip_prefix(&prefix).unwrap_or(clause)).collect();
         capitalised(&prefix) + &clauses.join("; ") + "."
     }
 }
@@ -188,24 +159,13 @@ impl<'a> FindingGroups<'a> {
 impl<'a> FindingGroup<'a> {
     fn new(kinds: &GroupKinds, sentences: &'a [Sentence]) -> Self {
         let is_last = GROUPS.last().is_some_and(|last| last.title == kinds.title);
-        let listed = kinds.kinds().flat_map(|kind| {
-            sentences
-                .iter()
-                .filter(move |sentence| sentence.kind == kind)
-        });
-        let unlisted = sentences
-            .iter()
-            .filter(|sentence| is_last && !is_listed(sentence.kind));
+        let listed = kinds.kinds().flat_map(|kind| sentences.iter().filter(move |sentence| sentence.kind == kind));
+        let unlisted = sentences.iter().filter(|sentence| is_last && !is_listed(sentence.kind));
         let mut findings: Vec<Finding<'a>> = Vec::new();
         for sentence in listed.chain(unlisted) {
-            match findings
-                .iter_mut()
-                .find(|finding| finding.is_about(sentence))
-            {
+            match findings.iter_mut().find(|finding| finding.is_about(sentence)) {
                 Some(finding) => finding.sentences.push(sentence),
-                None => findings.push(Finding {
-                    sentences: vec![sentence],
-                }),
+                None => findings.push(Finding { sentences: vec![sentence] }),
             }
         }
         let leading: Vec<usize> = findings
@@ -214,38 +174,26 @@ impl<'a> FindingGroup<'a> {
             .filter(|(_, finding)| kinds.leading.contains(&finding.kind()))
             .map(|(index, _)| index)
             .collect();
-        let detected = leading
-            .iter()
-            .copied()
-            .find(|index| findings[*index].is_detected());
+        let detected = leading.iter().copied().find(|index| findings[*index].is_detected());
         let first = detected.or(leading.first().copied());
-        Self {
-            title: kinds.title,
-            first: first.map(|first| strongest(&findings, first)),
-            findings,
-        }
+        Self { title: kinds.title, first: first.map(|first| strongest(&findings, first)), findings }
     }
 
-    /// The first detected finding of a leading kind, else the first one; of several enhancers the one with the largest effect. `None`
-    /// without a finding of a leading kind.
+    /// The first detected finding of a leading kind, else the first one; of several enhancers the one with the largest
+    /// effect. `None` without a finding of a leading kind.
     fn main_finding(&self) -> Option<&Finding<'a>> {
         Some(&self.findings[self.first?])
     }
 
     /// Sentences of all findings in the group.
     pub(super) fn sentences(&self) -> impl Iterator<Item = &'a Sentence> {
-        self.findings
-            .iter()
-            .flat_map(|finding| finding.sentences.iter().copied())
+        self.findings.iter().flat_map(|finding| finding.sentences.iter().copied())
     }
 
     /// Findings about the enhancers, of the kind of the main finding.
     fn of_main_kind(&self) -> Vec<&Finding<'a>> {
         let kind = self.main_finding().map(Finding::kind);
-        self.findings
-            .iter()
-            .filter(|finding| Some(finding.kind()) == kind)
-            .collect()
+        self.findings.iter().filter(|finding| Some(finding.kind()) == kind).collect()
     }
 
     /// Findings in the summary: the largest detected effects, or the effect of the only enhancer.
@@ -280,8 +228,8 @@ impl<'a> FindingGroup<'a> {
     }
 }
 
-/// Index of the finding with the largest effect among those that are about the same kind of effect as the finding `first` and as
-/// detected as it, but about other enhancers; `first` if it is not about an enhancer.
+/// Index of the finding with the largest effect among those that are about the same kind of effect as the finding
+/// `first` and as detected as it, but about other enhancers; `first` if it is not about an enhancer.
 fn strongest(findings: &[Finding<'_>], first: usize) -> usize {
     let is_alike = |finding: &Finding<'_>| {
         let sentence = finding.main_sentence();
@@ -298,9 +246,7 @@ fn strongest(findings: &[Finding<'_>], first: usize) -> usize {
 
 /// True if a group lists a kind of sentence.
 fn is_listed(kind: &str) -> bool {
-    GROUPS
-        .iter()
-        .any(|group| group.kinds().any(|listed| listed == kind))
+    GROUPS.iter().any(|group| group.kinds().any(|listed| listed == kind))
 }
 
 impl GroupKinds {
@@ -321,22 +267,17 @@ impl<'a> Finding<'a> {
         self.main_sentence().tone.is_detected()
     }
 
-    /// True if a sentence belongs to this finding: it is about the same enhancer, or about the same effect in another variant.
+    /// True if a sentence belongs to this finding: it is about the same enhancer, or about the same effect in another
+    /// variant.
     fn is_about(&self, sentence: &Sentence) -> bool {
         let own = self.sentences[0];
         let is_one_of_several = sentence.scope.subject.is_some() || sentence.scope.light.is_some();
-        is_one_of_several
-            && own.kind == sentence.kind
-            && own.scope.subject == sentence.scope.subject
+        is_one_of_several && own.kind == sentence.kind && own.scope.subject == sentence.scope.subject
     }
 
     /// Sentence whose sign and interval stand for the finding: the first with a detected effect, else the first.
     pub(super) fn main_sentence(&self) -> &'a Sentence {
-        self.sentences
-            .iter()
-            .copied()
-            .find(|sentence| sentence.tone.is_detected())
-            .unwrap_or(self.sentences[0])
+        self.sentences.iter().copied().find(|sentence| sentence.tone.is_detected()).unwrap_or(self.sentences[0])
     }
 
     /// Size of the effect of the main sentence in points; 0 without one.
@@ -345,8 +286,8 @@ impl<'a> Finding<'a> {
         difference.map_or(0.0, |difference| difference.abs())
     }
 
-    /// Text of the detected effects in the variant of [`Self::main_sentence`] and the sentence about training data, without the last full
-    /// stop.
+    /// Text of the detected effects in the variant of [`Self::main_sentence`] and the sentence about training data,
+    /// without the last full stop.
     pub(super) fn text(&self) -> String {
         match self.main_sentence().scope.training.trim_end_matches('.') {
             "" => self.claims(),
@@ -386,9 +327,7 @@ impl<'a> Finding<'a> {
         let mut by_light = vec![main];
         for sentence in &self.sentences {
             let light = &sentence.scope.light;
-            let known = by_light
-                .iter_mut()
-                .find(|known| known.scope.light == *light);
+            let known = by_light.iter_mut().find(|known| known.scope.light == *light);
             match known {
                 None => by_light.push(sentence),
                 // Prefer a detected effect in each variant.

@@ -16,55 +16,29 @@ const TOLD_FROM: f64 = 0.05;
 
 /// Serializes the forecast as JSON.
 pub(crate) fn json(forecast: &Forecast) -> Result<String> {
-    serde_json::to_string_pretty(forecast)
-        .map(|text| text + "\n")
-        .map_err(|e| Error::data("the estimate", e))
+    serde_json::to_string_pretty(forecast).map(|text| text + "\n").map_err(|e| Error::data("the estimate", e))
 }
 
 /// Formats the forecast for the terminal.
 #[must_use]
-#[expect(clippy::too_many_lines, reason = "one column after another")]
 pub(crate) fn render(forecast: &Forecast) -> String {
     let table = TableBuilder::new("estimate", &forecast.lines)
         .column(Text, "terminal model", |line| line.model.clone())
-        .column(Count, "terminal requests", |line| {
-            count(line.requests as f64)
-        })
-        .column(Count, "terminal text tokens", |line| {
-            count(line.text_tokens)
-        })
-        .column(Count, "terminal image tokens", |line| {
-            line.image_tokens.map_or("unknown".to_owned(), count)
-        })
+        .column(Count, "terminal requests", |line| count(line.requests as f64))
+        .column(Count, "terminal text tokens", |line| count(line.text_tokens))
+        .column(Count, "terminal image tokens", |line| line.image_tokens.map_or("unknown".to_owned(), count))
         .column(Count, "terminal reply tokens", |line| {
             range_text(Some(line.reply_tokens), line.longest_reply_tokens, count)
         })
-        .column(Count, "terminal dollars", |line| {
-            range_text(line.dollars, line.most_dollars, money)
-        })
+        .column(Count, "terminal dollars", |line| range_text(line.dollars, line.most_dollars, money))
         .build();
     let table = terminal::table(&[table]);
-    let Forecast {
-        trials,
-        answered,
-        images,
-        sampled,
-        pace,
-        prices,
-        ..
-    } = forecast;
-    let mut text = format!(
-        "Nothing was sent. {} of {trials} trials are left to ask",
-        trials - answered
-    );
+    let Forecast { trials, answered, images, sampled, pace, prices, .. } = forecast;
+    let mut text = format!("Nothing was sent. {} of {trials} trials are left to ask", trials - answered);
     if let (Some(spent), true) = (forecast.spent, *answered > 0) {
         let _ = write!(text, "; the {answered} answered ones cost {}", money(spent));
     }
-    let mut last = forecast
-        .image_store
-        .as_ref()
-        .map(StoreForecast::line)
-        .unwrap_or_default();
+    let mut last = forecast.image_store.as_ref().map(StoreForecast::line).unwrap_or_default();
     if let Some(power) = &forecast.power {
         let _ = writeln!(last, "{}", power.line());
     }
@@ -83,19 +57,12 @@ pub(crate) fn render(forecast: &Forecast) -> String {
     let _ = write!(text, ".\n{table}{built_in}");
     for line in &forecast.lines {
         if let Some(tokens) = line.charged_image_tokens {
-            let _ = writeln!(
-                text,
-                "{}: {} tokens an image, as its first replies were charged",
-                line.model,
-                count(tokens)
-            );
+            let _ =
+                writeln!(text, "{}: {} tokens an image, as its first replies were charged", line.model, count(tokens));
         }
     }
     for line in &forecast.lines {
-        if let Some(ratio) = line
-            .charge_ratio
-            .filter(|ratio| (ratio - 1.0).abs() > TOLD_FROM)
-        {
+        if let Some(ratio) = line.charge_ratio.filter(|ratio| (ratio - 1.0).abs() > TOLD_FROM) {
             let _ = writeln!(
                 text,
                 "{}: dollars at {ratio:.2} times the price table, as its replies were charged",
@@ -139,10 +106,8 @@ pub(crate) fn render(forecast: &Forecast) -> String {
 
 /// Line with the built-in models and their trials; empty without any.
 fn built_in_line(models: &[(String, usize)]) -> String {
-    let models: Vec<String> = models
-        .iter()
-        .map(|(model, trials)| format!("{model} {}", count(*trials as f64)))
-        .collect();
+    let models: Vec<String> =
+        models.iter().map(|(model, trials)| format!("{model} {}", count(*trials as f64))).collect();
     match &*models {
         [] => String::new(),
         models => format!("at no endpoint, built in: {}\n", models.join(", ")),
@@ -186,10 +151,7 @@ fn by_reading(lines: &[CostLine]) -> String {
     let parts: Vec<String> = sums
         .into_iter()
         .map(|(reading, (requests, dollars))| {
-            let name = reading.map_or(
-                "shared by all (L0, exposure drop, blind)",
-                ProfileName::as_str,
-            );
+            let name = reading.map_or("shared by all (L0, exposure drop, blind)", ProfileName::as_str);
             let price = dollars.map_or("price unknown".to_owned(), money);
             format!("{name} {} ({price})", count(requests as f64))
         })
@@ -227,11 +189,7 @@ mod tests {
     use crate::runs::forecast::ProfileCost;
 
     fn cost(reading: Option<&str>, requests: usize, dollars: Option<f64>) -> ProfileCost {
-        ProfileCost {
-            reading: reading.map(|name| ProfileName::new(name).unwrap()),
-            requests,
-            dollars,
-        }
+        ProfileCost { reading: reading.map(|name| ProfileName::new(name).unwrap()), requests, dollars }
     }
 
     fn line(readings: Vec<ProfileCost>) -> CostLine {
@@ -256,11 +214,7 @@ mod tests {
         let shared = cost(None, 6, Some(0.5));
         let one = line(vec![shared.clone(), cost(Some("paper"), 5, Some(0.25))]);
         assert_eq!(by_reading(std::slice::from_ref(&one)), "");
-        let two = line(vec![
-            shared,
-            cost(Some("paper"), 5, Some(0.25)),
-            cost(Some("physical"), 1005, None),
-        ]);
+        let two = line(vec![shared, cost(Some("paper"), 5, Some(0.25)), cost(Some("physical"), 1005, None)]);
         assert_eq!(
             by_reading(&[one, two]),
             "requests by reading: shared by all (L0, exposure drop, blind) 12 ($1.00), paper 10 ($0.5000), \

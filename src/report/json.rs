@@ -30,7 +30,8 @@ struct Document<'a, H> {
     tables: BTreeMap<&'a str, Rows<'a>>,
 }
 
-/// Rows of tables that have the same columns in their file; each row becomes an object. Tables without a file have no rows.
+/// Rows of tables that have the same columns in their file; each row becomes an object. Tables without a file have no
+/// rows.
 pub(super) struct Rows<'a>(&'a [Table]);
 
 impl<'a> Rows<'a> {
@@ -71,12 +72,7 @@ impl Serialize for RowObject<'_> {
 ///
 /// # Errors
 /// If the document cannot be serialised.
-pub(super) fn document(
-    head: impl Serialize,
-    rows: &Table,
-    tables: &[Table],
-    length: ReportLength,
-) -> Result<String> {
+pub(super) fn document(head: impl Serialize, rows: &Table, tables: &[Table], length: ReportLength) -> Result<String> {
     let document = Document {
         head,
         rows: (length != ReportLength::Findings).then(|| Rows::new(rows)),
@@ -86,9 +82,7 @@ pub(super) fn document(
             .map(|parts| (parts[0].name, Rows(parts)))
             .collect(),
     };
-    serde_json::to_string_pretty(&document)
-        .map(|text| text + "\n")
-        .map_err(|e| Error::data("summary.json", e))
+    serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|e| Error::data("summary.json", e))
 }
 
 /// Head of the summary of an evaluation.
@@ -144,15 +138,7 @@ impl<'a> SummaryRuns<'a> {
             Self::One(run, folder) => (Some(run), folder, [].as_slice()),
             Self::Several(runs) => (None, None, runs),
         };
-        RunsHead {
-            schema,
-            folder,
-            run,
-            runs: runs
-                .iter()
-                .map(|&(run, folder)| ComparedRun { folder, run })
-                .collect(),
-        }
+        RunsHead { schema, folder, run, runs: runs.iter().map(|&(run, folder)| ComparedRun { folder, run }).collect() }
     }
 }
 
@@ -160,11 +146,7 @@ impl<'a> SummaryRuns<'a> {
 ///
 /// # Errors
 /// If the document cannot be serialised.
-pub(crate) fn summary(
-    report: &ChoiceReport<'_>,
-    runs: SummaryRuns<'_>,
-    length: ReportLength,
-) -> Result<String> {
+pub(crate) fn summary(report: &ChoiceReport<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String> {
     let groups = strict_groups(report.findings);
     let head = Head {
         runs: runs.head("darkqa.summary/1"),
@@ -173,18 +155,9 @@ pub(crate) fn summary(
         alerts: &report.alerts,
         findings: &report.sentences,
         groups: (!groups.is_empty()).then_some(Rows(&groups)),
-        baseline: report
-            .tables
-            .iter()
-            .find(|table| table.name == BASELINE)
-            .map(Rows::new),
+        baseline: report.tables.iter().find(|table| table.name == BASELINE).map(Rows::new),
     };
-    document(
-        head,
-        &summary_rows(&report.findings.summary, &report.findings.grid.listing),
-        &report.tables,
-        length,
-    )
+    document(head, &summary_rows(&report.findings.summary, &report.findings.grid.listing), &report.tables, length)
 }
 
 #[cfg(test)]
@@ -195,17 +168,11 @@ mod tests {
 
     #[test]
     fn tables_without_csv_columns_have_no_rows() {
-        let tables = ["csv n | page n", "page n"].map(|heads| {
-            TableBuilder::new("readings", [1_usize])
-                .column(Count, heads, |row| *row)
-                .build()
-        });
+        let tables = ["csv n | page n", "page n"]
+            .map(|heads| TableBuilder::new("readings", [1_usize]).column(Count, heads, |row| *row).build());
         let head = serde_json::json!({});
         let text = document(head, &tables[0], &tables, ReportLength::Full).unwrap();
         let document: serde_json::Value = serde_json::from_str(&text).unwrap();
-        assert_eq!(
-            document["tables"],
-            serde_json::json!({"readings": [{"n": 1}]})
-        );
+        assert_eq!(document["tables"], serde_json::json!({"readings": [{"n": 1}]}));
     }
 }

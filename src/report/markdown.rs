@@ -36,11 +36,7 @@ pub(crate) struct MarkdownReport<'a> {
 
 impl<'a> MarkdownReport<'a> {
     /// Report on multiple-choice questions.
-    pub(crate) fn for_choices(
-        report: &'a ChoiceReport<'a>,
-        names: Vec<String>,
-        length: ReportLength,
-    ) -> Self {
+    pub(crate) fn for_choices(report: &'a ChoiceReport<'a>, names: Vec<String>, length: ReportLength) -> Self {
         let mut tables = tables(&report.tables, LEVELS, length);
         if length == ReportLength::Summary && report.findings.common.is_some() && tables.len() > 1 {
             // Models that were asked different questions are compared on the questions that they share.
@@ -58,11 +54,7 @@ impl<'a> MarkdownReport<'a> {
     }
 
     /// Report on questions without true answers.
-    pub(crate) fn for_own_answers(
-        report: &'a AgreementReport<'a>,
-        names: Vec<String>,
-        length: ReportLength,
-    ) -> Self {
+    pub(crate) fn for_own_answers(report: &'a AgreementReport<'a>, names: Vec<String>, length: ReportLength) -> Self {
         let parts = self_agreement::markdown_parts(report);
         Self {
             names,
@@ -76,16 +68,9 @@ impl<'a> MarkdownReport<'a> {
     }
 
     /// Report on open questions, with all its tables.
-    pub(crate) fn for_open(
-        report: &'a OpenReport<'_>,
-        all: &'a [Table],
-        length: ReportLength,
-    ) -> Self {
+    pub(crate) fn for_open(report: &'a OpenReport<'_>, all: &'a [Table], length: ReportLength) -> Self {
         let judge = report.judge.unwrap_or("nobody");
-        let mut head = vec![format!(
-            "OpenEQA by LLM-Match, marked by {judge}, protocol {}",
-            report.protocol
-        )];
+        let mut head = vec![format!("OpenEQA by LLM-Match, marked by {judge}, protocol {}", report.protocol)];
         head.extend(coverage(report));
         Self {
             names: report.names(),
@@ -156,7 +141,8 @@ fn list_item(sign: char, group: &str, text: &str, detail: &str) -> String {
     }
 }
 
-/// Selects non-empty tables: those with a name in a summary, all tables of the page in a full report, none with only the findings.
+/// Selects non-empty tables: those with a name in a summary, all tables of the page in a full report, none with only
+/// the findings.
 fn tables<'a>(tables: &'a [Table], name: &str, length: ReportLength) -> Vec<&'a Table> {
     tables
         .iter()
@@ -171,15 +157,8 @@ fn tables<'a>(tables: &'a [Table], name: &str, length: ReportLength) -> Vec<&'a 
 
 /// Table with the columns and rows of the page. Each number is followed by its interval.
 fn markdown_table(table: &Table) -> String {
-    let columns: Vec<&Column> = table
-        .columns
-        .iter()
-        .filter(|column| is_on_page(column))
-        .collect();
-    let heads = columns
-        .iter()
-        .filter_map(|column| column.heads.page.as_deref())
-        .map(inline);
+    let columns: Vec<&Column> = table.columns.iter().filter(|column| is_on_page(column)).collect();
+    let heads = columns.iter().filter_map(|column| column.heads.page.as_deref()).map(inline);
     let alignments = columns.iter().map(|column| {
         let is_text = matches!(column.kind, ColumnKind::Text | ColumnKind::Significance);
         if is_text { "---" } else { "---:" }.to_owned()
@@ -192,13 +171,10 @@ fn markdown_table(table: &Table) -> String {
             let empty = columns.iter().skip(1).map(|_| String::new());
             text += &row(std::iter::once(format!("**{}**", inline(heading))).chain(empty));
         }
-        let cells = table
-            .cells(cells)
-            .filter(|(column, _)| is_on_page(column))
-            .map(|(column, cell)| {
-                let ends = interval(column.kind, cell).map(|share| format!(" ({})", ends(share)));
-                inline(&words(column.kind, cell)) + &ends.unwrap_or_default()
-            });
+        let cells = table.cells(cells).filter(|(column, _)| is_on_page(column)).map(|(column, cell)| {
+            let ends = interval(column.kind, cell).map(|share| format!(" ({})", ends(share)));
+            inline(&words(column.kind, cell)) + &ends.unwrap_or_default()
+        });
         text += &row(cells);
     }
     text.push('\n');
@@ -276,10 +252,7 @@ mod tests {
             assert_eq!(inline(name), expected);
         }
         // Plain text is unchanged.
-        assert_eq!(
-            inline("gpt-4o (max-side 512), 5 %"),
-            "gpt-4o (max-side 512), 5 %"
-        );
+        assert_eq!(inline("gpt-4o (max-side 512), 5 %"), "gpt-4o (max-side 512), 5 %");
         assert_eq!(block("1. a"), "1\\. a");
         assert_eq!(block("+ a"), "\\+ a");
         assert_eq!(block("10 models"), "10 models");
@@ -287,12 +260,7 @@ mod tests {
 
     #[test]
     fn table_rows_have_equal_cell_counts() {
-        let share = Estimate {
-            value: 0.5,
-            low: 0.25,
-            high: 0.75,
-            n: 10,
-        };
+        let share = Estimate { value: 0.5, low: 0.25, high: 0.75, n: 10 };
         let table = TableBuilder::new(LEVELS, [("a|b\n`c`", Some(share)), ("plain", None)])
             .page("accuracy", "Accuracy")
             .column(Text, "page model", |row| row.0)

@@ -18,10 +18,7 @@ use crate::report::text::table::Table;
 ///
 /// # Errors
 /// If a file cannot be made.
-pub fn products<'a>(
-    report: &'a ChoiceReport<'a>,
-    inputs: &PageInputs<'a>,
-) -> Result<Vec<(String, Vec<u8>)>> {
+pub fn products<'a>(report: &'a ChoiceReport<'a>, inputs: &PageInputs<'a>) -> Result<Vec<(String, Vec<u8>)>> {
     let figures: Vec<Figure> = figure_specs(report.findings, &Names::default())
         .into_iter()
         .chain(views::figure_specs(report.findings))
@@ -50,16 +47,10 @@ pub(super) fn files(
 }
 
 /// Tables as CSV files, and as one LaTeX file that starts with the findings; `head` is the title of the LaTeX file.
-pub(super) fn table_files(
-    tables: &[Table],
-    sentences: &[Sentence],
-    head: &str,
-) -> Result<Vec<(String, Vec<u8>)>> {
+pub(super) fn table_files(tables: &[Table], sentences: &[Sentence], head: &str) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = csv::files(tables)?;
-    let findings: Vec<String> = sentences
-        .iter()
-        .map(|sentence| format!("{} ({})", sentence.text, sentence.detail))
-        .collect();
+    let findings: Vec<String> =
+        sentences.iter().map(|sentence| format!("{} ({})", sentence.text, sentence.detail)).collect();
     let tables = latex::tables(head, &findings, tables);
     files.push(("tables.tex".to_owned(), tables.into_bytes()));
     Ok(files)

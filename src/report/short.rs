@@ -43,19 +43,9 @@ const MAX_LEVELS: usize = 7;
 
 /// Renders a report on multiple-choice questions as text. `runs` are the manifests with the folders of their runs.
 #[must_use]
-pub(crate) fn text(
-    report: &ChoiceReport<'_>,
-    runs: &[(&RunManifest, &Path)],
-    length: ReportLength,
-) -> String {
+pub(crate) fn text(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
     let groups = FindingGroups::new(&report.sentences);
-    let mut text = findings::findings(
-        &head(report),
-        &report.alerts,
-        &groups,
-        length,
-        &how_to_read(&report.sentences),
-    );
+    let mut text = findings::findings(&head(report), &report.alerts, &groups, length, &how_to_read(&report.sentences));
     match length {
         ReportLength::Findings => return text,
         ReportLength::Summary => text += &styled_lines::table(&accuracy_table(report)),
@@ -77,17 +67,13 @@ fn open_question(report: &ChoiceReport<'_>) -> String {
 
 /// Models of a grid, in the order of its subjects.
 fn models<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
-    let mut models: Vec<&str> = grid
-        .subjects
-        .iter()
-        .map(|subject| &*subject.model)
-        .collect();
+    let mut models: Vec<&str> = grid.subjects.iter().map(|subject| &*subject.model).collect();
     models.dedup();
     models
 }
 
-/// Name of the model under test or number of models, then the names of people. References such as `random` count only if no other
-/// model ran.
+/// Name of the model under test or number of models, then the names of people. References such as `random` count only
+/// if no other model ran.
 pub(super) fn who_is_judged(grid: &Grid<'_>) -> String {
     let mut models = models(grid);
     let judged = models_under_test(models.iter().copied());
@@ -97,20 +83,14 @@ pub(super) fn who_is_judged(grid: &Grid<'_>) -> String {
 
 /// Name of the only model or number of models, then the names of people, separated by commas.
 fn models_and_people(grid: &Grid<'_>, models: Vec<&str>) -> String {
-    let (people, models): (Vec<&str>, Vec<&str>) = models
-        .into_iter()
-        .partition(|model| grid.listing.is_people(model));
+    let (people, models): (Vec<&str>, Vec<&str>) = models.into_iter().partition(|model| grid.listing.is_people(model));
     let model = match &models[..] {
         [] => String::new(),
         [one] => (*one).to_owned(),
         several => counted(several.len(), "model"),
     };
     let people = people.into_iter().map(|name| format!("{name} (people)"));
-    let names: Vec<String> = Some(model)
-        .filter(|model| !model.is_empty())
-        .into_iter()
-        .chain(people)
-        .collect();
+    let names: Vec<String> = Some(model).filter(|model| !model.is_empty()).into_iter().chain(people).collect();
     names.join(", ")
 }
 
@@ -118,29 +98,19 @@ fn models_and_people(grid: &Grid<'_>, models: Vec<&str>) -> String {
 fn everyone(grid: &Grid<'_>) -> String {
     let models = models(grid);
     let judged = models_under_test(models.iter().copied());
-    let references = models
-        .into_iter()
-        .filter(|model| !judged.contains(model))
-        .collect::<Vec<_>>();
+    let references = models.into_iter().filter(|model| !judged.contains(model)).collect::<Vec<_>>();
     let references = match &references[..] {
         [_, _, _, ..] => vec![counted(references.len(), "reference")],
         few => few.iter().map(|name| (*name).to_owned()).collect(),
     };
-    std::iter::once(who_is_judged(grid))
-        .chain(references)
-        .collect::<Vec<_>>()
-        .join(", ")
+    std::iter::once(who_is_judged(grid)).chain(references).collect::<Vec<_>>().join(", ")
 }
 
 /// Head line of the report: models, questions, frames, replies, failures, and the unit of the intervals.
 pub(super) fn head(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
     let grid = &findings.grid;
-    let questions: BTreeSet<_> = grid
-        .items
-        .iter()
-        .map(|item| &*item.asked.question)
-        .collect();
+    let questions: BTreeSet<_> = grid.items.iter().map(|item| &*item.asked.question).collect();
     let replies: usize = findings.health.iter().map(|health| health.replies).sum();
     let failed: usize = findings.health.iter().map(Health::failures).sum();
     let replies = plural(replies, "reply", "replies");
@@ -167,40 +137,26 @@ struct AccuracyRow<'a> {
 impl AccuracyRow<'_> {
     /// Axis of the row's levels.
     fn axis(&self) -> Axis {
-        self.cells
-            .keys()
-            .find_map(|level| level.axis())
-            .unwrap_or(Axis::LIGHT)
+        self.cells.keys().find_map(|level| level.axis()).unwrap_or(Axis::LIGHT)
     }
 }
 
-/// Table of accuracies by level. With several models, it has one block per light condition and one row per model; with a single model,
-/// one block and one row per light condition.
+/// Table of accuracies by level. With several models, it has one block per light condition and one row per model; with
+/// a single model, one block and one row per light condition.
 fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     let common = report.findings.common.as_ref();
     let summary = common.map_or(&report.findings.summary, |common| &common.summary);
     let cells = summary.family_cells(None, ParsingMode::Strict);
-    let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell)))
-        .with_pairs(report.findings)
-        .with_clean();
+    let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_pairs(report.findings).with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
     models.dedup();
     let mut rows: Vec<AccuracyRow<'_>> = Vec::new();
     let is_single = models.len() == 1;
     for (series, cells) in &ladder.series {
         let listing = &report.findings.grid.listing;
-        let (block, name) = block_and_name(
-            &ladder.light(series),
-            &listing.label(series.model),
-            is_single,
-        );
+        let (block, name) = block_and_name(&ladder.light(series), &listing.label(series.model), is_single);
         let group = listing.group(series.model);
-        rows.push(AccuracyRow {
-            block,
-            name,
-            group: group.filter(|_| !is_single),
-            cells,
-        });
+        rows.push(AccuracyRow { block, name, group: group.filter(|_| !is_single), cells });
     }
     // Sort by block, which makes the rows of a light condition adjacent.
     rows.sort_by(|a, b| a.block.cmp(&b.block));
@@ -214,44 +170,25 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
         .into_iter()
         .max()
         .unwrap_or_default();
-    let room = WIDTH
-        .saturating_sub(1 + most_levels.min(MAX_LEVELS) * LEVEL_WIDTH + INTERVAL_WIDTH)
-        .max(12);
-    let name_width = longest_name
-        .max(longest_title)
-        .unwrap_or(0)
-        .min(room.min(MAX_NAME_WIDTH));
+    let room = WIDTH.saturating_sub(1 + most_levels.min(MAX_LEVELS) * LEVEL_WIDTH + INTERVAL_WIDTH).max(12);
+    let name_width = longest_name.max(longest_title).unwrap_or(0).min(room.min(MAX_NAME_WIDTH));
     let texts = rows.iter().flat_map(|row| [&*row.block, &*row.name]);
     let names = NameColumn::new(texts, name_width);
     let shared_note = common.map(|common| {
         let questions = counted(common.shared_questions, "question");
         format!(" on the {questions} that all models with images answered")
     });
-    let counts: BTreeSet<usize> = rows
-        .iter()
-        .flat_map(|row| row.cells.values())
-        .filter_map(|cell| Some(cell.accuracy?.n))
-        .collect();
+    let counts: BTreeSet<usize> =
+        rows.iter().flat_map(|row| row.cells.values()).filter_map(|cell| Some(cell.accuracy?.n)).collect();
     let count_note = match (counts.first(), counts.last()) {
         (Some(least), Some(most)) if least < most => format!("; n from {least} to {most}"),
         _ => String::new(),
     };
-    let mut text = format!(
-        " accuracy in %{}{count_note}\n",
-        shared_note.unwrap_or_default()
-    );
+    let mut text = format!(" accuracy in %{}{count_note}\n", shared_note.unwrap_or_default());
     for block in rows.chunk_by(|a, b| a.block == b.block) {
         for axis in Axis::ALL {
-            let block: Vec<AccuracyRow<'_>> = block
-                .iter()
-                .filter(|row| row.axis() == axis)
-                .cloned()
-                .collect();
-            let levels: Vec<AxisLevel> = levels
-                .iter()
-                .copied()
-                .filter(|level| level.belongs_to(axis))
-                .collect();
+            let block: Vec<AccuracyRow<'_>> = block.iter().filter(|row| row.axis() == axis).cloned().collect();
+            let levels: Vec<AxisLevel> = levels.iter().copied().filter(|level| level.belongs_to(axis)).collect();
             for levels in levels.chunks(MAX_LEVELS) {
                 text += &block_lines(report, &block, levels, &names);
             }
@@ -264,7 +201,8 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     text + &foot::about_models(report, &ladder.models)
 }
 
-/// Rows of a block at some levels, below a heading with its title and the levels; empty if no row has a cell at these levels.
+/// Rows of a block at some levels, below a heading with its title and the levels; empty if no row has a cell at these
+/// levels.
 fn block_lines(
     report: &ChoiceReport<'_>,
     block: &[AccuracyRow<'_>],
@@ -274,10 +212,7 @@ fn block_lines(
     let mut text = String::new();
     let mut last_group = None;
     for row in block {
-        let cells: Vec<Option<&AccuracyCell>> = levels
-            .iter()
-            .map(|level| row.cells.get(level).copied())
-            .collect();
+        let cells: Vec<Option<&AccuracyCell>> = levels.iter().map(|level| row.cells.get(level).copied()).collect();
         if cells.iter().all(Option::is_none) {
             continue;
         }
@@ -290,22 +225,14 @@ fn block_lines(
             let _ = writeln!(text, " — {}", last_group.unwrap_or_default());
         }
         let reach = widest_reach_of(cells.iter().flatten().filter_map(|cell| cell.accuracy));
-        text += &names.line(
-            &row.name,
-            cells.iter().map(|cell| accuracy_text(report, *cell)),
-            &reach,
-        );
+        text += &names.line(&row.name, cells.iter().map(|cell| accuracy_text(report, *cell)), &reach);
     }
     text
 }
 
 /// Block title and row name of a series.
 fn block_and_name(light: &str, model: &str, is_single: bool) -> (String, String) {
-    if is_single {
-        (model.to_owned(), light.to_owned())
-    } else {
-        (light.to_owned(), model.to_owned())
-    }
+    if is_single { (model.to_owned(), light.to_owned()) } else { (light.to_owned(), model.to_owned()) }
 }
 
 /// Accuracy in percent, with a mark if it is below the accuracy without images.

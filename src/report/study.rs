@@ -45,19 +45,15 @@ struct StudyPage<'a> {
 
 /// Renders the page as one HTML file.
 ///
-/// Each person has a number and sees each frame or walk in one condition. The condition moves on by one from person to person, so that n
-/// people together see every image once if there are n conditions. People choose answers with the keyboard. Choices are saved as lines of
-/// JSON; open answers are saved as an array for `openeqa --answers`.
+/// Each person has a number and sees each frame or walk in one condition. The condition moves on by one from person to
+/// person, so that n people together see every image once if there are n conditions. People choose answers with the
+/// keyboard. Choices are saved as lines of JSON; open answers are saved as an array for `openeqa --answers`.
 ///
 /// # Errors
 /// If the questions cannot be serialized.
 pub(crate) fn page(items: &[StudyQuestion]) -> Result<String> {
     let set = Digest::from_parts(items.iter().flat_map(|item| {
-        let images = item
-            .shots
-            .iter()
-            .flat_map(|shot| &shot.images)
-            .map(String::as_bytes);
+        let images = item.shots.iter().flat_map(|shot| &shot.images).map(String::as_bytes);
         std::iter::once(item.id.as_bytes()).chain(images)
     }));
     let page = PAGE.replacen(PLACEHOLDER, &to_script_json(&StudyPage { set, items })?, 1);
@@ -75,10 +71,7 @@ mod tests {
             frame: 0,
             text: "</script>?".into(),
             choices: vec!["a".into(), "b".into()],
-            shots: vec![StudyImage {
-                condition: "L5-noise".into(),
-                images: vec!["images/0.png".into()],
-            }],
+            shots: vec![StudyImage { condition: "L5-noise".into(), images: vec!["images/0.png".into()] }],
         };
         let page = page(&[question]).unwrap();
         assert!(!page.contains(PLACEHOLDER) && !page.contains("truth"));

@@ -20,15 +20,10 @@ const PARTS: [(&str, &str); 3] = [
 /// # Errors
 /// If the template cannot be rendered.
 pub(super) fn render(template: &str, values: impl Serialize) -> Result<String> {
-    let whole = PARTS
-        .iter()
-        .fold(template.to_owned(), |text, (placeholder, part)| {
-            text.replace(placeholder, part)
-        });
+    let whole = PARTS.iter().fold(template.to_owned(), |text, (placeholder, part)| text.replace(placeholder, part));
     let mut environment = Environment::new();
     environment.set_auto_escape_callback(|_| AutoEscape::Html);
-    let page = environment
-        .render_named_str("page", &whole, Serde(values))
-        .map_err(|e| Error::data("report.html", e))?;
+    let page =
+        environment.render_named_str("page", &whole, Serde(values)).map_err(|e| Error::data("report.html", e))?;
     Ok(escape_hidden(&page).into_owned())
 }

@@ -17,9 +17,7 @@ impl BatchSystem {
     ///
     /// # Errors
     /// If a variable is not a number.
-    pub(crate) fn from_environment(
-        variable: &impl Fn(&str) -> Option<String>,
-    ) -> Result<Option<Self>> {
+    pub(crate) fn from_environment(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
         if let Some(task) = ArrayTask::from_environment(variable)? {
             return Ok(Some(Self::Slurm(task)));
         }

@@ -26,37 +26,25 @@ pub(crate) fn key(prefix: &str, model: &str, is_judge: bool) -> String {
 
 /// True if later commands must keep the manifest setting.
 pub(crate) fn is_kept(key: &str) -> bool {
-    [CHANGED_FOR, REFUSED_FOR]
-        .iter()
-        .any(|prefix| key.starts_with(prefix))
+    [CHANGED_FOR, REFUSED_FOR].iter().any(|prefix| key.starts_with(prefix))
 }
 
 /// The strings in an array; none if the value is missing or not an array.
 pub(crate) fn strings(value: Option<&Value>) -> Vec<String> {
-    value
-        .and_then(|value| serde_json::from_value(value.clone()).ok())
-        .unwrap_or_default()
+    value.and_then(|value| serde_json::from_value(value.clone()).ok()).unwrap_or_default()
 }
 
 /// The changes in the value of a manifest setting with the prefix [`CHANGED_FOR`].
 pub(crate) fn changes(value: Option<&Value>) -> Vec<ChangedSetting> {
-    value
-        .and_then(|value| serde_json::from_value(value.clone()).ok())
-        .unwrap_or_default()
+    value.and_then(|value| serde_json::from_value(value.clone()).ok()).unwrap_or_default()
 }
 
 /// The changed settings of all models and judges of a run: the name, true for a judge, and the changes.
-pub(crate) fn all(
-    settings: &BTreeMap<String, Value>,
-) -> impl Iterator<Item = (&str, bool, Vec<ChangedSetting>)> {
+pub(crate) fn all(settings: &BTreeMap<String, Value>) -> impl Iterator<Item = (&str, bool, Vec<ChangedSetting>)> {
     settings.iter().filter_map(|(key, value)| {
         let owner = key.strip_prefix(CHANGED_FOR)?;
         let judge = owner.strip_prefix(JUDGE);
-        Some((
-            judge.unwrap_or(owner),
-            judge.is_some(),
-            changes(Some(value)),
-        ))
+        Some((judge.unwrap_or(owner), judge.is_some(), changes(Some(value))))
     })
 }
 
@@ -64,15 +52,6 @@ pub(crate) fn all(
 pub(crate) fn current(manifest: &RunManifest, model: &str, flag: &str) -> Option<Value> {
     let changes = changes(manifest.settings.get(&key(CHANGED_FOR, model, false)));
     let changed = changes.into_iter().rfind(|change| change.flag == flag);
-    let first = || {
-        manifest
-            .columns
-            .get("model")?
-            .get(model)?
-            .get(flag)
-            .cloned()
-    };
-    changed
-        .map_or_else(first, |change| Some(change.now))
-        .filter(|value| !value.is_null())
+    let first = || manifest.columns.get("model")?.get(model)?.get(flag).cloned();
+    changed.map_or_else(first, |change| Some(change.now)).filter(|value| !value.is_null())
 }

@@ -25,7 +25,8 @@ pub(super) struct Division {
 }
 
 impl Division {
-    /// The shard of a task that repeats one of this division, and the array of the division; `None` if it does not repeat one.
+    /// The shard of a task that repeats one of this division, and the array of the division; `None` if it does not
+    /// repeat one.
     pub(super) fn shard_of(&self, task: ArrayTask) -> Option<(Shard, TaskRange)> {
         let tasks = self.tasks.filter(|tasks| task.repeats(*tasks))?;
         let shard = Shard::new(tasks.index(task.number)?, self.count)?;
@@ -33,7 +34,8 @@ impl Division {
     }
 }
 
-/// The divisions of the run in a folder, by their numbers of shards. Empty if the folder has no shard or cannot be read.
+/// The divisions of the run in a folder, by their numbers of shards. Empty if the folder has no shard or cannot be
+/// read.
 pub(super) fn divisions_in(folder: &Path) -> Vec<Division> {
     let mut shards: Vec<Shard> = fs::read_dir(folder)
         .into_iter()
@@ -49,13 +51,11 @@ pub(super) fn divisions_in(folder: &Path) -> Vec<Division> {
             *tasks = tasks_of(&folder.join(shard.folder()));
         }
     }
-    divisions
-        .into_iter()
-        .map(|(count, tasks)| Division { count, tasks })
-        .collect()
+    divisions.into_iter().map(|(count, tasks)| Division { count, tasks }).collect()
 }
 
-/// The array in the manifest of a shard; `None` if there is none, or if the manifest cannot be read: opening the shard reports that error.
+/// The array in the manifest of a shard; `None` if there is none, or if the manifest cannot be read: opening the shard
+/// reports that error.
 fn tasks_of(shard: &Path) -> Option<TaskRange> {
     let settings = store::read_settings(shard).ok()?;
     settings.get(ENTRY)?.as_str()?.parse().ok()

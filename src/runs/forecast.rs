@@ -30,8 +30,8 @@ pub(crate) struct CostLine {
     /// Tokens of one image as charged for the replies so far; `None` if there are too few replies.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charged_image_tokens: Option<f64>,
-    /// Ratio of the charges that the server has stated so far to the price table, by which the costs are multiplied; `None` without such
-    /// charges.
+    /// Ratio of the charges that the server has stated so far to the price table, by which the costs are multiplied;
+    /// `None` without such charges.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub charge_ratio: Option<f64>,
     /// The same requests by the noise profile of their images.
@@ -49,10 +49,7 @@ impl CostLine {
             readings: self
                 .readings
                 .into_iter()
-                .map(|profile| ProfileCost {
-                    dollars: times(profile.dollars),
-                    ..profile
-                })
+                .map(|profile| ProfileCost { dollars: times(profile.dollars), ..profile })
                 .collect(),
             ..self
         }
@@ -149,21 +146,14 @@ impl StoreForecast {
     /// Forecast for images of a total size and a store of a capacity, both in bytes.
     pub(crate) fn new(kept: &'static str, bytes: f64, room: f64) -> Self {
         let hits = if bytes > room { room / bytes } else { 1.0 };
-        Self {
-            kept,
-            bytes,
-            room,
-            hits,
-        }
+        Self { kept, bytes, room, hits }
     }
 
     /// Formats the forecast as one line.
     pub(crate) fn line(&self) -> String {
         let (kept, set, room) = (self.kept, bytes(self.bytes), bytes(self.room));
         let percent = 100.0 * self.hits;
-        format!(
-            "image store: {kept} {set}, room {room}: the next model finds about {percent:.0} % of them\n"
-        )
+        format!("image store: {kept} {set}, room {room}: the next model finds about {percent:.0} % of them\n")
     }
 }
 
@@ -173,8 +163,7 @@ mod tests {
 
     #[test]
     fn hits_are_limited_by_the_store_capacity() {
-        let [too_large, fitting] =
-            [80e9, 20e9].map(|bytes| StoreForecast::new("enhanced images", bytes, 20e9));
+        let [too_large, fitting] = [80e9, 20e9].map(|bytes| StoreForecast::new("enhanced images", bytes, 20e9));
         assert!((too_large.hits - 0.25).abs() < 1e-12);
         assert!((fitting.hits - 1.0).abs() < 1e-12);
         assert_eq!(

@@ -19,30 +19,21 @@ pub(crate) struct MissingThumbnails {
 }
 
 impl MissingThumbnails {
-    /// Thumbnails of `frames`, less those already `present`. Of more than [`MAX_FRAMES`] frames, those with the lowest digests
-    /// are kept, so that the choice does not depend on order or shards.
-    pub(crate) fn new<'a>(
-        frames: impl IntoIterator<Item = &'a FrameId>,
-        present: Vec<Thumbnail>,
-    ) -> Self {
+    /// Thumbnails of `frames`, less those already `present`. Of more than [`MAX_FRAMES`] frames, those with the lowest
+    /// digests are kept, so that the choice does not depend on order or shards.
+    pub(crate) fn new<'a>(frames: impl IntoIterator<Item = &'a FrameId>, present: Vec<Thumbnail>) -> Self {
         let frames: BTreeSet<&FrameId> = frames.into_iter().collect();
         let mut ranked: Vec<&FrameId> = frames.into_iter().collect();
         ranked.sort_by_cached_key(|frame| *Digest::from_bytes(frame.0.as_bytes()).as_bytes());
         Self {
             frames: ranked.into_iter().take(MAX_FRAMES).cloned().collect(),
             objects: BTreeMap::new(),
-            present: present
-                .into_iter()
-                .map(|thumbnail| (thumbnail.frame, thumbnail.condition))
-                .collect(),
+            present: present.into_iter().map(|thumbnail| (thumbnail.frame, thumbnail.condition)).collect(),
         }
     }
 
     /// Adds crops of the objects that these questions are about, for the first [`MAX_OBJECTS`] objects of each frame.
-    pub(crate) fn with_objects<'a>(
-        mut self,
-        questions: impl IntoIterator<Item = &'a RunQuestion>,
-    ) -> Self {
+    pub(crate) fn with_objects<'a>(mut self, questions: impl IntoIterator<Item = &'a RunQuestion>) -> Self {
         for question in questions {
             let Some(object) = question.object().filter(|_| self.wants(&question.frame)) else {
                 continue;

@@ -12,8 +12,8 @@ use crate::types::manifests::{RunManifest, differences};
 use crate::types::{FrameId, TextPlace, TrialKey};
 use darkqa_score::answers::record::Detail;
 
-/// Shards of a run that was divided into another number of shards, for example because a job array was stopped and restarted with another
-/// size. Their replies are reused.
+/// Shards of a run that was divided into another number of shards, for example because a job array was stopped and
+/// restarted with another size. Their replies are reused.
 pub(crate) struct OtherShards(Vec<(PathBuf, RunManifest)>);
 
 impl OtherShards {
@@ -38,9 +38,7 @@ impl OtherShards {
             if shard_count(&other).is_none_or(|count| count == own) {
                 continue;
             }
-            if let Some((field, before, now)) =
-                differences(&other.identity, &manifest.identity).next()
-            {
+            if let Some((field, before, now)) = differences(&other.identity, &manifest.identity).next() {
                 let field = setting_spelling(field);
                 return Err(Error::Run {
                     path: path.clone(),
@@ -65,8 +63,8 @@ impl OtherShards {
         Ok(Self(shards))
     }
 
-    /// Copies the replies to the trials in `wanted` from the other shards, with the thumbnails and fidelity notes of `sources`. Returns the
-    /// number of replies.
+    /// Copies the replies to the trials in `wanted` from the other shards, with the thumbnails and fidelity notes of
+    /// `sources`. Returns the number of replies.
     ///
     /// # Errors
     /// If a record cannot be read or written.
@@ -87,21 +85,13 @@ impl OtherShards {
                 .map(|trial| (trial.text().in_log(number), trial.key()))
                 .collect();
             answered.sort_unstable();
-            found.extend(
-                answered
-                    .into_iter()
-                    .filter(|(_, key)| keys.insert(*key))
-                    .map(|(place, key)| (key, place)),
-            );
+            found.extend(answered.into_iter().filter(|(_, key)| keys.insert(*key)).map(|(place, key)| (key, place)));
         }
         if found.is_empty() {
             return Ok(0);
         }
-        let shards: Vec<(&Path, &RunManifest)> = self
-            .0
-            .iter()
-            .map(|(folder, manifest)| (&**folder, manifest))
-            .collect();
+        let shards: Vec<(&Path, &RunManifest)> =
+            self.0.iter().map(|(folder, manifest)| (&**folder, manifest)).collect();
         append_records(store, manifest, &shards, found.iter().copied())?;
         let folders: Vec<&Path> = shards.iter().map(|(folder, _)| *folder).collect();
         store.add_thumbnails_from(&folders, |frame| sources.contains(frame))?;

@@ -15,39 +15,29 @@ pub(crate) struct Outcome {
     pub status: Status,
     /// Text for standard output.
     pub output: String,
-    /// Paths written. With `--quiet`, only these are printed, unless the list is empty because the text itself is the result.
+    /// Paths written. With `--quiet`, only these are printed, unless the list is empty because the text itself is the
+    /// result.
     pub written: Vec<PathBuf>,
 }
 
 impl Outcome {
     /// `Complete` if all work of the command succeeded, else `Incomplete`.
     pub(crate) fn complete_if(is_whole: bool) -> Status {
-        if is_whole {
-            Status::Complete
-        } else {
-            Status::Incomplete
-        }
+        if is_whole { Status::Complete } else { Status::Incomplete }
     }
 
     /// The result of a command that only prints text.
     pub(crate) fn text(status: Status, output: String) -> Self {
-        Self {
-            status,
-            output,
-            written: Vec::new(),
-        }
+        Self { status, output, written: Vec::new() }
     }
 
     /// The result of a command that wrote a file or folder, and prints text about it.
     pub(crate) fn wrote(path: impl Into<PathBuf>, status: Status, output: String) -> Self {
-        Self {
-            status,
-            output,
-            written: vec![path.into()],
-        }
+        Self { status, output, written: vec![path.into()] }
     }
 
-    /// Makes the text the result, so that `--quiet` prints it, if a format other than the default summary was requested.
+    /// Makes the text the result, so that `--quiet` prints it, if a format other than the default summary was
+    /// requested.
     pub(crate) fn in_format(mut self, format: StdoutFormat) -> Self {
         if format != StdoutFormat::SUMMARY {
             self.written.clear();
@@ -86,22 +76,14 @@ pub(crate) struct WrittenArgs {
 impl ShowArgs {
     /// Whether to write the table of records.
     pub(crate) fn record_table(&self) -> RecordTable {
-        if self.written.no_parquet {
-            RecordTable::Skip
-        } else {
-            RecordTable::Write
-        }
+        if self.written.no_parquet { RecordTable::Skip } else { RecordTable::Write }
     }
 
     /// The format requested by the flags.
     #[must_use]
     pub(crate) fn format(&self) -> StdoutFormat {
         StdoutFormat {
-            syntax: if self.json {
-                Syntax::Json
-            } else {
-                Syntax::Text
-            },
+            syntax: if self.json { Syntax::Json } else { Syntax::Text },
             length: match (self.full, self.findings) {
                 (true, _) => ReportLength::Full,
                 (_, true) => ReportLength::Findings,
@@ -128,10 +110,7 @@ pub(crate) enum Syntax {
 
 impl StdoutFormat {
     /// The default format.
-    const SUMMARY: Self = Self {
-        syntax: Syntax::Text,
-        length: ReportLength::Summary,
-    };
+    const SUMMARY: Self = Self { syntax: Syntax::Text, length: ReportLength::Summary };
 
     /// True for JSON and Markdown, to which no further lines may be added.
     #[must_use]

@@ -43,31 +43,18 @@ impl OverBudget {
     /// A sentence about the cost, with the cause if it is known.
     pub(crate) fn sentence(&self) -> String {
         let causes = [
-            (
-                &self.longer_replies,
-                "replies that were charged more tokens than --max-tokens",
-            ),
-            (
-                &self.dearer_replies,
-                "replies that were charged more than the price table",
-            ),
+            (&self.longer_replies, "replies that were charged more tokens than --max-tokens"),
+            (&self.dearer_replies, "replies that were charged more than the price table"),
         ];
         let cause: String = causes
             .into_iter()
             .filter(|(replies, _)| !replies.is_empty())
             .map(|(replies, what)| {
-                let replies: Vec<String> = replies
-                    .iter()
-                    .map(|(model, count)| format!("{model} ({count})"))
-                    .collect();
+                let replies: Vec<String> = replies.iter().map(|(model, count)| format!("{model} ({count})")).collect();
                 format!("; {what}: {}", replies.join(", "))
             })
             .collect();
-        format!(
-            "The requests cost {}, more than the {} of --max-cost{cause}.",
-            money(self.spent),
-            money(self.limit)
-        )
+        format!("The requests cost {}, more than the {} of --max-cost{cause}.", money(self.spent), money(self.limit))
     }
 }
 
@@ -77,12 +64,8 @@ mod tests {
 
     #[test]
     fn the_sentence_names_the_models_that_exceeded_their_limit() {
-        let mut over = OverBudget {
-            limit: 0.5,
-            spent: 2.0,
-            longer_replies: BTreeMap::new(),
-            dearer_replies: BTreeMap::new(),
-        };
+        let mut over =
+            OverBudget { limit: 0.5, spent: 2.0, longer_replies: BTreeMap::new(), dearer_replies: BTreeMap::new() };
         let plain = "The requests cost $2.00, more than the $0.5000 of --max-cost.";
         assert_eq!(over.sentence(), plain);
         over.longer_replies.insert("m".to_owned(), 3);
@@ -90,8 +73,6 @@ mod tests {
         over.longer_replies.clear();
         over.dearer_replies.insert("m".to_owned(), 2);
         let sentence = over.sentence();
-        assert!(
-            sentence.ends_with("; replies that were charged more than the price table: m (2).")
-        );
+        assert!(sentence.ends_with("; replies that were charged more than the price table: m (2)."));
     }
 }

@@ -8,7 +8,8 @@ use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::power::{CHANGED, CORRELATION, Detectable, PlannedSample, TARGET};
 use darkqa_score::tested_sentences::RunContents;
 
-/// Smallest difference between two conditions that a run can detect, and the number of clusters needed to detect 5 points.
+/// Smallest difference between two conditions that a run can detect, and the number of clusters needed to detect 5
+/// points.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct PowerForecast {
     /// Number of questions.
@@ -26,11 +27,7 @@ pub(crate) struct PowerForecast {
 
 impl PowerForecast {
     /// Computes the forecast. `question_clusters` has the cluster index of each question; `None` without questions.
-    pub(crate) fn new(
-        clusters: &Clusters,
-        question_clusters: &[u32],
-        contents: RunContents,
-    ) -> Option<Self> {
+    pub(crate) fn new(clusters: &Clusters, question_clusters: &[u32], contents: RunContents) -> Option<Self> {
         let mut questions = vec![0; clusters.count()];
         for cluster in question_clusters {
             questions[*cluster as usize] += 1;
@@ -39,11 +36,8 @@ impl PowerForecast {
         if questions.is_empty() {
             return None;
         }
-        let sample = PlannedSample {
-            questions,
-            models: contents.models.max(1),
-            level: contents.first_significance_level(),
-        };
+        let sample =
+            PlannedSample { questions, models: contents.models.max(1), level: contents.first_significance_level() };
         Some(Self {
             questions: question_clusters.len(),
             clusters: sample.questions.len(),
@@ -59,19 +53,14 @@ impl PowerForecast {
         let among = if self.unit == ClusterUnit::Question.to_string() {
             counted(self.questions, "question")
         } else {
-            format!(
-                "{} in {}",
-                counted(self.questions, "question"),
-                counted(self.clusters, &self.unit)
-            )
+            format!("{} in {}", counted(self.questions, "question"), counted(self.clusters, &self.unit))
         };
         let power = 100.0 * POWER;
         let found = match self.detectable.difference {
             None => "detects no difference between two conditions".to_owned(),
-            Some(difference) => format!(
-                "detects {:.1} points between two conditions in {power:.0} % of such runs",
-                100.0 * difference
-            ),
+            Some(difference) => {
+                format!("detects {:.1} points between two conditions in {power:.0} % of such runs", 100.0 * difference)
+            }
         };
         let who = match self.models {
             1 => "one model".to_owned(),
@@ -95,26 +84,13 @@ mod tests {
     use darkqa_score::cluster::FrameTies;
 
     fn forecast(frames: usize, models: usize) -> PowerForecast {
-        let questions: Vec<(QuestionId, FrameId)> = (0..4 * frames)
-            .map(|item| {
-                (
-                    QuestionId(format!("q{item}")),
-                    FrameId(format!("f{}", item / 4)),
-                )
-            })
-            .collect();
+        let questions: Vec<(QuestionId, FrameId)> =
+            (0..4 * frames).map(|item| (QuestionId(format!("q{item}")), FrameId(format!("f{}", item / 4)))).collect();
         let pairs = questions.iter().map(|(question, frame)| (question, frame));
         let clusters = Clusters::new(pairs, &FrameTies::default());
-        let question_clusters: Vec<u32> = questions
-            .iter()
-            .map(|(question, frame)| clusters.get(frame, question).unwrap())
-            .collect();
-        let contents = RunContents {
-            models,
-            enhancers: 1,
-            lights: 1,
-            has_noise: true,
-        };
+        let question_clusters: Vec<u32> =
+            questions.iter().map(|(question, frame)| clusters.get(frame, question).unwrap()).collect();
+        let contents = RunContents { models, enhancers: 1, lights: 1, has_noise: true };
         PowerForecast::new(&clusters, &question_clusters, contents).unwrap()
     }
 
@@ -128,13 +104,8 @@ mod tests {
             "{line}"
         );
         let (one, six) = (forecast(42, 1).detectable, forecast(42, 6).detectable);
-        assert!(
-            six.difference < one.difference && six.clusters_for_target < one.clusters_for_target
-        );
+        assert!(six.difference < one.difference && six.clusters_for_target < one.clusters_for_target);
         let few = forecast(3, 1).line();
-        assert!(
-            few.starts_with("power: 12 questions in 3 frames detects no difference"),
-            "{few}"
-        );
+        assert!(few.starts_with("power: 12 questions in 3 frames detects no difference"), "{few}");
     }
 }

@@ -35,8 +35,8 @@ pub(crate) struct Prediction {
     pub(crate) state: AnswerState,
 }
 
-/// All answers of a run in the order of its questions: requested ones, including missing ones, and those from files. A subject that was
-/// asked any question is expected to have answers to all.
+/// All answers of a run in the order of its questions: requested ones, including missing ones, and those from files. A
+/// subject that was asked any question is expected to have answers to all.
 pub(crate) fn predictions(
     records: &[Record<OpenDetail>],
     questions: &[&QuestionId],
@@ -45,10 +45,7 @@ pub(crate) fn predictions(
     let places: HashMap<&QuestionId, usize> = questions.iter().copied().zip(0..).collect();
     let mut answers = BTreeMap::<(usize, ModelInCondition), Vec<&Record<OpenDetail>>>::new();
     let mut asked_subjects = BTreeSet::new();
-    for record in records
-        .iter()
-        .filter(|record| record.detail.step == Step::Answer)
-    {
+    for record in records.iter().filter(|record| record.detail.step == Step::Answer) {
         let subject = ModelInCondition::new(&record.model, record.condition.as_ref());
         if record.via != Via::File {
             asked_subjects.insert(subject.clone());
@@ -68,12 +65,7 @@ pub(crate) fn predictions(
         let missing = records.is_empty().then_some(None);
         for record in records.into_iter().map(Some).chain(missing) {
             let (full_answer, state) = state(record, protocol);
-            predictions.push(Prediction {
-                subject: subject.clone(),
-                question,
-                full_answer,
-                state,
-            });
+            predictions.push(Prediction { subject: subject.clone(), question, full_answer, state });
         }
     }
     predictions
@@ -95,20 +87,14 @@ fn state(record: Option<&Record<OpenDetail>>, protocol: Protocol) -> (Option<Str
         Protocol::Upstream => truncate_answer(&full),
         Protocol::Tolerant => &full,
     };
-    let state = AnswerState::Text {
-        answer: answer.into(),
-        cut: answer != full,
-    };
+    let state = AnswerState::Text { answer: answer.into(), cut: answer != full };
     (Some(full), state)
 }
 
-/// The answer in a model's reply, without thoughts and template tokens; `None` if there is none, which upstream treats as an error. A
-/// missing, empty or refused reply has no answer, and neither have thoughts that do not end.
+/// The answer in a model's reply, without thoughts and template tokens; `None` if there is none, which upstream treats
+/// as an error. A missing, empty or refused reply has no answer, and neither have thoughts that do not end.
 fn full_answer(record: &Record<OpenDetail>, protocol: Protocol) -> Option<String> {
-    let reply = record
-        .reply
-        .as_deref()
-        .filter(|_| record.refusal.is_none())?;
+    let reply = record.reply.as_deref().filter(|_| record.refusal.is_none())?;
     let reply = open_answer(reply).ok()?;
     match (record.view, blind_answer(&reply), protocol) {
         (View::Image, _, _) => Some(reply.into_owned()),

@@ -1,8 +1,8 @@
-//! Models of a run that were renamed, have other settings under their name, or are no longer asked: [`note_renamed_models`],
-//! [`rename_record`].
+//! Models of a run that were renamed, have other settings under their name, or are no longer asked:
+//! [`note_renamed_models`], [`rename_record`].
 //!
-//! The key of a trial does not contain the model's name, so a renamed model keeps its replies. Records keep the name that they were
-//! written with, and are shown under the current one ([`RecordedNames`]).
+//! The key of a trial does not contain the model's name, so a renamed model keeps its replies. Records keep the name
+//! that they were written with, and are shown under the current one ([`RecordedNames`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -41,9 +41,9 @@ pub(crate) struct CurrentModels<'a> {
     pub(crate) settings: SettingsChange,
 }
 
-/// Notes in a manifest which models of the stored manifest have another name now. Two names belong to the same model if all settings that
-/// determine its replies are equal, and both get images or neither does. A model whose name another model has taken becomes
-/// `NAME (before)`.
+/// Notes in a manifest which models of the stored manifest have another name now. Two names belong to the same model if
+/// all settings that determine its replies are equal, and both get images or neither does. A model whose name another
+/// model has taken becomes `NAME (before)`.
 ///
 /// # Errors
 /// If a number in the settings of a model is not finite.
@@ -52,11 +52,7 @@ pub(crate) fn note_renamed_models(
     stored: &RunManifest,
     command: CurrentModels<'_>,
 ) -> Result<()> {
-    let CurrentModels {
-        models: now,
-        settings,
-        ..
-    } = command;
+    let CurrentModels { models: now, settings, .. } = command;
     let empty = BTreeMap::new();
     let before = stored.columns.get("model").unwrap_or(&empty);
     let stored_views = StoredViews::from_manifest(stored);
@@ -64,8 +60,7 @@ pub(crate) fn note_renamed_models(
     let mut names = RecordedNames::from_manifest(stored);
     names.rename(&new_names);
     for (name, content) in now {
-        let digest =
-            Digest::canonical("darkqa.model-name/1", &reply_settings(content))?.to_string();
+        let digest = Digest::canonical("darkqa.model-name/1", &reply_settings(content))?.to_string();
         names.ensure(name, || format!("{name} [{}]", &digest[..8]));
     }
     names.write_to(manifest);
@@ -77,11 +72,7 @@ pub(crate) fn note_renamed_models(
         }
     }
     if let Some(models) = manifest.columns.get_mut("model") {
-        *models = before
-            .iter()
-            .map(|(name, content)| (new_name(name), content.clone()))
-            .chain(now.clone())
-            .collect();
+        *models = before.iter().map(|(name, content)| (new_name(name), content.clone())).chain(now.clone()).collect();
     }
     // Two models may have swapped names: remove all old entries before inserting new ones.
     for key in new_names.keys().flat_map(|name| model_keys(name)) {
@@ -104,9 +95,7 @@ pub(crate) fn note_renamed_models(
     if left_out.is_empty() {
         manifest.settings.remove(LEFT_OUT);
     } else {
-        manifest
-            .settings
-            .insert(LEFT_OUT.to_owned(), json!(left_out));
+        manifest.settings.insert(LEFT_OUT.to_owned(), json!(left_out));
     }
     Ok(())
 }
@@ -122,11 +111,7 @@ fn new_names(
     views: &StoredViews,
     command: CurrentModels<'_>,
 ) -> BTreeMap<String, String> {
-    let CurrentModels {
-        models: now,
-        settings,
-        ..
-    } = command;
+    let CurrentModels { models: now, settings, .. } = command;
     // How well a stored model matches a current one; `None` if they are different models.
     let fit = |old: &String, new: &String| {
         let is_same = reply_settings(before.get(old)?) == reply_settings(now.get(new)?);
@@ -163,10 +148,7 @@ fn new_names(
         return new_names;
     }
     // Rename stored models whose name another model has now.
-    for name in now
-        .keys()
-        .filter(|name| before.contains_key(*name) && !keeps_name(name))
-    {
+    for name in now.keys().filter(|name| before.contains_key(*name) && !keeps_name(name)) {
         if new_names.contains_key(name) {
             continue;
         }
@@ -174,9 +156,7 @@ fn new_names(
             .chain((2..=before.len() + now.len() + 2).map(|n| format!("{name} (before {n})")))
             .find(|candidate| {
                 let is_kept = before.contains_key(candidate) && !new_names.contains_key(candidate);
-                !is_kept
-                    && !now.contains_key(candidate)
-                    && !new_names.values().any(|new| new == candidate)
+                !is_kept && !now.contains_key(candidate) && !new_names.values().any(|new| new == candidate)
             });
         if let Some(new) = free_name {
             new_names.insert(name.clone(), new);
@@ -198,9 +178,7 @@ fn left_out(
         .map(|name| new_names.get(name).unwrap_or(name).clone())
         .chain(new_names.values().cloned())
         .collect();
-    let has = |name: &str| {
-        now.contains_key(name) || manifest.models.iter().any(|model| model.name == name)
-    };
+    let has = |name: &str| now.contains_key(name) || manifest.models.iter().any(|model| model.name == name);
     manifest
         .columns
         .get("model")
@@ -228,12 +206,7 @@ fn reply_settings(content: &Value) -> Value {
 
 /// Models that reports leave out.
 pub(crate) fn left_out_models(manifest: &RunManifest) -> Vec<String> {
-    manifest
-        .settings
-        .get(LEFT_OUT)
-        .cloned()
-        .and_then(|names| serde_json::from_value(names).ok())
-        .unwrap_or_default()
+    manifest.settings.get(LEFT_OUT).cloned().and_then(|names| serde_json::from_value(names).ok()).unwrap_or_default()
 }
 
 /// Changes the model name in a record to the current one.

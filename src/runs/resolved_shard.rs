@@ -45,8 +45,8 @@ impl From<Shard> for ResolvedShard {
 }
 
 impl ResolvedShard {
-    /// The shard given by `--shard` (`2/4`, `auto/4`, `auto`, `none`), or, without the flag, by the batch system. `folder` has the parts of
-    /// the run: tasks of a Slurm array that are repeated do the same parts again.
+    /// The shard given by `--shard` (`2/4`, `auto/4`, `auto`, `none`), or, without the flag, by the batch system.
+    /// `folder` has the parts of the run: tasks of a Slurm array that are repeated do the same parts again.
     ///
     /// # Errors
     /// If there is no such shard, or the batch system does not determine it.
@@ -102,11 +102,7 @@ impl ResolvedShard {
         let what = if is_repeated {
             format!("task {} of the Slurm array {tasks} again", task.number)
         } else {
-            format!(
-                "task {} of a Slurm array of {}",
-                shard.index() + 1,
-                shard.count()
-            )
+            format!("task {} of a Slurm array of {}", shard.index() + 1, shard.count())
         };
         let doubt = doubt.map_or_else(String::new, |reason| {
             format!(
@@ -114,14 +110,9 @@ impl ResolvedShard {
             )
         });
         if wanted == Wanted::Nothing || is_repeated || !doubt.is_empty() {
-            tracing::warn!(
-                "{what}: this process does shard {shard}; --shard none does everything{doubt}"
-            );
+            tracing::warn!("{what}: this process does shard {shard}; --shard none does everything{doubt}");
         }
-        Ok(Self {
-            shard,
-            tasks: Some(tasks),
-        })
+        Ok(Self { shard, tasks: Some(tasks) })
     }
 }
 
@@ -154,32 +145,21 @@ fn task_shard(
         )));
     }
     let index = task.range.index(task.number);
-    index
-        .and_then(|index| Shard::new(index, task.count))
-        .map(|shard| (shard, task.range))
-        .ok_or_else(|| {
-            usage_error(format_args!(
-                "SLURM_ARRAY_TASK_ID={} is none of the tasks {} of the array",
-                task.number, task.range
-            ))
-        })
+    index.and_then(|index| Shard::new(index, task.count)).map(|shard| (shard, task.range)).ok_or_else(|| {
+        usage_error(format_args!(
+            "SLURM_ARRAY_TASK_ID={} is none of the tasks {} of the array",
+            task.number, task.range
+        ))
+    })
 }
 
 /// The error for a task of an array that does not determine its shard. It names the shards that the task may mean.
-fn unknown_part(
-    task: ArrayTask,
-    count: Option<NonZeroU32>,
-    folder: Option<&Path>,
-    divisions: &[Division],
-) -> Error {
+fn unknown_part(task: ArrayTask, count: Option<NonZeroU32>, folder: Option<&Path>, divisions: &[Division]) -> Error {
     let number = task.number;
     let why = if task.is_alone() {
         format!("task {number} is the only one of its Slurm array (SLURM_ARRAY_TASK_COUNT=1)")
     } else {
-        format!(
-            "the Slurm array has only {} tasks of {}",
-            task.count, task.range
-        )
+        format!("the Slurm array has only {} tasks of {}", task.count, task.range)
     };
     let counts: Vec<NonZeroU32> = match count {
         Some(count) => vec![count],
@@ -192,9 +172,7 @@ fn unknown_part(
             [0, 1].into_iter().filter_map(move |first| {
                 let shard = Shard::new(number.checked_sub(first)?, *count)?;
                 let last = count.get() - 1 + first;
-                Some(format!(
-                    "--shard {shard} for task {number} of {first}-{last}"
-                ))
+                Some(format!("--shard {shard} for task {number} of {first}-{last}"))
             })
         })
         .collect();
@@ -242,12 +220,8 @@ mod tests {
     use super::*;
 
     fn resolved(text: Option<&str>, variables: &[(&str, &str)]) -> Result<Shard> {
-        let variable = |name: &str| {
-            variables
-                .iter()
-                .find(|(known, _)| *known == name)
-                .map(|(_, value)| (*value).to_owned())
-        };
+        let variable =
+            |name: &str| variables.iter().find(|(known, _)| *known == name).map(|(_, value)| (*value).to_owned());
         ResolvedShard::resolve(text, variable, None).map(|resolved| resolved.shard)
     }
 
@@ -303,11 +277,7 @@ mod tests {
             (Some("auto/3"), &TASK, "has 4 tasks, not 3"),
             (None, &POD, "--shard auto/N"),
             (None, &WITH_GAPS, "without gaps, as --array=0-2"),
-            (
-                Some("auto/4"),
-                &ALONE,
-                "--shard 3/4 for task 2 of 0-3, --shard 2/4 for task 2 of 1-4",
-            ),
+            (Some("auto/4"), &ALONE, "--shard 3/4 for task 2 of 0-3, --shard 2/4 for task 2 of 1-4"),
         ] {
             let error = resolved(text, variables).unwrap_err().to_string();
             assert!(error.contains(message), "{text:?}: {error}");

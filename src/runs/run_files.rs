@@ -23,11 +23,7 @@ impl RunFiles {
         store::each_question(folder, |question| {
             questions.push(question.without_evidence());
         })?;
-        Ok(Self {
-            questions,
-            thumbnails: store::read_thumbnails(folder),
-            fidelity: store::read_fidelity(folder),
-        })
+        Ok(Self { questions, thumbnails: store::read_thumbnails(folder), fidelity: store::read_fidelity(folder) })
     }
 
     /// Reads the files of a run folder.

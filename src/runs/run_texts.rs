@@ -75,10 +75,7 @@ impl<D: Detail> RunTexts<D> {
             }
             Self::Shards(parts) => match parts.get(place.log()) {
                 Some(part) => part.record(place),
-                None => Err(Error::data(
-                    "records",
-                    format_args!("there is no part {}", place.log()),
-                )),
+                None => Err(Error::data("records", format_args!("there is no part {}", place.log()))),
             },
             Self::InMemory(texts) => {
                 let record = texts.records.get(place.start() as usize);
@@ -115,9 +112,7 @@ impl<D: Detail> RunTexts<D> {
         };
         match self {
             Self::Stored(texts) => each_question(&texts.folder, add),
-            Self::Shards(parts) => parts
-                .iter()
-                .try_for_each(|part| part.questions(wanted, found)),
+            Self::Shards(parts) => parts.iter().try_for_each(|part| part.questions(wanted, found)),
             Self::InMemory(texts) => {
                 texts.questions.iter().cloned().for_each(&mut add);
                 Ok(())

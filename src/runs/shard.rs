@@ -7,8 +7,8 @@ use std::str::FromStr;
 use crate::ask::Quota;
 use crate::error::{Error, Result};
 
-/// One of several parts of a run, with consecutive sources. Each source is in one shard, with all its conditions and questions. See
-/// [`shard_questions`](crate::runs::shard_sources::shard_questions) for the division.
+/// One of several parts of a run, with consecutive sources. Each source is in one shard, with all its conditions and
+/// questions. See [`shard_questions`](crate::runs::shard_sources::shard_questions) for the division.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Shard {
     /// Index of the shard, from 0.
@@ -18,10 +18,7 @@ pub(crate) struct Shard {
 
 impl Shard {
     /// The only shard of a run that is not divided.
-    pub(crate) const WHOLE: Self = Self {
-        index: 0,
-        count: NonZeroU32::MIN,
-    };
+    pub(crate) const WHOLE: Self = Self { index: 0, count: NonZeroU32::MIN };
 
     /// True if there are other shards.
     #[must_use]
@@ -44,8 +41,8 @@ impl Shard {
         self.index
     }
 
-    /// This shard's share of `whole` if `at_once` shards run in parallel. The shares of `at_once` consecutive shards sum to `whole`, except
-    /// that each is at least 1.
+    /// This shard's share of `whole` if `at_once` shards run in parallel. The shares of `at_once` consecutive shards
+    /// sum to `whole`, except that each is at least 1.
     fn share(self, whole: NonZeroU32, at_once: NonZeroU32) -> NonZeroU32 {
         let (at_once, whole) = (at_once.get(), whole.get());
         let share = whole / at_once + u32::from(self.index % at_once < whole % at_once);
@@ -68,13 +65,11 @@ impl Shard {
     /// The shard with this name of a folder; `None` for other folders.
     pub(super) fn of_folder(name: &str) -> Option<Self> {
         let (index, count) = name.strip_prefix("shard-")?.split_once("-of-")?;
-        Self::new(
-            index.parse::<u32>().ok()?.checked_sub(1)?,
-            count.parse().ok()?,
-        )
+        Self::new(index.parse::<u32>().ok()?.checked_sub(1)?, count.parse().ok()?)
     }
 
-    /// This shard's share of the requests and tokens per minute if `workers` shards run in parallel, by default all of them.
+    /// This shard's share of the requests and tokens per minute if `workers` shards run in parallel, by default all of
+    /// them.
     pub(crate) fn quota(self, whole: Quota, workers: Option<NonZeroU32>) -> Quota {
         let at_once = workers.map_or(self.count, |workers| workers.min(self.count));
         Quota {
@@ -110,9 +105,7 @@ pub(super) fn usage_error(problem: impl fmt::Display) -> Error {
 }
 
 fn not_a_shard(text: &str) -> Error {
-    usage_error(format_args!(
-        "{text:?}; a part expected, as 2/4, or auto, auto/4, none"
-    ))
+    usage_error(format_args!("{text:?}; a part expected, as 2/4, or auto, auto/4, none"))
 }
 
 /// The number of shards in the text `whole` of a flag.
@@ -134,10 +127,7 @@ mod tests {
     #[test]
     fn shares_of_the_shards_that_run_at_once_sum_up() {
         let parts: Vec<Shard> = Shard::all(number(3)).collect();
-        let whole = Quota {
-            requests: Some(number(500)),
-            tokens: Some(number(1)),
-        };
+        let whole = Quota { requests: Some(number(500)), tokens: Some(number(1)) };
         let shares = |workers: Option<u32>| -> Vec<u32> {
             parts
                 .iter()

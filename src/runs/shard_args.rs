@@ -12,8 +12,8 @@ use crate::types::text::counted;
 /// The `--shard` flag.
 #[derive(Debug, Clone, Default, Args)]
 pub(crate) struct ShardArgs {
-    /// Process only this shard of the frames, as 2/4, or auto/4 for the task of a Slurm array or the pod of an indexed Kubernetes job. All
-    /// shards together write what one call does; default: all frames
+    /// Process only this shard of the frames, as 2/4, or auto/4 for the task of a Slurm array or the pod of an indexed
+    /// Kubernetes job. All shards together write what one call does; default: all frames
     #[arg(long, value_name = "I/N|auto/N|auto", help_heading = "Scale", add = Decides::Trials)]
     pub shard: Option<String>,
 }
@@ -28,15 +28,14 @@ impl ShardArgs {
     }
 }
 
-/// The shard in a flag; everything without the flag. A batch system alone does not select a shard, because each task of its array may run
-/// another model.
+/// The shard in a flag; everything without the flag. A batch system alone does not select a shard, because each task of
+/// its array may run another model.
 ///
 /// # Errors
 /// If there is no such shard, or the variables of the batch system do not determine it.
 pub(crate) fn shard_from_flag(flag: Option<&str>) -> Result<Shard> {
     let flag = flag.unwrap_or("none");
-    ResolvedShard::resolve(Some(flag), |name| std::env::var(name).ok(), None)
-        .map(|resolved| resolved.shard)
+    ResolvedShard::resolve(Some(flag), |name| std::env::var(name).ok(), None).map(|resolved| resolved.shard)
 }
 
 /// Keeps the frames of a shard. All frames cost the same.
@@ -49,10 +48,7 @@ pub(crate) fn keep_shard<T>(frames: &mut Vec<T>, shard: Shard) -> Result<()> {
     }
     let own = shard_range(&vec![WeightedSource::equal(); frames.len()], shard);
     if own.is_empty() {
-        let problem = format!(
-            "{shard} is empty: only {}; use at most as many parts",
-            counted(frames.len(), "frame")
-        );
+        let problem = format!("{shard} is empty: only {}; use at most as many parts", counted(frames.len(), "frame"));
         return Err(Error::usage("--shard", problem));
     }
     frames.truncate(own.end);

@@ -1,5 +1,5 @@
-//! Trials of shards with the places of their records in the log files, so that shards are joined without keeping records in memory:
-//! [`read_shard`], [`append_records`].
+//! Trials of shards with the places of their records in the log files, so that shards are joined without keeping
+//! records in memory: [`read_shard`], [`append_records`].
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -15,8 +15,8 @@ use darkqa_score::answers::record::Detail;
 /// Minimum number of bytes in a write. Chosen to make fewer system calls than there are records.
 const CHUNK: usize = 1 << 20;
 
-/// Adds the trials of a shard to `trials`, with the current names of models. `number` is the shard's index among the folders that are
-/// joined.
+/// Adds the trials of a shard to `trials`, with the current names of models. `number` is the shard's index among the
+/// folders that are joined.
 ///
 /// # Errors
 /// If a line is not a record.
@@ -53,10 +53,7 @@ pub(crate) struct ShardLogs<'a> {
 impl<'a> ShardLogs<'a> {
     /// The record files of these folders, by index. Each file is opened when it is first read.
     pub(crate) fn new(folders: &[&'a Path]) -> Self {
-        Self {
-            folders: folders.to_vec(),
-            open: HashMap::new(),
-        }
+        Self { folders: folders.to_vec(), open: HashMap::new() }
     }
 
     fn log(&mut self, number: usize) -> Result<&RecordLog> {
@@ -83,8 +80,8 @@ impl<'a> ShardLogs<'a> {
     }
 }
 
-/// Appends the records at these places to a run, except those that the run already has. A line is copied unchanged if the run and the shard
-/// map the same recorded names of models to current ones.
+/// Appends the records at these places to a run, except those that the run already has. A line is copied unchanged if
+/// the run and the shard map the same recorded names of models to current ones.
 ///
 /// # Errors
 /// If a record cannot be read or written.
@@ -95,15 +92,9 @@ pub(crate) fn append_records<D: Detail>(
     trials: impl Iterator<Item = (TrialKey, TextPlace)>,
 ) -> Result<()> {
     let names = RecordedNames::from_manifest(manifest);
-    let shard_names: Vec<RecordedNames> = shards
-        .iter()
-        .map(|(_, shard)| RecordedNames::from_manifest(shard))
-        .collect();
+    let shard_names: Vec<RecordedNames> = shards.iter().map(|(_, shard)| RecordedNames::from_manifest(shard)).collect();
     let present = latest_trials::<D>(store.folder(), manifest)?;
-    let present: HashMap<TrialKey, TextPlace> = present
-        .iter()
-        .map(|trial| (trial.key(), trial.text()))
-        .collect();
+    let present: HashMap<TrialKey, TextPlace> = present.iter().map(|trial| (trial.key(), trial.text())).collect();
     let own_log = RecordLog::open(store.folder())?;
     let mut logs = ShardLogs::new(&shards.iter().map(|(folder, _)| *folder).collect::<Vec<_>>());
     let mut chunk = Vec::new();
@@ -114,8 +105,7 @@ pub(crate) fn append_records<D: Detail>(
         if let Some(own_place) = present.get(&key) {
             let own_line = own_log.line_from(own_place.start())?;
             if own_line == line
-                || renamed_record::<D>(&own_log, &own_line, &names)?
-                    == renamed_record(log, &line, shard_names)?
+                || renamed_record::<D>(&own_log, &own_line, &names)? == renamed_record(log, &line, shard_names)?
             {
                 continue;
             }
@@ -135,11 +125,7 @@ pub(crate) fn append_records<D: Detail>(
 }
 
 /// Parses a line and gives its model the current name.
-fn renamed_record<D: Detail>(
-    log: &RecordLog,
-    line: &[u8],
-    names: &RecordedNames,
-) -> Result<Record<D>> {
+fn renamed_record<D: Detail>(log: &RecordLog, line: &[u8], names: &RecordedNames) -> Result<Record<D>> {
     let mut record = log.record(line)?;
     rename_record(&mut record, names);
     Ok(record)

@@ -9,11 +9,13 @@ use crate::runs::shard::Shard;
 use crate::types::manifests::PartPlace;
 use crate::types::text::plural;
 
-/// The questions about the sources of a shard, with the place of these sources. The place is `None` if the run is not divided.
+/// The questions about the sources of a shard, with the place of these sources. The place is `None` if the run is not
+/// divided.
 ///
-/// Sources are numbered in the order of their first question. A shard has consecutive sources, and all shards cost about the same.
-/// Consecutive sources of one scene stay in one shard if they cost at most as much as a shard. `source` returns the source of a question,
-/// `scene` its scene (empty if it has none), and `cost` the cost of a source in any unit.
+/// Sources are numbered in the order of their first question. A shard has consecutive sources, and all shards cost
+/// about the same. Consecutive sources of one scene stay in one shard if they cost at most as much as a shard. `source`
+/// returns the source of a question, `scene` its scene (empty if it has none), and `cost` the cost of a source in any
+/// unit.
 ///
 /// # Errors
 /// If the shard is empty.
@@ -32,10 +34,7 @@ pub(crate) fn shard_questions<Q>(
     for question in &questions {
         let next = positions.len();
         if let Entry::Vacant(place) = positions.entry(source(question)) {
-            sources.push(WeightedSource {
-                scene: scene(question),
-                cost: cost(place.key()),
-            });
+            sources.push(WeightedSource { scene: scene(question), cost: cost(place.key()) });
             place.insert(next);
         }
     }
@@ -47,14 +46,8 @@ pub(crate) fn shard_questions<Q>(
         );
         return Err(Error::usage("--shard", problem));
     }
-    let place = PartPlace {
-        first: own.start,
-        count: own.len(),
-        of: positions.len(),
-    };
-    let questions = questions
-        .into_iter()
-        .filter(|question| own.contains(&positions[&source(question)]));
+    let place = PartPlace { first: own.start, count: own.len(), of: positions.len() };
+    let questions = questions.into_iter().filter(|question| own.contains(&positions[&source(question)]));
     Ok((questions.collect(), Some(place)))
 }
 
@@ -70,10 +63,7 @@ pub(crate) struct WeightedSource {
 impl WeightedSource {
     /// A source without a scene and with the same cost as all others.
     pub(crate) fn equal() -> Self {
-        Self {
-            scene: String::new(),
-            cost: 1,
-        }
+        Self { scene: String::new(), cost: 1 }
     }
 }
 
@@ -97,17 +87,11 @@ fn shard_starts(sources: &[WeightedSource], count: usize) -> Vec<usize> {
         let fits_in_shard = scene_cost * count as u128 <= total;
         let first = shard_at(cost_before);
         for source in scene {
-            shards.push(if fits_in_shard {
-                first
-            } else {
-                shard_at(cost_before)
-            });
+            shards.push(if fits_in_shard { first } else { shard_at(cost_before) });
             cost_before += cost(source);
         }
     }
-    let mut starts: Vec<usize> = (0..count)
-        .map(|shard| shards.partition_point(|other| *other < shard))
-        .collect();
+    let mut starts: Vec<usize> = (0..count).map(|shard| shards.partition_point(|other| *other < shard)).collect();
     // If there are enough sources, give each shard at least one, although a source may cost more than a share.
     if count <= sources.len() {
         for shard in 1..count {
@@ -147,13 +131,7 @@ mod tests {
     }
 
     fn divided_costs(costs: &[u64]) -> Vec<WeightedSource> {
-        costs
-            .iter()
-            .map(|cost| WeightedSource {
-                scene: String::new(),
-                cost: *cost,
-            })
-            .collect()
+        costs.iter().map(|cost| WeightedSource { scene: String::new(), cost: *cost }).collect()
     }
 
     #[test]
@@ -193,10 +171,7 @@ mod tests {
         // One source costs as much as all others together.
         assert_eq!(divided(&divided_costs(&[4, 1, 1, 1, 1]), 2), [0..1, 1..5]);
         assert_eq!(divided(&divided_costs(&[1, 1, 1, 1, 4]), 2), [0..4, 4..5]);
-        assert_eq!(
-            divided(&divided_costs(&[2, 2, 1, 1, 1, 1]), 2),
-            [0..2, 2..6]
-        );
+        assert_eq!(divided(&divided_costs(&[2, 2, 1, 1, 1, 1]), 2), [0..2, 2..6]);
         // An expensive source leaves no shard empty.
         assert_eq!(divided(&divided_costs(&[100, 1, 1]), 3), [0..1, 1..2, 2..3]);
         assert_eq!(divided(&divided_costs(&[1, 1, 100]), 3), [0..1, 1..2, 2..3]);

@@ -1,4 +1,5 @@
-//! The task of a Slurm array that this process may belong to: [`ArrayTask`], and the numbers of its array: [`TaskRange`].
+//! The task of a Slurm array that this process may belong to: [`ArrayTask`], and the numbers of its array:
+//! [`TaskRange`].
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -52,8 +53,8 @@ impl FromStr for TaskRange {
     }
 }
 
-/// A task of a Slurm array, as the environment describes it. A job that a task submits inherits the variables of the task: see
-/// [`membership`](Self::membership).
+/// A task of a Slurm array, as the environment describes it. A job that a task submits inherits the variables of the
+/// task: see [`membership`](Self::membership).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ArrayTask {
     /// Number of the task.
@@ -73,24 +74,17 @@ impl ArrayTask {
     ///
     /// # Errors
     /// If a variable is not a number.
-    pub(super) fn from_environment(
-        variable: &impl Fn(&str) -> Option<String>,
-    ) -> Result<Option<Self>> {
+    pub(super) fn from_environment(variable: &impl Fn(&str) -> Option<String>) -> Result<Option<Self>> {
         let Some(number) = read_number(variable, "SLURM_ARRAY_TASK_ID")? else {
             return Ok(None);
         };
         let read = |name| read_number(variable, name);
-        let count = read("SLURM_ARRAY_TASK_COUNT")?
-            .and_then(NonZeroU32::new)
-            .unwrap_or(NonZeroU32::MIN);
-        let step = read("SLURM_ARRAY_TASK_STEP")?
-            .and_then(NonZeroU32::new)
-            .unwrap_or(NonZeroU32::MIN);
+        let count = read("SLURM_ARRAY_TASK_COUNT")?.and_then(NonZeroU32::new).unwrap_or(NonZeroU32::MIN);
+        let step = read("SLURM_ARRAY_TASK_STEP")?.and_then(NonZeroU32::new).unwrap_or(NonZeroU32::MIN);
         let first = read("SLURM_ARRAY_TASK_MIN")?.unwrap_or(number);
         // Old versions of Slurm do not state the highest number.
-        let last = read("SLURM_ARRAY_TASK_MAX")?.unwrap_or_else(|| {
-            first.saturating_add(step.get().saturating_mul(count.get().saturating_sub(1)))
-        });
+        let last = read("SLURM_ARRAY_TASK_MAX")?
+            .unwrap_or_else(|| first.saturating_add(step.get().saturating_mul(count.get().saturating_sub(1))));
         Ok(Some(Self {
             number,
             range: TaskRange { first, last, step },
@@ -110,19 +104,18 @@ impl ArrayTask {
         self.range.count() != self.count.get()
     }
 
-    /// True if this array repeats tasks of an earlier one: it has a single task or gaps, or does not begin with the same number. An array
-    /// that begins with the same number is a new division of the run.
+    /// True if this array repeats tasks of an earlier one: it has a single task or gaps, or does not begin with the
+    /// same number. An array that begins with the same number is a new division of the run.
     pub(super) fn repeats(self, earlier: TaskRange) -> bool {
-        let is_within = [self.number, self.range.first, self.range.last]
-            .into_iter()
-            .all(|number| earlier.index(number).is_some());
-        let is_new_division = !self.is_alone()
-            && (self.range == earlier || !self.has_gaps() && self.range.first == earlier.first);
+        let is_within =
+            [self.number, self.range.first, self.range.last].into_iter().all(|number| earlier.index(number).is_some());
+        let is_new_division =
+            !self.is_alone() && (self.range == earlier || !self.has_gaps() && self.range.first == earlier.first);
         is_within && !is_new_division
     }
 
-    /// Whether this process belongs to the task. The job of a task has the number of the array only in its last task, so that `scontrol`
-    /// is asked about other jobs.
+    /// Whether this process belongs to the task. The job of a task has the number of the array only in its last task,
+    /// so that `scontrol` is asked about other jobs.
     pub(super) fn membership(self) -> Membership {
         match self.job {
             Some(job) if self.array_job != Some(job) => ask_scontrol(job),
@@ -135,16 +128,9 @@ impl ArrayTask {
 ///
 /// # Errors
 /// If the variable is not a number.
-pub(super) fn read_number(
-    variable: &impl Fn(&str) -> Option<String>,
-    name: &str,
-) -> Result<Option<u32>> {
+pub(super) fn read_number(variable: &impl Fn(&str) -> Option<String>, name: &str) -> Result<Option<u32>> {
     variable(name)
-        .map(|text| {
-            text.trim()
-                .parse()
-                .map_err(|_| Error::usage(name, format_args!("{text:?} is not a number")))
-        })
+        .map(|text| text.trim().parse().map_err(|_| Error::usage(name, format_args!("{text:?} is not a number"))))
         .transpose()
 }
 
@@ -158,13 +144,7 @@ mod tests {
 
     /// A task as Slurm 22.05.8 describes it.
     fn task(number: u32, count: u32, numbers: &str) -> ArrayTask {
-        ArrayTask {
-            number,
-            range: range(numbers),
-            count: NonZeroU32::new(count).unwrap(),
-            job: None,
-            array_job: None,
-        }
+        ArrayTask { number, range: range(numbers), count: NonZeroU32::new(count).unwrap(), job: None, array_job: None }
     }
 
     #[test]
@@ -177,10 +157,7 @@ mod tests {
         }
         let even = range("2-8:2");
         assert_eq!(even.count(), 4);
-        assert_eq!(
-            [1, 2, 3, 8, 10].map(|number| even.index(number)),
-            [None, Some(0), None, Some(3), None]
-        );
+        assert_eq!([1, 2, 3, 8, 10].map(|number| even.index(number)), [None, Some(0), None, Some(3), None]);
     }
 
     #[test]
@@ -193,12 +170,7 @@ mod tests {
     #[test]
     fn repeated_tasks_differ_from_new_divisions() {
         let earlier = range("0-3");
-        for repeated in [
-            task(2, 1, "2-2"),
-            task(0, 1, "0-0"),
-            task(3, 2, "1-3"),
-            task(2, 2, "2-3"),
-        ] {
+        for repeated in [task(2, 1, "2-2"), task(0, 1, "0-0"), task(3, 2, "1-3"), task(2, 2, "2-3")] {
             assert!(repeated.repeats(earlier), "{repeated:?}");
         }
         for other in [

@@ -6,7 +6,8 @@ use std::sync::mpsc;
 use std::thread;
 use std::time::Duration;
 
-/// Maximum time for an answer of `scontrol` (chosen). A busy controller may answer late; `scontrol` itself waits 10 s and more.
+/// Maximum time for an answer of `scontrol` (chosen). A busy controller may answer late; `scontrol` itself waits 10 s
+/// and more.
 const TIME_LIMIT: Duration = Duration::from_secs(5);
 
 /// Whether a job is a task of an array.
@@ -46,14 +47,16 @@ pub(super) fn ask_scontrol(job: u32) -> Membership {
     let _ = child.kill();
     let _ = child.wait();
     match answer {
-        Ok(text) => parse(&text.unwrap_or_default(), job)
-            .unwrap_or_else(|| unknown(format!("does not know job {job}"))),
+        Ok(text) => {
+            parse(&text.unwrap_or_default(), job).unwrap_or_else(|| unknown(format!("does not know job {job}")))
+        }
         Err(_) => unknown(format!("did not answer within {} s", TIME_LIMIT.as_secs())),
     }
 }
 
-/// Parses the answer of `scontrol`: `JobId=107 ArrayJobId=100 ArrayTaskId=2 JobName=…` for a task, `JobId=108 JobName=…` for a plain job.
-/// `None` if it does not describe this job. The fields after the name of the job may have any text.
+/// Parses the answer of `scontrol`: `JobId=107 ArrayJobId=100 ArrayTaskId=2 JobName=…` for a task, `JobId=108
+/// JobName=…` for a plain job. `None` if it does not describe this job. The fields after the name of the job may have
+/// any text.
 fn parse(answer: &str, job: u32) -> Option<Membership> {
     let own = format!("JobId={job}");
     let mut fields = answer
@@ -64,11 +67,7 @@ fn parse(answer: &str, job: u32) -> Option<Membership> {
         .by_ref()
         .take_while(|field| !field.starts_with("JobName="))
         .any(|field| field.starts_with("ArrayJobId="));
-    Some(if is_task {
-        Membership::Task
-    } else {
-        Membership::PlainJob(job)
-    })
+    Some(if is_task { Membership::Task } else { Membership::PlainJob(job) })
 }
 
 #[cfg(test)]
@@ -78,24 +77,15 @@ mod tests {
     #[test]
     fn answers_of_scontrol_are_parsed() {
         for (answer, expected) in [
-            (
-                "JobId=107 ArrayJobId=100 ArrayTaskId=2 JobName=job.sh UserId=root(0)",
-                Some(Membership::Task),
-            ),
+            ("JobId=107 ArrayJobId=100 ArrayTaskId=2 JobName=job.sh UserId=root(0)", Some(Membership::Task)),
             // The throttle of an array, and the form without --oneliner.
             (
                 "JobId=107 ArrayJobId=100 ArrayTaskId=2 ArrayTaskThrottle=1 JobName=a\n   Comment=b",
                 Some(Membership::Task),
             ),
-            (
-                "JobId=107 JobName=job.sh UserId=root(0)",
-                Some(Membership::PlainJob(107)),
-            ),
+            ("JobId=107 JobName=job.sh UserId=root(0)", Some(Membership::PlainJob(107))),
             // The name of a job is free text.
-            (
-                "JobId=107 JobName=x ArrayJobId=100",
-                Some(Membership::PlainJob(107)),
-            ),
+            ("JobId=107 JobName=x ArrayJobId=100", Some(Membership::PlainJob(107))),
             // Another job, and no answer.
             ("JobId=1070 ArrayJobId=100 ArrayTaskId=2 JobName=a", None),
             ("", None),

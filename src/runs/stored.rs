@@ -12,9 +12,8 @@ pub(crate) use crate::runs::run_texts::RunTexts;
 use crate::store;
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
-    ChoiceDetail, FailureKind, Finish, ImageFidelity, ListedModel, ModelListing, OpenDetail,
-    QuestionId, Record, Reply, RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef,
-    Trials,
+    ChoiceDetail, FailureKind, Finish, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record, Reply,
+    RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
 };
 use darkqa_score::answers::record::{Detail, answered};
 
@@ -53,7 +52,8 @@ pub(crate) struct StoredRun<D: Detail> {
 }
 
 impl<D: Detail> StoredRun<D> {
-    /// Reads a run folder. For a run that has not ended, the counts in the manifest are replaced by those of the records.
+    /// Reads a run folder. For a run that has not ended, the counts in the manifest are replaced by those of the
+    /// records.
     ///
     /// # Errors
     /// If the folder has no run with records of this kind.
@@ -133,8 +133,7 @@ impl<D: Detail> StoredRun<D> {
         if shown == ShownModels::Current {
             let names = renamed::left_out_models(&self.manifest);
             if !names.is_empty() {
-                let is_left_out =
-                    |trial: TrialRef<'_, D>| names.iter().any(|name| name == trial.model());
+                let is_left_out = |trial: TrialRef<'_, D>| names.iter().any(|name| name == trial.model());
                 self.left_out = self.trials.extract(is_left_out);
             }
         }
@@ -157,11 +156,7 @@ impl<D: Detail> StoredRun<D> {
     /// # Errors
     /// As for [`record`](Self::record).
     pub(crate) fn records_of(&self, question: &str) -> Result<Vec<Record<D>>> {
-        self.trials
-            .iter()
-            .filter(|trial| trial.question().0 == question)
-            .map(|trial| self.record(trial))
-            .collect()
+        self.trials.iter().filter(|trial| trial.question().0 == question).map(|trial| self.record(trial)).collect()
     }
 
     /// Name of the run, which is the name of its folder.
@@ -183,8 +178,8 @@ fn add_trial<D: Detail>(trials: &mut Result<Trials<D>>, record: Record<D>, text:
     }
 }
 
-/// A record whose content the server refused, as earlier versions stored it, as a failure: it counts as the reply that this version stores,
-/// withheld by a filter. Other records are unchanged.
+/// A record whose content the server refused, as earlier versions stored it, as a failure: it counts as the reply that
+/// this version stores, withheld by a filter. Other records are unchanged.
 ///
 /// # Errors
 /// If the choices of the record are not valid.
@@ -198,15 +193,9 @@ fn refused_as_filtered<D: Detail>(record: Record<D>) -> Result<Record<D>> {
                 lost: record.lost,
                 ..Reply::local(String::new())
             };
-            let blank = Record {
-                failure: None,
-                ..record
-            };
+            let blank = Record { failure: None, ..record };
             let record = answered(blank, reply)?;
-            Ok(Record {
-                latency_ms: None,
-                ..record
-            })
+            Ok(Record { latency_ms: None, ..record })
         }
         failure => Ok(Record { failure, ..record }),
     }
@@ -220,10 +209,7 @@ pub(crate) fn sort_trials<'q, D: Detail>(
 ) {
     let places: HashMap<&QuestionId, usize> = questions.zip(0..).collect();
     let listing = ModelListing::new(listed.iter().cloned());
-    trials.sort(
-        |question| places.get(question).copied(),
-        |model| listing.place(model),
-    );
+    trials.sort(|question| places.get(question).copied(), |model| listing.place(model));
 }
 
 /// Name of the run in a folder, which is the name of the folder.
@@ -234,10 +220,7 @@ pub(crate) fn run_name(folder: &Path) -> String {
 }
 
 /// A run of either experiment. Only this module distinguishes the experiments, by the schema of their folders.
-#[expect(
-    clippy::large_enum_variant,
-    reason = "of the few that are held, none is moved often"
-)]
+#[expect(clippy::large_enum_variant, reason = "of the few that are held, none is moved often")]
 pub(crate) enum AnyRun {
     Choice(StoredRun<ChoiceDetail>),
     Open(StoredRun<OpenDetail>),
@@ -296,20 +279,12 @@ impl StoredRun<ChoiceDetail> {
     /// # Errors
     /// If they are not. The message ends with `why`, the reason why they are needed.
     pub(crate) fn with_truths(self, why: &str) -> Result<Self> {
-        if self
-            .trials
-            .items()
-            .into_iter()
-            .flatten()
-            .all(|item| item.truth.is_some())
-        {
+        if self.trials.items().into_iter().flatten().all(|item| item.truth.is_some()) {
             return Ok(self);
         }
         Err(Error::Run {
             path: self.folder,
-            problem: format!(
-                "nobody knows the true answers to the questions of this run (--ask): {why}"
-            ),
+            problem: format!("nobody knows the true answers to the questions of this run (--ask): {why}"),
         })
     }
 }
@@ -328,10 +303,7 @@ pub(crate) fn read_run_manifest(folder: &Path) -> Result<RunManifest> {
 
 /// The error for a run of open questions where one with choices is needed. The message ends with `instead`.
 pub(crate) fn open_questions_error(folder: &Path, instead: &str) -> Error {
-    Error::Run {
-        path: folder.to_owned(),
-        problem: format!("the run asked open questions: {instead}"),
-    }
+    Error::Run { path: folder.to_owned(), problem: format!("the run asked open questions: {instead}") }
 }
 
 /// Maximum number of runs in a message.
@@ -361,10 +333,7 @@ fn no_run(folder: &Path) -> Error {
         [] => String::new(),
         runs => format!("; there are runs in it: {}", runs.join(" ")),
     };
-    Error::Run {
-        path: folder.to_owned(),
-        problem: format!("no run in this folder: it has no manifest.json{hint}"),
-    }
+    Error::Run { path: folder.to_owned(), problem: format!("no run in this folder: it has no manifest.json{hint}") }
 }
 
 /// A setting of a manifest, if it is a text.

@@ -40,10 +40,11 @@ pub struct FrameTies {
 /// The cluster of each frame.
 ///
 /// Questions of a frame and frames of a scene are not independent. Intervals that treat them as independent are too
-/// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). Frames are joined if they show the same picture, or if
-/// they consist of several images and share one with each other or with a question about that image alone. The unit is the scene if there
-/// are two scenes or more, and some have more than one of these frames. A frame without a scene then counts as a scene of its own.
-/// Otherwise the unit is the frame, or the question if there is only one frame.
+/// narrow (Miller 2024, "Adding Error Bars to Evals", arXiv:2411.00640, section 2.2). Frames are joined if they show
+/// the same picture, or if they consist of several images and share one with each other or with a question about that
+/// image alone. The unit is the scene if there are two scenes or more, and some have more than one of these frames. A
+/// frame without a scene then counts as a scene of its own. Otherwise the unit is the frame, or the question if there
+/// is only one frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Clusters {
     unit: ClusterUnit,
@@ -54,20 +55,15 @@ pub struct Clusters {
     count: usize,
 }
 
-/// Recommended minimum number of clusters. With fewer, intervals are wide, and a comparison at five levels can have no verdict
-/// (5 · 2 / 2⁷ = 0.08).
+/// Recommended minimum number of clusters. With fewer, intervals are wide, and a comparison at five levels can have no
+/// verdict (5 · 2 / 2⁷ = 0.08).
 pub const MIN_CLUSTERS: usize = 8;
 
 impl Clusters {
     /// Assigns clusters to questions, given with their frames.
-    pub fn new<'a>(
-        pairs: impl IntoIterator<Item = (&'a QuestionId, &'a FrameId)>,
-        ties: &FrameTies,
-    ) -> Self {
-        let pairs: BTreeSet<(&FrameId, &QuestionId)> = pairs
-            .into_iter()
-            .map(|(question, frame)| (frame, question))
-            .collect();
+    pub fn new<'a>(pairs: impl IntoIterator<Item = (&'a QuestionId, &'a FrameId)>, ties: &FrameTies) -> Self {
+        let pairs: BTreeSet<(&FrameId, &QuestionId)> =
+            pairs.into_iter().map(|(question, frame)| (frame, question)).collect();
         let mut frames: Vec<&FrameId> = pairs.iter().map(|(frame, _)| *frame).collect();
         frames.dedup();
         let (by_frame, count) = number_frames(&frames, ties, |_| None);
@@ -87,19 +83,11 @@ impl Clusters {
                 unit: ClusterUnit::Question,
                 count: pairs.len(),
                 by_frame: HashMap::new(),
-                by_question: pairs
-                    .iter()
-                    .map(|(_, question)| (*question).clone())
-                    .zip(0..)
-                    .collect(),
+                by_question: pairs.iter().map(|(_, question)| (*question).clone()).zip(0..).collect(),
             };
         }
         Self {
-            unit: if pairs.len() == count {
-                ClusterUnit::Question
-            } else {
-                ClusterUnit::Frame
-            },
+            unit: if pairs.len() == count { ClusterUnit::Question } else { ClusterUnit::Frame },
             count,
             by_frame,
             by_question: HashMap::new(),
@@ -121,10 +109,7 @@ impl Clusters {
     /// Index of the cluster of a question about a frame, from 0; `None` if that question was not asked.
     #[must_use]
     pub fn get(&self, frame: &FrameId, question: &QuestionId) -> Option<u32> {
-        self.by_frame
-            .get(frame)
-            .or_else(|| self.by_question.get(question))
-            .copied()
+        self.by_frame.get(frame).or_else(|| self.by_question.get(question)).copied()
     }
 }
 
@@ -136,8 +121,8 @@ enum Tie<'a> {
     Scene(&'a str),
 }
 
-/// Numbers the frames in the order of their scenes and names, and returns the count of numbers. Frames that share a tie, directly or
-/// through others, get the same number.
+/// Numbers the frames in the order of their scenes and names, and returns the count of numbers. Frames that share a
+/// tie, directly or through others, get the same number.
 fn number_frames<'a>(
     frames: &[&'a FrameId],
     ties: &'a FrameTies,
@@ -154,10 +139,7 @@ fn number_frames<'a>(
     let mut parents: Vec<usize> = (0..frames.len()).collect();
     let mut first_frames = HashMap::<Tie<'_>, usize>::new();
     for (index, frame) in frames.iter().enumerate() {
-        let images = ties
-            .images
-            .get(*frame)
-            .map_or(std::slice::from_ref(*frame), Vec::as_slice);
+        let images = ties.images.get(*frame).map_or(std::slice::from_ref(*frame), Vec::as_slice);
         let own = images
             .iter()
             .map(Tie::Image)
@@ -195,9 +177,7 @@ mod tests {
 
     fn clusters(frames: usize, scenes: usize, questions: usize) -> Clusters {
         let frames: Vec<FrameId> = (0..frames).map(|i| FrameId(format!("f{i:03}"))).collect();
-        let ids: Vec<QuestionId> = (0..questions)
-            .map(|i| QuestionId(format!("q{i:03}")))
-            .collect();
+        let ids: Vec<QuestionId> = (0..questions).map(|i| QuestionId(format!("q{i:03}"))).collect();
         let known = frames
             .iter()
             .enumerate()
@@ -205,22 +185,12 @@ mod tests {
             .map(|(i, frame)| (frame.clone(), format!("s{}", i % scenes.max(1))));
         let pairs = ids.iter().zip(frames.iter().cycle());
         let scenes = known.collect();
-        Clusters::new(
-            pairs,
-            &FrameTies {
-                scenes,
-                ..FrameTies::default()
-            },
-        )
+        Clusters::new(pairs, &FrameTies { scenes, ..FrameTies::default() })
     }
 
     /// Cluster of each frame with its question.
     fn clusters_of(found: &Clusters, frames: &[FrameId], ids: &[QuestionId]) -> Vec<Option<u32>> {
-        frames
-            .iter()
-            .zip(ids)
-            .map(|(frame, id)| found.get(frame, id))
-            .collect()
+        frames.iter().zip(ids).map(|(frame, id)| found.get(frame, id)).collect()
     }
 
     #[test]
@@ -246,11 +216,7 @@ mod tests {
         let found = Clusters::new(ids.iter().zip(&frames), &ties);
         assert_eq!((found.count(), found.unit()), (3, ClusterUnit::Frame));
         let clusters = clusters_of(&found, &frames, &ids);
-        assert!(
-            [1, 2, 5]
-                .iter()
-                .all(|frame| clusters[*frame] == clusters[0])
-        );
+        assert!([1, 2, 5].iter().all(|frame| clusters[*frame] == clusters[0]));
         assert!(clusters[3] != clusters[0] && clusters[4] != clusters[0]);
         assert!(clusters[3] != clusters[4]);
         let apart = Clusters::new(ids.iter().zip(&frames), &FrameTies::default());
@@ -262,14 +228,8 @@ mod tests {
         let frames: Vec<FrameId> = (0..6).map(|i| FrameId(format!("f{i}"))).collect();
         let ids: Vec<QuestionId> = (0..6).map(|i| QuestionId(format!("q{i}"))).collect();
         let ties = FrameTies {
-            scenes: frames
-                .iter()
-                .cloned()
-                .zip(scenes.iter().map(|&scene| scene.to_owned()))
-                .collect(),
-            digests: [0, 3]
-                .map(|i| (frames[i].clone(), Digest::from_bytes(b"picture")))
-                .into(),
+            scenes: frames.iter().cloned().zip(scenes.iter().map(|&scene| scene.to_owned())).collect(),
+            digests: [0, 3].map(|i| (frames[i].clone(), Digest::from_bytes(b"picture"))).into(),
             ..FrameTies::default()
         };
         let found = Clusters::new(ids.iter().zip(&frames), &ties);
@@ -297,11 +257,7 @@ mod tests {
         let frames: Vec<FrameId> = (0..30).map(|i| FrameId(format!("f{i:02}"))).collect();
         let ids: Vec<QuestionId> = (0..30).map(|i| QuestionId(format!("q{i}"))).collect();
         let ties = FrameTies {
-            scenes: frames[..24]
-                .iter()
-                .enumerate()
-                .map(|(i, frame)| (frame.clone(), format!("s{}", i % 8)))
-                .collect(),
+            scenes: frames[..24].iter().enumerate().map(|(i, frame)| (frame.clone(), format!("s{}", i % 8))).collect(),
             ..FrameTies::default()
         };
         let found = Clusters::new(ids.iter().zip(&frames), &ties);
@@ -333,9 +289,6 @@ mod tests {
         assert_eq!(found.get(&FrameId("else".into()), &question), None);
         let single = clusters(1, 0, 5);
         let frame = FrameId("f000".into());
-        assert_ne!(
-            single.get(&frame, &question),
-            single.get(&frame, &QuestionId("q001".into()))
-        );
+        assert_ne!(single.get(&frame, &question), single.get(&frame, &QuestionId("q001".into())));
     }
 }

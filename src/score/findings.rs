@@ -1,8 +1,8 @@
 //! All results of a run: [`Findings`].
 
 use super::accuracies::{
-    AccuracySummary, CommonItems, Curve, FirstFailure, Health, OfferedChoices, StrictScore, curves,
-    first_failures, healths, summarize,
+    AccuracySummary, CommonItems, Curve, FirstFailure, Health, OfferedChoices, StrictScore, curves, first_failures,
+    healths, summarize,
 };
 use super::answers::confusion::{Confusion, Hallucination, confusions, hallucinations};
 use super::bootstrap::Resamples;
@@ -10,9 +10,9 @@ use super::calibration::{Calibration, calibrations};
 use super::choice::ParsingMode;
 use super::cluster::{ClusterUnit, Clusters, FrameTies};
 use super::comparisons::{
-    Agreement, BestInTheDark, Claim, Comparison, ComparisonKind, FamilyContrast, FindingByProfile,
-    ModelsLeftOut, PooledFinding, PooledKind, agreements, best_in_the_dark, by_profile,
-    comparisons, family_contrasts, light_agreements, lights_between, models_left_out, pool, pooled,
+    Agreement, BestInTheDark, Claim, Comparison, ComparisonKind, FamilyContrast, FindingByProfile, ModelsLeftOut,
+    PooledFinding, PooledKind, agreements, best_in_the_dark, by_profile, comparisons, family_contrasts,
+    light_agreements, lights_between, models_left_out, pool, pooled,
 };
 use super::grid::Grid;
 use super::model_in_condition::{ModelInCondition, is_control, is_observer};
@@ -20,9 +20,7 @@ use super::observed::ObserverSummary;
 use super::photographs::pair_darkness::{self, PairDarkness};
 use super::photographs::{FidelityFindings, PhotographedSet};
 use super::significance::Significance;
-use darkqa_base::types::{
-    ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant,
-};
+use darkqa_base::types::{ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant};
 
 /// All results that are computed from the trials of a run.
 #[derive(Debug)]
@@ -37,7 +35,8 @@ pub struct Findings<'a> {
     pub health: Vec<Health>,
     /// Differences of all models together, ordered by kind, variant, enhancer, family and level.
     pub pooled: Vec<PooledFinding>,
-    /// Differences averaged over the darker levels of a set, and over the lighter ones. Sentences test them before single levels.
+    /// Differences averaged over the darker levels of a set, and over the lighter ones. Sentences test them before
+    /// single levels.
     pub averaged: Vec<PooledFinding>,
     /// In each variant, the two families whose losses are furthest apart.
     pub contrasts: Vec<FamilyContrast>,
@@ -84,8 +83,8 @@ pub struct Findings<'a> {
 }
 
 impl<'a> Findings<'a> {
-    /// Computes the results of the trials. `ties` relates frames to each other; `questions` are all questions of the run, for the chance
-    /// line; `measured` lists the images that were compared with their clean frames.
+    /// Computes the results of the trials. `ties` relates frames to each other; `questions` are all questions of the
+    /// run, for the chance line; `measured` lists the images that were compared with their clean frames.
     #[must_use]
     pub fn new(
         trials: &'a Trials<ChoiceDetail>,
@@ -110,22 +109,11 @@ impl<'a> Findings<'a> {
         let questions: Vec<OfferedChoices> = questions.into_iter().collect();
         let observer = ObserverSummary::new(trials, &clusters);
         let without_observer = observer.is_hidden().then(|| {
-            let grid = Grid::for_models(trials, &clusters, listing, |model| {
-                !is_control(model) && !is_observer(model)
-            });
-            Box::new(Self::build(
-                grid,
-                &clusters,
-                &questions,
-                observer.clone(),
-                measured,
-            ))
+            let grid = Grid::for_models(trials, &clusters, listing, |model| !is_control(model) && !is_observer(model));
+            Box::new(Self::build(grid, &clusters, &questions, observer.clone(), measured))
         });
         let grid = Grid::for_models(trials, &clusters, listing, |model| !is_control(model));
-        Self {
-            without_observer,
-            ..Self::build(grid, &clusters, &questions, observer, measured)
-        }
+        Self { without_observer, ..Self::build(grid, &clusters, &questions, observer, measured) }
     }
 
     /// Sets the light in which the photographs of the data set were taken.
@@ -146,7 +134,8 @@ impl<'a> Findings<'a> {
         self
     }
 
-    /// Findings to report: those without the observer if one of its controls is not at chance, or if no control was asked.
+    /// Findings to report: those without the observer if one of its controls is not at chance, or if no control was
+    /// asked.
     #[must_use]
     pub fn shown(&self) -> &Self {
         self.without_observer.as_deref().unwrap_or(self)
@@ -162,11 +151,7 @@ impl<'a> Findings<'a> {
         let draws = Resamples::new(clusters.count());
         let mut findings = Self::for_sentences(grid, clusters, questions, observer, measured);
         let grid = &findings.grid;
-        findings.curves = grid
-            .groups()
-            .into_iter()
-            .flat_map(|family| curves(grid, &draws, family))
-            .collect();
+        findings.curves = grid.groups().into_iter().flat_map(|family| curves(grid, &draws, family)).collect();
         findings.first_failures = first_failures(grid);
         findings.agreements = agreements(grid);
         findings.light_agreements = light_agreements(grid);
@@ -243,40 +228,35 @@ impl<'a> Findings<'a> {
         (strict.is_detected() && lenient.is_detected() && is_same).then_some(strict)
     }
 
-    /// Models that findings about a variant are about, sorted: models with images, without people and without models that answered fewer
-    /// items than others in this variant.
+    /// Models that findings about a variant are about, sorted: models with images, without people and without models
+    /// that answered fewer items than others in this variant.
     #[must_use]
     pub fn models_of(&self, variant: &Variant) -> Vec<&str> {
         let mut models = pool(&self.grid);
         let apart: Vec<&String> = self
             .left_out
             .iter()
-            .filter(|set| {
-                set.kind == PooledKind::Darkness && set.variant == *variant && !set.is_more
-            })
+            .filter(|set| set.kind == PooledKind::Darkness && set.variant == *variant && !set.is_more)
             .flat_map(|set| &set.models)
             .collect();
         models.retain(|model| !apart.iter().any(|name| name == model));
         models
     }
 
-    /// True if sentences may be about this comparison of a model with a blind model: raw dark images, in one family or, if the pooled
-    /// findings are about several models, over all families.
+    /// True if sentences may be about this comparison of a model with a blind model: raw dark images, in one family or,
+    /// if the pooled findings are about several models, over all families.
     #[must_use]
     pub fn is_tested_against_blind(&self, comparison: &Comparison) -> bool {
         let first = &comparison.first;
-        if comparison.kind != ComparisonKind::Blind
-            || first.enhancer.is_some()
-            || first.variant.kind.is_none()
-        {
+        if comparison.kind != ComparisonKind::Blind || first.enhancer.is_some() || first.variant.kind.is_none() {
             return false;
         }
         let models = self.models_of(&first.variant);
         models.contains(&&*first.model) && (comparison.family.is_some() || models.len() > 1)
     }
 
-    /// Blind models that are detected to be more accurate than a subject: the subject's own model, or any model if that one was not asked
-    /// without images. The test is paired, and corrected over all tests behind sentences.
+    /// Blind models that are detected to be more accurate than a subject: the subject's own model, or any model if that
+    /// one was not asked without images. The test is paired, and corrected over all tests behind sentences.
     #[must_use]
     pub fn below_blind(&self, subject: &ModelInCondition, family: Option<&Family>) -> Vec<&str> {
         self.comparisons

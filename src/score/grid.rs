@@ -8,8 +8,7 @@ use super::estimate::{ClusterCount, Estimate};
 use super::model_in_condition::ModelInCondition;
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{
-    AskedItem, ChoiceDetail, Family, ModelListing, ParsedAnswer, TrialOutcome, TrialRef, Trials,
-    Variant,
+    AskedItem, ChoiceDetail, Family, ModelListing, ParsedAnswer, TrialOutcome, TrialRef, Trials, Variant,
 };
 
 /// Marks a missing index.
@@ -99,8 +98,8 @@ pub struct Grid<'a> {
 }
 
 impl<'a> Grid<'a> {
-    /// Creates the table of all trials whose true choice is known. A later trial replaces an earlier one of the same subject and item.
-    /// Trials whose frame has no cluster are ignored.
+    /// Creates the table of all trials whose true choice is known. A later trial replaces an earlier one of the same
+    /// subject and item. Trials whose frame has no cluster are ignored.
     #[must_use]
     pub fn new(trials: &'a Trials<ChoiceDetail>, clusters: &Clusters) -> Self {
         Self::for_models(trials, clusters, &ModelListing::default(), |_| true)
@@ -115,18 +114,12 @@ impl<'a> Grid<'a> {
         is_shown: impl Fn(&str) -> bool,
     ) -> Self {
         // Questions without a known true choice are never scored.
-        Self::build(trials, clusters, listing, |asked, model| {
-            asked.truth.is_some() && is_shown(model)
-        })
+        Self::build(trials, clusters, listing, |asked, model| asked.truth.is_some() && is_shown(model))
     }
 
     /// Creates the table of trials whose true choice is unknown, for inspection only.
     #[must_use]
-    pub fn without_truths(
-        trials: &'a Trials<ChoiceDetail>,
-        clusters: &Clusters,
-        listing: &ModelListing,
-    ) -> Self {
+    pub fn without_truths(trials: &'a Trials<ChoiceDetail>, clusters: &Clusters, listing: &ModelListing) -> Self {
         Self::build(trials, clusters, listing, |asked, _| asked.truth.is_none())
     }
 
@@ -153,12 +146,9 @@ impl<'a> Grid<'a> {
         let mut subjects: Vec<ModelInCondition> = sorted.into_iter().cloned().collect();
         // The sort is stable, so the subjects of a model stay sorted.
         subjects.sort_by_cached_key(|subject| listing.place(&subject.model));
-        let indices: BTreeMap<ModelInCondition, usize> =
-            subjects.iter().cloned().zip(0..).collect();
-        let index_by_asked: Vec<Option<usize>> = subject_by_asked
-            .iter()
-            .map(|subject| indices.get(subject.as_ref()?).copied())
-            .collect();
+        let indices: BTreeMap<ModelInCondition, usize> = subjects.iter().cloned().zip(0..).collect();
+        let index_by_asked: Vec<Option<usize>> =
+            subject_by_asked.iter().map(|subject| indices.get(subject.as_ref()?).copied()).collect();
         let mut seen = HashSet::new();
         let mut items: Vec<GridItem<'a>> = scope
             .items
@@ -166,13 +156,11 @@ impl<'a> Grid<'a> {
             .filter_map(|number| {
                 let asked = trials.item(*number);
                 let cluster = clusters.get(&asked.frame, &asked.question)?;
-                seen.insert(asked.key())
-                    .then_some(GridItem { asked, cluster })
+                seen.insert(asked.key()).then_some(GridItem { asked, cluster })
             })
             .collect();
         items.sort_by(|a, b| sort_key(a.asked).cmp(&sort_key(b.asked)));
-        let index_by_key: HashMap<_, u32> =
-            items.iter().map(|item| item.asked.key()).zip(0..).collect();
+        let index_by_key: HashMap<_, u32> = items.iter().map(|item| item.asked.key()).zip(0..).collect();
         let mut index_by_item = vec![NO_INDEX; trials.item_count()];
         for number in &scope.items {
             index_by_item[*number] = index_by_key[&trials.item(*number).key()];
@@ -218,9 +206,9 @@ impl<'a> Grid<'a> {
     /// True if the strict and the lenient parsing of any reply of a subject differ.
     #[must_use]
     pub fn parsings_differ(&self, subject: usize) -> bool {
-        self.row(subject).iter().any(
-            |result| matches!(result, TrialResult::Read { strict, lenient } if strict != lenient),
-        )
+        self.row(subject)
+            .iter()
+            .any(|result| matches!(result, TrialResult::Read { strict, lenient } if strict != lenient))
     }
 
     /// Results of a subject for all items.
@@ -238,39 +226,25 @@ impl<'a> Grid<'a> {
     /// All variants of the subjects, sorted: each kind of degradation in each noise profile.
     #[must_use]
     pub fn variants(&self) -> BTreeSet<&Variant> {
-        self.subjects
-            .iter()
-            .map(|subject| &subject.variant)
-            .filter(|variant| variant.kind.is_some())
-            .collect()
+        self.subjects.iter().map(|subject| &subject.variant).filter(|variant| variant.kind.is_some()).collect()
     }
 
-    /// The variant to show if only one can be shown. Among the first kind of degradation and the kinds that extend it, this is the last
-    /// kind, in its first noise profile. Noise therefore remains the main variant if other kinds are asked as well.
+    /// The variant to show if only one can be shown. Among the first kind of degradation and the kinds that extend it,
+    /// this is the last kind, in its first noise profile. Noise therefore remains the main variant if other kinds are
+    /// asked as well.
     #[must_use]
     pub fn main_variant(&self) -> Option<Variant> {
         let variants = self.variants();
         let root = variants.first()?.kind.map(Kind::root);
-        let kind = variants
-            .iter()
-            .copied()
-            .rfind(|variant| variant.kind.map(Kind::root) == root)?
-            .kind;
-        variants
-            .into_iter()
-            .find(|variant| variant.kind == kind)
-            .cloned()
+        let kind = variants.iter().copied().rfind(|variant| variant.kind.map(Kind::root) == root)?.kind;
+        variants.into_iter().find(|variant| variant.kind == kind).cloned()
     }
 
-    /// Index of a subject or, if the grid does not contain it, of the first subject that differs only in its group of runs and whose
-    /// group overlaps. `None` if the grid contains neither.
+    /// Index of a subject or, if the grid does not contain it, of the first subject that differs only in its group of
+    /// runs and whose group overlaps. `None` if the grid contains neither.
     #[must_use]
     pub fn find_up_to_group(&self, subject: &ModelInCondition) -> Option<usize> {
-        self.find(subject).or_else(|| {
-            self.subjects
-                .iter()
-                .position(|other| other.matches_up_to_group(subject))
-        })
+        self.find(subject).or_else(|| self.subjects.iter().position(|other| other.matches_up_to_group(subject)))
     }
 
     /// Items of a family (of all families for `None`), each with its result for a subject.
@@ -279,20 +253,12 @@ impl<'a> Grid<'a> {
         subject: usize,
         family: Option<&'s Family>,
     ) -> impl Iterator<Item = (&'s GridItem<'a>, TrialResult)> + 's {
-        self.items
-            .iter()
-            .zip(self.row(subject).iter().copied())
-            .filter(move |(item, _)| item.is_in_family(family))
+        self.items.iter().zip(self.row(subject).iter().copied()).filter(move |(item, _)| item.is_in_family(family))
     }
 
     /// Number of replies and of right replies of a subject in each cluster.
     #[must_use]
-    pub fn counts(
-        &self,
-        subject: usize,
-        family: Option<&Family>,
-        mode: ParsingMode,
-    ) -> Vec<ClusterCount> {
+    pub fn counts(&self, subject: usize, family: Option<&Family>, mode: ParsingMode) -> Vec<ClusterCount> {
         let mut counts = vec![ClusterCount::default(); self.clusters];
         for (item, result) in self.family_items(subject, family) {
             if let Some(chosen) = result.reading(mode) {
@@ -319,27 +285,16 @@ impl<'a> Grid<'a> {
 
     /// Accuracy of a subject. Its interval holds for all values of the missing replies. `None` without a reply.
     #[must_use]
-    pub fn accuracy(
-        &self,
-        subject: usize,
-        family: Option<&Family>,
-        mode: ParsingMode,
-    ) -> Option<Estimate> {
-        Estimate::with_missing(
-            &self.counts(subject, family, mode),
-            &self.failed(subject, family),
-        )
+    pub fn accuracy(&self, subject: usize, family: Option<&Family>, mode: ParsingMode) -> Option<Estimate> {
+        Estimate::with_missing(&self.counts(subject, family, mode), &self.failed(subject, family))
     }
 
-    /// Returns the grid of the items for which `kept` is true; `kept` has one value per item. Cluster indices do not change.
+    /// Returns the grid of the items for which `kept` is true; `kept` has one value per item. Cluster indices do not
+    /// change.
     #[must_use]
     pub fn select_items(&self, kept: &[bool]) -> Self {
-        let kept_items: Vec<usize> = kept
-            .iter()
-            .enumerate()
-            .filter(|(_, is_kept)| **is_kept)
-            .map(|(item, _)| item)
-            .collect();
+        let kept_items: Vec<usize> =
+            kept.iter().enumerate().filter(|(_, is_kept)| **is_kept).map(|(item, _)| item).collect();
         let cells: Vec<usize> = (0..self.subjects.len())
             .map(|subject| subject * self.items.len())
             .flat_map(|start| kept_items.iter().map(move |item| start + item))
@@ -359,17 +314,14 @@ impl<'a> Grid<'a> {
     /// All families of the items, sorted.
     #[must_use]
     pub fn families(&self) -> Vec<&'a Family> {
-        let families: BTreeSet<&Family> =
-            self.items.iter().map(|item| &*item.asked.family).collect();
+        let families: BTreeSet<&Family> = self.items.iter().map(|item| &*item.asked.family).collect();
         families.into_iter().collect()
     }
 
     /// Groups that are scored separately: all families together (`None`), then each family.
     #[must_use]
     pub fn groups(&self) -> Vec<Option<&'a Family>> {
-        std::iter::once(None)
-            .chain(self.families().into_iter().map(Some))
-            .collect()
+        std::iter::once(None).chain(self.families().into_iter().map(Some)).collect()
     }
 }
 
@@ -383,10 +335,7 @@ struct GridScope {
 
 impl GridScope {
     fn new(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
-        let mut scope = Self {
-            asked: vec![false; trials.asked().len()],
-            items: Vec::new(),
-        };
+        let mut scope = Self { asked: vec![false; trials.asked().len()], items: Vec::new() };
         let mut is_included = vec![false; trials.item_count()];
         for trial in trials.iter() {
             let (item, asked) = (trial.item_number(), trial.asked_number());
@@ -412,10 +361,9 @@ fn sort_key(asked: &AskedItem) -> impl Ord + '_ {
 fn trial_result(trial: TrialRef<'_>) -> TrialResult {
     match (trial.outcome(), trial.strict()) {
         (TrialOutcome::Failed, _) | (_, None) => TrialResult::Failed,
-        (_, Some(strict)) => TrialResult::Read {
-            strict: chosen_index(strict),
-            lenient: trial.lenient().and_then(chosen_index),
-        },
+        (_, Some(strict)) => {
+            TrialResult::Read { strict: chosen_index(strict), lenient: trial.lenient().and_then(chosen_index) }
+        }
     }
 }
 

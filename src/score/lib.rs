@@ -1,24 +1,23 @@
-//! Statistics of a run's records, with their intervals. [`choice`] parses a reply; the primitives ([`estimate`], [`bootstrap`],
-//! [`significance`], [`threshold`]) are in `statistics`.
+//! Statistics of a run's records, with their intervals. [`choice`] parses a reply; the primitives ([`estimate`],
+//! [`bootstrap`], [`significance`], [`threshold`]) are in `statistics`.
 //!
 //! [`findings`] is the entry point. It arranges the records as a [`grid`] and computes from it the accuracies
-//! and the curves over the levels ([`accuracies`]), the paired differences and the agreement of models ([`comparisons`]), and the answers
-//! given against the true ones ([`answers`]).
+//! and the curves over the levels ([`accuracies`]), the paired differences and the agreement of models
+//! ([`comparisons`]), and the answers given against the true ones ([`answers`]).
 //!
-//! Intervals are computed from the clusters ([`cluster`]). Each method was chosen because its 95 % intervals cover the true value in
-//! simulation (`statistics.rs` and `coverage/` in `tests/program/scores`; `src/docs/numbers.md` lists the cases with a coverage below
-//! 93 %). The plain percentile bootstrap does not with fewer than about 50 clusters, or near 0 and 1.
+//! Intervals are computed from the clusters ([`cluster`]). Each method was chosen because its 95 % intervals cover the
+//! true value in simulation (`statistics.rs` and `coverage/` in `tests/program/scores`; `src/docs/numbers.md` lists the
+//! cases with a coverage below 93 %). The plain percentile bootstrap does not with fewer than about 50 clusters, or
+//! near 0 and 1.
 //!
 //! - shares: Wilson's score interval at the clusters' effective number of replies ([`estimate::Estimate::clustered`]);
-//! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`comparisons::paired`]), and an exact test;
+//! - differences: Bonett and Price's adjusted interval with the clusters' variance ([`comparisons::paired`]), and an
+//!   exact test;
 //! - κ: its linear form in the clusters' counts, with the clusters' variance ([`comparisons::Agreement`]);
 //! - confidence: the cluster bootstrap, with its bias subtracted for the calibration error ([`calibration`]);
 //! - thresholds: the cluster bootstrap ([`bootstrap`]).
 
-#![allow(
-    missing_docs,
-    reason = "fields and variants of this workspace's own use, whose names say what they are"
-)]
+#![allow(missing_docs, reason = "fields and variants of this workspace's own use, whose names say what they are")]
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 pub mod accuracies;

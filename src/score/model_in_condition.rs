@@ -5,14 +5,13 @@ use std::collections::BTreeSet;
 use serde::Serialize;
 
 use darkqa_base::types::replies::OBSERVER;
-use darkqa_base::types::{
-    AxisLevel, Condition, Control, EnhancerName, RunGroup, TrialRef, Variant, View,
-};
+use darkqa_base::types::{AxisLevel, Condition, Control, EnhancerName, RunGroup, TrialRef, Variant, View};
 
 /// Model name of the chance line in results.
 pub const CHANCE: &str = "chance";
 
-/// Removes the name of the run from a model name. When several runs are compared, `observer (one)` is the observer of the run `one`.
+/// Removes the name of the run from a model name. When several runs are compared, `observer (one)` is the observer of
+/// the run `one`.
 #[must_use]
 pub fn without_run(model: &str) -> &str {
     model.split_once(" (").map_or(model, |(name, _)| name)
@@ -30,8 +29,8 @@ pub fn is_control(model: &str) -> bool {
     Control::from_model_name(model).is_some()
 }
 
-/// True if the model is built in and serves only as a reference: `random`, `observer` and its controls (`observer:…`). References
-/// are not under test, so rankings and comparisons of models leave them out.
+/// True if the model is built in and serves only as a reference: `random`, `observer` and its controls (`observer:…`).
+/// References are not under test, so rankings and comparisons of models leave them out.
 #[must_use]
 pub fn is_reference(model: &str) -> bool {
     without_run(model) == "random" || is_observer(model) || is_control(model)
@@ -41,33 +40,19 @@ pub fn is_reference(model: &str) -> bool {
 #[must_use]
 pub fn models_under_test<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
     let all: BTreeSet<&str> = models.into_iter().collect();
-    let under_test: BTreeSet<&str> = all
-        .iter()
-        .copied()
-        .filter(|model| !is_reference(model))
-        .collect();
-    if under_test.is_empty() {
-        all
-    } else {
-        under_test
-    }
+    let under_test: BTreeSet<&str> = all.iter().copied().filter(|model| !is_reference(model)).collect();
+    if under_test.is_empty() { all } else { under_test }
 }
 
-/// Models to pool, sorted: the [`models_under_test`]. If only references ran, one of them, preferably the observer, because a mean of the
-/// observer and `random` would be meaningless.
+/// Models to pool, sorted: the [`models_under_test`]. If only references ran, one of them, preferably the observer,
+/// because a mean of the observer and `random` would be meaningless.
 #[must_use]
 pub fn pooled_models<'m>(models: impl IntoIterator<Item = &'m str>) -> BTreeSet<&'m str> {
     let models = models_under_test(models);
     if !models.iter().all(|model| is_reference(model)) {
         return models;
     }
-    models
-        .iter()
-        .find(|model| is_observer(model))
-        .or(models.first())
-        .copied()
-        .into_iter()
-        .collect()
+    models.iter().find(|model| is_observer(model)).or(models.first()).copied().into_iter().collect()
 }
 
 /// A model in a condition. Every table cell belongs to one.
@@ -121,10 +106,7 @@ impl ModelInCondition {
             (None, None) => level.to_string(),
             (None, Some(_)) => format!("{level}-{}", self.variant.kind_and_profile()),
         };
-        let enhancer = self
-            .enhancer
-            .as_ref()
-            .map_or_else(String::new, |name| format!("+{name}"));
+        let enhancer = self.enhancer.as_ref().map_or_else(String::new, |name| format!("+{name}"));
         let group = self.variant.group_suffix();
         format!("{light}{enhancer}{group}")
     }
@@ -150,28 +132,17 @@ impl ModelInCondition {
         subject
     }
 
-    /// A model with images at a level of a variant, raw or enhanced. Variants share the clean frame: at L0, only the group of runs
-    /// is kept of the variant, so that [`matches_up_to_group`](Self::matches_up_to_group) finds the clean frames of those runs.
+    /// A model with images at a level of a variant, raw or enhanced. Variants share the clean frame: at L0, only the
+    /// group of runs is kept of the variant, so that [`matches_up_to_group`](Self::matches_up_to_group) finds the clean
+    /// frames of those runs.
     #[must_use]
-    pub fn with_images(
-        model: &str,
-        level: AxisLevel,
-        variant: &Variant,
-        enhancer: Option<&EnhancerName>,
-    ) -> Self {
+    pub fn with_images(model: &str, level: AxisLevel, variant: &Variant, enhancer: Option<&EnhancerName>) -> Self {
         let is_clean = level == AxisLevel::L0;
         Self {
             model: model.to_owned(),
             view: Some(View::Image),
             level: Some(level),
-            variant: if is_clean {
-                Variant {
-                    group: variant.group.clone(),
-                    ..Variant::NONE
-                }
-            } else {
-                variant.clone()
-            },
+            variant: if is_clean { Variant { group: variant.group.clone(), ..Variant::NONE } } else { variant.clone() },
             enhancer: enhancer.cloned(),
         }
     }
@@ -184,21 +155,9 @@ mod tests {
     #[test]
     fn references_count_only_without_other_models() {
         for (models, expected, pooled) in [
-            (
-                &["gpt-4o", "observer", "m", "random"][..],
-                &["gpt-4o", "m"][..],
-                &["gpt-4o", "m"][..],
-            ),
-            (
-                &["random", "observer"],
-                &["observer", "random"],
-                &["observer"],
-            ),
-            (
-                &["random (a)", "observer (b)"],
-                &["observer (b)", "random (a)"],
-                &["observer (b)"],
-            ),
+            (&["gpt-4o", "observer", "m", "random"][..], &["gpt-4o", "m"][..], &["gpt-4o", "m"][..]),
+            (&["random", "observer"], &["observer", "random"], &["observer"]),
+            (&["random (a)", "observer (b)"], &["observer (b)", "random (a)"], &["observer (b)"]),
             (&["random"], &["random"], &["random"]),
             (&[], &[], &[]),
         ] {
@@ -224,11 +183,7 @@ mod tests {
             ("gpt-4o", false),
             (CHANCE, false),
         ] {
-            assert_eq!(
-                ModelInCondition::new(model, None).is_reference(),
-                expected,
-                "{model}"
-            );
+            assert_eq!(ModelInCondition::new(model, None).is_reference(), expected, "{model}");
         }
     }
 }

@@ -7,8 +7,7 @@ use super::estimate::Estimate;
 use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use darkqa_base::types::replies::OBSERVER;
 use darkqa_base::types::{
-    AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef,
-    Trials,
+    AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef, Trials,
 };
 
 /// Results of the observer, or of one of its controls, in one condition.
@@ -40,8 +39,7 @@ impl ObserverCell {
     /// True if this is the control that every run with the observer asks.
     #[must_use]
     pub fn is_standing(&self) -> bool {
-        Control::from_model_name(&self.subject.model)
-            .is_some_and(|control| Control::DEFAULTS.contains(&control))
+        Control::from_model_name(&self.subject.model).is_some_and(|control| Control::DEFAULTS.contains(&control))
     }
 
     /// True if this is a control whose interval excludes chance, which invalidates the observer's results.
@@ -49,10 +47,8 @@ impl ObserverCell {
     pub fn is_off_chance(&self) -> bool {
         // The two means are summed in different orders.
         let tolerance = 1e-9;
-        let excludes_chance =
-            self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
-        Control::from_model_name(&self.subject.model).is_some_and(Control::removes_all_information)
-            && excludes_chance
+        let excludes_chance = self.score.low > self.chance + tolerance || self.score.high < self.chance - tolerance;
+        Control::from_model_name(&self.subject.model).is_some_and(Control::removes_all_information) && excludes_chance
     }
 }
 
@@ -74,10 +70,7 @@ impl ObserverSummary {
         for trial in trials.iter() {
             if trial.observed().is_some() {
                 let key = trial.item().key();
-                items
-                    .entry(ModelInCondition::from_trial(trial))
-                    .or_default()
-                    .insert(key, trial);
+                items.entry(ModelInCondition::from_trial(trial)).or_default().insert(key, trial);
             }
         }
         let mut by_control = BTreeMap::<&str, Vec<TrialRef<'_>>>::new();
@@ -85,19 +78,14 @@ impl ObserverSummary {
         for (subject, trials) in &items {
             let trials: Vec<TrialRef<'_>> = trials.values().copied().collect();
             if is_control(&subject.model) {
-                by_control
-                    .entry(&subject.model)
-                    .or_default()
-                    .extend(&trials);
+                by_control.entry(&subject.model).or_default().extend(&trials);
             }
             cells.extend(cell(subject.clone(), &trials, clusters));
         }
         Self {
             controls: by_control
                 .into_iter()
-                .filter_map(|(model, trials)| {
-                    cell(ModelInCondition::new(model, None), &trials, clusters)
-                })
+                .filter_map(|(model, trials)| cell(ModelInCondition::new(model, None), &trials, clusters))
                 .collect(),
             cells,
         }
@@ -106,18 +94,13 @@ impl ObserverSummary {
     /// True if the observer was asked with images.
     #[must_use]
     pub fn is_asked(&self) -> bool {
-        self.cells
-            .iter()
-            .any(|cell| is_observer(&cell.subject.model))
+        self.cells.iter().any(|cell| is_observer(&cell.subject.model))
     }
 
-    /// Controls that are not at chance, over all conditions or in one. The intervals are not corrected for the number of conditions: it is
-    /// better to hide a sound observer than to show a broken one.
+    /// Controls that are not at chance, over all conditions or in one. The intervals are not corrected for the number
+    /// of conditions: it is better to hide a sound observer than to show a broken one.
     pub fn failed_controls(&self) -> impl Iterator<Item = &ObserverCell> {
-        self.controls
-            .iter()
-            .chain(&self.cells)
-            .filter(|cell| cell.is_off_chance())
+        self.controls.iter().chain(&self.cells).filter(|cell| cell.is_off_chance())
     }
 
     /// True if the observer's results must not be shown: a control is not at chance, or no control was asked.
@@ -146,22 +129,13 @@ impl ObserverSummary {
     #[must_use]
     pub fn control_of(&self, cell: &ObserverCell) -> Option<&ObserverCell> {
         // If several runs are compared, each may have its own control.
-        let run = cell
-            .subject
-            .model
-            .strip_prefix(OBSERVER)
-            .unwrap_or_default();
-        Control::DEFAULTS
-            .into_iter()
-            .map(Control::model_name)
-            .flat_map(|name| [format!("{name}{run}"), name])
-            .find_map(|model| {
-                let subject = ModelInCondition {
-                    model,
-                    ..cell.subject.clone()
-                };
+        let run = cell.subject.model.strip_prefix(OBSERVER).unwrap_or_default();
+        Control::DEFAULTS.into_iter().map(Control::model_name).flat_map(|name| [format!("{name}{run}"), name]).find_map(
+            |model| {
+                let subject = ModelInCondition { model, ..cell.subject.clone() };
                 self.cells.iter().find(|other| other.subject == subject)
-            })
+            },
+        )
     }
 }
 
@@ -169,11 +143,7 @@ impl ObserverSummary {
 type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
 
 /// Computes the result of some trials; `None` without trials of frames that have a cluster.
-fn cell(
-    subject: ModelInCondition,
-    trials: &[TrialRef<'_>],
-    clusters: &Clusters,
-) -> Option<ObserverCell> {
+fn cell(subject: ModelInCondition, trials: &[TrialRef<'_>], clusters: &Clusters) -> Option<ObserverCell> {
     let mut sums = vec![(0.0, 0.0); clusters.count()];
     let mut frames = BTreeMap::<(&FrameId, String), &Observed>::new();
     let (mut guesses, mut evidence, mut n) = (0.0, 0, 0);
@@ -205,7 +175,8 @@ fn cell(
         explained += f64::from(frame.explained_ppm) / 1e6;
     }
     let things = things.max(1) as f64;
-    // A guess scores exactly 1 / k and adds no noise, so only the answers from evidence count for the noise of the score.
+    // A guess scores exactly 1 / k and adds no noise, so only the answers from evidence count for the noise of the
+    // score.
     let max_weight = n as f64 / f64::max(evidence as f64, 1.0);
     Some(ObserverCell {
         subject,
@@ -225,12 +196,7 @@ mod tests {
     fn cell(model: &str, [value, low, high]: [f64; 3]) -> ObserverCell {
         ObserverCell {
             subject: ModelInCondition::new(model, None),
-            score: Estimate {
-                value,
-                low,
-                high,
-                n: 100,
-            },
+            score: Estimate { value, low, high, n: 100 },
             chance: 0.3,
             evidence: 0.0,
             seen: 0.0,
@@ -255,10 +221,7 @@ mod tests {
             assert!(summary(control, above, chance).is_hidden());
             assert!(summary(control, chance, above).is_hidden());
         }
-        assert!(
-            !summary("observer:shift-4", above, above).is_hidden(),
-            "a limit refutes nothing"
-        );
+        assert!(!summary("observer:shift-4", above, above).is_hidden(), "a limit refutes nothing");
         let mut alone = summary("observer:tiles", chance, chance);
         alone.cells.pop();
         assert!(alone.is_hidden(), "without a control");

@@ -1,11 +1,12 @@
 //! [`PlannedSample`]: the difference that a planned run can detect, computed before any request.
 //!
-//! Paired answers right or wrong are a matched-pairs design. With n pairs, a share ψ of which differ between the two sides, a difference δ
-//! is detected with power 1 − β at level α if n δ² = D (t₁₋α⁄₂ √ψ + t₁₋β √(ψ − δ²))² (Connett, Smith and McHugh 1987, Stat. Med. 6:53). D
-//! is the design effect of clusters of unequal sizes m, 1 + (Σm² / Σm − 1) ρ (Eldridge, Ashby and Kerry 2006, Int. J. Epidemiol. 35:1292,
-//! with its cv of the sizes written out). The quantiles are those of Student's t, with the degrees of freedom that the test finds on
-//! average ([`degrees_of_freedom`](crate::statistics::quantiles)): half the number C of clusters, whose sums have a kurtosis of about 3; C
-//! − 1 if pairs are independent.
+//! Paired answers right or wrong are a matched-pairs design. With n pairs, a share ψ of which differ between the two
+//! sides, a difference δ is detected with power 1 − β at level α if n δ² = D (t₁₋α⁄₂ √ψ + t₁₋β √(ψ − δ²))² (Connett,
+//! Smith and McHugh 1987, Stat. Med. 6:53). D is the design effect of clusters of unequal sizes m, 1 + (Σm² / Σm − 1) ρ
+//! (Eldridge, Ashby and Kerry 2006, Int. J. Epidemiol. 35:1292, with its cv of the sizes written out). The quantiles
+//! are those of Student's t, with the degrees of freedom that the test finds on average
+//! ([`degrees_of_freedom`](crate::statistics::quantiles)): half the number C of clusters, whose sums have a kurtosis of
+//! about 3; C − 1 if pairs are independent.
 //!
 //! ψ and ρ are not known before a run, so both are assumed: [`CHANGED`] and [`CORRELATION`].
 
@@ -15,8 +16,8 @@ use super::comparisons::paired::POWER;
 use super::significance::least_p;
 use crate::statistics::quantiles::quantile;
 
-/// Share of the answers that change between two conditions without any effect, half of them in each direction; assumed. It is that of the
-/// simulated runs of `src/docs/numbers.md`.
+/// Share of the answers that change between two conditions without any effect, half of them in each direction; assumed.
+/// It is that of the simulated runs of `src/docs/numbers.md`.
 pub const CHANGED: f64 = 0.2;
 
 /// Correlation of the changes of answers within a cluster; assumed.
@@ -55,8 +56,7 @@ impl PlannedSample {
         let design = Design::new(self);
         let mut low = 0.0;
         let mut high = 1.0;
-        let is_possible =
-            least_p(self.questions.len()) < self.level && design.detects(high, clusters);
+        let is_possible = least_p(self.questions.len()) < self.level && design.detects(high, clusters);
         // Bisection: the power grows with the difference.
         for _ in 0..40 {
             let middle = f64::midpoint(low, high);
@@ -66,10 +66,7 @@ impl PlannedSample {
                 low = middle;
             }
         }
-        Detectable {
-            difference: is_possible.then_some(high),
-            clusters_for_target: design.clusters_for(TARGET),
-        }
+        Detectable { difference: is_possible.then_some(high), clusters_for_target: design.clusters_for(TARGET) }
     }
 }
 
@@ -115,17 +112,12 @@ impl Design {
     /// True if a difference is detected with [`POWER`] in this number of clusters like these.
     fn detects(&self, difference: f64, clusters: f64) -> bool {
         let n = self.pairs * clusters;
-        // An effect reverses some answers that would change in the other direction, and changes some that would not change.
+        // An effect reverses some answers that would change in the other direction, and changes some that would not
+        // change.
         let changed = (CHANGED + difference / 2.0).max(difference);
-        let degrees = if self.effect > 1.0 {
-            clusters / 2.0
-        } else {
-            clusters - 1.0
-        };
-        let [test, power] =
-            [1.0 - self.level / 2.0, POWER].map(|share| quantile(share, degrees.max(1.0)));
-        let spread =
-            test * changed.sqrt() + power * (changed - difference * difference).max(0.0).sqrt();
+        let degrees = if self.effect > 1.0 { clusters / 2.0 } else { clusters - 1.0 };
+        let [test, power] = [1.0 - self.level / 2.0, POWER].map(|share| quantile(share, degrees.max(1.0)));
+        let spread = test * changed.sqrt() + power * (changed - difference * difference).max(0.0).sqrt();
         n * difference * difference >= self.effect * spread * spread
     }
 }
@@ -140,12 +132,7 @@ mod tests {
 
     /// Smallest effect that one model can show in clusters of equally many questions.
     fn detectable(clusters: usize, questions: usize, level: f64) -> Detectable {
-        PlannedSample {
-            questions: vec![questions; clusters],
-            models: 1,
-            level,
-        }
-        .detectable()
+        PlannedSample { questions: vec![questions; clusters], models: 1, level }.detectable()
     }
 
     #[test]
@@ -168,8 +155,8 @@ mod tests {
         assert!(found <= TARGET + 1e-6 && found_in_fewer > TARGET);
     }
 
-    /// Share of simulated samples in which a difference is detected. Changes of a cluster are correlated because some items take the
-    /// draw of their cluster.
+    /// Share of simulated samples in which a difference is detected. Changes of a cluster are correlated because some
+    /// items take the draw of their cluster.
     fn power(sample: &PlannedSample, difference: f64, random: &mut StdRng) -> f64 {
         let runs = 400;
         let changed = CHANGED + difference / 2.0;
@@ -186,11 +173,7 @@ mod tests {
                             let net: i64 = (0..sample.models)
                                 .map(|_| {
                                     let is_common = random.random_bool(CORRELATION.sqrt());
-                                    let draw = if is_common {
-                                        common
-                                    } else {
-                                        random.random_range(0.0..1.0)
-                                    };
+                                    let draw = if is_common { common } else { random.random_range(0.0..1.0) };
                                     if draw < better {
                                         1
                                     } else if draw < changed {
@@ -203,10 +186,7 @@ mod tests {
                             squares += (net * net) as f64;
                             net
                         });
-                        ClusterNet {
-                            net: nets.sum(),
-                            items: *items as u32,
-                        }
+                        ClusterNet { net: nets.sum(), items: *items as u32 }
                     })
                     .collect();
                 PairedTest::new(&clusters, sample.models as f64, squares).p < sample.level
@@ -226,17 +206,10 @@ mod tests {
             (uneven, 3, 0.05),
             (vec![1; 300], 1, 0.01),
         ] {
-            let sample = PlannedSample {
-                questions,
-                models,
-                level,
-            };
+            let sample = PlannedSample { questions, models, level };
             let difference = sample.detectable().difference.unwrap();
             let found = power(&sample, difference, &mut random);
-            assert!(
-                (0.7..0.9).contains(&found),
-                "{sample:?} {difference}: {found}"
-            );
+            assert!((0.7..0.9).contains(&found), "{sample:?} {difference}: {found}");
         }
     }
 }

@@ -29,36 +29,30 @@ enum NamedBy {
 
 /// A file name that begins with a numbered place, such as `scene0001_00` or `room-12.`.
 static NUMBERED_PLACE: LazyLock<Option<Regex>> = LazyLock::new(|| {
-    let places = "scene|room|house|home|apartment|building|place|location|site|video|clip|sequence|seq|episode|walk|trajectory";
-    Regex::new(&format!(
-        r"(?i)^((?:{places})[ _-]?[0-9]+)(?:[^0-9a-z].*)?$"
-    ))
-    .ok()
+    let places =
+        "scene|room|house|home|apartment|building|place|location|site|video|clip|sequence|seq|episode|walk|trajectory";
+    Regex::new(&format!(r"(?i)^((?:{places})[ _-]?[0-9]+)(?:[^0-9a-z].*)?$")).ok()
 });
 
 /// Number of scenes that a message names.
 const MAX_NAMED: usize = 2;
 
 impl SuggestedScenes {
-    /// Guesses scenes from the folders or the beginnings of the file names of these frames. `None` if each scene would have one frame, or
-    /// if one scene would have all frames.
+    /// Guesses scenes from the folders or the beginnings of the file names of these frames. `None` if each scene would
+    /// have one frame, or if one scene would have all frames.
     #[must_use]
     pub fn new<'f>(frames: impl IntoIterator<Item = &'f FrameId>) -> Option<Self> {
         let frames: BTreeSet<&str> = frames.into_iter().map(|frame| &*frame.0).collect();
         Self::grouped(&frames, NamedBy::Folder, folder)
             .or_else(|| Self::grouped(&frames, NamedBy::FileName, numbered_place))
             .or_else(|| {
-                Self::grouped(&frames, NamedBy::FileName, before_number)
-                    .filter(|found| found.scenes >= MIN_CLUSTERS)
+                Self::grouped(&frames, NamedBy::FileName, before_number).filter(|found| found.scenes >= MIN_CLUSTERS)
             })
     }
 
-    /// Groups frames by scene, which `scene_of` finds in the name. `None` if a name has no scene or the groups are unlikely to be scenes.
-    fn grouped(
-        frames: &BTreeSet<&str>,
-        by: NamedBy,
-        scene_of: fn(&str) -> Option<String>,
-    ) -> Option<Self> {
+    /// Groups frames by scene, which `scene_of` finds in the name. `None` if a name has no scene or the groups are
+    /// unlikely to be scenes.
+    fn grouped(frames: &BTreeSet<&str>, by: NamedBy, scene_of: fn(&str) -> Option<String>) -> Option<Self> {
         let mut scenes = BTreeMap::<String, usize>::new();
         for frame in frames {
             *scenes.entry(scene_of(frame)?).or_default() += 1;
@@ -81,11 +75,7 @@ impl SuggestedScenes {
             NamedBy::Folder => "Folders",
             NamedBy::FileName => "File names",
         };
-        let more = if self.scenes > self.examples.len() {
-            ", …"
-        } else {
-            ""
-        };
+        let more = if self.scenes > self.examples.len() { ", …" } else { "" };
         format!(
             "{names} suggest {} scenes ({}{more}), but the data name none, so the {} frames count as independent",
             self.scenes,
@@ -140,34 +130,14 @@ mod tests {
     #[test]
     fn folders_and_numbered_places_suggest_scenes() {
         for (frames, scenes, first) in [
-            (
-                names(42, |i| format!("scene{:04}_{i}.png", i % 19)),
-                19,
-                "scene0000",
-            ),
-            (
-                names(12, |i| format!("scene{:04}_00_{i:06}.jpg", i / 3)),
-                4,
-                "scene0000",
-            ),
+            (names(42, |i| format!("scene{:04}_{i}.png", i % 19)), 19, "scene0000"),
+            (names(12, |i| format!("scene{:04}_00_{i:06}.jpg", i / 3)), 4, "scene0000"),
             (names(9, |i| format!("Room-{}.{i}.png", i % 3)), 3, "Room-0"),
             (names(20, |i| format!("{}/{i}.png", i / 4)), 5, "0"),
-            (
-                names(20, |i| format!("images/k{}/{i}.png", i / 4)),
-                5,
-                "images/k0",
-            ),
-            (
-                names(40, |i| format!("kitchen{}-a_{i:03}.png", i / 4)),
-                10,
-                "kitchen0-a",
-            ),
+            (names(20, |i| format!("images/k{}/{i}.png", i / 4)), 5, "images/k0"),
+            (names(40, |i| format!("kitchen{}-a_{i:03}.png", i / 4)), 10, "kitchen0-a"),
         ] {
-            assert_eq!(
-                suggested(&frames),
-                Some((scenes, first.to_owned())),
-                "{frames:?}"
-            );
+            assert_eq!(suggested(&frames), Some((scenes, first.to_owned())), "{frames:?}");
         }
     }
 

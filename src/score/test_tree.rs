@@ -1,14 +1,16 @@
 //! Multiple-testing correction over a tree of tests: [`adjust_p_values`].
 //!
-//! The significance level of 5 % is divided between the branches in proportion to their weights. A test below another one starts only after
-//! that one is rejected, and inherits its share. Single levels can therefore be tested after their mean, one after the other, at no
-//! additional cost. When all tests of a branch are rejected, its share goes to its sibling branches. If all tests are leaves of equal
-//! weight, this is Holm's procedure (Holm 1979, Scand. J. Stat. 6:65); a single chain of tests is a fixed sequence.
+//! The significance level of 5 % is divided between the branches in proportion to their weights. A test below another
+//! one starts only after that one is rejected, and inherits its share. Single levels can therefore be tested after
+//! their mean, one after the other, at no additional cost. When all tests of a branch are rejected, its share goes to
+//! its sibling branches. If all tests are leaves of equal weight, this is Holm's procedure (Holm 1979, Scand. J. Stat.
+//! 6:65); a single chain of tests is a fixed sequence.
 //!
-//! Shares never shrink while tests are rejected, and never add up to more than 1. The probability that any true hypothesis is rejected is
-//! therefore at most 5 %, whichever others are false and however the tests depend on each other (Goeman and Solari 2010, Ann. Stat.
-//! 38:3782, theorem 1; Goeman and Finos 2012, Stat. Appl. Genet. Mol. Biol. 11(1):11, for trees; Bretz, Maurer, Brannath and Posch 2009,
-//! Stat. Med. 28:586, for weights that pass from test to test).
+//! Shares never shrink while tests are rejected, and never add up to more than 1. The probability that any true
+//! hypothesis is rejected is therefore at most 5 %, whichever others are false and however the tests depend on each
+//! other (Goeman and Solari 2010, Ann. Stat. 38:3782, theorem 1; Goeman and Finos 2012, Stat. Appl. Genet. Mol. Biol.
+//! 11(1):11, for trees; Bretz, Maurer, Brannath and Posch 2009, Stat. Med. 28:586, for weights that pass from test to
+//! test).
 
 /// A test and the branches that start after its rejection, or a group of branches that start together.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,32 +30,19 @@ impl<T> TestTree<T> {
 
     /// Creates a test with branches that start once it is rejected.
     pub(super) fn with_branches(test: T, branches: Vec<Self>) -> Self {
-        Self {
-            test: Some(test),
-            weight: 1.0,
-            branches,
-        }
+        Self { test: Some(test), weight: 1.0, branches }
     }
 
     /// Creates a group of branches that start together; branches without a test are left out.
     pub(super) fn group(branches: impl IntoIterator<Item = Self>) -> Self {
-        Self {
-            test: None,
-            weight: 1.0,
-            branches: branches
-                .into_iter()
-                .filter(|branch| !branch.is_empty())
-                .collect(),
-        }
+        Self { test: None, weight: 1.0, branches: branches.into_iter().filter(|branch| !branch.is_empty()).collect() }
     }
 
     /// Creates a chain of tests: each starts once the previous one is rejected.
     pub(super) fn chain(tests: impl DoubleEndedIterator<Item = T>) -> Self {
         tests
             .rev()
-            .fold(None, |below, test| {
-                Some(Self::with_branches(test, below.into_iter().collect()))
-            })
+            .fold(None, |below, test| Some(Self::with_branches(test, below.into_iter().collect())))
             .unwrap_or_else(|| Self::group([]))
     }
 
@@ -92,17 +81,13 @@ impl<T: Copy> Branch<T> {
             test: tree.test.map(|test| (test, p(test))),
             rejected: None,
             weight: tree.weight,
-            branches: tree
-                .branches
-                .iter()
-                .map(|branch| Self::new(branch, p))
-                .collect(),
+            branches: tree.branches.iter().map(|branch| Self::new(branch, p)).collect(),
             remaining: tree.count(),
         }
     }
 
-    /// Finds the started test with the smallest ratio of its p-value to its share of the level; `share` is the share of this branch. Returns
-    /// the ratio and appends the indices of the branches that lead to the test to `path`.
+    /// Finds the started test with the smallest ratio of its p-value to its share of the level; `share` is the share of
+    /// this branch. Returns the ratio and appends the indices of the branches that lead to the test to `path`.
     fn next(&self, share: f64, path: &mut Vec<usize>) -> Option<f64> {
         if let (Some((_, p)), None) = (self.test, self.rejected) {
             return Some(p / share);
@@ -124,10 +109,7 @@ impl<T: Copy> Branch<T> {
 
     /// Branches with tests that are not yet rejected, by index.
     fn unfinished(&self) -> impl Iterator<Item = (usize, &Self)> {
-        self.branches
-            .iter()
-            .enumerate()
-            .filter(|(_, branch)| branch.remaining > 0)
+        self.branches.iter().enumerate().filter(|(_, branch)| branch.remaining > 0)
     }
 
     /// Rejects the test at the end of a path.
@@ -150,7 +132,8 @@ impl<T: Copy> Branch<T> {
     }
 }
 
-/// Returns all tests with their corrected p-values; `p` gives the p-value of a test. Tests with a corrected p-value below 0.05 are rejected.
+/// Returns all tests with their corrected p-values; `p` gives the p-value of a test. Tests with a corrected p-value
+/// below 0.05 are rejected.
 #[must_use]
 pub(super) fn adjust_p_values<T: Copy>(tree: &TestTree<T>, p: impl Fn(T) -> f64) -> Vec<(T, f64)> {
     let mut root = Branch::new(tree, &p);
@@ -173,10 +156,7 @@ mod tests {
 
     /// Corrected p-values of tests, each represented by its p-value.
     fn corrected(tree: &TestTree<f64>) -> Vec<f64> {
-        adjust_p_values(tree, |p| p)
-            .into_iter()
-            .map(|(_, p)| (p * 1e9).round() / 1e9)
-            .collect()
+        adjust_p_values(tree, |p| p).into_iter().map(|(_, p)| (p * 1e9).round() / 1e9).collect()
     }
 
     fn leaves(values: &[f64]) -> TestTree<f64> {
@@ -210,10 +190,7 @@ mod tests {
 
     #[test]
     fn finished_branch_passes_its_share_to_siblings() {
-        let found = corrected(&TestTree::group([
-            leaves(&[0.001, 0.002]),
-            TestTree::leaf(0.03),
-        ]));
+        let found = corrected(&TestTree::group([leaves(&[0.001, 0.002]), TestTree::leaf(0.03)]));
         // 0.001 · 2 · 2, then 0.002 · 2, then 0.03 alone.
         assert_eq!(found, [0.004, 0.004, 0.03]);
     }
@@ -223,10 +200,7 @@ mod tests {
         let heavy = TestTree::leaf(0.03).with_weight(3.0);
         let found = corrected(&TestTree::group([heavy, TestTree::leaf(0.04), leaves(&[])]));
         assert_eq!(found, [0.04, 0.04]);
-        let found = corrected(&TestTree::group([
-            TestTree::leaf(0.01),
-            TestTree::leaf(0.5).with_weight(3.0),
-        ]));
+        let found = corrected(&TestTree::group([TestTree::leaf(0.01), TestTree::leaf(0.5).with_weight(3.0)]));
         assert_eq!(found, [0.04, 0.5]);
     }
 

@@ -41,7 +41,8 @@ enum Test {
     Fidelity,
 }
 
-/// Weight of each main question: the cost of darkness, the effect of each enhancer, the best model, and photographs in the dark.
+/// Weight of each main question: the cost of darkness, the effect of each enhancer, the best model, and photographs in
+/// the dark.
 const MAIN: f64 = 1.0;
 
 /// Weight of the noise tests, if the run has noise as well as the exposure drop.
@@ -50,7 +51,8 @@ const NOISE: f64 = 0.5;
 /// Weight of all other questions together. They concern how accuracy is lost, not how much.
 const FURTHER: f64 = 0.5;
 
-/// Weight of a secondary variant relative to a main one (1). Sentences name it only if its result differs from that of the main one.
+/// Weight of a secondary variant relative to a main one (1). Sentences name it only if its result differs from that of
+/// the main one.
 const OTHER_VARIANT: f64 = 0.25;
 
 type Tests = TestTree<Test>;
@@ -67,8 +69,8 @@ pub struct RunContents {
 }
 
 impl RunContents {
-    /// Significance level of the first test of an enhancer at the darker levels of one variant; without enhancers, of the first test of
-    /// the cost of darkness. Later tests of the same question have this level or a larger one.
+    /// Significance level of the first test of an enhancer at the darker levels of one variant; without enhancers, of
+    /// the first test of the cost of darkness. Later tests of the same question have this level or a larger one.
     #[must_use]
     pub fn first_significance_level(self) -> f64 {
         let rank = u32::from(self.models > 1);
@@ -97,8 +99,8 @@ impl Findings<'_> {
         self.correct_comparisons_of_one_model();
     }
 
-    /// Copies the corrected p-values of the pooled findings about a single model to the comparisons of the same two sides: a sentence about
-    /// one is about the other.
+    /// Copies the corrected p-values of the pooled findings about a single model to the comparisons of the same two
+    /// sides: a sentence about one is about the other.
     fn correct_comparisons_of_one_model(&mut self) {
         let mut corrected = HashMap::new();
         for finding in &self.pooled {
@@ -109,21 +111,13 @@ impl Findings<'_> {
                 PooledKind::Darkness => ComparisonKind::Level,
                 PooledKind::Noise => ComparisonKind::Variant,
                 PooledKind::Enhancer => ComparisonKind::Enhancer,
-                PooledKind::Blind if finding.blind_models == [model.clone()] => {
-                    ComparisonKind::Blind
-                }
+                PooledKind::Blind if finding.blind_models == [model.clone()] => ComparisonKind::Blind,
                 PooledKind::EnhancerPair | PooledKind::Blind | PooledKind::Hallucination(_) => {
                     continue;
                 }
             };
             if finding.family.is_none() {
-                let sides = (
-                    kind,
-                    &**model,
-                    finding.level,
-                    &finding.variant,
-                    &finding.enhancer,
-                );
+                let sides = (kind, &**model, finding.level, &finding.variant, &finding.enhancer);
                 let p = [finding.strict.p_report, finding.lenient.p_report];
                 corrected.insert(sides, p);
             }
@@ -134,13 +128,7 @@ impl Findings<'_> {
                 continue;
             };
             let is_own = comparison.second.model == first.model && comparison.family.is_none();
-            let sides = (
-                comparison.kind,
-                &*first.model,
-                level,
-                &first.variant,
-                &first.enhancer,
-            );
+            let sides = (comparison.kind, &*first.model, level, &first.variant, &first.enhancer);
             if let Some([strict, lenient]) = corrected.get(&sides).filter(|_| is_own) {
                 comparison.strict.p_report = *strict;
                 comparison.lenient.p_report = *lenient;
@@ -153,21 +141,14 @@ impl Findings<'_> {
 fn report_tests(findings: &Findings<'_>) -> Tests {
     let sets = pooled_sets(findings);
     let enhancers: BTreeSet<&EnhancerName> = sets.iter().filter_map(|set| set.enhancer).collect();
-    let best = findings
-        .best
-        .as_ref()
-        .filter(|best| best.is_possible())
-        .map(|best| {
-            let levels = 0..best.lighter.len() + best.levels.len();
-            [
-                TestTree::chain([Test::Best, Test::Sees].into_iter()),
-                TestTree::group(levels.map(|level| TestTree::leaf(Test::Lead(level)))),
-            ]
-        });
-    let fidelity = findings
-        .fidelity
-        .as_ref()
-        .filter(|fidelity| fidelity.within[0].is_some());
+    let best = findings.best.as_ref().filter(|best| best.is_possible()).map(|best| {
+        let levels = 0..best.lighter.len() + best.levels.len();
+        [
+            TestTree::chain([Test::Best, Test::Sees].into_iter()),
+            TestTree::group(levels.map(|level| TestTree::leaf(Test::Lead(level)))),
+        ]
+    });
+    let fidelity = findings.fidelity.as_ref().filter(|fidelity| fidelity.within[0].is_some());
     let further = [
         kind_tests(findings, &sets, PooledKind::Blind),
         below_blind(findings),
@@ -205,16 +186,11 @@ fn kind_tests(findings: &Findings<'_>, sets: &[PooledSet<'_>], kind: PooledKind)
     TestTree::group(own.map(|set| set.tests(findings)))
 }
 
-/// True for a main variant: it has the last degradation kind of its root, or no kind. Sentences about all other variants are limited to
-/// the cost of darkness.
+/// True for a main variant: it has the last degradation kind of its root, or no kind. Sentences about all other
+/// variants are limited to the cost of darkness.
 fn is_main(grid: &Grid<'_>, variant: &Variant) -> bool {
     let root = variant.kind.map(Kind::root);
-    let last = grid
-        .variants()
-        .into_iter()
-        .map(|other| other.kind)
-        .filter(|kind| kind.map(Kind::root) == root)
-        .max();
+    let last = grid.variants().into_iter().map(|other| other.kind).filter(|kind| kind.map(Kind::root) == root).max();
     variant.kind.is_none() || last == Some(variant.kind)
 }
 
@@ -232,23 +208,14 @@ fn pooled_sets<'f>(findings: &'f Findings<'_>) -> Vec<PooledSet<'f>> {
     let mut sets: Vec<PooledSet<'f>> = Vec::new();
     for (index, finding) in findings.pooled.iter().enumerate() {
         // No sentence is about two enhancers.
-        if finding.family.as_ref() != finding.kind.only_family()
-            || finding.kind == PooledKind::EnhancerPair
-        {
+        if finding.family.as_ref() != finding.kind.only_family() || finding.kind == PooledKind::EnhancerPair {
             continue;
         }
         let (kind, variant, enhancer) = (finding.kind, &finding.variant, finding.enhancer.as_ref());
-        let known = sets
-            .iter_mut()
-            .find(|set| (set.kind, set.variant, set.enhancer) == (kind, variant, enhancer));
+        let known = sets.iter_mut().find(|set| (set.kind, set.variant, set.enhancer) == (kind, variant, enhancer));
         match known {
             Some(set) => set.levels.push((index, finding)),
-            None => sets.push(PooledSet {
-                kind,
-                variant,
-                enhancer,
-                levels: vec![(index, finding)],
-            }),
+            None => sets.push(PooledSet { kind, variant, enhancer, levels: vec![(index, finding)] }),
         }
     }
     sets.retain(|set| {
@@ -260,22 +227,17 @@ fn pooled_sets<'f>(findings: &'f Findings<'_>) -> Vec<PooledSet<'f>> {
 }
 
 impl PooledSet<'_> {
-    /// Tree of the tests of the set. Single levels come after their mean: the severe ones from the darkest level, the mild ones from the
-    /// brightest. If the effect grows with the level, all levels come after the means, from the darkest one.
+    /// Tree of the tests of the set. Single levels come after their mean: the severe ones from the darkest level, the
+    /// mild ones from the brightest. If the effect grows with the level, all levels come after the means, from the
+    /// darkest one.
     fn tests(&self, findings: &Findings<'_>) -> Tests {
-        let weight = if is_main(&findings.grid, self.variant) {
-            1.0
-        } else {
-            OTHER_VARIANT
-        };
+        let weight = if is_main(&findings.grid, self.variant) { 1.0 } else { OTHER_VARIANT };
         let averaged: Vec<(usize, &PooledFinding)> = findings
             .averaged
             .iter()
             .enumerate()
             .filter(|(_, mean)| {
-                mean.kind == self.kind
-                    && mean.variant == *self.variant
-                    && mean.enhancer.as_ref() == self.enhancer
+                mean.kind == self.kind && mean.variant == *self.variant && mean.enhancer.as_ref() == self.enhancer
             })
             .collect();
         if self.kind.grows_with_the_level() {
@@ -306,8 +268,8 @@ impl PooledSet<'_> {
     }
 }
 
-/// Comparisons of each family and model with the blind baseline, in order from the darkest level. If several models are pooled, each is also
-/// compared over all families.
+/// Comparisons of each family and model with the blind baseline, in order from the darkest level. If several models are
+/// pooled, each is also compared over all families.
 fn below_blind(findings: &Findings<'_>) -> Tests {
     let mut chains = BTreeMap::<_, Vec<Test>>::new();
     for (index, comparison) in findings.comparisons.iter().enumerate() {
@@ -316,30 +278,17 @@ fn below_blind(findings: &Findings<'_>) -> Tests {
             && is_main(&findings.grid, &first.variant)
             && comparison.strict.significance.is_possible()
         {
-            let key = (
-                &first.model,
-                &second.model,
-                &comparison.family,
-                &first.variant,
-            );
+            let key = (&first.model, &second.model, &comparison.family, &first.variant);
             chains.entry(key).or_default().push(Test::Comparison(index));
         }
     }
-    TestTree::group(
-        chains
-            .into_values()
-            .map(|tests| TestTree::chain(tests.into_iter().rev())),
-    )
+    TestTree::group(chains.into_values().map(|tests| TestTree::chain(tests.into_iter().rev())))
 }
 
 /// Tests on dark photographs: the cost of darkness, the difference from synthetic images, and the effect of enhancers.
 fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
     let models = models_under_test(findings.grid.subjects.iter().map(|subject| &*subject.model));
-    let kinds = [
-        ComparisonKind::Level,
-        ComparisonKind::RealSynthetic,
-        ComparisonKind::RealEnhanced,
-    ];
+    let kinds = [ComparisonKind::Level, ComparisonKind::RealSynthetic, ComparisonKind::RealEnhanced];
     kinds
         .map(|kind| {
             TestTree::group(
@@ -362,7 +311,8 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
         .into()
 }
 
-/// Subjects with raw images at the darkest level of each main variant, limited to the models that findings are pooled over.
+/// Subjects with raw images at the darkest level of each main variant, limited to the models that findings are pooled
+/// over.
 fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
     let grid = &findings.grid;
     let raw: Vec<&ModelInCondition> = grid
@@ -372,19 +322,14 @@ fn darkest<'f>(findings: &'f Findings<'_>) -> Vec<&'f ModelInCondition> {
             subject.enhancer.is_none()
                 && subject.variant.kind.is_some()
                 && is_main(grid, &subject.variant)
-                && findings
-                    .models_of(&subject.variant)
-                    .contains(&&*subject.model)
+                && findings.models_of(&subject.variant).contains(&&*subject.model)
         })
         .collect();
     raw.iter()
         .copied()
         .filter(|subject| {
-            let darkest = raw
-                .iter()
-                .filter(|other| other.variant == subject.variant)
-                .filter_map(|other| other.level)
-                .max();
+            let darkest =
+                raw.iter().filter(|other| other.variant == subject.variant).filter_map(|other| other.level).max();
             subject.level == darkest
         })
         .collect()
@@ -398,9 +343,7 @@ fn collapses(findings: &Findings<'_>) -> Tests {
             .confusions
             .iter()
             .enumerate()
-            .filter(|(_, confusion)| {
-                darkest.contains(&&confusion.subject) && against_clean(confusion).is_some()
-            })
+            .filter(|(_, confusion)| darkest.contains(&&confusion.subject) && against_clean(confusion).is_some())
             .map(|(index, _)| TestTree::leaf(Test::Collapse(index))),
     )
 }
@@ -416,10 +359,11 @@ fn confidence(findings: &Findings<'_>) -> Tests {
         return TestTree::group([]);
     }
     let darkest = darkest(findings);
-    let tested =
-        findings.calibrations.iter().enumerate().filter(|(_, row)| {
-            row.replies >= MIN_CONFIDENT_REPLIES && darkest.contains(&&row.subject)
-        });
+    let tested = findings
+        .calibrations
+        .iter()
+        .enumerate()
+        .filter(|(_, row)| row.replies >= MIN_CONFIDENT_REPLIES && darkest.contains(&&row.subject));
     TestTree::group(tested.map(|(index, row)| {
         let grown = row.growth.map(|_| TestTree::leaf(Test::Growth(index)));
         TestTree::with_branches(Test::Overconfident(index), grown.into_iter().collect())
@@ -427,7 +371,8 @@ fn confidence(findings: &Findings<'_>) -> Tests {
 }
 
 impl Test {
-    /// p-value before correction in a parsing; 1 if the test was not computed. Confidence and fidelity exist only in strict parsing.
+    /// p-value before correction in a parsing; 1 if the test was not computed. Confidence and fidelity exist only in
+    /// strict parsing.
     fn p(self, findings: &Findings<'_>, mode: ParsingMode) -> f64 {
         let best = match mode {
             ParsingMode::Strict => findings.best.as_ref(),
@@ -439,19 +384,12 @@ impl Test {
             Self::Comparison(index) => Some(findings.comparisons[index].parsed(mode).paired.p),
             Self::Best => best.map(BestInTheDark::p_leader),
             Self::Sees => best.map(|best| best.gain.p),
-            Self::Lead(level) => {
-                best.and_then(|best| Some(best.crossing.as_ref()?.levels.get(level)?.p))
-            }
+            Self::Lead(level) => best.and_then(|best| Some(best.crossing.as_ref()?.levels.get(level)?.p)),
             Self::Families(index) => Some(findings.contrasts[index].parsed(mode).p),
-            Self::Collapse(index) => {
-                against_clean(&findings.confusions[index]).map(|clean| clean.p(mode))
-            }
+            Self::Collapse(index) => against_clean(&findings.confusions[index]).map(|clean| clean.p(mode)),
             Self::Overconfident(index) => Some(findings.calibrations[index].overconfidence.p),
             Self::Growth(index) => findings.calibrations[index].growth.map(|growth| growth.p),
-            Self::Fidelity => findings
-                .fidelity
-                .as_ref()
-                .and_then(|found| Some(found.within[0]?.p)),
+            Self::Fidelity => findings.fidelity.as_ref().and_then(|found| Some(found.within[0]?.p)),
         };
         found.unwrap_or(1.0)
     }
@@ -497,8 +435,7 @@ impl Test {
                 }
             }
             // Confidence and fidelity have one p-value, from strict parsing.
-            Self::Overconfident(_) | Self::Growth(_) | Self::Fidelity
-                if mode == ParsingMode::Lenient => {}
+            Self::Overconfident(_) | Self::Growth(_) | Self::Fidelity if mode == ParsingMode::Lenient => {}
             Self::Overconfident(index) => findings.calibrations[index].overconfidence.p_report = p,
             Self::Growth(index) => {
                 if let Some(growth) = findings.calibrations[index].growth.as_mut() {

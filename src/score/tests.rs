@@ -4,16 +4,13 @@ use super::answers::confusion::{Collapse, FalseAnswer, confusions};
 use super::choice::ParsingMode;
 use super::cluster::{Clusters, FrameTies};
 use super::comparisons::paired::PairedComparison;
-use super::comparisons::{
-    Comparison, ComparisonKind, PooledFinding, PooledKind, best_in_the_dark, pooled,
-};
+use super::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, best_in_the_dark, pooled};
 use super::findings::Findings;
 use super::grid::Grid;
 use super::model_in_condition::ModelInCondition;
 use super::significance::Significance;
 use darkqa_base::types::{
-    ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record,
-    TrialOutcome,
+    ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record, TrialOutcome,
 };
 
 /// Number of frames, each with two questions.
@@ -28,10 +25,7 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
     (0..2 * FRAMES)
         .map(|item: usize| {
             let right = answers(item);
-            let chosen = right.map(|right| ParsedAnswer {
-                chosen: Some(usize::from(!right)),
-                why: None,
-            });
+            let chosen = right.map(|right| ParsedAnswer { chosen: Some(usize::from(!right)), why: None });
             let detail = ChoiceDetail {
                 frame: FrameId(format!("f{:02}", item / 2)),
                 family: [Family::Color, Family::RoomType][item % 2].clone(),
@@ -60,18 +54,12 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
 
 /// Runs a check on the grid of records.
 pub(super) fn with_grid<T>(records: &[Record], check: impl FnOnce(&Grid<'_>) -> T) -> T {
-    let asked = records
-        .iter()
-        .map(|record| (&record.question, &record.detail.frame));
+    let asked = records.iter().map(|record| (&record.question, &record.detail.frame));
     let clusters = Clusters::new(asked, &FrameTies::default());
     check(&Grid::new(&records.iter().cloned().collect(), &clusters))
 }
 
-fn find<'f>(
-    findings: &'f [PooledFinding],
-    kind: PooledKind,
-    condition: &str,
-) -> Vec<&'f PooledFinding> {
+fn find<'f>(findings: &'f [PooledFinding], kind: PooledKind, condition: &str) -> Vec<&'f PooledFinding> {
     findings
         .iter()
         .filter(|finding| {
@@ -103,15 +91,10 @@ fn one_model_pooled_is_its_own_comparison() {
         assert_eq!((dark.items, dark.dropped, dark.clusters), (23, 1, 12));
         // Two levels: the smaller p counts twice.
         let darkest = find(&findings, PooledKind::Darkness, "L5-noise")[0];
-        assert!(
-            (darkest.strict.holm - 2.0 * darkest.strict.p).abs() < 1e-15 && darkest.levels == 2
-        );
+        assert!((darkest.strict.holm - 2.0 * darkest.strict.p).abs() < 1e-15 && darkest.levels == 2);
         assert_eq!(darkest.strict.verdict, Significance::Worse);
         // By family the clusters are the same, and the sets are corrected apart.
-        let by_family = findings
-            .iter()
-            .filter(|finding| finding.family.is_some())
-            .count();
+        let by_family = findings.iter().filter(|finding| finding.family.is_some()).count();
         assert_eq!(by_family, 4);
     });
 }
@@ -137,8 +120,8 @@ fn items_are_those_that_every_model_answered_on_both_sides() {
         assert_eq!(noise.models, ["a", "b", "c"]);
         assert!((noise.strict.difference.value + 10.0 / 22.0).abs() < 1e-12);
         assert!((noise.strict.second - 1.0).abs() < 1e-12);
-        // Frames 1 to 5 lose all, frame 0 has no item: 5 of 11 clusters differ, all in one direction. The swaps do not reject 0, so
-        // that the interval holds it.
+        // Frames 1 to 5 lose all, frame 0 has no item: 5 of 11 clusters differ, all in one direction. The swaps do not
+        // reject 0, so that the interval holds it.
         assert!((noise.strict.p - 2.0 / 32.0).abs() < 1e-12 && noise.clusters == 11);
         assert!(noise.strict.difference.high.abs() < 1e-12);
         assert!(find(&findings, PooledKind::Noise, "L5-noise").is_empty());
@@ -148,24 +131,12 @@ fn items_are_those_that_every_model_answered_on_both_sides() {
 #[test]
 fn models_are_compared_with_their_own_words_if_some_were_asked() {
     let right: Answers = |_| Some(true);
-    let base = [
-        records("a", "L3-noise", |item| Some(item % 2 == 0)),
-        records("b", "L3-noise", right),
-    ]
-    .concat();
-    let own = [
-        base.clone(),
-        records("a", "", right),
-        records("c", "", right),
-    ]
-    .concat();
+    let base = [records("a", "L3-noise", |item| Some(item % 2 == 0)), records("b", "L3-noise", right)].concat();
+    let own = [base.clone(), records("a", "", right), records("c", "", right)].concat();
     with_grid(&own, |grid| {
         let (findings, _) = pooled(grid);
         let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
-        assert_eq!(
-            (&*blind.models, &*blind.blind_models),
-            (&["a".to_owned()][..], &["a".to_owned()][..])
-        );
+        assert_eq!((&*blind.models, &*blind.blind_models), (&["a".to_owned()][..], &["a".to_owned()][..]));
         assert_eq!(blind.strict.verdict, Significance::Worse);
     });
     let other = [base, records("c", "", right), records("random", "", right)].concat();
@@ -180,11 +151,7 @@ fn models_are_compared_with_their_own_words_if_some_were_asked() {
 
 #[test]
 fn few_clusters_give_no_verdict() {
-    let mut all = [
-        records("m", "L0", |_| Some(true)),
-        records("m", "L3-noise", |_| Some(false)),
-    ]
-    .concat();
+    let mut all = [records("m", "L0", |_| Some(true)), records("m", "L3-noise", |_| Some(false))].concat();
     // Five frames: 2 / 2⁵ is above 0.05.
     all.retain(|record| *record.detail.frame.0 < *"f05");
     with_grid(&all, |grid| {
@@ -200,16 +167,8 @@ fn the_best_is_shown_better_than_every_other() {
     let mut all = Vec::new();
     let models: [(&str, Answers, Answers); 4] = [
         // At chance it loses nothing, and is not the best.
-        (
-            "guess",
-            |item| Some(item % 3 == 0),
-            |item| Some(item % 3 == 0),
-        ),
-        (
-            "good",
-            |_| Some(true),
-            |item| (item != 0).then_some(item % 8 != 0),
-        ),
+        ("guess", |item| Some(item % 3 == 0), |item| Some(item % 3 == 0)),
+        ("good", |_| Some(true), |item| (item != 0).then_some(item % 8 != 0)),
         ("same", |_| Some(true), |item| Some(item % 8 != 1)),
         ("random", |_| Some(true), |_| Some(true)),
     ];
@@ -244,11 +203,7 @@ fn the_best_is_shown_better_than_every_other() {
         assert!(best.is_shown() && best.pairs.len() == 1);
     });
     all.retain(|record| record.model != "guess");
-    assert!(with_grid(&all, |grid| best_in_the_dark(
-        grid,
-        ParsingMode::Strict
-    )
-    .is_none()));
+    assert!(with_grid(&all, |grid| best_in_the_dark(grid, ParsingMode::Strict).is_none()));
 }
 
 #[test]
@@ -300,21 +255,14 @@ fn leader_is_compared_with_its_own_replies_without_images() {
     with_grid(&all, |grid| {
         let gain = best_in_the_dark(grid, ParsingMode::Strict).unwrap().gain;
         assert!(gain.is_against_blind);
-        assert!(
-            gain.difference.value.abs() < 1e-12 && gain.p > 0.99,
-            "{gain:?}"
-        );
+        assert!(gain.difference.value.abs() < 1e-12 && gain.p > 0.99, "{gain:?}");
     });
 }
 
 #[test]
 fn families_are_compared_by_a_test() {
     let contrast = |dark: Answers| {
-        let all = [
-            records("m", "L0", |_| Some(true)),
-            records("m", "L5-noise", dark),
-        ]
-        .concat();
+        let all = [records("m", "L0", |_| Some(true)), records("m", "L5-noise", dark)].concat();
         let trials = all.iter().cloned().collect();
         let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
         findings.contrasts[0].clone()
@@ -331,24 +279,12 @@ fn families_are_compared_by_a_test() {
 
 #[test]
 fn rows_of_one_model_have_the_verdict_of_the_sentences() {
-    let one = [
-        records("m", "L0", |_| Some(true)),
-        records("m", "L5-noise", |_| Some(false)),
-    ]
-    .concat();
-    let two = [
-        one.clone(),
-        records("n", "L0", |_| Some(true)),
-        records("n", "L5-noise", |_| Some(false)),
-    ]
-    .concat();
+    let one = [records("m", "L0", |_| Some(true)), records("m", "L5-noise", |_| Some(false))].concat();
+    let two = [one.clone(), records("n", "L0", |_| Some(true)), records("n", "L5-noise", |_| Some(false))].concat();
     let verdicts = |all: &[Record]| {
         let trials = all.iter().cloned().collect();
         let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
-        let level = findings
-            .comparisons
-            .iter()
-            .find(|one| one.kind == ComparisonKind::Level && one.family.is_none());
+        let level = findings.comparisons.iter().find(|one| one.kind == ComparisonKind::Level && one.family.is_none());
         let pooled = &find(&findings.pooled, PooledKind::Darkness, "L5-noise")[0];
         (level.unwrap().verdict(), pooled.verdict())
     };
@@ -383,11 +319,7 @@ fn enhancers_are_compared_with_each_other() {
     assert!((pooled[1].strict.difference.value - 1.0).abs() < 1e-12);
     // Holm's correction is over the three pairs, and no sentence is about them.
     assert!((pooled[1].strict.holm - 3.0 * pooled[1].strict.p).abs() < 1e-12);
-    assert!(
-        pooled
-            .iter()
-            .all(|finding| finding.strict.p_report.is_none())
-    );
+    assert!(pooled.iter().all(|finding| finding.strict.p_report.is_none()));
     let single: Vec<&Comparison> = findings
         .comparisons
         .iter()
@@ -415,8 +347,8 @@ fn below_blind_is_what_the_corrected_test_shows() {
     assert_eq!(dark, ["m"]);
 }
 
-/// Records of a model about presence, two questions a frame: an object is present in the first, and absent in the second. `reply` gives the
-/// answer to a question; `true` means present.
+/// Records of a model about presence, two questions a frame: an object is present in the first, and absent in the
+/// second. `reply` gives the answer to a question; `true` means present.
 fn presence(model: &str, condition: &str, reply: fn(usize, bool) -> Option<bool>) -> Vec<Record> {
     let mut records = records(model, condition, |_| Some(true));
     for (item, record) in records.iter_mut().enumerate() {
@@ -446,10 +378,7 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
         let (findings, _) = pooled(grid);
         let [said_no, said_yes] = [FalseAnswer::No, FalseAnswer::Yes].map(|answer| {
             let kind = PooledKind::Hallucination(answer);
-            findings
-                .iter()
-                .filter(|finding| finding.kind == kind)
-                .collect::<Vec<&PooledFinding>>()
+            findings.iter().filter(|finding| finding.kind == kind).collect::<Vec<&PooledFinding>>()
         });
         assert_eq!(said_no.len(), 2);
         let (dark, darkest) = (said_no[0], said_no[1]);
@@ -471,11 +400,7 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
     });
     with_grid(&all[6 * FRAMES..], |grid| {
         let (findings, _) = pooled(grid);
-        assert!(
-            findings
-                .iter()
-                .all(|finding| finding.kind.only_family().is_none())
-        );
+        assert!(findings.iter().all(|finding| finding.kind.only_family().is_none()));
     });
 }
 

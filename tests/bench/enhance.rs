@@ -1,7 +1,7 @@
 //! What it costs to enhance an image, from bytes to bytes, at 640×360 and 1280×720.
 //!
-//! `cargo bench --bench enhance` runs the project's own model; `DARKQA_BENCH_LLIE=zero-dce:FILE.onnx` any other, in tiles of
-//! `DARKQA_BENCH_TILE` pixels or as it is by itself, on `DARKQA_BENCH_THREADS` threads or all cores.
+//! `cargo bench --bench enhance` runs the project's own model; `DARKQA_BENCH_LLIE=zero-dce:FILE.onnx` any other, in
+//! tiles of `DARKQA_BENCH_TILE` pixels or as it is by itself, on `DARKQA_BENCH_THREADS` threads or all cores.
 
 use std::env;
 use std::hint::black_box;
@@ -30,16 +30,9 @@ fn enhance(c: &mut Criterion) {
     let own = concat!(env!("CARGO_MANIFEST_DIR"), "/models/gray-gain.onnx");
     let model = env::var_os("DARKQA_BENCH_LLIE").map_or(own.into(), PathBuf::from);
     let number = |name: &str| env::var(name).ok().map(|text| text.parse().unwrap());
-    let search = RuntimeSearch {
-        library: env::var_os("ORT_DYLIB_PATH").map(PathBuf::from),
-        install: Install::Allowed,
-    };
+    let search = RuntimeSearch { library: env::var_os("ORT_DYLIB_PATH").map(PathBuf::from), install: Install::Allowed };
     let file = ModelFile::read(&model).unwrap();
-    let enhancer = Enhancer::open(
-        file,
-        &search.open().unwrap(),
-        number("DARKQA_BENCH_THREADS"),
-    );
+    let enhancer = Enhancer::open(file, &search.open().unwrap(), number("DARKQA_BENCH_THREADS"));
     let tiling = number("DARKQA_BENCH_TILE").map_or(Tiling::Auto, Tiling::Side);
     let mut enhancer = enhancer.unwrap().with_tiling(tiling);
     let mut group = c.benchmark_group(enhancer.name().to_string());

@@ -1,5 +1,6 @@
-//! What an image costs: one 2560×1440 frame through the ladder of both branches and through each part of it, a 1000×1000 frame
-//! blurred by the motion of its camera, a 1280×720 frame from pixels to request, and a dark image compared with its clean frame.
+//! What an image costs: one 2560×1440 frame through the ladder of both branches and through each part of it, a
+//! 1000×1000 frame blurred by the motion of its camera, a 1280×720 frame from pixels to request, and a dark image
+//! compared with its clean frame.
 //!
 //! `cargo bench --bench light` runs it; `RAYON_NUM_THREADS=1 cargo bench --bench light` on one core.
 
@@ -14,8 +15,8 @@ use darkqa_light::raw::negative::{Negative, ladder as develop_ladder};
 use darkqa_light::raw::noise::{Term, add as add_noise};
 use darkqa_light::raw::unprocess;
 use darkqa_light::{
-    Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView, Motion,
-    NoiseKey, NoiseProfile, Streak, Synthesis,
+    Amplify, AppliedDegradation, AutoExposure, CameraModel, Draws, Exposures, FrameView, Motion, NoiseKey,
+    NoiseProfile, Streak, Synthesis,
 };
 use darkqa_pictures::Payload;
 use darkqa_pictures::PayloadFormat;
@@ -29,9 +30,7 @@ fn frame(height: usize, width: usize) -> Rgb {
     let sample = |i: usize| {
         let (y, x, channel) = (i / 3 / width, i / 3 % width, i % 3);
         let shade = (x * 200 / width + y * 55 / height + 40 * ((x / 97 + y / 61) % 2)) as u8;
-        shade
-            .wrapping_add((i.wrapping_mul(2_654_435_761) >> 28) as u8)
-            .wrapping_add(9 * channel as u8)
+        shade.wrapping_add((i.wrapping_mul(2_654_435_761) >> 28) as u8).wrapping_add(9 * channel as u8)
     };
     Rgb::new(height, width, (0..height * width * 3).map(sample).collect()).unwrap()
 }
@@ -68,10 +67,7 @@ fn ladder(c: &mut Criterion) {
             );
         });
     });
-    let fresh = Synthesis {
-        draws: Draws::Fresh,
-        ..Synthesis::default()
-    };
+    let fresh = Synthesis { draws: Draws::Fresh, ..Synthesis::default() };
     group.bench_function("noise, five levels, fresh draws", |b| {
         b.iter(|| {
             develop_ladder(
@@ -122,24 +118,17 @@ fn parts(c: &mut Criterion) {
     group.finish();
 }
 
-/// A megapixel, so that the milliseconds are those of a megapixel: motion blur alone, the light that automatic exposure takes, and
-/// whole images of both kinds.
+/// A megapixel, so that the milliseconds are those of a megapixel: motion blur alone, the light that automatic exposure
+/// takes, and whole images of both kinds.
 #[expect(clippy::unwrap_used, reason = "the paths are short enough")]
 fn motion(c: &mut Criterion) {
     let clean = frame(1000, 1000);
     let mut group = c.benchmark_group("1000x1000");
     group.sample_size(10);
     group.throughput(Throughput::Elements(1_000_000));
-    for (length, angle) in [
-        (1.69, 0.0),
-        (6.78, 0.0),
-        (16.0, 0.0),
-        (64.0, 0.0),
-        (4.0, 30.0),
-        (16.0, 30.0),
-        (16.0, 90.0),
-        (64.0, 30.0),
-    ] {
+    for (length, angle) in
+        [(1.69, 0.0), (6.78, 0.0), (16.0, 0.0), (64.0, 0.0), (4.0, 30.0), (16.0, 30.0), (16.0, 90.0), (64.0, 30.0)]
+    {
         let streak = Streak::new(length, angle).unwrap();
         group.bench_function(format!("motion, {length} px at {angle}°"), |b| {
             b.iter(|| blurred_codes(black_box(&clean), streak));
@@ -151,16 +140,12 @@ fn motion(c: &mut Criterion) {
             b.iter(|| blur(black_box(&clean).into(), streak));
         });
     }
-    let view = FrameView {
-        width: 1000,
-        focal: None,
-    };
+    let view = FrameView { width: 1000, focal: None };
     let (auto, motion) = (AutoExposure::default(), Motion::default());
     for how in ["L5-auto", "L5-noise@physical"] {
         let how: darkqa_eval::Degradation = how.parse().unwrap();
         let physical = Synthesis::new(NoiseProfile::Physical, CameraModel::default());
-        let applied =
-            AppliedDegradation::new(&how, &physical, &auto, &motion, view, &key()).unwrap();
+        let applied = AppliedDegradation::new(&how, &physical, &auto, &motion, view, &key()).unwrap();
         group.bench_function(how.to_string(), |b| {
             b.iter(|| Exposures::default().degrade(black_box((&clean).into()), &applied, &key()));
         });

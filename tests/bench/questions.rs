@@ -7,9 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use darkqa_base::types::{
-    DepthKind, Digest, Frame, FrameId, Intrinsics, Label, Labels, Rgb, Segmentation,
-};
+use darkqa_base::types::{DepthKind, Digest, Frame, FrameId, Intrinsics, Label, Labels, Rgb, Segmentation};
 use darkqa_eval::internals::dataset::Dataset;
 use darkqa_questions::colors::Palette;
 use darkqa_questions::rules::Rules;
@@ -18,19 +16,13 @@ use image::{ImageBuffer, Luma, RgbImage};
 use ndarray::Array2;
 
 const SIZE: (usize, usize) = (1440, 2560);
-const CLASSES: [&str; 8] = [
-    "wall", "chair", "table", "picture", "cabinet", "cushion", "sofa", "bed",
-];
+const CLASSES: [&str; 8] = ["wall", "chair", "table", "picture", "cabinet", "cushion", "sofa", "bed"];
 
 /// The segment of a pixel: a grid of 10 × 8 discs that lie before a wall.
 fn segment(y: usize, x: usize) -> usize {
     let (column, row) = (x / 256, y / 180);
     let (dx, dy) = ((x % 256).abs_diff(128), (y % 180).abs_diff(90));
-    if dx * dx + 2 * dy * dy < 110 * 110 {
-        1 + row * 10 + column
-    } else {
-        0
-    }
+    if dx * dx + 2 * dy * dy < 110 * 110 { 1 + row * 10 + column } else { 0 }
 }
 
 fn class(y: usize, x: usize) -> u16 {
@@ -64,12 +56,7 @@ fn frame() -> Frame {
         rgb: rgb(),
         depth: Some(Array2::from_shape_fn(SIZE, |(y, x)| depth(y, x))),
         depth_kind: DepthKind::Planar,
-        intrinsics: Some(Intrinsics {
-            fx: 1280.0,
-            fy: 1280.0,
-            cx: 1279.5,
-            cy: 719.5,
-        }),
+        intrinsics: Some(Intrinsics { fx: 1280.0, fy: 1280.0, cx: 1279.5, cy: 719.5 }),
         semantic: Some(Array2::from_shape_fn(SIZE, |(y, x)| class(y, x))),
         segments: Some(Array2::from_shape_fn(SIZE, |(y, x)| segment(y, x) as u32)),
         segmentation: Segmentation::Instances,
@@ -79,10 +66,7 @@ fn frame() -> Frame {
 }
 
 fn labels() -> Labels {
-    let label = |name: &&str| Label {
-        name: (*name).into(),
-        canonical: (*name).into(),
-    };
+    let label = |name: &&str| Label { name: (*name).into(), canonical: (*name).into() };
     Labels {
         space: "bench".into(),
         void: [0].into(),
@@ -97,9 +81,7 @@ fn write(folder: &Path) {
     let (height, width) = (SIZE.0 as u32, SIZE.1 as u32);
     let grey = |name: &str, value: &dyn Fn(usize, usize) -> u32| {
         let image: ImageBuffer<Luma<u16>, Vec<u16>> =
-            ImageBuffer::from_fn(width, height, |x, y| {
-                Luma([value(y as usize, x as usize) as u16])
-            });
+            ImageBuffer::from_fn(width, height, |x, y| Luma([value(y as usize, x as usize) as u16]));
         image.save(folder.join(name)).unwrap();
     };
     let image = RgbImage::from_raw(width, height, rgb().samples().to_vec()).unwrap();
@@ -111,16 +93,9 @@ fn write(folder: &Path) {
     std::fs::write(folder.join("frames.jsonl"), line).unwrap();
 }
 
-#[expect(
-    clippy::unwrap_used,
-    reason = "what is built in and what the bench has written"
-)]
+#[expect(clippy::unwrap_used, reason = "what is built in and what the bench has written")]
 fn stage(c: &mut Criterion) {
-    let (rules, palette, labels) = (
-        Rules::built_in().unwrap(),
-        Palette::built_in().unwrap(),
-        labels(),
-    );
+    let (rules, palette, labels) = (Rules::built_in().unwrap(), Palette::built_in().unwrap(), labels());
     let key = Digest::from_bytes(b"bench");
     let mut group = c.benchmark_group("questions, 2560x1440");
     group.sample_size(10);

@@ -5,19 +5,14 @@
 #![expect(clippy::unwrap_used, reason = "what is made here can be written")]
 
 #[path = "../support/made.rs"]
-#[expect(
-    unreachable_pub,
-    reason = "the tests share it as a module of their support"
-)]
+#[expect(unreachable_pub, reason = "the tests share it as a module of their support")]
 mod made;
 
 use std::collections::HashMap;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use darkqa_base::types::{
-    ChoiceDetail, Condition, Degradation, Digest, Family, Record, Severity, Trials,
-};
+use darkqa_base::types::{ChoiceDetail, Condition, Degradation, Digest, Family, Record, Severity, Trials};
 use darkqa_eval::Kind;
 use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
 use darkqa_score::cluster::FrameTies;
@@ -29,10 +24,7 @@ fn records() -> Vec<Record> {
     let dark = Severity::LADDER
         .into_iter()
         .flat_map(|severity| Kind::ALL.map(|kind| Degradation::new(kind, severity, None).unwrap()));
-    let conditions: Vec<Condition> = std::iter::once(None)
-        .chain(dark.map(Some))
-        .map(Condition::raw)
-        .collect();
+    let conditions: Vec<Condition> = std::iter::once(None).chain(dark.map(Some)).map(Condition::raw).collect();
     let mut records = Vec::new();
     for model in 0..5 {
         for condition in &conditions {
@@ -40,10 +32,7 @@ fn records() -> Vec<Record> {
                 let name = format!("model-{model}");
                 let drawn = Digest::from_bytes(format!("{name} {condition} {question}").as_bytes());
                 let severity = condition.level().severity();
-                let level = Severity::LADDER
-                    .iter()
-                    .filter(|s| Some(**s) <= severity)
-                    .count() as u32;
+                let level = Severity::LADDER.iter().filter(|s| Some(**s) <= severity).count() as u32;
                 let right = u32::from(drawn.as_bytes()[0]) > 30 * level;
                 let mut record = record(&name, condition, (question, question / 4), right);
                 record.detail.family = Family::PAPER[question % 4].clone();

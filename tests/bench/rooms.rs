@@ -19,12 +19,7 @@ const SIZES: [[usize; 2]; 2] = [[640, 480], [1280, 720]];
 
 /// The frames of six rooms, none of them drawn yet.
 fn rooms(size: [usize; 2]) -> Vec<Room> {
-    let rooms = Rooms {
-        frames: 12,
-        seed: 7,
-        size,
-        ..Rooms::default()
-    };
+    let rooms = Rooms { frames: 12, seed: 7, size, ..Rooms::default() };
     rooms.all().map(|(_, room)| room).step_by(2).collect()
 }
 

@@ -1,4 +1,5 @@
-//! The accuracy of each model at each level and variant, without enhancers: `cargo run --example accuracy -- results/reference`.
+//! The accuracy of each model at each level and variant, without enhancers: `cargo run --example accuracy --
+//! results/reference`.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,7 +13,8 @@ pub(crate) struct Score {
     pub(crate) replies: usize,
 }
 
-/// The score of each model, level and variant of the run in a folder, by the strict parsing. Failed trials are left out.
+/// The score of each model, level and variant of the run in a folder, by the strict parsing. Failed trials are left
+/// out.
 ///
 /// # Errors
 /// If the folder holds no run.
@@ -36,11 +38,7 @@ pub(crate) fn accuracy(folder: &Path) -> Result<BTreeMap<[String; 3], Score>> {
     Ok(scores)
 }
 
-#[allow(
-    clippy::print_stdout,
-    dead_code,
-    reason = "a program, which a test includes"
-)]
+#[allow(clippy::print_stdout, dead_code, reason = "a program, which a test includes")]
 fn main() -> Result<()> {
     let folder = std::env::args().nth(1);
     let folder = folder.unwrap_or_else(|| "results/reference".to_owned());

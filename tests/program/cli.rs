@@ -16,22 +16,17 @@ fn the_help_is_as_it_was() {
     let help = called(bench.command(&["--help"]).env("COLUMNS", "110"));
     assert_eq!(help.code, Some(0));
     let help = help.stdout.replace("darkqa-eval.exe", "darkqa-eval");
-    let long = help
-        .lines()
-        .map(str::trim_end)
-        .collect::<Vec<_>>()
-        .join("\n");
+    let long = help.lines().map(str::trim_end).collect::<Vec<_>>().join("\n");
     insta::assert_snapshot!(long);
 }
 
 /// A frame with one question; `wrong` changes the question.
 fn data(bench: &Bench, wrong: impl FnOnce(&mut serde_json::Value)) {
-    let image = image::RgbImage::from_fn(8, 8, |x, y| {
-        image::Rgb([(x * 30) as u8, (y * 30) as u8, 90])
-    });
+    let image = image::RgbImage::from_fn(8, 8, |x, y| image::Rgb([(x * 30) as u8, (y * 30) as u8, 90]));
     std::fs::create_dir_all(bench.path("frames")).unwrap();
     image.save(bench.path("frames/a.png")).unwrap();
-    let mut question = json!({"id": "q", "frame": "a.png", "question": "Is it?", "choices": ["yes", "no"], "answer": "no"});
+    let mut question =
+        json!({"id": "q", "frame": "a.png", "question": "Is it?", "choices": ["yes", "no"], "answer": "no"});
     wrong(&mut question);
     bench.file("frames/questions.jsonl", question.to_string());
 }
@@ -40,17 +35,8 @@ fn data(bench: &Bench, wrong: impl FnOnce(&mut serde_json::Value)) {
 fn refused(bench: &Bench, line: &str) -> String {
     let refused = bench.call(&words(line));
     assert_eq!(refused.code, Some(2), "{line:?}: {refused:?}");
-    assert_eq!(
-        refused.stderr.trim_end().lines().count(),
-        1,
-        "{line:?}: {}",
-        refused.stderr
-    );
-    assert!(
-        refused.stderr.starts_with("error: "),
-        "{line:?}: {}",
-        refused.stderr
-    );
+    assert_eq!(refused.stderr.trim_end().lines().count(), 1, "{line:?}: {}", refused.stderr);
+    assert!(refused.stderr.starts_with("error: "), "{line:?}: {}", refused.stderr);
     assert!(refused.stdout.is_empty());
     assert!(!bench.path("run").exists(), "{line:?} left a run behind");
     redacted(&refused.stderr)
@@ -59,9 +45,7 @@ fn refused(bench: &Bench, line: &str) -> String {
 #[test]
 fn global_flags_work_around_command() {
     let bench = Bench::new();
-    bench.complete(&words(
-        "--model random --levels L0 --limit 2 --no-parquet --out run",
-    ));
+    bench.complete(&words("--model random --levels L0 --limit 2 --no-parquet --out run"));
     bench.file("flags.toml", "quiet = true\n");
     for flag in ["--quiet", "--color never", "--config flags.toml"] {
         let before = bench.complete(&words(&format!("{flag} report run")));
@@ -83,8 +67,7 @@ fn evaluation_flags_before_command_are_refused() {
 #[test]
 fn evaluation_words_show_correct_form() {
     let bench = Bench::new();
-    let lines = ["run", "evaluate", "eval"]
-        .map(|word| [format!("{word} --model random"), format!("--quiet {word}")]);
+    let lines = ["run", "evaluate", "eval"].map(|word| [format!("{word} --model random"), format!("--quiet {word}")]);
     let errors = each(lines.concat(), |line| refused(&bench, line));
     insta::assert_snapshot!(errors, @"
     run --model random
@@ -189,8 +172,7 @@ fn completions_and_manual_come_from_flags() {
         assert!(script.contains("llie-options"), "{shell}");
     });
     bench.complete(&["man", "pages"]);
-    let page =
-        |name: &str| std::fs::read_to_string(bench.path(&format!("pages/{name}.1"))).unwrap();
+    let page = |name: &str| std::fs::read_to_string(bench.path(&format!("pages/{name}.1"))).unwrap();
     assert!(page("darkqa-eval").contains("llie\\-options"));
     assert!(page("darkqa-eval-openeqa").contains("judge\\-base\\-url"));
     assert!(page("darkqa-eval-batch-export").contains("file\\-size"));
@@ -219,10 +201,7 @@ fn a_dry_run_needs_no_key() {
     let run = bench.complete(&args);
     assert!(run.starts_with("Nothing was sent. 33 of 33"), "{run}");
     insta::assert_snapshot!(lines_with(&run, "asked at"), @"asked at https://api.openai.com/v1");
-    bench.file(
-        "two.toml",
-        "[[model]]\nid = \"a\"\n[[model]]\nid = \"b\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n",
-    );
+    bench.file("two.toml", "[[model]]\nid = \"a\"\n[[model]]\nid = \"b\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n");
     let two = bench.complete(&words("--data set.jsonl --models two.toml --dry-run"));
     insta::assert_snapshot!(lines_with(&two, "asked at"), @"
     asked at https://api.openai.com/v1: a
@@ -241,8 +220,7 @@ fn unreachable_address_is_reported_at_once() {
     assert_eq!(called.code, Some(1), "{called:?}");
     let said = "WARN http://127.0.0.1:9/v1: ";
     let warned = called.stderr.lines().filter(|line| {
-        line.contains(said)
-            && line.ends_with("Is a server running there? --base-url names the address")
+        line.contains(said) && line.ends_with("Is a server running there? --base-url names the address")
     });
     assert_eq!(warned.count(), 1, "{called:?}");
 }
@@ -260,10 +238,7 @@ fn refusing_server_is_reported_while_waiting() {
     let line = "--data set.jsonl --levels L0 --out run --retries patience=";
     let waited = |patience: &str| {
         let called = bench.call(&model_args(&mock.base_url(), &format!("{line}{patience}")));
-        let lines = called
-            .stderr
-            .lines()
-            .filter(|line| line.contains("waiting: "));
+        let lines = called.stderr.lines().filter(|line| line.contains("waiting: "));
         (called.code, lines.map(str::to_owned).collect::<Vec<_>>())
     };
     let (code, told) = waited("8");
@@ -296,10 +271,7 @@ fn what_changes_nothing_is_said() {
     let quiet = bench.call(&args);
     assert_eq!((quiet.code, &*quiet.stderr), (Some(0), ""));
     let run = bench.call(&[&args[..], &["--levels", "L3", "--llie", "no.onnx"]].concat());
-    assert_eq!(
-        run.stderr.trim(),
-        "WARN --levels, --llie: no effect: no model is shown an image"
-    );
+    assert_eq!(run.stderr.trim(), "WARN --levels, --llie: no effect: no model is shown an image");
 }
 
 #[test]
@@ -389,9 +361,7 @@ fn wrong_enhancers_name_their_file() {
     let bench = Bench::new();
     // Where ONNX Runtime is not there yet, its first use installs it and says so.
     onnx::identity().write(&bench.path(""), "fine.onnx");
-    bench.complete(&words(
-        "--model random --limit 1 --levels L1 --out first --llie-anyway --llie fine.onnx",
-    ));
+    bench.complete(&words("--model random --limit 1 --levels L1 --out first --llie-anyway --llie fine.onnx"));
     let line = |file: &str| format!("--model random --out run --llie {file}");
     insta::assert_snapshot!(refused(&bench, &line("nowhere.onnx")), @"error: --llie: nowhere.onnx: no such file");
     bench.file("text.onnx", "this is no model, whatever its name says");
@@ -479,15 +449,9 @@ fn foreign_variables_rank_below_file() {
 #[test]
 fn flag_file_has_lists_and_errors() {
     let bench = Bench::new();
-    bench.file(
-        "lists.toml",
-        "levels = [\"L0\", \"L3\"]\nvariant = \"ev\"\nfamilies = [\"closest\", \"presence\"]\n",
-    );
+    bench.file("lists.toml", "levels = [\"L0\", \"L3\"]\nvariant = \"ev\"\nfamilies = [\"closest\", \"presence\"]\n");
     let listed = bench.complete(&words(&format!("{SHORT} --config lists.toml")));
-    assert_eq!(
-        values(&listed, "level"),
-        ["\"L0\"".into(), "\"L3\"".into()].into()
-    );
+    assert_eq!(values(&listed, "level"), ["\"L0\"".into(), "\"L3\"".into()].into());
     let bench = Bench::new();
     let files = [
         "seed = 1\nblind = = 2\n",
@@ -519,10 +483,7 @@ fn variable_that_sets_nothing_is_refused() {
     let bench = Bench::new();
     let run = called(bench.command(&words(SHORT)).env("DARKQA_LEVEL", "L0"));
     assert_eq!(run.code, Some(2), "{run:?}");
-    assert_eq!(
-        run.stderr,
-        "error: DARKQA_LEVEL: no flag of this name; did you mean DARKQA_LEVELS?\n"
-    );
+    assert_eq!(run.stderr, "error: DARKQA_LEVEL: no flag of this name; did you mean DARKQA_LEVELS?\n");
     // A variable that another command knows is none of this one's business.
     let run = called(bench.command(&words(SHORT)).env("DARKQA_BALANCE", "none"));
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -531,9 +492,7 @@ fn variable_that_sets_nothing_is_refused() {
 #[test]
 fn a_cause_is_said_once() {
     let bench = Bench::new();
-    let error = bench
-        .call(&["--model", "random", "--config", "nowhere.toml"])
-        .stderr;
+    let error = bench.call(&["--model", "random", "--config", "nowhere.toml"]).stderr;
     assert_eq!(error.matches("os error").count(), 1, "{error}");
 }
 
@@ -542,11 +501,7 @@ fn quiet_prints_only_output_paths() {
     let bench = Bench::with_questions(12);
     let line = "--model random --data set.jsonl --levels L0,L5 --out run --quiet";
     assert_eq!(bench.complete(&words(line)), "run\n");
-    assert!(
-        bench
-            .complete(&words(&line.replace(" --quiet", "")))
-            .contains("accuracy")
-    );
+    assert!(bench.complete(&words(&line.replace(" --quiet", ""))).contains("accuracy"));
     for (line, said) in [
         ("report run", "run\n"),
         ("report run run --out both", "both\n"),
@@ -569,14 +524,6 @@ fn quiet_prints_only_output_paths() {
     // A report on shared items alone is written nowhere without --out.
     let common = bench.complete(&words("report run --common --quiet"));
     insta::assert_snapshot!(lines_with(&common, "report:"), @"report: not written; --out DIR writes one");
-    bench.complete(&words(
-        "--model random --seed 1 --data set.jsonl --levels L0 --out two",
-    ));
-    assert!(
-        bench
-            .complete(&words("report run two --quiet"))
-            .lines()
-            .count()
-            > 2
-    );
+    bench.complete(&words("--model random --seed 1 --data set.jsonl --levels L0 --out two"));
+    assert!(bench.complete(&words("report run two --quiet")).lines().count() > 2);
 }

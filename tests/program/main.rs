@@ -1,5 +1,5 @@
-//! The tests of the program and the library as a whole, a module a subject. They are one program, because each test program links the
-//! library anew: `cargo test --test program report::` runs one module.
+//! The tests of the program and the library as a whole, a module a subject. They are one program, because each test
+//! program links the library anew: `cargo test --test program report::` runs one module.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 

@@ -1,4 +1,5 @@
-//! A mock server with files and batches, by OpenAI's interface: [`MockBatches`]. What becomes of each batch is a [`Course`].
+//! A mock server with files and batches, by OpenAI's interface: [`MockBatches`]. What becomes of each batch is a
+//! [`Course`].
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Condvar, Mutex};
@@ -91,10 +92,7 @@ impl Course {
 
     /// No counts before the output file has a name.
     pub fn late_to_count(self) -> Self {
-        Self {
-            is_late_to_count: true,
-            ..self
-        }
+        Self { is_late_to_count: true, ..self }
     }
 
     /// A batch whose answers are charged `tokens` tokens each.
@@ -117,18 +115,12 @@ impl Course {
     /// A batch that fails with an error.
     pub fn failing(code: &str, message: &str, line: &Value) -> Self {
         let error = json!({"code": code, "message": message, "param": null, "line": line});
-        Self {
-            errors: json!({"object": "list", "data": [error]}),
-            ..Self::of("validating failed")
-        }
+        Self { errors: json!({"object": "list", "data": [error]}), ..Self::of("validating failed") }
     }
 
     /// A batch whose creation is refused.
     pub fn refused(answer: Answer) -> Self {
-        Self {
-            refused: Some(answer),
-            ..Self::of("failed")
-        }
+        Self { refused: Some(answer), ..Self::of("failed") }
     }
 }
 
@@ -198,10 +190,7 @@ pub struct MockBatches {
 impl MockBatches {
     /// A server that takes the batches through these courses; the last is that of all further ones.
     pub fn start(courses: impl IntoIterator<Item = Course>) -> Self {
-        let server = Server {
-            courses: courses.into_iter().collect(),
-            ..Server::default()
-        };
+        let server = Server { courses: courses.into_iter().collect(), ..Server::default() };
         let shared = Arc::new((Mutex::new(server), Condvar::new()));
         let endpoint = MockEndpoint::serving(Box::new({
             let shared = shared.clone();
@@ -229,7 +218,8 @@ impl MockBatches {
         act(&mut self.shared.0.lock().unwrap())
     }
 
-    /// The first request of this kind, as `POST files`, meets a fault; several faults of a kind meet its first requests.
+    /// The first request of this kind, as `POST files`, meets a fault; several faults of a kind meet its first
+    /// requests.
     pub fn fault(&self, kind: &str, fault: Fault) {
         self.with(|server| server.kind_faults.push((kind.to_owned(), fault)));
     }
@@ -273,13 +263,7 @@ impl MockBatches {
                 .batches
                 .iter()
                 .filter(|batch| batch.is_begun())
-                .map(|batch| {
-                    batch
-                        .requests
-                        .iter()
-                        .map(|one| one["custom_id"].as_str().unwrap().to_owned())
-                        .collect()
-                })
+                .map(|batch| batch.requests.iter().map(|one| one["custom_id"].as_str().unwrap().to_owned()).collect())
                 .collect()
         })
     }
@@ -345,15 +329,10 @@ impl Server {
                 file.pending = file.pending.saturating_sub(1);
                 Answer::json(200, &object)
             }),
-            ("GET", ["files", id, "content"]) => {
-                self.with_file(id, |file| Answer::new(200, file.content.clone()))
-            }
+            ("GET", ["files", id, "content"]) => self.with_file(id, |file| Answer::new(200, file.content.clone())),
             ("DELETE", ["files", id]) => self.with_file(id, |file| {
                 file.deleted = true;
-                Answer::json(
-                    200,
-                    &json!({"id": file.id, "object": "file", "deleted": true}),
-                )
+                Answer::json(200, &json!({"id": file.id, "object": "file", "deleted": true}))
             }),
             ("POST", ["batches"]) => self.create(&request.json()),
             ("GET", ["batches"]) => {
@@ -422,13 +401,7 @@ impl Server {
 
     fn store(&mut self, name: String, content: Vec<u8>) -> String {
         let id = format!("file-{}", self.files.len() + 1);
-        self.files.push(StoredFile {
-            id: id.clone(),
-            name,
-            content,
-            pending: 0,
-            deleted: false,
-        });
+        self.files.push(StoredFile { id: id.clone(), name, content, pending: 0, deleted: false });
         id
     }
 
@@ -437,10 +410,7 @@ impl Server {
         let course = self.courses.get(number).or(self.courses.last());
         let course = course.unwrap().clone();
         let id = body["input_file_id"].as_str().unwrap_or_default();
-        let file = self
-            .files
-            .iter()
-            .find(|file| file.id == id && !file.deleted);
+        let file = self.files.iter().find(|file| file.id == id && !file.deleted);
         let wrong = match file {
             None => Some("no such file"),
             Some(file) if file.pending > 0 => Some("the file is not processed"),
@@ -477,8 +447,7 @@ impl Server {
         self.batches[place].looks += 1;
         let state = self.batches[place].state().to_lowercase();
         let has_ended = ["completed", "expired", "cancelled"].contains(&&*state);
-        if has_ended && self.batches[place].output.is_none() && self.batches[place].errors.is_none()
-        {
+        if has_ended && self.batches[place].output.is_none() && self.batches[place].errors.is_none() {
             let [output, errors] = self.batches[place].results();
             if !output.is_empty() {
                 let id = self.store("output.jsonl".into(), output);
@@ -499,9 +468,7 @@ impl Server {
         if !batch.cancelled {
             batch.cancelled = true;
             batch.looks = 0;
-            batch.course.states = ["cancelling", "cancelling", "cancelled"]
-                .map(str::to_owned)
-                .to_vec();
+            batch.course.states = ["cancelling", "cancelling", "cancelled"].map(str::to_owned).to_vec();
         }
         Answer::json(200, &batch.object())
     }
@@ -509,11 +476,7 @@ impl Server {
 
 impl StoredFile {
     fn object(&self) -> Value {
-        let status = if self.pending > 0 {
-            "pending"
-        } else {
-            "processed"
-        };
+        let status = if self.pending > 0 { "pending" } else { "processed" };
         json!({
             "id": self.id, "object": "file", "bytes": self.content.len(), "created_at": 1, "filename": self.name,
             "purpose": "batch", "status": status,
@@ -536,17 +499,11 @@ impl StoredBatch {
     fn object(&self) -> Value {
         let total = self.requests.len();
         let has_ended = self.output.is_some() || self.errors.is_some();
-        let right = (0..total)
-            .map(|i| (self.course.line)(i))
-            .filter(|line| matches!(line, Line::Right))
-            .count();
+        let right = (0..total).map(|i| (self.course.line)(i)).filter(|line| matches!(line, Line::Right)).count();
         let is_silent = self.course.is_late_to_count && self.looks <= self.course.late;
         let counted = if is_silent { 0 } else { total };
-        let (completed, failed) = if has_ended && !is_silent {
-            (right - self.course.uncounted, total - right)
-        } else {
-            (0, 0)
-        };
+        let (completed, failed) =
+            if has_ended && !is_silent { (right - self.course.uncounted, total - right) } else { (0, 0) };
         json!({
             "id": self.id, "object": "batch", "endpoint": self.body["endpoint"],
             "errors": if self.state() == "failed" { self.course.errors.clone() } else { Value::Null },
@@ -581,7 +538,8 @@ impl StoredBatch {
                 }
                 Line::Expired => {
                     let error = json!({"code": "batch_expired", "message": "too late"});
-                    errors.push(json!({"id": "b", "custom_id": request["custom_id"], "response": null, "error": error}));
+                    errors
+                        .push(json!({"id": "b", "custom_id": request["custom_id"], "response": null, "error": error}));
                 }
                 Line::Absent => {}
             }
@@ -621,26 +579,19 @@ fn reply(request: &Value, status: u16, body: &Value) -> Value {
 
 /// One page of a list, of two items, so that lists have several pages.
 fn page(items: &[Value], query: &str) -> Answer {
-    let after = query
-        .split('&')
-        .find_map(|pair| pair.strip_prefix("after="));
+    let after = query.split('&').find_map(|pair| pair.strip_prefix("after="));
     let start = after.map_or(0, |after| {
         let place = items.iter().position(|item| item["id"] == after);
         place.map_or(items.len(), |place| place + 1)
     });
     let end = (start + 2).min(items.len());
-    Answer::json(
-        200,
-        &json!({"object": "list", "data": items[start..end], "has_more": end < items.len()}),
-    )
+    Answer::json(200, &json!({"object": "list", "data": items[start..end], "has_more": end < items.len()}))
 }
 
 /// The purpose, the name and the content of an uploaded file.
 fn form(body: &[u8]) -> (String, String, Vec<u8>) {
     let find = |from: usize, what: &[u8]| {
-        let place = body[from..]
-            .windows(what.len())
-            .position(|window| window == what);
+        let place = body[from..].windows(what.len()).position(|window| window == what);
         from + place.unwrap()
     };
     let boundary = body[..find(0, b"\r\n")].to_vec();

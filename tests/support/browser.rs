@@ -24,9 +24,7 @@ pub fn chromium() -> Option<PathBuf> {
     }
     let folders: Vec<PathBuf> = std::env::split_paths(&std::env::var_os("PATH")?).collect();
     let names = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-    let all = names
-        .iter()
-        .flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
+    let all = names.iter().flat_map(|name| folders.iter().map(move |folder| folder.join(name)));
     all.into_iter().find(|path| path.is_file())
 }
 
@@ -81,21 +79,12 @@ impl Browser {
         if let MaybeTlsStream::Plain(stream) = socket.get_ref() {
             stream.set_read_timeout(Some(PATIENCE)).unwrap();
         }
-        let mut browser = Self {
-            process,
-            _profile: profile,
-            socket,
-            session: String::new(),
-            number: 0,
-            events: VecDeque::new(),
-        };
+        let mut browser =
+            Self { process, _profile: profile, socket, session: String::new(), number: 0, events: VecDeque::new() };
         let target = browser.call("Target.createTarget", &json!({"url": "about:blank"}));
         let target = json!({"targetId": target["targetId"], "flatten": true});
         let attached = browser.call("Target.attachToTarget", &target);
-        attached["sessionId"]
-            .as_str()
-            .unwrap()
-            .clone_into(&mut browser.session);
+        attached["sessionId"].as_str().unwrap().clone_into(&mut browser.session);
         for domain in ["Page", "Runtime", "Log", "Network"] {
             browser.call(&format!("{domain}.enable"), &json!({}));
         }
@@ -126,13 +115,9 @@ impl Browser {
 
     /// Value of an expression in the page.
     pub fn evaluate(&mut self, expression: &str) -> Value {
-        let parameters =
-            json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
+        let parameters = json!({"expression": expression, "returnByValue": true, "awaitPromise": true});
         let result = self.call("Runtime.evaluate", &parameters);
-        assert!(
-            result.get("exceptionDetails").is_none(),
-            "{expression}: {result}"
-        );
+        assert!(result.get("exceptionDetails").is_none(), "{expression}: {result}");
         result["result"]["value"].clone()
     }
 
@@ -140,10 +125,7 @@ impl Browser {
     pub fn wait(&mut self, expression: &str) {
         let start = Instant::now();
         while self.evaluate(expression) != json!(true) {
-            assert!(
-                start.elapsed() < PATIENCE,
-                "{expression} does not come true"
-            );
+            assert!(start.elapsed() < PATIENCE, "{expression} does not come true");
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -154,8 +136,7 @@ impl Browser {
 
     /// Sets the window, and which theme the system asks for.
     pub fn window(&mut self, width: u32, height: u32, theme: &str) {
-        let size =
-            json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
+        let size = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": false});
         self.call("Emulation.setDeviceMetricsOverride", &size);
         let features = json!([{"name": "prefers-color-scheme", "value": theme}]);
         self.call("Emulation.setEmulatedMedia", &json!({"features": features}));
@@ -201,10 +182,7 @@ impl Browser {
         let Some(folder) = std::env::var_os("SHOTS") else {
             return;
         };
-        let shot = self.call(
-            "Page.captureScreenshot",
-            &json!({"captureBeyondViewport": whole}),
-        );
+        let shot = self.call("Page.captureScreenshot", &json!({"captureBeyondViewport": whole}));
         let picture = STANDARD.decode(shot["data"].as_str().unwrap()).unwrap();
         std::fs::write(Path::new(&folder).join(name), picture).unwrap();
     }
@@ -233,9 +211,8 @@ impl Browser {
                     }
                     "Network.requestWillBeSent" => {
                         let url = parameters["request"]["url"].as_str()?;
-                        let within = url == "about:blank"
-                            || url.starts_with("data:")
-                            || url.split('#').next() == Some(own);
+                        let within =
+                            url == "about:blank" || url.starts_with("data:") || url.split('#').next() == Some(own);
                         (!within).then(|| url.to_owned())
                     }
                     _ => None,

@@ -1,6 +1,7 @@
 //! A mock endpoint on raw TCP: [`MockEndpoint`] plays a script of [`Answer`]s and records what it was sent.
 //!
-//! It writes bytes, not HTTP library calls: replies cut short, connections dropped and lengths that lie cannot be made otherwise.
+//! It writes bytes, not HTTP library calls: replies cut short, connections dropped and lengths that lie cannot be made
+//! otherwise.
 
 use std::collections::VecDeque;
 use std::io::{BufRead as _, BufReader, Read as _, Write as _};
@@ -138,10 +139,7 @@ impl Answer {
 
     /// These bytes and nothing else.
     pub fn raw(bytes: impl Into<Vec<u8>>) -> Self {
-        Self {
-            manner: Manner::Raw,
-            ..Self::new(200, bytes)
-        }
+        Self { manner: Manner::Raw, ..Self::new(200, bytes) }
     }
 
     pub fn drip(mut self, milliseconds: u64) -> Self {
@@ -150,24 +148,15 @@ impl Answer {
     }
 
     pub fn dropped() -> Self {
-        Self {
-            manner: Manner::Dropped,
-            ..Self::new(200, "")
-        }
+        Self { manner: Manner::Dropped, ..Self::new(200, "") }
     }
 
     pub fn silent() -> Self {
-        Self {
-            manner: Manner::Silent,
-            ..Self::new(200, "")
-        }
+        Self { manner: Manner::Silent, ..Self::new(200, "") }
     }
 
     pub fn stuck() -> Self {
-        Self {
-            manner: Manner::Stuck,
-            ..Self::text("B")
-        }
+        Self { manner: Manner::Stuck, ..Self::text("B") }
     }
 
     /// Writes it; says whether the connection can be used again.
@@ -176,11 +165,7 @@ impl Answer {
             stream.write_all(&self.body)?;
             return Ok(false);
         }
-        let mut head = format!(
-            "HTTP/1.1 {} Status\r\ncontent-length: {}\r\n",
-            self.status,
-            self.body.len()
-        );
+        let mut head = format!("HTTP/1.1 {} Status\r\ncontent-length: {}\r\n", self.status, self.body.len());
         for (name, value) in &self.headers {
             head.extend([name, ": ", value, "\r\n"]);
         }
@@ -236,11 +221,7 @@ impl MockEndpoint {
         let answers = Mutex::new(answers);
         Self::posted(move |_| {
             let mut answers = answers.lock().unwrap();
-            if answers.len() > 1 {
-                answers.pop_front().unwrap()
-            } else {
-                answers[0].clone()
-            }
+            if answers.len() > 1 { answers.pop_front().unwrap() } else { answers[0].clone() }
         })
     }
 
@@ -268,11 +249,7 @@ impl MockEndpoint {
     pub fn serving(answer: Box<dyn Fn(&Request) -> Answer + Send + Sync>) -> Self {
         let listener = TcpListener::bind("127.0.0.1:0").unwrap();
         let address = listener.local_addr().unwrap();
-        let shared = Arc::new(Shared {
-            answer,
-            requests: Mutex::new(Vec::new()),
-            closing: AtomicBool::new(false),
-        });
+        let shared = Arc::new(Shared { answer, requests: Mutex::new(Vec::new()), closing: AtomicBool::new(false) });
         thread::spawn({
             let shared = shared.clone();
             move || {
@@ -338,9 +315,5 @@ fn read(reader: &mut BufReader<TcpStream>) -> std::io::Result<Option<Request>> {
     let length = headers.iter().find(|(name, _)| name == "content-length");
     let mut body = vec![0; length.map_or(0, |(_, length)| length.parse().unwrap())];
     reader.read_exact(&mut body)?;
-    Ok(Some(Request {
-        line: line.trim_end().to_owned(),
-        headers,
-        body,
-    }))
+    Ok(Some(Request { line: line.trim_end().to_owned(), headers, body }))
 }

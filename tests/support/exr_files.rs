@@ -4,8 +4,8 @@ use std::io::Cursor;
 
 use exr::meta::attribute::{Chromaticities, IntegerBounds};
 use exr::prelude::{
-    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, ImageAttributes, Layer,
-    LayerAttributes, SpecificChannels, Vec2, WritableImage as _,
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Image, ImageAttributes, Layer, LayerAttributes,
+    SpecificChannels, Vec2, WritableImage as _,
 };
 
 /// The bytes of an image, whose type is long.
@@ -24,30 +24,20 @@ pub fn exr([width, height]: [usize; 2], light: &[f32]) -> Vec<u8> {
 
 /// The same in a compression.
 pub fn compressed([width, height]: [usize; 2], light: &[f32], by: Compression) -> Vec<u8> {
-    let channel =
-        |place: usize| FlatSamples::F32(light.iter().skip(place).step_by(3).copied().collect());
-    let channels = ["R", "G", "B"]
-        .into_iter()
-        .zip([0, 1, 2].map(channel))
-        .map(|(name, samples)| AnyChannel::new(name, samples));
+    let channel = |place: usize| FlatSamples::F32(light.iter().skip(place).step_by(3).copied().collect());
+    let channels =
+        ["R", "G", "B"].into_iter().zip([0, 1, 2].map(channel)).map(|(name, samples)| AnyChannel::new(name, samples));
     let layer = Layer::new(
         (width, height),
         LayerAttributes::default(),
-        Encoding {
-            compression: by,
-            ..Encoding::UNCOMPRESSED
-        },
+        Encoding { compression: by, ..Encoding::UNCOMPRESSED },
         AnyChannels::sort(channels.collect()),
     );
     written!(&Image::from_layer(layer))
 }
 
 /// The same with primaries: x and y of red, green, blue and white.
-pub fn with_primaries(
-    [width, height]: [usize; 2],
-    light: &[f32],
-    primaries: Option<[[f32; 2]; 4]>,
-) -> Vec<u8> {
+pub fn with_primaries([width, height]: [usize; 2], light: &[f32], primaries: Option<[[f32; 2]; 4]>) -> Vec<u8> {
     let light = light.to_vec();
     let pixel = move |at: Vec2<usize>| {
         let samples = &light[3 * (at.y() * width + at.x())..];
@@ -66,9 +56,7 @@ pub fn with_primaries(
 
 /// A file of one layer with these channels.
 pub fn with_channels([width, height]: [usize; 2], channels: Vec<(&str, FlatSamples)>) -> Vec<u8> {
-    let channels = channels
-        .into_iter()
-        .map(|(name, samples)| AnyChannel::new(name, samples));
+    let channels = channels.into_iter().map(|(name, samples)| AnyChannel::new(name, samples));
     let layer = Layer::new(
         (width, height),
         LayerAttributes::default(),
@@ -91,10 +79,7 @@ pub fn with_two_layers(size: [usize; 2], light: [f32; 2]) -> Vec<u8> {
         )
     });
     let window = IntegerBounds::from_dimensions((size[0], size[1]));
-    written!(&Image::from_layers(
-        ImageAttributes::new(window),
-        vec![one, other]
-    ))
+    written!(&Image::from_layers(ImageAttributes::new(window), vec![one, other]))
 }
 
 /// A file of light whose data window is smaller than its display window.

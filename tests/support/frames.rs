@@ -8,9 +8,8 @@ use super::run::Bench;
 
 /// A small PNG with something to see in it.
 pub fn png(shade: u8) -> Vec<u8> {
-    let image = image::RgbImage::from_fn(24, 16, |x, y| {
-        image::Rgb([shade.wrapping_add((x * 9) as u8), (y * 15) as u8, shade])
-    });
+    let image =
+        image::RgbImage::from_fn(24, 16, |x, y| image::Rgb([shade.wrapping_add((x * 9) as u8), (y * 15) as u8, shade]));
     let mut bytes = Cursor::new(Vec::new());
     image.write_to(&mut bytes, image::ImageFormat::Png).unwrap();
     bytes.into_inner()

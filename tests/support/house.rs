@@ -24,30 +24,13 @@ impl House {
             }
         }
         let question = |id: &str, text: &str, answer: &str, walk: &str, category: &str| json!({"question_id": id, "question": text, "answer": answer, "category": category, "episode_history": walk});
-        let mut extra = question(
-            "q2",
-            "Where's the {sofa}?",
-            "Near the café's door",
-            "hm3d-v0/000-a",
-            "object localization",
-        );
+        let mut extra =
+            question("q2", "Where's the {sofa}?", "Near the café's door", "hm3d-v0/000-a", "object localization");
         extra["extra_answers"] = json!(["By the stairs", "it's here", "\"both\" it's", "日本"]);
         let all = json!([
-            question(
-                "q1",
-                "What colour is it?",
-                "brown",
-                "hm3d-v0/000-a",
-                "attribute recognition"
-            ),
+            question("q1", "What colour is it?", "brown", "hm3d-v0/000-a", "attribute recognition"),
             extra,
-            question(
-                "q3",
-                "Is it “safe”?",
-                "No",
-                "scannet-v0/001-b",
-                "world knowledge"
-            ),
+            question("q3", "Is it “safe”?", "No", "scannet-v0/001-b", "world knowledge"),
         ]);
         bench.file("questions.json", all.to_string());
         Self(bench)
@@ -64,13 +47,7 @@ impl House {
 
 /// The flags of all calls, and some more.
 pub fn flags<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    let own = [
-        "openeqa",
-        "--questions",
-        "questions.json",
-        "--frames",
-        "walks",
-    ];
+    let own = ["openeqa", "--questions", "questions.json", "--frames", "walks"];
     let few = ["--num-frames", "3", "--image-size", "48"];
     [&own[..], &few, more].concat()
 }

@@ -76,11 +76,7 @@ pub fn rgb_profile(name: &str, colorants: [[f64; 3]; 3], curve: &[u8]) -> Vec<u8
 pub fn grey_profile(name: &str, curve: &[u8]) -> Vec<u8> {
     profile(
         *b"GRAY",
-        &[
-            (*b"desc", description(name)),
-            (*b"wtpt", xyz([0.9642, 1.0, 0.8249])),
-            (*b"kTRC", curve.to_vec()),
-        ],
+        &[(*b"desc", description(name)), (*b"wtpt", xyz([0.9642, 1.0, 0.8249])), (*b"kTRC", curve.to_vec())],
     )
 }
 
@@ -90,15 +86,8 @@ pub fn srgb_curve() -> Vec<u8> {
 }
 
 /// The XYZ of the colours of sRGB.
-pub const SRGB: [[f64; 3]; 3] = [
-    [0.43607, 0.22249, 0.01392],
-    [0.38515, 0.71687, 0.09708],
-    [0.14307, 0.06061, 0.7141],
-];
+pub const SRGB: [[f64; 3]; 3] = [[0.43607, 0.22249, 0.01392], [0.38515, 0.71687, 0.09708], [0.14307, 0.06061, 0.7141]];
 
 /// The XYZ of the colours of Display P3.
-pub const DISPLAY_P3: [[f64; 3]; 3] = [
-    [0.51512, 0.2412, -0.00105],
-    [0.29198, 0.69225, 0.04189],
-    [0.1571, 0.06657, 0.78407],
-];
+pub const DISPLAY_P3: [[f64; 3]; 3] =
+    [[0.51512, 0.2412, -0.00105], [0.29198, 0.69225, 0.04189], [0.1571, 0.06657, 0.78407]];

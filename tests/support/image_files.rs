@@ -22,9 +22,7 @@ pub fn jpeg(image: &RgbImage) -> Vec<u8> {
     let (width, height) = (image.width() as u16, image.height() as u16);
     let mut encoder = jpeg_encoder::Encoder::new(&mut file, 100);
     encoder.set_sampling_factor(jpeg_encoder::SamplingFactor::R_4_4_4);
-    encoder
-        .encode(image, width, height, jpeg_encoder::ColorType::Rgb)
-        .unwrap();
+    encoder.encode(image, width, height, jpeg_encoder::ColorType::Rgb).unwrap();
     file
 }
 
@@ -32,18 +30,10 @@ pub fn jpeg(image: &RgbImage) -> Vec<u8> {
 pub fn exif(orientation: u16) -> Vec<u8> {
     let big = orientation % 2 == 1;
     let short = |n: u16| {
-        if big {
-            n.to_be_bytes()
-        } else {
-            n.to_le_bytes()
-        }
+        if big { n.to_be_bytes() } else { n.to_le_bytes() }
     };
     let long = |n: u32| {
-        if big {
-            n.to_be_bytes()
-        } else {
-            n.to_le_bytes()
-        }
+        if big { n.to_be_bytes() } else { n.to_le_bytes() }
     };
     let mut data = if big { b"MM".to_vec() } else { b"II".to_vec() };
     data.extend(short(42));
@@ -98,8 +88,8 @@ pub fn turned_jpeg(jpeg: &[u8], orientation: u16) -> Vec<u8> {
     with_segment(jpeg, 0xE1, &data)
 }
 
-/// The image as a person sees it, by the meaning of the eight values (TIFF 6.0, section 8): the side of the image at which the
-/// first row stands, then the side at which the first column stands.
+/// The image as a person sees it, by the meaning of the eight values (TIFF 6.0, section 8): the side of the image at
+/// which the first row stands, then the side at which the first column stands.
 pub fn seen(stored: &RgbImage, orientation: u16) -> RgbImage {
     let (width, height) = stored.dimensions();
     let (last_x, last_y) = (width - 1, height - 1);
@@ -108,9 +98,7 @@ pub fn seen(stored: &RgbImage, orientation: u16) -> RgbImage {
         // Top, right.
         2 => RgbImage::from_fn(width, height, |x, y| *stored.get_pixel(last_x - x, y)),
         // Bottom, right.
-        3 => RgbImage::from_fn(width, height, |x, y| {
-            *stored.get_pixel(last_x - x, last_y - y)
-        }),
+        3 => RgbImage::from_fn(width, height, |x, y| *stored.get_pixel(last_x - x, last_y - y)),
         // Bottom, left.
         4 => RgbImage::from_fn(width, height, |x, y| *stored.get_pixel(x, last_y - y)),
         // Left, top.
@@ -118,9 +106,7 @@ pub fn seen(stored: &RgbImage, orientation: u16) -> RgbImage {
         // Right, top.
         6 => RgbImage::from_fn(height, width, |x, y| *stored.get_pixel(y, last_y - x)),
         // Right, bottom.
-        7 => RgbImage::from_fn(height, width, |x, y| {
-            *stored.get_pixel(last_x - y, last_y - x)
-        }),
+        7 => RgbImage::from_fn(height, width, |x, y| *stored.get_pixel(last_x - y, last_y - x)),
         // Left, bottom.
         8 => RgbImage::from_fn(height, width, |x, y| *stored.get_pixel(last_x - y, x)),
         _ => unreachable!("eight values"),
@@ -156,21 +142,14 @@ pub fn webp_samples(image: &RgbImage) -> Vec<u8> {
 /// A lossless WebP file that states an orientation.
 pub fn turned_webp(image: &RgbImage, orientation: u16) -> Vec<u8> {
     let (width, height) = image.dimensions();
-    webp_of(&[
-        extended([width, height], 0x08),
-        webp_samples(image),
-        riff(*b"EXIF", &exif(orientation)),
-    ])
+    webp_of(&[extended([width, height], 0x08), webp_samples(image), riff(*b"EXIF", &exif(orientation))])
 }
 
 /// A lossless WebP animation.
 pub fn animated_webp(frames: &[RgbImage]) -> Vec<u8> {
     let (width, height) = frames[0].dimensions();
     let side = |side: u32| (side - 1).to_le_bytes()[..3].to_vec();
-    let mut chunks = vec![
-        extended([width, height], 0x02),
-        riff(*b"ANIM", &[255, 255, 255, 255, 0, 0]),
-    ];
+    let mut chunks = vec![extended([width, height], 0x02), riff(*b"ANIM", &[255, 255, 255, 255, 0, 0])];
     for frame in frames {
         // The place, the size, 40 ms, no blending.
         let head = [&[0; 6][..], &side(width), &side(height), &[40, 0, 0, 2]].concat();
@@ -209,9 +188,5 @@ pub fn jpeg_with_profile(jpeg: &[u8], profile: &[u8]) -> Vec<u8> {
 /// A lossless WebP file with an ICC profile.
 pub fn webp_with_profile(image: &RgbImage, profile: &[u8]) -> Vec<u8> {
     let (width, height) = image.dimensions();
-    webp_of(&[
-        extended([width, height], 0x20),
-        riff(*b"ICCP", profile),
-        webp_samples(image),
-    ])
+    webp_of(&[extended([width, height], 0x20), riff(*b"ICCP", profile), webp_samples(image)])
 }

@@ -34,13 +34,7 @@ pub struct Set {
 
 impl Default for Set {
     fn default() -> Self {
-        Self {
-            version: "v3.0",
-            lengths: vec![3, 4],
-            videos: false,
-            task_column: "task",
-            wrist_fps: FPS,
-        }
+        Self { version: "v3.0", lengths: vec![3, 4], videos: false, task_column: "task", wrist_fps: FPS }
     }
 }
 
@@ -89,15 +83,10 @@ impl Set {
         let episodes: Vec<u32> = (0..self.lengths.len() as u32).collect();
         if self.is_v3() {
             let texts = episodes.iter().map(|episode| task(*episode)).collect();
-            let tasks = [
-                ("task_index", Column::Integers(integers(&episodes))),
-                (self.task_column, Column::Texts(texts)),
-            ];
+            let tasks =
+                [("task_index", Column::Integers(integers(&episodes))), (self.task_column, Column::Texts(texts))];
             file("meta/tasks.parquet", table(tasks));
-            file(
-                "meta/episodes/chunk-000/file-000.parquet",
-                self.episode_table(),
-            );
+            file("meta/episodes/chunk-000/file-000.parquet", self.episode_table());
             file("data/chunk-000/file-000.parquet", self.data(&episodes));
         } else {
             let lines = |line: fn(&Self, u32) -> Value| {
@@ -166,14 +155,8 @@ impl Set {
             })
             .collect();
         let mut columns: Vec<(String, Column)> = vec![
-            (
-                "episode_index".to_owned(),
-                Column::Integers((0..count as i64).collect()),
-            ),
-            (
-                "length".to_owned(),
-                Column::Integers(integers(&self.lengths)),
-            ),
+            ("episode_index".to_owned(), Column::Integers((0..count as i64).collect())),
+            ("length".to_owned(), Column::Integers(integers(&self.lengths))),
             ("data/chunk_index".to_owned(), zeros()),
             ("data/file_index".to_owned(), zeros()),
         ];
@@ -195,19 +178,11 @@ impl Set {
             let mut columns = vec![
                 ("timestamp", Column::Floats(times.collect())),
                 ("frame_index", Column::Integers(integers(&frames))),
-                (
-                    "episode_index",
-                    Column::Integers(vec![i64::from(*episode); frames.len()]),
-                ),
-                (
-                    "task_index",
-                    Column::Integers(vec![i64::from(*episode); frames.len()]),
-                ),
+                ("episode_index", Column::Integers(vec![i64::from(*episode); frames.len()])),
+                ("task_index", Column::Integers(vec![i64::from(*episode); frames.len()])),
             ];
             for camera in [FRONT, WRIST].into_iter().filter(|_| !self.videos) {
-                let images = frames
-                    .iter()
-                    .map(|frame| png(&picture(camera, *episode, *frame)));
+                let images = frames.iter().map(|frame| png(&picture(camera, *episode, *frame)));
                 columns.push((camera, Column::Images(images.collect())));
             }
             columns

@@ -1,21 +1,12 @@
 //! Records whose truth is known, as a run would have kept them.
 
 use darkqa_base::types::{
-    ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record,
-    TrialOutcome,
+    ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record, TrialOutcome,
 };
 
 /// A model's reply to one question in one condition; the first of three choices is true.
-pub fn record(
-    model: &str,
-    condition: &Condition,
-    (question, frame): (usize, usize),
-    right: bool,
-) -> Record {
-    let chosen = ParsedAnswer {
-        chosen: Some(usize::from(!right)),
-        why: None,
-    };
+pub fn record(model: &str, condition: &Condition, (question, frame): (usize, usize), right: bool) -> Record {
+    let chosen = ParsedAnswer { chosen: Some(usize::from(!right)), why: None };
     let detail = ChoiceDetail {
         frame: FrameId(format!("f{frame:04}")),
         family: Family::Color,
@@ -24,11 +15,7 @@ pub fn record(
         repeat: 0,
         strict: Some(chosen),
         lenient: Some(chosen),
-        outcome: if right {
-            TrialOutcome::Right
-        } else {
-            TrialOutcome::Wrong
-        },
+        outcome: if right { TrialOutcome::Right } else { TrialOutcome::Wrong },
         image: None,
         more_images: Vec::new(),
         shown_frame: None,

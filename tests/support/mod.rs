@@ -4,10 +4,7 @@
     unreachable_pub,
     reason = "each integration test is a program of its own and uses a part of what is shared"
 )]
-#![allow(
-    clippy::unwrap_used,
-    reason = "a test that cannot set up its scene fails where it cannot"
-)]
+#![allow(clippy::unwrap_used, reason = "a test that cannot set up its scene fails where it cannot")]
 
 pub mod batches;
 pub mod browser;
@@ -34,7 +31,7 @@ pub mod tools;
 #[expect(unsafe_code, reason = "the environment is how ONNX Runtime is told")]
 pub fn disable_telemetry() {
     static ONCE: std::sync::Once = std::sync::Once::new();
-    // SAFETY: the tests read the environment through the standard library, which locks it; ONNX Runtime, which does not,
-    // is opened after this call alone, by every thread that opens it.
+    // SAFETY: the tests read the environment through the standard library, which locks it; ONNX Runtime, which does
+    // not, is opened after this call alone, by every thread that opens it.
     ONCE.call_once(|| unsafe { darkqa_enhance::disable_telemetry() });
 }

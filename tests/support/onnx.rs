@@ -79,12 +79,7 @@ pub struct Graph {
 
 impl Graph {
     fn empty() -> Self {
-        Self {
-            nodes: Vec::new(),
-            constants: Vec::new(),
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-        }
+        Self { nodes: Vec::new(), constants: Vec::new(), inputs: Vec::new(), outputs: Vec::new() }
     }
 
     /// A graph with the input `input`, an image of any size.
@@ -93,16 +88,12 @@ impl Graph {
     }
 
     fn port(name: &str, element: Type, shape: &[Size]) -> Message {
-        let dims = shape
-            .iter()
-            .fold(Message::default(), |dims, size| match size {
-                Known(size) => dims.message(1, &Message::default().int(1, *size)),
-                Named(name) => dims.message(1, &Message::default().bytes(2, name.as_bytes())),
-            });
+        let dims = shape.iter().fold(Message::default(), |dims, size| match size {
+            Known(size) => dims.message(1, &Message::default().int(1, *size)),
+            Named(name) => dims.message(1, &Message::default().bytes(2, name.as_bytes())),
+        });
         let tensor = Message::default().int(1, element as u64).message(2, &dims);
-        Message::default()
-            .bytes(1, name.as_bytes())
-            .message(2, &Message::default().message(1, &tensor))
+        Message::default().bytes(1, name.as_bytes()).message(2, &Message::default().message(1, &tensor))
     }
 
     pub fn input(mut self, name: &str, element: Type, shape: &[Size]) -> Self {
@@ -117,9 +108,7 @@ impl Graph {
 
     /// A float initialiser.
     pub fn constant(mut self, name: &str, shape: &[u64], values: &[f32]) -> Self {
-        let dims = shape
-            .iter()
-            .fold(Message::default(), |tensor, size| tensor.int(1, *size));
+        let dims = shape.iter().fold(Message::default(), |tensor, size| tensor.int(1, *size));
         let raw: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
         let tensor = dims.int(2, 1).bytes(8, name.as_bytes()).bytes(9, &raw);
         self.constants.push(tensor);
@@ -130,24 +119,15 @@ impl Graph {
     pub fn shape(mut self, name: &str, values: &[i64]) -> Self {
         let raw: Vec<u8> = values.iter().flat_map(|x| x.to_le_bytes()).collect();
         let tensor = Message::default().int(1, values.len() as u64).int(2, 7);
-        self.constants
-            .push(tensor.bytes(8, name.as_bytes()).bytes(9, &raw));
+        self.constants.push(tensor.bytes(8, name.as_bytes()).bytes(9, &raw));
         self
     }
 
     /// A float initialiser whose values lie in another file.
     pub fn external(mut self, name: &str, shape: &[u64], file: &str) -> Self {
-        let dims = shape
-            .iter()
-            .fold(Message::default(), |tensor, size| tensor.int(1, *size));
-        let entry = Message::default()
-            .bytes(1, b"location")
-            .bytes(2, file.as_bytes());
-        let tensor = dims
-            .int(2, 1)
-            .bytes(8, name.as_bytes())
-            .message(13, &entry)
-            .int(14, 1);
+        let dims = shape.iter().fold(Message::default(), |tensor, size| tensor.int(1, *size));
+        let entry = Message::default().bytes(1, b"location").bytes(2, file.as_bytes());
+        let tensor = dims.int(2, 1).bytes(8, name.as_bytes()).message(13, &entry).int(14, 1);
         self.constants.push(tensor);
         self
     }
@@ -165,12 +145,8 @@ impl Graph {
         output: &str,
         attributes: &[(&str, Attribute)],
     ) -> Self {
-        let node = inputs.iter().fold(Message::default(), |node, name| {
-            node.bytes(1, name.as_bytes())
-        });
-        let node = node
-            .bytes(2, output.as_bytes())
-            .bytes(4, operator.as_bytes());
+        let node = inputs.iter().fold(Message::default(), |node, name| node.bytes(1, name.as_bytes()));
+        let node = node.bytes(2, output.as_bytes()).bytes(4, operator.as_bytes());
         let node = attributes.iter().fold(node, |node, (name, value)| {
             let attribute = Message::default().bytes(1, name.as_bytes());
             let attribute = match value {
@@ -192,13 +168,8 @@ impl Graph {
         let graph = self.nodes.iter().fold(graph, |g, node| g.message(1, node));
         let graph = graph.bytes(2, b"graph");
         let graph = self.constants.iter().fold(graph, |g, c| g.message(5, c));
-        let graph = self
-            .inputs
-            .iter()
-            .fold(graph, |g, port| g.message(11, port));
-        self.outputs
-            .iter()
-            .fold(graph, |g, port| g.message(12, port))
+        let graph = self.inputs.iter().fold(graph, |g, port| g.message(11, port));
+        self.outputs.iter().fold(graph, |g, port| g.message(12, port))
     }
 
     /// The bytes of an ONNX file: IR version 8, operator set 13.
@@ -209,9 +180,7 @@ impl Graph {
     /// The bytes of an ONNX file of an IR version and an operator set.
     pub fn model_of(&self, ir_version: u64, operators: u64) -> Vec<u8> {
         let opset = Message::default().bytes(1, b"").int(2, operators);
-        let model = Message::default()
-            .int(1, ir_version)
-            .bytes(2, b"darkqa-eval");
+        let model = Message::default().int(1, ir_version).bytes(2, b"darkqa-eval");
         model.message(7, &self.message()).message(8, &opset).0
     }
 
@@ -230,25 +199,17 @@ impl Graph {
 
 /// The image as it is.
 pub fn identity() -> Graph {
-    Graph::new()
-        .node("Identity", &["input"], "output")
-        .giving_image()
+    Graph::new().node("Identity", &["input"], "output").giving_image()
 }
 
 /// Every sample times a number.
 pub fn gain(factor: f32) -> Graph {
-    Graph::new()
-        .constant("factor", &[], &[factor])
-        .node("Mul", &["input", "factor"], "output")
-        .giving_image()
+    Graph::new().constant("factor", &[], &[factor]).node("Mul", &["input", "factor"], "output").giving_image()
 }
 
 /// Every sample to a power.
 pub fn gamma(exponent: f32) -> Graph {
-    Graph::new()
-        .constant("exponent", &[], &[exponent])
-        .node("Pow", &["input", "exponent"], "output")
-        .giving_image()
+    Graph::new().constant("exponent", &[], &[exponent]).node("Pow", &["input", "exponent"], "output").giving_image()
 }
 
 /// A model with the outputs of Zero-DCE: a wrong image (black), the image doubled, and 24 channels.
@@ -257,12 +218,7 @@ pub fn three_outputs(names: [&str; 3]) -> Graph {
         .constant("zero", &[], &[0.0])
         .node("Mul", &["input", "zero"], names[0])
         .node("Add", &["input", "input"], names[1])
-        .node_with(
-            "Concat",
-            &["input"; 8],
-            names[2],
-            &[("axis", Attribute::Int(1))],
-        )
+        .node_with("Concat", &["input"; 8], names[2], &[("axis", Attribute::Int(1))])
         .output(names[0], Type::Float, &image(3))
         .output(names[1], Type::Float, &image(3))
         .output(names[2], Type::Float, &image(24))
@@ -281,10 +237,11 @@ pub fn two_outputs() -> Graph {
 /// The image as it is, of one size only.
 pub fn fixed(height: u64, width: u64) -> Graph {
     let shape = [Known(1), Known(3), Known(height), Known(width)];
-    Graph::empty()
-        .input("input", Type::Float, &shape)
-        .node("Identity", &["input"], "output")
-        .output("output", Type::Float, &shape)
+    Graph::empty().input("input", Type::Float, &shape).node("Identity", &["input"], "output").output(
+        "output",
+        Type::Float,
+        &shape,
+    )
 }
 
 /// The same graph for images of one size, which may be another batch.
@@ -309,20 +266,10 @@ pub fn traced() -> Graph {
 
 /// The image enlarged by two.
 pub fn doubled() -> Graph {
-    let shape = [
-        Known(1),
-        Known(3),
-        Named("double_height"),
-        Named("double_width"),
-    ];
+    let shape = [Known(1), Known(3), Named("double_height"), Named("double_width")];
     let blocks = [("blocksize", Attribute::Int(2))];
     Graph::new()
-        .node_with(
-            "Concat",
-            &["input"; 4],
-            "deep",
-            &[("axis", Attribute::Int(1))],
-        )
+        .node_with("Concat", &["input"; 4], "deep", &[("axis", Attribute::Int(1))])
         .node_with("DepthToSpace", &["deep"], "output", &blocks)
         .output("output", Type::Float, &shape)
 }
@@ -332,32 +279,17 @@ pub fn of_much_memory() -> Graph {
     Graph::new()
         .shape("many", &[1 << 30, 3, 1, 1])
         .node("Expand", &["input", "many"], "large")
-        .node_with(
-            "ReduceMean",
-            &["large"],
-            "output",
-            &[("axes", Attribute::Ints(&[0]))],
-        )
+        .node_with("ReduceMean", &["large"], "output", &[("axes", Attribute::Ints(&[0]))])
         .giving_image()
 }
 
 /// The image, and a product of 400 constant matrices that is computed when the model is loaded: minutes.
 pub fn slow_to_load() -> Graph {
     let names: Vec<String> = (0..=400).map(|at| format!("m{at}")).collect();
-    let graph =
-        Graph::new()
-            .shape("square", &[2048, 2048])
-            .node("ConstantOfShape", &["square"], "m0");
-    let products = names.windows(2).fold(graph, |graph, pair| {
-        graph.node("MatMul", &[&pair[0], &pair[0]], &pair[1])
-    });
+    let graph = Graph::new().shape("square", &[2048, 2048]).node("ConstantOfShape", &["square"], "m0");
+    let products = names.windows(2).fold(graph, |graph, pair| graph.node("MatMul", &[&pair[0], &pair[0]], &pair[1]));
     products
-        .node_with(
-            "ReduceMax",
-            &["m400"],
-            "most",
-            &[("keepdims", Attribute::Int(0))],
-        )
+        .node_with("ReduceMax", &["m400"], "most", &[("keepdims", Attribute::Int(0))])
         .node("Add", &["input", "most"], "output")
         .giving_image()
 }
@@ -380,25 +312,10 @@ pub fn endless_if_bright_from(size: &'static [u64]) -> Graph {
     Graph::new()
         .shape("turns", &[1 << 40])
         .constant("half", &[], &[0.5])
-        .node_with(
-            "MaxPool",
-            &["input"],
-            "pooled",
-            &[("kernel_shape", Attribute::Ints(size))],
-        )
-        .node_with(
-            "ReduceMax",
-            &["pooled"],
-            "most",
-            &[("keepdims", Attribute::Int(0))],
-        )
+        .node_with("MaxPool", &["input"], "pooled", &[("kernel_shape", Attribute::Ints(size))])
+        .node_with("ReduceMax", &["pooled"], "most", &[("keepdims", Attribute::Int(0))])
         .node("Greater", &["most", "half"], "is_bright")
-        .node_with(
-            "Loop",
-            &["turns", "is_bright", "input"],
-            "output",
-            &[("body", Attribute::Body(body))],
-        )
+        .node_with("Loop", &["turns", "is_bright", "input"], "output", &[("body", Attribute::Body(body))])
         .giving_image()
 }
 
@@ -417,10 +334,7 @@ pub fn blurred() -> Graph {
             "AveragePool",
             &["input"],
             "output",
-            &[
-                ("kernel_shape", Attribute::Ints(&[5, 5])),
-                ("pads", Attribute::Ints(&[2, 2, 2, 2])),
-            ],
+            &[("kernel_shape", Attribute::Ints(&[5, 5])), ("pads", Attribute::Ints(&[2, 2, 2, 2]))],
         )
         .giving_image()
 }
@@ -428,12 +342,7 @@ pub fn blurred() -> Graph {
 /// The image and its mean, added.
 pub fn mean_added() -> Graph {
     Graph::new()
-        .node_with(
-            "ReduceMean",
-            &["input"],
-            "mean",
-            &[("axes", Attribute::Ints(&[2, 3]))],
-        )
+        .node_with("ReduceMean", &["input"], "mean", &[("axes", Attribute::Ints(&[2, 3]))])
         .node("Add", &["input", "mean"], "output")
         .giving_image()
 }
@@ -464,14 +373,11 @@ pub fn ranged(low: f32, high: f32) -> Graph {
 
 /// A model with a single output, of the eight-fold channels.
 pub fn no_image() -> Graph {
-    Graph::new()
-        .node_with(
-            "Concat",
-            &["input"; 8],
-            "curves",
-            &[("axis", Attribute::Int(1))],
-        )
-        .output("curves", Type::Float, &image(24))
+    Graph::new().node_with("Concat", &["input"; 8], "curves", &[("axis", Attribute::Int(1))]).output(
+        "curves",
+        Type::Float,
+        &image(24),
+    )
 }
 
 /// A second input beside the image.
@@ -484,30 +390,20 @@ pub fn two_inputs() -> Graph {
 
 /// Half of the image, under a shape that does not say so.
 pub fn halved() -> Graph {
-    let shape = [
-        Known(1),
-        Known(3),
-        Named("half_height"),
-        Named("half_width"),
-    ];
+    let shape = [Known(1), Known(3), Named("half_height"), Named("half_width")];
     Graph::new()
         .node_with(
             "MaxPool",
             &["input"],
             "output",
-            &[
-                ("kernel_shape", Attribute::Ints(&[2, 2])),
-                ("strides", Attribute::Ints(&[2, 2])),
-            ],
+            &[("kernel_shape", Attribute::Ints(&[2, 2])), ("strides", Attribute::Ints(&[2, 2]))],
         )
         .output("output", Type::Float, &shape)
 }
 
 /// 0/0 wherever the image is black.
 pub fn not_a_number() -> Graph {
-    Graph::new()
-        .node("Div", &["input", "input"], "output")
-        .giving_image()
+    Graph::new().node("Div", &["input", "input"], "output").giving_image()
 }
 
 /// The image and a weight of the given value, added `1e38` times over: nothing, where the weight counts as zero.
@@ -532,13 +428,11 @@ pub fn weight_times_external(value: f32, file: &str) -> Graph {
 
 /// The gain lies in another file: four bytes, a little-endian float.
 pub fn external_gain(file: &str) -> Graph {
-    Graph::new()
-        .external("factor", &[1, 1, 1, 1], file)
-        .node("Mul", &["input", "factor"], "output")
-        .giving_image()
+    Graph::new().external("factor", &[1, 1, 1, 1], file).node("Mul", &["input", "factor"], "output").giving_image()
 }
 
-/// Automatic exposure in linear light, the enhancer in `models/gray-gain.onnx`; `src/docs/enhancers.md` says what it computes.
+/// Automatic exposure in linear light, the enhancer in `models/gray-gain.onnx`; `src/docs/enhancers.md` says what it
+/// computes.
 pub fn gray_gain() -> Graph {
     // IEC 61966-2-1, both ways
     let decode = Graph::new()
@@ -558,12 +452,7 @@ pub fn gray_gain() -> Graph {
         .constant("black", &[], &[1e-6])
         .constant("one", &[], &[1.0])
         .constant("cap", &[], &[512.0])
-        .node_with(
-            "ReduceMean",
-            &["light"],
-            "mean",
-            &[("axes", Attribute::Ints(&[1, 2, 3]))],
-        )
+        .node_with("ReduceMean", &["light"], "mean", &[("axes", Attribute::Ints(&[1, 2, 3]))])
         .node("Max", &["mean", "black"], "mean_above_black")
         .node("Div", &["gray", "mean_above_black"], "wanted")
         .node("Clip", &["wanted", "one", "cap"], "gain")
@@ -577,15 +466,12 @@ pub fn gray_gain() -> Graph {
         .node("Mul", &["rooted", "scale"], "stretched")
         .node("Sub", &["stretched", "offset"], "encoded_shoulder")
         .node("Less", &["exposed", "linear_knee"], "in_encoded_toe")
-        .node(
-            "Where",
-            &["in_encoded_toe", "encoded_toe", "encoded_shoulder"],
-            "enhanced",
-        )
+        .node("Where", &["in_encoded_toe", "encoded_toe", "encoded_shoulder"], "enhanced")
         .output("enhanced", Type::Float, &image(3))
 }
 
-/// An enhancer, the power 0.4 of each sample, that takes values from `low_in` to `high_in` and gives them from `low_out` to `high_out`.
+/// An enhancer, the power 0.4 of each sample, that takes values from `low_in` to `high_in` and gives them from
+/// `low_out` to `high_out`.
 pub fn enhancer_in_ranges([low_in, high_in]: [f32; 2], [low_out, high_out]: [f32; 2]) -> Graph {
     Graph::new()
         .constant("low in", &[], &[low_in])
@@ -605,11 +491,7 @@ pub fn enhancer_in_ranges([low_in, high_in]: [f32; 2], [low_out, high_out]: [f32
 
 /// What follows the power 0.4 of each sample, which is `enhanced`.
 fn after_enhancing(then: impl FnOnce(Graph) -> Graph) -> Graph {
-    let enhanced = Graph::new().constant("exponent", &[], &[0.4]).node(
-        "Pow",
-        &["input", "exponent"],
-        "enhanced",
-    );
+    let enhanced = Graph::new().constant("exponent", &[], &[0.4]).node("Pow", &["input", "exponent"], "enhanced");
     then(enhanced).giving_image()
 }
 
@@ -617,22 +499,13 @@ fn after_enhancing(then: impl FnOnce(Graph) -> Graph) -> Graph {
 pub fn blue_first() -> Graph {
     after_enhancing(|graph| {
         let axis = [("axis", Attribute::Int(1))];
-        graph.shape("order", &[2, 1, 0]).node_with(
-            "Gather",
-            &["enhanced", "order"],
-            "output",
-            &axis,
-        )
+        graph.shape("order", &[2, 1, 0]).node_with("Gather", &["enhanced", "order"], "output", &axis)
     })
 }
 
 /// An enhancer that gives a negative.
 pub fn negative() -> Graph {
-    after_enhancing(|graph| {
-        graph
-            .constant("white", &[], &[1.0])
-            .node("Sub", &["white", "enhanced"], "output")
-    })
+    after_enhancing(|graph| graph.constant("white", &[], &[1.0]).node("Sub", &["white", "enhanced"], "output"))
 }
 
 /// An enhancer that gives a plain colour.
@@ -651,10 +524,11 @@ pub fn flat() -> Graph {
 pub fn mislabelled() -> Graph {
     after_enhancing(|graph| {
         let packed = [("perm", Attribute::Ints(&[0, 2, 3, 1]))];
-        graph
-            .node_with("Transpose", &["enhanced"], "packed", &packed)
-            .node("Shape", &["enhanced"], "shape")
-            .node("Reshape", &["packed", "shape"], "output")
+        graph.node_with("Transpose", &["enhanced"], "packed", &packed).node("Shape", &["enhanced"], "shape").node(
+            "Reshape",
+            &["packed", "shape"],
+            "output",
+        )
     })
 }
 
@@ -662,30 +536,19 @@ pub fn mislabelled() -> Graph {
 pub fn times_input(element: Type, shape: &[Size]) -> Graph {
     Graph::new()
         .input("factor", element, shape)
-        .node_with(
-            "Cast",
-            &["factor"],
-            "number",
-            &[("to", Attribute::Int(Type::Float as u64))],
-        )
+        .node_with("Cast", &["factor"], "number", &[("to", Attribute::Int(Type::Float as u64))])
         .node("Mul", &["input", "number"], "output")
         .giving_image()
 }
 
 /// The image times a plane of its size, a further input.
 pub fn times_plane(name: &str) -> Graph {
-    Graph::new()
-        .input(name, Type::Float, &image(1))
-        .node("Mul", &["input", name], "output")
-        .giving_image()
+    Graph::new().input(name, Type::Float, &image(1)).node("Mul", &["input", name], "output").giving_image()
 }
 
 /// The image and noise, added: three channels of its size.
 pub fn plus_noise() -> Graph {
-    Graph::new()
-        .input("z", Type::Float, &image(3))
-        .node("Add", &["input", "z"], "output")
-        .giving_image()
+    Graph::new().input("z", Type::Float, &image(3)).node("Add", &["input", "z"], "output").giving_image()
 }
 
 /// The image and the mean of noise of another size, added.
@@ -732,10 +595,11 @@ pub fn subtracted() -> Graph {
 /// The factor in an authors' script.
 pub fn gain_map() -> Graph {
     after_enhancing(|graph| {
-        graph
-            .constant("black", &[], &[1e-3])
-            .node("Max", &["input", "black"], "lit")
-            .node("Div", &["enhanced", "lit"], "output")
+        graph.constant("black", &[], &[1e-3]).node("Max", &["input", "black"], "lit").node(
+            "Div",
+            &["enhanced", "lit"],
+            "output",
+        )
     })
 }
 
@@ -755,9 +619,12 @@ pub fn colourless() -> Graph {
     let axes = [("axes", Attribute::Ints(&[1]))];
     let axis = [("axis", Attribute::Int(1))];
     after_enhancing(|graph| {
-        graph
-            .node_with("ReduceMax", &["enhanced"], "luma", &axes)
-            .node_with("Concat", &["luma", "luma", "luma"], "output", &axis)
+        graph.node_with("ReduceMax", &["enhanced"], "luma", &axes).node_with(
+            "Concat",
+            &["luma", "luma", "luma"],
+            "output",
+            &axis,
+        )
     })
 }
 
@@ -765,12 +632,7 @@ pub fn colourless() -> Graph {
 pub fn light_beside() -> Graph {
     let axes = [("axes", Attribute::Ints(&[1]))];
     after_enhancing(|graph| {
-        graph.node("Identity", &["enhanced"], "output").node_with(
-            "ReduceMax",
-            &["input"],
-            "L",
-            &axes,
-        )
+        graph.node("Identity", &["enhanced"], "output").node_with("ReduceMax", &["input"], "L", &axes)
     })
     .output("L", Type::Float, &image(1))
 }
@@ -788,7 +650,8 @@ pub fn normalised_at_both_ends(mean: [f32; 3], std: [f32; 3]) -> Graph {
         .giving_image()
 }
 
-/// Nodes that take values with a mean and a deviation for each channel, and give the brightened values in [0, 1] under a name.
+/// Nodes that take values with a mean and a deviation for each channel, and give the brightened values in [0, 1] under
+/// a name.
 fn brightened_from_normalised(mean: [f32; 3], std: [f32; 3], output: &str) -> Graph {
     Graph::new()
         .constant("mean", &[1, 3, 1, 1], &mean)
@@ -801,19 +664,15 @@ fn brightened_from_normalised(mean: [f32; 3], std: [f32; 3], output: &str) -> Gr
         .node("Pow", &["light", "exponent"], output)
 }
 
-/// An image whose brightness follows from the last bits of a product over all pixels: of the 3 channels with 24 copies of them.
+/// An image whose brightness follows from the last bits of a product over all pixels: of the 3 channels with 24 copies
+/// of them.
 pub fn product_over_pixels() -> Graph {
     Graph::new()
         .shape("rows", &[3, -1])
         .constant("many", &[], &[1e5])
         .constant("half", &[], &[0.5])
         .node("Reshape", &["input", "rows"], "queries")
-        .node_with(
-            "Concat",
-            &["queries"; 8],
-            "keys",
-            &[("axis", Attribute::Int(0))],
-        )
+        .node_with("Concat", &["queries"; 8], "keys", &[("axis", Attribute::Int(0))])
         .node("Transpose", &["keys"], "columns")
         .node("MatMul", &["queries", "columns"], "product")
         .node("ReduceSum", &["product"], "sum")
@@ -830,12 +689,7 @@ pub fn cast(to: Type) -> Graph {
     Graph::new()
         .constant("white", &[], &[255.0])
         .node("Mul", &["input", "white"], "codes")
-        .node_with(
-            "Cast",
-            &["codes"],
-            "output",
-            &[("to", Attribute::Int(to as u64))],
-        )
+        .node_with("Cast", &["codes"], "output", &[("to", Attribute::Int(to as u64))])
         .output("output", to, &image(3))
 }
 
@@ -852,17 +706,12 @@ pub fn seven_channels() -> Graph {
 /// The image twice: six channels.
 pub fn six_channels() -> Graph {
     let axis = [("axis", Attribute::Int(1))];
-    Graph::new()
-        .node_with("Concat", &["input", "input"], "x", &axis)
-        .output("x", Type::Float, &image(6))
+    Graph::new().node_with("Concat", &["input", "input"], "x", &axis).output("x", Type::Float, &image(6))
 }
 
 /// The image `img` and a number, its loss, which is named as images are.
 pub fn loss_beside() -> Graph {
-    let axes = [
-        ("axes", Attribute::Ints(&[0, 1, 2, 3])),
-        ("keepdims", Attribute::Int(0)),
-    ];
+    let axes = [("axes", Attribute::Ints(&[0, 1, 2, 3])), ("keepdims", Attribute::Int(0))];
     Graph::new()
         .node_with("ReduceMean", &["input"], "output", &axes)
         .node("Identity", &["input"], "img")
@@ -889,23 +738,16 @@ pub fn times_vector() -> Graph {
         .giving_image()
 }
 
-/// A network of a fixed size that sees 2 × 2 blocks: each pixel the mean of its block, so that tiles must start at even places.
+/// A network of a fixed size that sees 2 × 2 blocks: each pixel the mean of its block, so that tiles must start at even
+/// places.
 pub fn pooled(height: u64, width: u64) -> Graph {
-    let pool = [
-        ("kernel_shape", Attribute::Ints(&[2, 2])),
-        ("strides", Attribute::Ints(&[2, 2])),
-    ];
+    let pool = [("kernel_shape", Attribute::Ints(&[2, 2])), ("strides", Attribute::Ints(&[2, 2]))];
     let blocks = [("blocksize", Attribute::Int(2))];
     let shape = [Known(1), Known(3), Known(height), Known(width)];
     Graph::empty()
         .input("input", Type::Float, &shape)
         .node_with("AveragePool", &["input"], "small", &pool)
-        .node_with(
-            "Concat",
-            &["small"; 4],
-            "deep",
-            &[("axis", Attribute::Int(1))],
-        )
+        .node_with("Concat", &["small"; 4], "deep", &[("axis", Attribute::Int(1))])
         .node_with("DepthToSpace", &["deep"], "output", &blocks)
         .output("output", Type::Float, &shape)
 }

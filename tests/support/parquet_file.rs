@@ -26,9 +26,7 @@ pub fn rows(path: &Path) -> Vec<Map<String, Value>> {
         .map(|row| {
             let row = row.unwrap();
             let cells = row.get_column_iter();
-            cells
-                .map(|(name, field)| (name.clone(), value(field)))
-                .collect()
+            cells.map(|(name, field)| (name.clone(), value(field))).collect()
         })
         .collect()
 }
@@ -37,11 +35,7 @@ pub fn rows(path: &Path) -> Vec<Map<String, Value>> {
 pub fn metadata(path: &Path) -> BTreeMap<String, String> {
     let reader = open(path);
     let pairs = reader.metadata().file_metadata().key_value_metadata();
-    pairs
-        .into_iter()
-        .flatten()
-        .map(|pair| (pair.key.clone(), pair.value.clone().unwrap()))
-        .collect()
+    pairs.into_iter().flatten().map(|pair| (pair.key.clone(), pair.value.clone().unwrap())).collect()
 }
 
 /// The part of a file that holds its values: what stands before its footer.
@@ -124,13 +118,8 @@ impl Column {
             Self::Doubles(_) => leaf(name, Physical::DOUBLE, None),
             Self::Texts(_) => leaf(name, Physical::BYTE_ARRAY, text),
             Self::Images(_) => {
-                let fields = vec![
-                    leaf("bytes", Physical::BYTE_ARRAY, None),
-                    leaf("path", Physical::BYTE_ARRAY, text),
-                ];
-                let group = Type::group_type_builder(name)
-                    .with_repetition(Repetition::OPTIONAL)
-                    .with_fields(fields);
+                let fields = vec![leaf("bytes", Physical::BYTE_ARRAY, None), leaf("path", Physical::BYTE_ARRAY, text)];
+                let group = Type::group_type_builder(name).with_repetition(Repetition::OPTIONAL).with_fields(fields);
                 Arc::new(group.build().unwrap())
             }
         }
@@ -143,8 +132,7 @@ impl Column {
             Self::Floats(values) => write::<FloatType>(group, values, 1),
             Self::Doubles(values) => write::<DoubleType>(group, values, 1),
             Self::Texts(values) => {
-                let values: Vec<ByteArray> =
-                    values.iter().map(|text| bytes(text.as_bytes())).collect();
+                let values: Vec<ByteArray> = values.iter().map(|text| bytes(text.as_bytes())).collect();
                 write::<ByteArrayType>(group, &values, 1);
             }
             Self::Images(values) => {
@@ -159,16 +147,9 @@ impl Column {
 }
 
 /// Writes the next column, without nulls, whose values have this definition level.
-fn write<T: DataType>(
-    group: &mut SerializedRowGroupWriter<'_, Vec<u8>>,
-    values: &[T::T],
-    level: i16,
-) {
+fn write<T: DataType>(group: &mut SerializedRowGroupWriter<'_, Vec<u8>>, values: &[T::T], level: i16) {
     let mut column = group.next_column().unwrap().unwrap();
     let levels = vec![level; values.len()];
-    column
-        .typed::<T>()
-        .write_batch(values, Some(&levels), None)
-        .unwrap();
+    column.typed::<T>().write_batch(values, Some(&levels), None).unwrap();
     column.close().unwrap();
 }

@@ -7,8 +7,7 @@ use std::io::{Cursor, Write as _};
 const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 /// A definition of a message type with exposure and gain, as a camera driver has it.
-pub const EXPOSURE: &str =
-    "std_msgs/Header header\nuint64 camera_time\nuint32 exposure_time\nfloat32 gain\n";
+pub const EXPOSURE: &str = "std_msgs/Header header\nuint64 camera_time\nuint32 exposure_time\nfloat32 gain\n";
 
 /// The start of all times, in seconds since 1970.
 pub const START: f64 = 1_700_000_000.0;
@@ -41,34 +40,18 @@ impl Records {
     }
 
     /// A topic with a schema of its own.
-    pub fn topic(
-        &mut self,
-        id: u16,
-        topic: &str,
-        schema: &str,
-        serialization: &str,
-        definition: &str,
-    ) {
+    pub fn topic(&mut self, id: u16, topic: &str, schema: &str, serialization: &str, definition: &str) {
         let id = id.to_le_bytes();
-        self.record(
-            3,
-            &[&id[..], &text(schema), &text("ros2msg"), &text(definition)].concat(),
-        );
+        self.record(3, &[&id[..], &text(schema), &text("ros2msg"), &text(definition)].concat());
         let no_metadata = 0_u32.to_le_bytes();
         let ids = [id, id].concat();
-        self.record(
-            4,
-            &[&ids[..], &text(topic), &text(serialization), &no_metadata].concat(),
-        );
+        self.record(4, &[&ids[..], &text(topic), &text(serialization), &no_metadata].concat());
     }
 
     /// A message at seconds from [`START`].
     pub fn message(&mut self, topic: u16, at: f64, body: &[u8]) {
         let time = (((START + at) * 1e9) as u64).to_le_bytes();
-        self.record(
-            5,
-            &[&topic.to_le_bytes()[..], &[0; 4], &time, &time, body].concat(),
-        );
+        self.record(5, &[&topic.to_le_bytes()[..], &[0; 4], &time, &time, body].concat());
     }
 
     /// A chunk of other records.
@@ -83,17 +66,8 @@ impl Records {
                 ("lz4", encoder.finish().unwrap())
             }
         };
-        let head = [
-            &[0; 16][..],
-            &(records.0.len() as u64).to_le_bytes(),
-            &crc.to_le_bytes(),
-            &text(name),
-        ]
-        .concat();
-        self.record(
-            6,
-            &[&head[..], &(stored.len() as u64).to_le_bytes(), &stored].concat(),
-        );
+        let head = [&[0; 16][..], &(records.0.len() as u64).to_le_bytes(), &crc.to_le_bytes(), &text(name)].concat();
+        self.record(6, &[&head[..], &(stored.len() as u64).to_le_bytes(), &stored].concat());
     }
 
     /// The file of these records, with its end.
@@ -170,22 +144,10 @@ impl Cdr {
 }
 
 /// A `sensor_msgs/Image` whose rows have `padding` more bytes.
-pub fn image(
-    at: f64,
-    encoding: &str,
-    [width, height]: [u32; 2],
-    rows: &[u8],
-    padding: usize,
-) -> Vec<u8> {
+pub fn image(at: f64, encoding: &str, [width, height]: [u32; 2], rows: &[u8], padding: usize) -> Vec<u8> {
     let row = rows.len() / height as usize;
-    let padded: Vec<u8> = rows
-        .chunks(row)
-        .flat_map(|row| {
-            row.iter()
-                .copied()
-                .chain(std::iter::repeat_n(0xee, padding))
-        })
-        .collect();
+    let padded: Vec<u8> =
+        rows.chunks(row).flat_map(|row| row.iter().copied().chain(std::iter::repeat_n(0xee, padding))).collect();
     let mut message = Cdr::new(at);
     message.u32(height);
     message.u32(width);
@@ -212,12 +174,8 @@ pub fn camera_info([width, height]: [u32; 2], focal: [f64; 2]) -> Vec<u8> {
     message.text("plumb_bob");
     message.u32(0);
     let centre = [width, height].map(|side| f64::from(side - 1) / 2.0);
-    let k = [
-        focal[0], 0.0, centre[0], 0.0, focal[1], centre[1], 0.0, 0.0, 1.0,
-    ];
-    k.iter()
-        .chain(&[0.0; 21])
-        .for_each(|number| message.f64(*number));
+    let k = [focal[0], 0.0, centre[0], 0.0, focal[1], centre[1], 0.0, 0.0, 1.0];
+    k.iter().chain(&[0.0; 21]).for_each(|number| message.f64(*number));
     message.done()
 }
 
@@ -234,19 +192,16 @@ pub fn exposure(at: f64, microseconds: u32, gain: f32) -> Vec<u8> {
 pub fn picture(number: u8, [width, height]: [u32; 2]) -> image::RgbImage {
     image::RgbImage::from_fn(width, height, |x, y| {
         let shade = |step: u32, at: u32| (at * step) as u8;
-        image::Rgb([
-            shade(2, x).wrapping_add(number.wrapping_mul(29)),
-            shade(3, y),
-            number.wrapping_mul(51),
-        ])
+        image::Rgb([shade(2, x).wrapping_add(number.wrapping_mul(29)), shade(3, y), number.wrapping_mul(51)])
     })
 }
 
 /// The size of the images of [`drive`].
 pub const SIZE: [u32; 2] = [96, 64];
 
-/// A drive of a robot with two cameras: `/front/image_raw` in bgr8 twice a second, with the camera's intrinsics and exposures, and
-/// `/rear/image_raw/compressed` as JPEG once a second; and a topic without images. Each second is a chunk.
+/// A drive of a robot with two cameras: `/front/image_raw` in bgr8 twice a second, with the camera's intrinsics and
+/// exposures, and `/rear/image_raw/compressed` as JPEG once a second; and a topic without images. Each second is a
+/// chunk.
 pub fn drive(seconds: u32, compression: Compression) -> Vec<u8> {
     let mut records = Records::default();
     for second in 0..seconds {
@@ -266,14 +221,8 @@ pub fn drive(seconds: u32, compression: Compression) -> Vec<u8> {
         let at = f64::from(second);
         let mut file = Cursor::new(Vec::new());
         let picture = picture(200_u8.wrapping_add(second as u8), SIZE);
-        picture
-            .write_to(&mut file, image::ImageFormat::Jpeg)
-            .unwrap();
-        chunk.message(
-            2,
-            at,
-            &compressed(at, "bgr8; jpeg compressed bgr8", &file.into_inner()),
-        );
+        picture.write_to(&mut file, image::ImageFormat::Jpeg).unwrap();
+        chunk.message(2, at, &compressed(at, "bgr8; jpeg compressed bgr8", &file.into_inner()));
         records.chunk(compression, &chunk);
     }
     records.file()
@@ -281,26 +230,8 @@ pub fn drive(seconds: u32, compression: Compression) -> Vec<u8> {
 
 fn topics(records: &mut Records) {
     records.topic(1, "/front/image_raw", "sensor_msgs/msg/Image", "cdr", "");
-    records.topic(
-        2,
-        "/rear/image_raw/compressed",
-        "sensor_msgs/msg/CompressedImage",
-        "cdr",
-        "",
-    );
-    records.topic(
-        3,
-        "/front/camera_info",
-        "sensor_msgs/msg/CameraInfo",
-        "cdr",
-        "",
-    );
-    records.topic(
-        4,
-        "/front/meta",
-        "driver/msg/ImageMetaData",
-        "cdr",
-        EXPOSURE,
-    );
+    records.topic(2, "/rear/image_raw/compressed", "sensor_msgs/msg/CompressedImage", "cdr", "");
+    records.topic(3, "/front/camera_info", "sensor_msgs/msg/CameraInfo", "cdr", "");
+    records.topic(4, "/front/meta", "driver/msg/ImageMetaData", "cdr", EXPOSURE);
     records.topic(5, "/imu", "sensor_msgs/msg/Imu", "cdr", "");
 }

@@ -8,7 +8,8 @@ use std::time::UNIX_EPOCH;
 
 use super::run::{Bench, PROGRAM, files};
 
-/// The folder with the first rooms of the default seed. It is kept beside the program, for as long as this is the same file.
+/// The folder with the first rooms of the default seed. It is kept beside the program, for as long as this is the same
+/// file.
 pub fn rooms(frames: usize, size: &str) -> PathBuf {
     static DRAWING: Mutex<()> = Mutex::new(());
     let _one_at_a_time = DRAWING.lock();
@@ -24,14 +25,8 @@ pub fn rooms(frames: usize, size: &str) -> PathBuf {
     if !folder.exists() {
         let made = tempfile::tempdir_in(&own).unwrap();
         let frames = frames.to_string();
-        let args = [
-            "rooms", "--out", "rooms", "--frames", &frames, "--size", size,
-        ];
-        let drawn = Command::new(PROGRAM)
-            .args(args)
-            .current_dir(&made)
-            .output()
-            .unwrap();
+        let args = ["rooms", "--out", "rooms", "--frames", &frames, "--size", size];
+        let drawn = Command::new(PROGRAM).args(args).current_dir(&made).output().unwrap();
         assert!(drawn.status.success(), "{drawn:?}");
         // Another test process may have been faster.
         let moved = fs::rename(made.path().join("rooms"), &folder);

@@ -38,16 +38,15 @@ impl Called {
 
 impl Bench {
     pub fn new() -> Self {
-        Self {
-            folder: tempfile::tempdir().unwrap(),
-        }
+        Self { folder: tempfile::tempdir().unwrap() }
     }
 
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    /// A folder with `set.jsonl`: `count` questions with three choices about one small brown picture; the third is true.
+    /// A folder with `set.jsonl`: `count` questions with three choices about one small brown picture; the third is
+    /// true.
     pub fn with_questions(count: usize) -> Self {
         let bench = Self::new();
         let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([90, 60, 30]));
@@ -92,10 +91,7 @@ impl Bench {
     pub fn command(&self, words: &[&str]) -> Command {
         let mut command = Command::new(PROGRAM);
         for (name, _) in std::env::vars() {
-            if ["OPENAI_", "DARKQA_", "RUST_LOG", "CLICOLOR", "NO_COLOR"]
-                .iter()
-                .any(|begin| name.starts_with(begin))
-            {
+            if ["OPENAI_", "DARKQA_", "RUST_LOG", "CLICOLOR", "NO_COLOR"].iter().any(|begin| name.starts_with(begin)) {
                 command.env_remove(name);
             }
         }
@@ -153,9 +149,7 @@ static SCHEMAS: LazyLock<(Schemas, [SchemaIndex; 2])> = LazyLock::new(|| {
     ]
     .map(|(name, text)| {
         let place = format!("memory:///{name}");
-        compiler
-            .add_resource(&place, serde_json::from_str(text).unwrap())
-            .unwrap();
+        compiler.add_resource(&place, serde_json::from_str(text).unwrap()).unwrap();
         compiler.compile(&place, &mut schemas).unwrap()
     });
     (schemas, indices)
@@ -164,10 +158,7 @@ static SCHEMAS: LazyLock<(Schemas, [SchemaIndex; 2])> = LazyLock::new(|| {
 /// The records of a run, in the order of the file; each is held to the schema of its kind.
 pub fn records(run: &Path) -> Vec<Value> {
     let text = fs::read_to_string(run.join("records.jsonl")).unwrap();
-    let records: Vec<Value> = text
-        .lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect();
+    let records: Vec<Value> = text.lines().map(|line| serde_json::from_str(line).unwrap()).collect();
     for record in &records {
         let open = record.get("step").is_some();
         let (schemas, indices) = &*SCHEMAS;
@@ -183,18 +174,12 @@ pub fn files(folder: &Path) -> Vec<PathBuf> {
     fs::read_dir(folder)
         .unwrap()
         .map(|entry| entry.unwrap().path())
-        .flat_map(|path| {
-            if path.is_dir() {
-                files(&path)
-            } else {
-                vec![path]
-            }
-        })
+        .flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] })
         .collect()
 }
 
-/// Asserts that all files of two runs are the same bytes, but for those that hold times or the name of the run. Returns how many
-/// files were compared.
+/// Asserts that all files of two runs are the same bytes, but for those that hold times or the name of the run. Returns
+/// how many files were compared.
 pub fn assert_same_products(run: &Path, other: &Path) -> usize {
     let timed = [
         "manifest.json",
@@ -211,12 +196,7 @@ pub fn assert_same_products(run: &Path, other: &Path) -> usize {
         if timed.iter().any(|timed| name.ends_with(timed)) {
             continue;
         }
-        assert_eq!(
-            fs::read(&path).unwrap(),
-            fs::read(other.join(name)).unwrap(),
-            "{}",
-            name.display()
-        );
+        assert_eq!(fs::read(&path).unwrap(), fs::read(other.join(name)).unwrap(), "{}", name.display());
         compared += 1;
     }
     compared

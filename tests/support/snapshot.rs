@@ -24,37 +24,16 @@ static VARYING: LazyLock<Vec<(Regex, &str)>> = LazyLock::new(|| {
         (r"(?m)^.*\r".to_owned(), ""),
         (format!(r"{tmp}[/\\]rooms[/\\]\d+[/\\][\w-]+"), "[ROOMS]"),
         (format!(r"(?:/private)?{temporary}[/\\][\w.-]+"), "[TMP]"),
-        (
-            r"(127\.0\.0\.1|localhost|\[::1\]):\d{4,5}\b".to_owned(),
-            "$1:[PORT]",
-        ),
-        (
-            r"\b(?:[0-9a-f]{2}/)?[0-9a-f]{32,64}\b".to_owned(),
-            "[DIGEST]",
-        ),
+        (r"(127\.0\.0\.1|localhost|\[::1\]):\d{4,5}\b".to_owned(), "$1:[PORT]"),
+        (r"\b(?:[0-9a-f]{2}/)?[0-9a-f]{32,64}\b".to_owned(), "[DIGEST]"),
         (r"[^:()\n]+ \(os error \d+\)".to_owned(), " [OS ERROR]"),
         // The library that was found, and its own words, which differ between its versions.
-        (
-            r"\S*onnxruntime\S*\.(?:so|dylib|dll)[\w.]*".to_owned(),
-            "[LIBRARY]",
-        ),
-        (
-            r"(?s)\(Non-zero status code returned .*?\); ".to_owned(),
-            "([ONNX RUNTIME]); ",
-        ),
-        (
-            r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?Z?)?".to_owned(),
-            "[DATE]",
-        ),
+        (r"\S*onnxruntime\S*\.(?:so|dylib|dll)[\w.]*".to_owned(), "[LIBRARY]"),
+        (r"(?s)\(Non-zero status code returned .*?\); ".to_owned(), "([ONNX RUNTIME]); "),
+        (r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d(?:\.\d+)?)?Z?)?".to_owned(), "[DATE]"),
         (format!(r"\b{version}\b"), "[VERSION]"),
-        (
-            r"\b\d+(?:\.\d+)?(?:/s| a (?:second|minute)| per (?:second|minute))\b".to_owned(),
-            "[RATE]",
-        ),
-        (
-            r"\b\d+(?:\.\d+)? (?:ms|s|min|h|seconds?|minutes?|hours?)\b".to_owned(),
-            "[TIME]",
-        ),
+        (r"\b\d+(?:\.\d+)?(?:/s| a (?:second|minute)| per (?:second|minute))\b".to_owned(), "[RATE]"),
+        (r"\b\d+(?:\.\d+)? (?:ms|s|min|h|seconds?|minutes?|hours?)\b".to_owned(), "[TIME]"),
         (r"\b(files, )\d+ bytes\b".to_owned(), "$1[BYTES]"),
         (r"\b\d+(?:\.\d+)? (?:GB|GiB)\b".to_owned(), "[MEMORY]"),
     ]
@@ -66,9 +45,7 @@ static VARYING: LazyLock<Vec<(Regex, &str)>> = LazyLock::new(|| {
 pub fn redacted(text: &str) -> String {
     let mut text = text.replace("\r\n", "\n");
     if cfg!(windows) {
-        text = text
-            .replace("darkqa-eval.exe", "darkqa-eval")
-            .replace('\\', "/");
+        text = text.replace("darkqa-eval.exe", "darkqa-eval").replace('\\', "/");
     }
     for (pattern, redacted) in &*VARYING {
         text = pattern.replace_all(&text, *redacted).into_owned();
@@ -78,11 +55,7 @@ pub fn redacted(text: &str) -> String {
     for group in lines.chunk_by_mut(|a, b| is_report(a) && is_report(b)) {
         group.sort_unstable();
     }
-    lines
-        .into_iter()
-        .map(wrapped)
-        .collect::<Vec<_>>()
-        .join("\n")
+    lines.into_iter().map(wrapped).collect::<Vec<_>>().join("\n")
 }
 
 /// True for a line of the log about one file or trial.
@@ -105,10 +78,7 @@ pub fn on_one_line(text: &str) -> String {
 }
 
 /// Every row of a table, and below each what came of it.
-pub fn each<T: Display>(
-    rows: impl IntoIterator<Item = T>,
-    mut text: impl FnMut(&T) -> String,
-) -> String {
+pub fn each<T: Display>(rows: impl IntoIterator<Item = T>, mut text: impl FnMut(&T) -> String) -> String {
     let rows = rows.into_iter().map(|row| {
         let name = row.to_string().trim_end().replace('\n', " \\n ");
         format!("{name}\n  {}\n", text(&row).replace('\n', "\n  "))
@@ -151,9 +121,7 @@ impl Called {
     /// Exit code and stderr.
     pub fn messages(&self) -> String {
         let text = redacted(&self.stderr);
-        format!("{}\n{text}", self.exit_code())
-            .trim_end()
-            .to_owned()
+        format!("{}\n{text}", self.exit_code()).trim_end().to_owned()
     }
 
     /// Exit code, and the lines of stdout and stderr that contain a part.

@@ -12,25 +12,14 @@ pub(crate) fn check_rows<T>(rows: impl IntoIterator<Item = T>, mut check: impl F
             failures.push(format!("row {number}: {}", message(&*panic)));
         }
     }
-    assert!(
-        failures.is_empty(),
-        "{} rows failed:\n{}",
-        failures.len(),
-        failures.join("\n")
-    );
+    assert!(failures.is_empty(), "{} rows failed:\n{}", failures.len(), failures.join("\n"));
 }
 
 /// Checks every row of a table at once, for rows that mostly wait; reports them as [`check_rows`] does.
-pub(crate) fn check_rows_at_once<T: Send>(
-    rows: impl IntoIterator<Item = T>,
-    check: impl Fn(T) + Sync,
-) {
+pub(crate) fn check_rows_at_once<T: Send>(rows: impl IntoIterator<Item = T>, check: impl Fn(T) + Sync) {
     let check = &check;
     thread::scope(|scope| {
-        let checks: Vec<_> = rows
-            .into_iter()
-            .map(|row| scope.spawn(move || check(row)))
-            .collect();
+        let checks: Vec<_> = rows.into_iter().map(|row| scope.spawn(move || check(row))).collect();
         check_rows(checks, |row| {
             row.join().unwrap_or_else(|panic| resume_unwind(panic));
         });
@@ -40,6 +29,5 @@ pub(crate) fn check_rows_at_once<T: Send>(
 /// The message of a panic.
 fn message(panic: &(dyn Any + Send)) -> &str {
     let text = panic.downcast_ref::<String>().map(String::as_str);
-    text.or_else(|| panic.downcast_ref::<&str>().copied())
-        .unwrap_or("no message")
+    text.or_else(|| panic.downcast_ref::<&str>().copied()).unwrap_or("no message")
 }

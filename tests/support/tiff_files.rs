@@ -34,21 +34,13 @@ impl Page {
 
     /// The same page with a tag of one 16-bit number.
     pub fn with(mut self, number: u16, value: u32) -> Self {
-        self.tags.push(Tag {
-            number,
-            kind: 3,
-            values: vec![value],
-        });
+        self.tags.push(Tag { number, kind: 3, values: vec![value] });
         self
     }
 
     /// The same page with an ICC profile.
     pub fn with_profile(mut self, profile: &[u8]) -> Self {
-        self.tags.push(Tag {
-            number: 34675,
-            kind: 7,
-            values: profile.iter().map(|byte| u32::from(*byte)).collect(),
-        });
+        self.tags.push(Tag { number: 34675, kind: 7, values: profile.iter().map(|byte| u32::from(*byte)).collect() });
         self
     }
 
@@ -58,11 +50,7 @@ impl Page {
         let mut tags: Vec<Tag> = [
             (256, 4, vec![self.size[0]]),
             (257, 4, vec![self.size[1]]),
-            (
-                258,
-                3,
-                vec![u32::from(self.bits); usize::from(self.channels)],
-            ),
+            (258, 3, vec![u32::from(self.bits); usize::from(self.channels)]),
             (259, 3, vec![1]),
             (262, 3, vec![photometric]),
             (273, 4, vec![samples_at]),
@@ -71,18 +59,10 @@ impl Page {
             (279, 4, vec![bytes]),
         ]
         .into_iter()
-        .map(|(number, kind, values)| Tag {
-            number,
-            kind,
-            values,
-        })
+        .map(|(number, kind, values)| Tag { number, kind, values })
         .collect();
         tags.retain(|tag| self.tags.iter().all(|other| other.number != tag.number));
-        tags.extend(self.tags.iter().map(|tag| Tag {
-            number: tag.number,
-            kind: tag.kind,
-            values: tag.values.clone(),
-        }));
+        tags.extend(self.tags.iter().map(|tag| Tag { number: tag.number, kind: tag.kind, values: tag.values.clone() }));
         tags.sort_by_key(|tag| tag.number);
         tags
     }

@@ -60,16 +60,16 @@ mod tests {
         let path = folder.path().join("part.download");
         let scrub = Scrub::new(["sk-0123456789abcdef".to_owned()]);
         assert_eq!(
-            rewritten(
-                &path,
-                &scrub,
-                b"{\"a\": 1}\r\n\n{\"key\": \"sk-0123456789abcdef\"}"
-            ),
+            rewritten(&path, &scrub, b"{\"a\": 1}\r\n\n{\"key\": \"sk-0123456789abcdef\"}"),
             b"{\"a\": 1}\r\n\n{\"key\": \"[secret]\"}"
         );
         // Parts of a key within one string are removed, but not across strings or in ids.
         assert_eq!(
-            rewritten(&path, &scrub, br#"{"custom_id": "abc0123456789abcdef", "b": ["0123", "4567"], "c": "\u0030123 4567 89a"}"#),
+            rewritten(
+                &path,
+                &scrub,
+                br#"{"custom_id": "abc0123456789abcdef", "b": ["0123", "4567"], "c": "\u0030123 4567 89a"}"#
+            ),
             br#"{"custom_id": "abc0123456789abcdef", "b": ["0123", "4567"], "c": "[secret]"}"#
         );
         let other = b"sk-01234\xff\n\n";

@@ -1,6 +1,7 @@
 //! Client of OpenAI's Files and Batch APIs: [`BatchServer`].
 //!
-//! Each call is sent once. The caller decides whether to repeat it, because a failed call may have had an effect at the server.
+//! Each call is sent once. The caller decides whether to repeat it, because a failed call may have had an effect at the
+//! server.
 
 mod download;
 mod objects;
@@ -59,20 +60,11 @@ pub(crate) struct NewBatch<'a> {
 impl BatchServer {
     /// Creates a client that uses these connections; nothing is sent yet.
     pub(super) fn new(connection: Connection, headers: HeaderMap, timeout: Duration) -> Self {
-        Self {
-            connection,
-            headers,
-            timeout,
-        }
+        Self { connection, headers, timeout }
     }
 
     /// Uploads a file under a name, for a purpose.
-    pub(crate) async fn upload(
-        &self,
-        path: &Path,
-        name: &str,
-        purpose: &str,
-    ) -> ApiResult<RemoteFile> {
+    pub(crate) async fn upload(&self, path: &Path, name: &str, purpose: &str) -> ApiResult<RemoteFile> {
         // The boundary cannot occur in a file of requests: every line is one JSON object.
         let boundary = format!("darkqa-{name}").replace(|c: char| !c.is_ascii_alphanumeric(), "-");
         let boundary: String = boundary.chars().take(70).collect();
@@ -82,10 +74,8 @@ impl BatchServer {
         })?;
         let bytes = path.metadata().map_or(0, |file| file.len());
         let content_type = format!("multipart/form-data; boundary={boundary}");
-        let request = self
-            .request(Method::POST, "files", &[])
-            .header(CONTENT_TYPE, content_type)
-            .body(reqwest::Body::wrap(form));
+        let request =
+            self.request(Method::POST, "files", &[]).header(CONTENT_TYPE, content_type).body(reqwest::Body::wrap(form));
         let timeout = self.timeout + Duration::from_secs(bytes / MIN_UPLOAD_SPEED);
         let response = self.send_within(timeout, request).await?;
         let object = self.parse_json(&response)?;
@@ -109,11 +99,8 @@ impl BatchServer {
     pub(crate) async fn download(&self, id: &str, to: &Path, max_bytes: u64) -> ApiResult<()> {
         let path = format!("files/{}/content", path_segment(id));
         let request = self.request(Method::GET, &path, &[]);
-        let response = self
-            .connection
-            .download(request, &self.headers, to, max_bytes)
-            .await
-            .map_err(with_possible_effect)?;
+        let response =
+            self.connection.download(request, &self.headers, to, max_bytes).await.map_err(with_possible_effect)?;
         self.check_status(response)?;
         remove_secrets(to, &self.connection.scrub()).map_err(|e| {
             let message = format!("{}: keys in it could not be removed: {e}", to.display());
@@ -121,8 +108,8 @@ impl BatchServer {
         })
     }
 
-    /// Parses a line of an output or error file of this server, and removes the keys sent to the server. `None` if the line has another
-    /// form.
+    /// Parses a line of an output or error file of this server, and removes the keys sent to the server. `None` if the
+    /// line has another form.
     #[must_use]
     pub(crate) fn line(&self, line: &str) -> Option<BatchLine> {
         BatchLine::read_without_secrets(line, &self.connection.scrub())
@@ -140,36 +127,28 @@ impl BatchServer {
             "input_file_id": new.file, "endpoint": new.url, "completion_window": new.window,
             "metadata": { MARK: new.mark },
         });
-        let request = self
-            .request(Method::POST, "batches", &[])
-            .header(CONTENT_TYPE, "application/json")
-            .body(body.to_string());
+        let request =
+            self.request(Method::POST, "batches", &[]).header(CONTENT_TYPE, "application/json").body(body.to_string());
         self.request_batch(request).await
     }
 
     /// Requests the batch with this id.
     pub(crate) async fn batch(&self, id: &str) -> ApiResult<RemoteBatch> {
         let path = format!("batches/{}", path_segment(id));
-        self.request_batch(self.request(Method::GET, &path, &[]))
-            .await
+        self.request_batch(self.request(Method::GET, &path, &[])).await
     }
 
     /// Lists all batches.
     pub(crate) async fn batches(&self) -> ApiResult<Vec<RemoteBatch>> {
         let items = self.list("batches", &[]).await?;
         let scrub = self.connection.scrub();
-        Ok(items
-            .iter()
-            .filter_map(|item| RemoteBatch::from_json(item, &scrub))
-            .collect())
+        Ok(items.iter().filter_map(|item| RemoteBatch::from_json(item, &scrub)).collect())
     }
 
     /// Asks the server to cancel a batch.
     pub(crate) async fn cancel(&self, id: &str) -> ApiResult<()> {
         let path = format!("batches/{}/cancel", path_segment(id));
-        self.send(self.request(Method::POST, &path, &[]))
-            .await
-            .map(drop)
+        self.send(self.request(Method::POST, &path, &[])).await.map(drop)
     }
 
     /// Sends a request whose response is a batch.
@@ -187,16 +166,11 @@ impl BatchServer {
             let mut query = query.to_vec();
             query.push(("limit", "100"));
             query.extend(after.as_deref().map(|after| ("after", after)));
-            let page = self
-                .request_json(self.request(Method::GET, path, &query))
-                .await?;
+            let page = self.request_json(self.request(Method::GET, path, &query)).await?;
             // Together sends the list without an object around it.
             let data = page.get("data").unwrap_or(&page);
             let data = data.as_array().cloned().unwrap_or_default();
-            let last = data
-                .last()
-                .and_then(|item| item.get("id")?.as_str())
-                .map(str::to_owned);
+            let last = data.last().and_then(|item| item.get("id")?.as_str()).map(str::to_owned);
             items.extend(data);
             let has_more = page.get("has_more").and_then(Value::as_bool) == Some(true);
             match last {
@@ -228,11 +202,7 @@ impl BatchServer {
     }
 
     /// Sends a request with this timeout, and checks the status of the response.
-    async fn send_within(
-        &self,
-        timeout: Duration,
-        request: RequestBuilder,
-    ) -> ApiResult<HttpResponse> {
+    async fn send_within(&self, timeout: Duration, request: RequestBuilder) -> ApiResult<HttpResponse> {
         let response = self
             .connection
             .exchange_keyed(request, &self.headers, Deadline::total(timeout))
@@ -269,14 +239,11 @@ impl BatchServer {
 
 /// Marks the error of a call without a complete response: the call may have had an effect.
 fn with_possible_effect(error: AskError) -> AskError {
-    AskError {
-        may_have_effect: true,
-        ..error
-    }
+    AskError { may_have_effect: true, ..error }
 }
 
-/// Characters of an id that a segment of a path cannot carry. Ids such as `batch_1` and `file-1` stay as they are (RFC 3986, section 2.3):
-/// some servers compare paths without decoding them.
+/// Characters of an id that a segment of a path cannot carry. Ids such as `batch_1` and `file-1` stay as they are (RFC
+/// 3986, section 2.3): some servers compare paths without decoding them.
 const ENCODED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'_').remove(b'~');
 
 /// An id, percent-encoded as a segment of a path.

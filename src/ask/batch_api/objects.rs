@@ -68,8 +68,8 @@ impl BatchState {
     /// Parses the name of a state, of OpenAI or of another server, ignoring case.
     pub(super) fn from_name(word: &str) -> Self {
         match word.to_lowercase().as_str() {
-            working @ ("validating" | "queued" | "pending" | "running" | "in_progress"
-            | "finalizing" | "cancelling" | "canceling") => Self::Working(working.to_owned()),
+            working @ ("validating" | "queued" | "pending" | "running" | "in_progress" | "finalizing"
+            | "cancelling" | "canceling") => Self::Working(working.to_owned()),
             "completed" | "succeeded" => Self::Completed,
             "failed" => Self::Failed,
             "expired" => Self::Expired,
@@ -148,9 +148,7 @@ impl RemoteBatch {
                 done: count(counts, "completed").saturating_add(count(counts, "failed")),
                 total: count(counts, "total"),
             },
-            problem: errors
-                .first()
-                .map_or_else(String::new, |e| problem(e, scrub)),
+            problem: errors.first().map_or_else(String::new, |e| problem(e, scrub)),
             quota: errors.iter().find_map(|error| {
                 let api_error = ApiError::from_error(error);
                 QuotaRefusal::from_api_error(&api_error, scrub)
@@ -162,9 +160,7 @@ impl RemoteBatch {
 
 /// Number of requests by its name in `request_counts`; 0 if absent.
 fn count(counts: Option<&Value>, name: &str) -> u64 {
-    counts
-        .and_then(|counts| counts.get(name)?.as_u64())
-        .unwrap_or(0)
+    counts.and_then(|counts| counts.get(name)?.as_u64()).unwrap_or(0)
 }
 
 /// Field of a batch's metadata with the mark of the program.
@@ -222,10 +218,8 @@ mod tests {
         ]}));
         assert_eq!(line.problem, "line 7: not JSON (invalid_json_line)");
         assert_eq!(line.quota, None);
-        let full = failed_batch(
-            &json!({"data": [{"code": "token_limit_exceeded", "line": null, "message":
-            "Enqueued token limit reached for m in organization o. Limit: 2,000,000 enqueued tokens."}]}),
-        );
+        let full = failed_batch(&json!({"data": [{"code": "token_limit_exceeded", "line": null, "message":
+            "Enqueued token limit reached for m in organization o. Limit: 2,000,000 enqueued tokens."}]}));
         let quota = full.quota.unwrap();
         assert_eq!(quota.limit, Some(2_000_000));
         assert_eq!(failed_batch(&Value::Null).quota, None);

@@ -30,8 +30,7 @@ impl FileForm {
     /// If the file cannot be opened.
     pub(super) fn open(path: &Path, name: &str, purpose: &str, boundary: &str) -> io::Result<Self> {
         let file = reading::open(path)?;
-        let field =
-            |name: &str| format!("--{boundary}\r\nContent-Disposition: form-data; name=\"{name}\"");
+        let field = |name: &str| format!("--{boundary}\r\nContent-Disposition: form-data; name=\"{name}\"");
         let head = format!(
             "{}\r\n\r\n{purpose}\r\n{}; filename=\"{name}\"\r\nContent-Type: application/jsonl\r\n\r\n",
             field("purpose"),
@@ -65,15 +64,8 @@ impl Body for FileForm {
     type Data = Bytes;
     type Error = io::Error;
 
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        _: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, io::Error>>> {
-        Poll::Ready(
-            self.next_chunk()
-                .map(|chunk| chunk.map(Frame::data))
-                .transpose(),
-        )
+    fn poll_frame(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, io::Error>>> {
+        Poll::Ready(self.next_chunk().map(|chunk| chunk.map(Frame::data)).transpose())
     }
 
     fn is_end_stream(&self) -> bool {
@@ -108,8 +100,7 @@ mod tests {
         assert_eq!(sent.len() as u64, size);
         assert!(chunks > 3, "{chunks}");
         let text = String::from_utf8(sent).unwrap();
-        let start =
-            "--XX\r\nContent-Disposition: form-data; name=\"purpose\"\r\n\r\nbatch\r\n--XX\r\n";
+        let start = "--XX\r\nContent-Disposition: form-data; name=\"purpose\"\r\n\r\nbatch\r\n--XX\r\n";
         assert!(text.starts_with(start), "{}", &text[..200]);
         assert!(text.ends_with("\n\r\n--XX--\r\n"));
         assert!(text.contains("filename=\"a.jsonl\""));

@@ -11,8 +11,8 @@ const TOLERANCE: f64 = 0.05;
 /// Ratio of the highest to the lowest charge per list price from which charges vary from reply to reply; chosen.
 const VARYING: f64 = 1.1;
 
-/// Assumed ratio of the dearest charge to the list price if the charges vary; chosen: the dearest provider of a model costs about ten
-/// times the cheapest. A higher ratio replaces it once a reply has it.
+/// Assumed ratio of the dearest charge to the list price if the charges vary; chosen: the dearest provider of a model
+/// costs about ten times the cheapest. A higher ratio replaces it once a reply has it.
 const MAX_VARYING: f64 = 10.0;
 
 /// A charge that a server states, and the price of its tokens by the table; in US dollars.
@@ -45,10 +45,7 @@ impl ChargeRatios {
     pub(crate) fn record(&self, price: Price, usage: Usage, share: f64) {
         let listed = share * price.list_charge(usage);
         let mut ratios = self.lock();
-        if let Some(tier) = usage
-            .service_tier
-            .filter(|tier| price.tiers.is_unknown(*tier))
-        {
+        if let Some(tier) = usage.service_tier.filter(|tier| price.tiers.is_unknown(*tier)) {
             ratios.unknown_tier.get_or_insert(tier);
         }
         let Some(cost) = usage.cost.filter(|_| listed > 0.0) else {
@@ -77,11 +74,7 @@ impl ChargeRatios {
         };
         let spread = highest / lowest;
         let is_dear = highest > 1.0 + TOLERANCE;
-        if is_dear && spread > VARYING {
-            highest.max((highest * spread).min(MAX_VARYING))
-        } else {
-            highest.max(1.0)
-        }
+        if is_dear && spread > VARYING { highest.max((highest * spread).min(MAX_VARYING)) } else { highest.max(1.0) }
     }
 
     /// Mean ratio of the stated charges to the list price; `None` without a stated charge.
@@ -129,11 +122,7 @@ mod tests {
     fn ratios(charges: &[f64]) -> ChargeRatios {
         let ratios = ChargeRatios::default();
         for charge in charges {
-            let usage = Usage {
-                prompt_tokens: Some(1),
-                cost: StatedCost::from_dollars(*charge),
-                ..Usage::default()
-            };
+            let usage = Usage { prompt_tokens: Some(1), cost: StatedCost::from_dollars(*charge), ..Usage::default() };
             ratios.record(price(), usage, 1.0);
         }
         ratios
@@ -160,10 +149,7 @@ mod tests {
     fn only_differing_charges_are_said() {
         assert_eq!(ratios(&[1.0, 1.03]).differing(), None);
         let dear = ratios(&[1.0, 5.0]);
-        let expected = StatedAndListed {
-            stated: 5.0,
-            listed: 1.0,
-        };
+        let expected = StatedAndListed { stated: 5.0, listed: 1.0 };
         assert_eq!(dear.differing(), Some(expected));
         assert_eq!(dear.mean(), Some(3.0));
     }

@@ -1,19 +1,20 @@
 //! Detection of servers that shrink images, by the tokens that they count: [`ImageTokenCheck`].
 //!
-//! A model that sees an image at its full size has a token for each of its patches. A server that counts far fewer tokens has made the
-//! image smaller first: LM Studio to a longer side of 500 or 1024 pixels, Ollama to a number of tokens, vLLM to its `max_pixels`. Averaging
-//! pixels removes noise and small objects.
+//! A model that sees an image at its full size has a token for each of its patches. A server that counts far fewer
+//! tokens has made the image smaller first: LM Studio to a longer side of 500 or 1024 pixels, Ollama to a number of
+//! tokens, vLLM to its `max_pixels`. Averaging pixels removes noise and small objects.
 
 use crate::types::text::plural;
 
-/// Share of the tokens by the family's rule below which an image was shrunk; chosen: half the area, and a tolerance for the text.
+/// Share of the tokens by the family's rule below which an image was shrunk; chosen: half the area, and a tolerance for
+/// the text.
 const MAX_SHARE: f64 = 0.6;
 
 /// Minimum number of tokens by the family's rule for an image to be judged; chosen, so that the text matters little.
 const MIN_EXPECTED: f64 = 100.0;
 
-/// Minimum number of tokens that a server counts for an image; with fewer it does not count images at all. Chosen, more than the error of
-/// an estimate of the text.
+/// Minimum number of tokens that a server counts for an image; with fewer it does not count images at all. Chosen, more
+/// than the error of an estimate of the text.
 const MIN_COUNTED: f64 = 64.0;
 
 /// Maximum number of characters per token of a text; chosen, twice the usual number in English.
@@ -26,13 +27,15 @@ const USUAL: (f64, f64) = (4.0, 10.0);
 const MIN_REPLIES: usize = 5;
 const MIN_SHARE: f64 = 0.9;
 
-/// Tokens of a large image by the rule, as a share of those of the largest image; chosen. A server may leave smaller ones as they are.
+/// Tokens of a large image by the rule, as a share of those of the largest image; chosen. A server may leave smaller
+/// ones as they are.
 const LARGE: f64 = 0.5;
 
 /// Maximum number of replies that are kept; chosen.
 const MAX_REPLIES: usize = 200;
 
-/// Difference of counts up to which they are the same for all sizes, and ratio of the rule's counts from which sizes differ; chosen.
+/// Difference of counts up to which they are the same for all sizes, and ratio of the rule's counts from which sizes
+/// differ; chosen.
 const SAME: f64 = 0.1;
 const OTHER_SIZE: f64 = 1.25;
 
@@ -65,8 +68,8 @@ pub(crate) struct ShrunkImages {
 }
 
 impl ImageTokenCheck {
-    /// Adds a reply: the charged tokens of its prompt, the characters of its text, and the tokens of each image by the rule of the
-    /// model's family.
+    /// Adds a reply: the charged tokens of its prompt, the characters of its text, and the tokens of each image by the
+    /// rule of the model's family.
     pub(crate) fn add(&mut self, charged: u64, characters: usize, expected: &[u64]) {
         let images = expected.len() as f64;
         let (charged, characters) = (charged as f64, characters as f64);
@@ -83,26 +86,21 @@ impl ImageTokenCheck {
         });
     }
 
-    /// The shrunk images; `None` if the images are sent as they are, if the server does not count them, or if there are too few replies.
+    /// The shrunk images; `None` if the images are sent as they are, if the server does not count them, or if there are
+    /// too few replies.
     pub(crate) fn shrunk(&self) -> Option<ShrunkImages> {
         let of_all = |value: fn(&Counted) -> f64| sorted(&self.replies, value);
         let largest = of_all(|one| one.expected).last().copied()?;
-        let large: Vec<Counted> = self
-            .replies
-            .iter()
-            .copied()
-            .filter(|one| one.expected >= LARGE * largest)
-            .collect();
+        let large: Vec<Counted> = self.replies.iter().copied().filter(|one| one.expected >= LARGE * largest).collect();
         let shrunk = large.iter().filter(|one| one.is_shrunk).count();
-        let is_enough =
-            large.len() >= MIN_REPLIES && shrunk as f64 >= MIN_SHARE * large.len() as f64;
+        let is_enough = large.len() >= MIN_REPLIES && shrunk as f64 >= MIN_SHARE * large.len() as f64;
         if !is_enough {
             return None;
         }
         let middle = |values: Vec<f64>| values[values.len() / 2];
         let spread = |values: &[f64]| values[values.len() - 1] / values[0];
-        let is_same = spread(&of_all(|one| one.expected)) >= OTHER_SIZE
-            && spread(&of_all(|one| one.tokens)) <= 1.0 + SAME;
+        let is_same =
+            spread(&of_all(|one| one.expected)) >= OTHER_SIZE && spread(&of_all(|one| one.tokens)) <= 1.0 + SAME;
         Some(ShrunkImages {
             counted: middle(sorted(&large, |one| one.tokens)),
             expected: middle(sorted(&large, |one| one.expected)),
@@ -153,11 +151,7 @@ mod tests {
         let one_size = check(&[(280, 1560)]).unwrap();
         assert!((one_size.counted - 280.0).abs() < 1.0 && !one_size.is_same);
         let sizes = check(&[(280, 1560), (282, 884)]).unwrap();
-        assert!(
-            sizes
-                .words("m")
-                .starts_with("m: the server counts about 282 tokens an image, at all sizes, where")
-        );
+        assert!(sizes.words("m").starts_with("m: the server counts about 282 tokens an image, at all sizes, where"));
         // A small image may be left as it is.
         let small = check(&[(280, 1564), (280, 391)]).unwrap();
         assert!((small.expected - 1564.0).abs() < 1.0 && small.is_same);

@@ -1,7 +1,7 @@
 //! Number of tokens that a model counts for an image: [`image_tokens`].
 //!
-//! It is used only for estimates before a request is sent; afterwards the server reports the charged tokens. The model families and the
-//! sources of their rules are in `image_tokens.toml`.
+//! It is used only for estimates before a request is sent; afterwards the server reports the charged tokens. The model
+//! families and the sources of their rules are in `image_tokens.toml`.
 
 use std::sync::LazyLock;
 
@@ -35,12 +35,7 @@ struct Family {
 
 /// Rule by which a family of models counts the tokens of an image; explained in `image_tokens.toml`.
 #[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(
-    deny_unknown_fields,
-    tag = "rule",
-    rename_all = "kebab-case",
-    rename_all_fields = "kebab-case"
-)]
+#[serde(deny_unknown_fields, tag = "rule", rename_all = "kebab-case", rename_all_fields = "kebab-case")]
 enum Rule {
     Tiles {
         base: u64,
@@ -95,39 +90,24 @@ fn unlimited() -> f64 {
 }
 
 /// Number of tokens that a model counts for an image of this size in pixels; `None` for an unknown family.
-pub(crate) fn image_tokens(
-    model: &str,
-    detail: Option<ImageDetail>,
-    width: u64,
-    height: u64,
-) -> Option<u64> {
+pub(crate) fn image_tokens(model: &str, detail: Option<ImageDetail>, width: u64, height: u64) -> Option<u64> {
     let rule = family(model)?.rule;
     Some(rule.count(detail, width as f64, height as f64))
 }
 
-/// Number of tokens of an image for a family that has more of them for larger images, so that fewer tokens mean a smaller image; `None`
-/// for other families: those whose number hardly depends on the size, and Gemini, whose servers choose the number of crops.
-pub(crate) fn scaling_image_tokens(
-    model: &str,
-    detail: Option<ImageDetail>,
-    width: u64,
-    height: u64,
-) -> Option<u64> {
+/// Number of tokens of an image for a family that has more of them for larger images, so that fewer tokens mean a
+/// smaller image; `None` for other families: those whose number hardly depends on the size, and Gemini, whose servers
+/// choose the number of crops.
+pub(crate) fn scaling_image_tokens(model: &str, detail: Option<ImageDetail>, width: u64, height: u64) -> Option<u64> {
     let rule = family(model)?.rule;
-    let is_scaling = !matches!(
-        rule,
-        Rule::Fixed { .. } | Rule::Crops | Rule::Filled { .. } | Rule::Grid { .. }
-    );
+    let is_scaling = !matches!(rule, Rule::Fixed { .. } | Rule::Crops | Rule::Filled { .. } | Rule::Grid { .. });
     is_scaling.then(|| rule.count(detail, width as f64, height as f64))
 }
 
 /// The family of a model, by the beginning of its name.
 fn family(model: &str) -> Option<&'static Family> {
     let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
-    TABLE
-        .family
-        .iter()
-        .find(|family| family.begins.iter().any(|begin| name.starts_with(begin)))
+    TABLE.family.iter().find(|family| family.begins.iter().any(|begin| name.starts_with(begin)))
 }
 
 impl Rule {
@@ -140,18 +120,9 @@ impl Rule {
             Self::Tiles { base, tile } => {
                 let scale = (2048.0 / longer).min(1.0);
                 let scale = scale * (768.0 / (shorter * scale)).min(1.0);
-                return base
-                    + tile * (tiles_along(scale, width) * tiles_along(scale, height)) as u64;
+                return base + tile * (tiles_along(scale, width) * tiles_along(scale, height)) as u64;
             }
-            Self::FittedPatches {
-                most,
-                side,
-                high_most,
-                high_side,
-                original_most,
-                original_side,
-                factor,
-            } => {
+            Self::FittedPatches { most, side, high_most, high_side, original_most, original_side, factor } => {
                 let (detail_side, detail_most) = match detail {
                     Some(ImageDetail::High) => (high_side, high_most),
                     Some(ImageDetail::Original) => (original_side, original_most),
@@ -161,30 +132,24 @@ impl Rule {
                 let most = detail_most.unwrap_or(most);
                 patches_after_fit(width, height, side, most) * factor
             }
-            Self::Patches { patch, side, most } => {
-                max_patches_within(width, height, patch, PatchLimits { side, most })
-            }
+            Self::Patches { patch, side, most } => max_patches_within(width, height, patch, PatchLimits { side, most }),
             Self::Crops if longer <= 384.0 => 258.0,
             Self::Crops => {
                 let unit = (shorter / 1.5).floor().max(1.0);
                 258.0 * (width / unit).ceil() * (height / unit).ceil()
             }
-            Self::Resized { patch, least, most } => {
-                patches_after_resize(width, height, patch, (least, most))
-            }
+            Self::Resized { patch, least, most } => patches_after_resize(width, height, patch, (least, most)),
             Self::Rows { patch, side } => {
                 let ratio = (longer / side).max(1.0);
-                let [columns, rows] = [width, height]
-                    .map(|length| ((length / ratio).round_ties_even().max(1.0) / patch).ceil());
+                let [columns, rows] =
+                    [width, height].map(|length| ((length / ratio).round_ties_even().max(1.0) / patch).ceil());
                 (columns + 1.0) * rows
             }
             Self::Padded { patch, side, most } => {
                 // The limit applies to patches before 2 × 2 of them are merged.
-                let [columns, rows] =
-                    [width, height].map(|length| (2.0 * length / patch).floor().max(1.0));
+                let [columns, rows] = [width, height].map(|length| (2.0 * length / patch).floor().max(1.0));
                 let scale = (4.0 * most / (columns * rows)).sqrt().min(side / longer);
-                let along =
-                    |length: f64| ((length * scale.min(1.0)).floor().max(1.0) / patch).ceil();
+                let along = |length: f64| ((length * scale.min(1.0)).floor().max(1.0) / patch).ceil();
                 along(width) * along(height)
             }
             Self::Filled { most } => {
@@ -212,15 +177,15 @@ fn tiles_along(scale: f64, side: f64) -> f64 {
     (side * scale / 512.0).ceil().max(1.0)
 }
 
-/// Number of patches that cover an image scaled by a factor. Up to a millionth of a patch per side is ignored as a rounding error.
+/// Number of patches that cover an image scaled by a factor. Up to a millionth of a patch per side is ignored as a
+/// rounding error.
 fn count_patches(width: f64, height: f64, patch: f64, scale: f64) -> f64 {
-    let [columns, rows] =
-        [width, height].map(|side| ((side * scale / patch * 1e6).round() / 1e6).ceil().max(1.0));
+    let [columns, rows] = [width, height].map(|side| ((side * scale / patch * 1e6).round() / 1e6).ceil().max(1.0));
     columns * rows
 }
 
-/// Number of 32 × 32 patches after an image is reduced to a maximum side and to at most `most` patches. The scale is chosen so that the
-/// sides are whole numbers of patches (OpenAI).
+/// Number of 32 × 32 patches after an image is reduced to a maximum side and to at most `most` patches. The scale is
+/// chosen so that the sides are whole numbers of patches (OpenAI).
 fn patches_after_fit(width: f64, height: f64, side: f64, most: f64) -> f64 {
     let scale = (side / width.max(height)).min(1.0);
     let count = count_patches(width, height, 32.0, scale);
@@ -240,7 +205,8 @@ struct PatchLimits {
     most: f64,
 }
 
-/// Number of patches of the largest image with the same aspect ratio within both limits (Anthropic), by bisection of the scale.
+/// Number of patches of the largest image with the same aspect ratio within both limits (Anthropic), by bisection of
+/// the scale.
 fn max_patches_within(width: f64, height: f64, patch: f64, limits: PatchLimits) -> f64 {
     let count_at = |scale: f64| count_patches(width, height, patch, scale);
     let max_scale = (limits.side / width.max(height)).min(1.0);
@@ -276,12 +242,11 @@ fn patches_after_resize(width: f64, height: f64, patch: f64, (least, most): (f64
     }
 }
 
-/// Number of tiles of the grid with the aspect ratio closest to that of an image. Among equally close ones the largest that the image fills
-/// by half.
+/// Number of tiles of the grid with the aspect ratio closest to that of an image. Among equally close ones the largest
+/// that the image fills by half.
 fn tiles_of_grid(width: f64, height: f64, tile: f64, most: u32) -> f64 {
-    let mut grids: Vec<(u32, u32)> = (1..=most)
-        .flat_map(|columns| (1..=most / columns).map(move |rows| (columns, rows)))
-        .collect();
+    let mut grids: Vec<(u32, u32)> =
+        (1..=most).flat_map(|columns| (1..=most / columns).map(move |rows| (columns, rows))).collect();
     grids.sort_by_key(|(columns, rows)| columns * rows);
     let (mut closest, mut tiles) = (f64::INFINITY, 1.0);
     for (columns, rows) in grids {
@@ -344,16 +309,7 @@ mod tests {
     /// Counts by running the image processors of transformers 5.24.0 and mistral-common 1.13.1.
     #[test]
     fn counts_match_the_published_image_processors() {
-        let sizes = [
-            (96, 64),
-            (10, 10),
-            (640, 480),
-            (1280, 720),
-            (2560, 1440),
-            (500, 333),
-            (4000, 3000),
-            (30, 1000),
-        ];
+        let sizes = [(96, 64), (10, 10), (640, 480), (1280, 720), (2560, 1440), (500, 333), (4000, 3000), (30, 1000)];
         for (model, counts) in [
             ("qwen2.5-vl-7b", [6, 4, 391, 1196, 4641, 216, 15301, 36]),
             ("qwen3-vl-8b", [70, 64, 300, 880, 3600, 160, 11750, 94]),
@@ -361,18 +317,11 @@ mod tests {
             ("glm-4.5v", [12, 9, 391, 1196, 4641, 216, 6030, 36]),
             ("kimi-k2.5", [12, 1, 414, 1196, 4214, 216, 4200, 72]),
             ("gemma-4-31b-it", [260, 256, 266, 264, 264, 260, 266, 192]),
-            (
-                "internvl3-8b",
-                [1794, 258, 3330, 2306, 2306, 1794, 3330, 3330],
-            ),
+            ("internvl3-8b", [1794, 258, 3330, 2306, 2306, 1794, 3330, 3330]),
             ("pixtral-12b", [28, 2, 1230, 2340, 2340, 693, 3120, 189]),
-            (
-                "mistral-small-2603",
-                [15, 2, 432, 1222, 1736, 228, 2352, 108],
-            ),
+            ("mistral-small-2603", [15, 2, 432, 1222, 1736, 228, 2352, 108]),
         ] {
-            let found =
-                sizes.map(|(width, height)| image_tokens(model, None, width, height).unwrap());
+            let found = sizes.map(|(width, height)| image_tokens(model, None, width, height).unwrap());
             assert_eq!(found, counts, "{model}");
         }
     }
@@ -381,9 +330,7 @@ mod tests {
     fn no_prefix_is_hidden_by_an_earlier_one() {
         let mut earlier: Vec<&String> = Vec::new();
         for begin in TABLE.family.iter().flat_map(|family| &family.begins) {
-            let hidden_by = earlier
-                .iter()
-                .find(|prefix| begin.starts_with(prefix.as_str()));
+            let hidden_by = earlier.iter().find(|prefix| begin.starts_with(prefix.as_str()));
             assert_eq!(hidden_by, None, "{begin} is never reached");
             earlier.push(begin);
         }
@@ -393,13 +340,9 @@ mod tests {
     #[test]
     fn counts_grow_with_the_size() {
         for family in &TABLE.family {
-            let counts: Vec<u64> = (1..40)
-                .map(|step| f64::from(step) * 100.0)
-                .map(|side| family.rule.count(None, side, side))
-                .collect();
-            let decrease = counts
-                .windows(2)
-                .find(|pair| (pair[1] as f64) < 0.9 * pair[0] as f64);
+            let counts: Vec<u64> =
+                (1..40).map(|step| f64::from(step) * 100.0).map(|side| family.rule.count(None, side, side)).collect();
+            let decrease = counts.windows(2).find(|pair| (pair[1] as f64) < 0.9 * pair[0] as f64);
             assert_eq!(decrease, None, "{:?}", family.begins);
         }
     }

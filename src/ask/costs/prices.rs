@@ -32,8 +32,9 @@ pub(crate) struct Price {
     pub tiers: TierFactors,
 }
 
-/// Ratio of a stated charge to the price of its tokens, or its inverse, up to which the charge is plausible. Chosen: a cache and a batch
-/// make a prompt at most 20 times cheaper, and the dearest provider of a model costs about ten times the cheapest.
+/// Ratio of a stated charge to the price of its tokens, or its inverse, up to which the charge is plausible. Chosen: a
+/// cache and a batch make a prompt at most 20 times cheaper, and the dearest provider of a model costs about ten times
+/// the cheapest.
 const MAX_RATIO: f64 = 100.0;
 
 impl Price {
@@ -50,20 +51,23 @@ impl Price {
         (bound.prompt as f64 * input + bound.reply as f64 * self.output) / 1e6
     }
 
-    /// Charge for a request in US dollars: the charge that the server states, if it is plausible, else the price of its tokens.
+    /// Charge for a request in US dollars: the charge that the server states, if it is plausible, else the price of its
+    /// tokens.
     #[must_use]
     pub(crate) fn charged(&self, usage: Usage) -> f64 {
         self.charged_in_part(usage, 1.0)
     }
 
-    /// Charge for a request whose tokens cost only a `share` of their price, as in a batch. A stated charge is what was charged in all.
+    /// Charge for a request whose tokens cost only a `share` of their price, as in a batch. A stated charge is what was
+    /// charged in all.
     #[must_use]
     pub(crate) fn charged_in_part(&self, usage: Usage, share: f64) -> f64 {
         let list = share * self.list_charge(usage);
         stated_charge(usage, list).unwrap_or(list)
     }
 
-    /// Price of the tokens of a request at its service tier, in US dollars. A token count that the server did not report counts as 0.
+    /// Price of the tokens of a request at its service tier, in US dollars. A token count that the server did not
+    /// report counts as 0.
     #[must_use]
     pub(crate) fn list_charge(&self, usage: Usage) -> f64 {
         let prompt = tokens_or_zero(usage.prompt_tokens);
@@ -77,10 +81,7 @@ impl Price {
     /// The same price, as that of the service tier that is asked for, whatever its name.
     pub(crate) fn as_asked(self, tier: Option<&str>) -> Self {
         let kind = tier.and_then(ServiceTier::from_name);
-        Self {
-            tiers: self.tiers.relative_to(kind, 1.0),
-            ..self
-        }
+        Self { tiers: self.tiers.relative_to(kind, 1.0), ..self }
     }
 
     /// The price at another tier, by its factor.
@@ -94,8 +95,8 @@ impl Price {
     }
 }
 
-/// The charge that the server states for a request whose tokens cost `list`, both in US dollars; `None` if it states none, or one that is
-/// no plausible price of these tokens.
+/// The charge that the server states for a request whose tokens cost `list`, both in US dollars; `None` if it states
+/// none, or one that is no plausible price of these tokens.
 pub(crate) fn stated_charge(usage: Usage, list: f64) -> Option<f64> {
     let stated = usage.cost?.dollars();
     let is_plausible = list <= 0.0 || (list / MAX_RATIO..=list * MAX_RATIO).contains(&stated);
@@ -132,8 +133,7 @@ impl Prices {
     /// # Errors
     /// Never in practice: a test parses the table.
     pub(crate) fn built_in() -> Result<Self> {
-        toml::from_str(include_str!("../prices.toml"))
-            .map_err(|e| Error::usage("src/ask/prices.toml", e.message()))
+        toml::from_str(include_str!("../prices.toml")).map_err(|e| Error::usage("src/ask/prices.toml", e.message()))
     }
 
     /// Reads a custom table in the format of the built-in one.
@@ -154,24 +154,12 @@ impl Prices {
                 [price.input, price.output, cached].map(|number| (name.as_str(), number))
             })
             .chain([("batch", prices.batch)])
-            .chain(
-                prices
-                    .tiers
-                    .values()
-                    .flatten()
-                    .map(|(name, factor)| (name.as_str(), *factor)),
-            )
+            .chain(prices.tiers.values().flatten().map(|(name, factor)| (name.as_str(), *factor)))
             .find(|(_, number)| !is_finite_and_not_negative(*number));
         if let Some((name, number)) = first_invalid {
-            return Err(invalid_table(
-                path,
-                &format!("{name}: {number} is not a number of 0 or more"),
-            ));
+            return Err(invalid_table(path, &format!("{name}: {number} is not a number of 0 or more")));
         }
-        Ok(Self {
-            is_custom: true,
-            ..prices
-        })
+        Ok(Self { is_custom: true, ..prices })
     }
 
     /// Key of a custom table in the settings of a manifest.
@@ -190,22 +178,15 @@ impl Prices {
         let Some(stored) = settings.get(Self::SETTING) else {
             return Self::built_in();
         };
-        let prices: Self = serde_json::from_value(stored.clone())
-            .map_err(|e| Error::data("the prices in the manifest", e))?;
-        Ok(Self {
-            is_custom: true,
-            ..prices
-        })
+        let prices: Self =
+            serde_json::from_value(stored.clone()).map_err(|e| Error::data("the prices in the manifest", e))?;
+        Ok(Self { is_custom: true, ..prices })
     }
 
     /// Source of the prices, as a phrase that follows "at".
     pub(crate) fn source(&self) -> String {
         let date = &self.as_of;
-        if self.is_custom {
-            format!("the prices of {date} of --prices")
-        } else {
-            format!("the list prices of {date}")
-        }
+        if self.is_custom { format!("the prices of {date} of --prices") } else { format!("the list prices of {date}") }
     }
 
     /// Finds the price of a model at the standard tier; `None` if the table does not state it.
@@ -214,16 +195,13 @@ impl Prices {
         self.price(model, None).ok()
     }
 
-    /// Finds the price of a model at the service tier that is asked for: by its full name, then by the name after the provider prefix
-    /// (`openai/gpt-4o`). A name with a version (`gpt-4o-2024-08-06`) has the price of the name without it only if the table says so.
+    /// Finds the price of a model at the service tier that is asked for: by its full name, then by the name after the
+    /// provider prefix (`openai/gpt-4o`). A name with a version (`gpt-4o-2024-08-06`) has the price of the name without
+    /// it only if the table says so.
     ///
     /// # Errors
     /// The reason why the table has no such price.
-    pub(crate) fn price(
-        &self,
-        model: &str,
-        tier: Option<&str>,
-    ) -> std::result::Result<Price, Unpriced> {
+    pub(crate) fn price(&self, model: &str, tier: Option<&str>) -> std::result::Result<Price, Unpriced> {
         let bare = model.rsplit('/').next().unwrap_or(model);
         let mut reason = Unpriced::Model;
         for name in [model, bare] {
@@ -233,48 +211,28 @@ impl Prices {
                 return self.at_tier(name, *price, tier);
             }
             if let Some(alias) = self.alias(name) {
-                reason = Unpriced::Version {
-                    alias: alias.to_owned(),
-                };
+                reason = Unpriced::Version { alias: alias.to_owned() };
             }
         }
         Err(reason)
     }
 
     /// The price of a listed model at a service tier.
-    fn at_tier(
-        &self,
-        name: &str,
-        price: Price,
-        tier: Option<&str>,
-    ) -> std::result::Result<Price, Unpriced> {
-        let stated = self
-            .tiers
-            .iter()
-            .filter_map(|(tier, models)| Some((tier.as_str(), *models.get(name)?)));
+    fn at_tier(&self, name: &str, price: Price, tier: Option<&str>) -> std::result::Result<Price, Unpriced> {
+        let stated = self.tiers.iter().filter_map(|(tier, models)| Some((tier.as_str(), *models.get(name)?)));
         let factors = TierFactors::new(stated.clone());
         let Some(asked) = tier else {
-            return Ok(Price {
-                tiers: factors,
-                ..price
-            });
+            return Ok(Price { tiers: factors, ..price });
         };
         let kind = ServiceTier::from_name(asked);
         let factor = match kind {
             None | Some(ServiceTier::Standard) => Some(1.0),
-            Some(_) => stated
-                .clone()
-                .find(|(name, _)| name.eq_ignore_ascii_case(asked.trim()))
-                .map(|(_, factor)| factor),
+            Some(_) => {
+                stated.clone().find(|(name, _)| name.eq_ignore_ascii_case(asked.trim())).map(|(_, factor)| factor)
+            }
         };
-        let factor = factor.ok_or_else(|| Unpriced::Tier {
-            tier: asked.to_owned(),
-            listed: name.to_owned(),
-        })?;
-        Ok(Price {
-            tiers: factors.relative_to(kind, factor),
-            ..price.times(factor)
-        })
+        let factor = factor.ok_or_else(|| Unpriced::Tier { tier: asked.to_owned(), listed: name.to_owned() })?;
+        Ok(Price { tiers: factors.relative_to(kind, factor), ..price.times(factor) })
     }
 
     /// The model that costs the same as `name`, by the list of its versions.
@@ -283,11 +241,7 @@ impl Prices {
             let version = version_of(name, model);
             let versions = self.versions.get(*model);
             version.is_some_and(|version| {
-                versions.is_some_and(|versions| {
-                    versions
-                        .iter()
-                        .any(|listed| listed == "all" || listed == version)
-                })
+                versions.is_some_and(|versions| versions.iter().any(|listed| listed == "all" || listed == version))
             })
         })
     }
@@ -344,8 +298,8 @@ fn is_finite_and_not_negative(number: f64) -> bool {
     number.is_finite() && number >= 0.0
 }
 
-/// The version in a name that begins with a model's: a date, `latest`, or `preview` with or without a date. `None` for another model:
-/// `preview-tts` has another price.
+/// The version in a name that begins with a model's: a date, `latest`, or `preview` with or without a date. `None` for
+/// another model: `preview-tts` has another price.
 fn version_of<'n>(name: &'n str, model: &str) -> Option<&'n str> {
     let version = name.strip_prefix(model)?.strip_prefix(['-', '@'])?;
     let date = version.strip_prefix("preview").unwrap_or(version);
@@ -372,10 +326,7 @@ mod tests {
     }
 
     fn with_cached(usage: Usage, tokens: u64) -> Usage {
-        Usage {
-            cached_tokens: Some(tokens),
-            ..usage
-        }
+        Usage { cached_tokens: Some(tokens), ..usage }
     }
 
     #[test]
@@ -385,16 +336,10 @@ mod tests {
         assert_eq!(input_price(&prices, "gpt-4o-2024-08-06"), Some(2.5));
         assert_eq!(input_price(&prices, "gpt-4-0613"), Some(30.0));
         assert_eq!(input_price(&prices, "gpt-4-1106-preview"), Some(10.0));
-        assert_eq!(
-            input_price(&prices, "openai/gpt-4o-mini-2024-07-18"),
-            Some(0.15)
-        );
+        assert_eq!(input_price(&prices, "openai/gpt-4o-mini-2024-07-18"), Some(0.15));
         assert_eq!(input_price(&prices, "claude-haiku-4-5-20251001"), Some(1.0));
         assert_eq!(input_price(&prices, "gpt-4o-2024-05-13"), Some(5.0));
-        assert_eq!(
-            input_price(&prices, "gemini-2.5-flash-preview-09-2025"),
-            input_price(&prices, "gemini-2.5-flash")
-        );
+        assert_eq!(input_price(&prices, "gemini-2.5-flash-preview-09-2025"), input_price(&prices, "gemini-2.5-flash"));
         for unknown in [
             "gpt-4o-2031-01-01",
             "gemini-2.5-flash-preview-04-17",
@@ -408,11 +353,7 @@ mod tests {
             assert_eq!(input_price(&prices, unknown), None, "{unknown}");
         }
         let price = prices.find("gpt-4o").unwrap();
-        let usage = Usage {
-            prompt_tokens: Some(1_000_000),
-            completion_tokens: Some(100_000),
-            ..Usage::default()
-        };
+        let usage = Usage { prompt_tokens: Some(1_000_000), completion_tokens: Some(100_000), ..Usage::default() };
         assert!((price.charged(usage) - 3.5).abs() < 1e-12);
         // Half of the prompt is cached and costs half the price. A count of cached tokens above the prompt is capped.
         assert!((price.charged(with_cached(usage, 500_000)) - 2.875).abs() < 1e-12);
@@ -444,20 +385,12 @@ mod tests {
         ] {
             let price = prices.price("gpt-4o", asked).unwrap();
             let charged = price.charged(usage(answered));
-            assert!(
-                (charged - dollars).abs() < 1e-9,
-                "{asked:?} {answered:?}: {charged}"
-            );
+            assert!((charged - dollars).abs() < 1e-9, "{asked:?} {answered:?}: {charged}");
         }
         let reason = prices.price("gpt-4o", Some("turbo")).unwrap_err();
         assert!(matches!(reason, Unpriced::Tier { .. }), "{reason:?}");
         let reason = prices.price("gpt-4o-2031-01-01", None).unwrap_err();
-        assert_eq!(
-            reason,
-            Unpriced::Version {
-                alias: "gpt-4o".to_owned()
-            }
-        );
+        assert_eq!(reason, Unpriced::Version { alias: "gpt-4o".to_owned() });
     }
 
     #[test]
@@ -495,7 +428,8 @@ mod tests {
     #[test]
     fn invalid_custom_tables_are_rejected() {
         let file = tempfile::NamedTempFile::new().unwrap();
-        let good = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\n\"m/x\" = { input = 1, output = 2, image-tokens = 900 }\n";
+        let good =
+            "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\n\"m/x\" = { input = 1, output = 2, image-tokens = 900 }\n";
         let price = load_text(file.path(), good).unwrap().find("m/x").unwrap();
         assert_eq!((price.input, price.image_tokens), (1.0, Some(900)));
         for wrong in [

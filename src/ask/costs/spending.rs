@@ -1,7 +1,7 @@
 //! Cost of the requests of a run in US dollars, and its limit: [`Spending`].
 //!
-//! Each request has a [`Reservation`] of its maximum cost until its real charge is known, so that the sum stays below the limit in any
-//! order of replies.
+//! Each request has a [`Reservation`] of its maximum cost until its real charge is known, so that the sum stays below
+//! the limit in any order of replies.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -118,13 +118,11 @@ pub(crate) struct PricedRequest {
 impl PricedRequest {
     /// Token bound; the bound of the reply is higher if the server has exceeded a token limit before.
     pub(crate) fn current_bound(&self) -> TokenBound {
-        TokenBound {
-            reply: self.excess.bound(self.bound.reply),
-            ..self.bound
-        }
+        TokenBound { reply: self.excess.bound(self.bound.reply), ..self.bound }
     }
 
-    /// Maximum cost of the request, in US dollars: at the price table, or as much dearer as the server has charged before.
+    /// Maximum cost of the request, in US dollars: at the price table, or as much dearer as the server has charged
+    /// before.
     pub(crate) fn max_cost(&self) -> f64 {
         self.max_cost_within(self.current_bound())
     }
@@ -140,22 +138,14 @@ impl Spending {
         Self {
             limit,
             pending_batches: 0.0,
-            dollars: Mutex::new(Dollars {
-                spent,
-                reserved: 0.0,
-                reservations: 0,
-                waiting: 0,
-            }),
+            dollars: Mutex::new(Dollars { spent, reserved: 0.0, reservations: 0, waiting: 0 }),
             released: Notify::new(),
         }
     }
 
     /// Sets the maximum cost, in US dollars, of batches that have not ended.
     pub(crate) fn with_pending_batches(self, pending_batches: f64) -> Self {
-        Self {
-            pending_batches,
-            ..self
-        }
+        Self { pending_batches, ..self }
     }
 
     /// Limit in US dollars; `None` for no limit.
@@ -166,8 +156,7 @@ impl Spending {
     /// True if `additional` dollars fit into the limit, on top of all spent and reserved dollars.
     fn fits(&self, dollars: &Dollars, additional: f64) -> bool {
         let sum = dollars.spent + dollars.reserved + self.pending_batches + additional;
-        self.limit
-            .is_none_or(|limit| sum <= limit * (1.0 + TOLERANCE))
+        self.limit.is_none_or(|limit| sum <= limit * (1.0 + TOLERANCE))
     }
 
     /// US dollars spent so far.
@@ -188,11 +177,7 @@ impl Spending {
     /// US dollars spent beyond the limit; 0 within the limit.
     pub(crate) fn overrun(&self) -> f64 {
         let over = self.limit.map_or(0.0, |limit| self.spent() - limit);
-        if over > self.limit.unwrap_or(0.0) * TOLERANCE {
-            over
-        } else {
-            0.0
-        }
+        if over > self.limit.unwrap_or(0.0) * TOLERANCE { over } else { 0.0 }
     }
 
     /// Reserves the maximum cost of a request; `None` if the limit does not allow it.
@@ -208,10 +193,7 @@ impl Spending {
         Some(Reservation {
             spending: Arc::clone(self),
             request,
-            attempts: Mutex::new(Attempts {
-                held: Held::Reserved(bound, max_cost),
-                charged: LostAttempts::default(),
-            }),
+            attempts: Mutex::new(Attempts { held: Held::Reserved(bound, max_cost), charged: LostAttempts::default() }),
         })
     }
 
@@ -252,8 +234,8 @@ enum Held {
 }
 
 impl Reservation {
-    /// Reserves the maximum cost of the next request, unless it is already reserved. If the limit does not allow it, waits for other
-    /// requests to end; false if there are none.
+    /// Reserves the maximum cost of the next request, unless it is already reserved. If the limit does not allow it,
+    /// waits for other requests to end; false if there are none.
     pub(crate) async fn reserve(&self) -> bool {
         let mut waiting = None;
         loop {
@@ -380,21 +362,14 @@ mod tests {
                 image_tokens: None,
                 tiers: TierFactors::default(),
             },
-            bound: TokenBound {
-                prompt: 10,
-                reply: 90,
-            },
+            bound: TokenBound { prompt: 10, reply: 90 },
             excess: Arc::default(),
             charges: Arc::default(),
         }
     }
 
     fn usage(prompt: u64, reply: u64) -> Charge {
-        Charge::Stated(Usage {
-            prompt_tokens: Some(prompt),
-            completion_tokens: Some(reply),
-            ..Usage::default()
-        })
+        Charge::Stated(Usage { prompt_tokens: Some(prompt), completion_tokens: Some(reply), ..Usage::default() })
     }
 
     fn spending() -> Arc<Spending> {
@@ -436,9 +411,7 @@ mod tests {
             (usage(7, 0), 7.0, 0),
             (usage(0, 3), 13.0, 10),
         ] {
-            let reservation = Arc::new(Spending::new(None, 0.0))
-                .reserve(request())
-                .unwrap();
+            let reservation = Arc::new(Spending::new(None, 0.0)).reserve(request()).unwrap();
             reservation.mark_sent();
             reservation.settle(charge);
             let spent = reservation.spending.spent();
@@ -525,9 +498,6 @@ mod tests {
         reservation.mark_sent();
         reservation.settle(usage(10, 91));
         assert_eq!(request.current_bound().reply, 94);
-        assert_eq!(
-            (request.excess.longest(), request.excess.replies()),
-            (91, 1)
-        );
+        assert_eq!((request.excess.longest(), request.excess.replies()), (91, 1));
     }
 }

@@ -13,8 +13,8 @@ impl Default for TierFactors {
 }
 
 impl TierFactors {
-    /// Factors by the names of tiers, relative to the standard tier. Tiers with other names than those of [`ServiceTier`] are left out,
-    /// because replies do not tell them apart.
+    /// Factors by the names of tiers, relative to the standard tier. Tiers with other names than those of
+    /// [`ServiceTier`] are left out, because replies do not tell them apart.
     pub(super) fn new<'a>(stated: impl Iterator<Item = (&'a str, f64)>) -> Self {
         let mut factors = [None; ServiceTier::COUNT];
         factors[ServiceTier::Standard as usize] = Some(1.0);
@@ -36,11 +36,10 @@ impl TierFactors {
         Self(factors.map(|other| other.map(|other| other / factor)))
     }
 
-    /// The factor of a tier that a reply states; 1 for the tier that was asked for, and for one whose factor is unknown.
+    /// The factor of a tier that a reply states; 1 for the tier that was asked for, and for one whose factor is
+    /// unknown.
     pub(super) fn factor(&self, tier: Option<ServiceTier>) -> f64 {
-        tier.and_then(|tier| self.0[tier as usize])
-            .filter(|factor| factor.is_finite())
-            .unwrap_or(1.0)
+        tier.and_then(|tier| self.0[tier as usize]).filter(|factor| factor.is_finite()).unwrap_or(1.0)
     }
 
     /// True if a reply states a tier whose factor is unknown.
@@ -55,8 +54,7 @@ mod tests {
 
     #[test]
     fn factors_are_relative_to_the_tier_asked_for() {
-        let factors =
-            TierFactors::new([("priority", 1.7), ("flex", 0.5), ("turbo", 9.0)].into_iter());
+        let factors = TierFactors::new([("priority", 1.7), ("flex", 0.5), ("turbo", 9.0)].into_iter());
         assert!((factors.factor(Some(ServiceTier::Priority)) - 1.7).abs() < 1e-12);
         assert!((factors.factor(None) - 1.0).abs() < 1e-12);
         assert!(factors.is_unknown(ServiceTier::Other) && factors.is_unknown(ServiceTier::Scale));

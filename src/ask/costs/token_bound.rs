@@ -13,16 +13,13 @@ pub(crate) struct TokenBound {
 impl TokenBound {
     /// Returns the bound as the unreported tokens of one request.
     pub(crate) fn unstated(self) -> Unstated {
-        Unstated {
-            requests: 1,
-            prompt_tokens: self.prompt,
-            completion_tokens: self.reply,
-        }
+        Unstated { requests: 1, prompt_tokens: self.prompt, completion_tokens: self.reply }
     }
 
     /// Returns the bound on the counts that are missing from `usage`; reported counts become 0.
     ///
-    /// Nothing is missing if the server states what it charges. Without prompt tokens (absent or 0), the server does not count tokens: 0 reply tokens are then also missing.
+    /// Nothing is missing if the server states what it charges. Without prompt tokens (absent or 0), the server does
+    /// not count tokens: 0 reply tokens are then also missing.
     pub(crate) fn missing_from(self, usage: Usage) -> Self {
         if usage.cost.is_some_and(|cost| cost.dollars() > 0.0) {
             return Self::default();
@@ -32,9 +29,6 @@ impl TokenBound {
             (None, Some(0)) => None,
             (_, reply) => reply,
         };
-        Self {
-            prompt: prompt.map_or(self.prompt, |_| 0),
-            reply: reply.map_or(self.reply, |_| 0),
-        }
+        Self { prompt: prompt.map_or(self.prompt, |_| 0), reply: reply.map_or(self.reply, |_| 0) }
     }
 }

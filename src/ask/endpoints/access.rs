@@ -85,9 +85,7 @@ impl Access {
         if self.key.is_some() && base.has_credentials() {
             return Err(Error::usage(
                 "--base-url",
-                format_args!(
-                    "{base} has a user name in the address, and a key is set too; remove one of them"
-                ),
+                format_args!("{base} has a user name in the address, and a key is set too; remove one of them"),
             ));
         }
         Ok(())
@@ -98,14 +96,10 @@ impl Access {
         let mut headers = self.key_headers(self.key.as_ref(), wire)?;
         for (name, text) in &self.account {
             let value = HeaderValue::try_from(text).map_err(|_| {
-                Error::usage(
-                    name.as_str(),
-                    "the value has characters that an HTTP header cannot carry",
-                )
+                Error::usage(name.as_str(), "the value has characters that an HTTP header cannot carry")
             })?;
-            let name = HeaderName::try_from(name).map_err(|_| {
-                Error::usage(name.as_str(), "this is not a valid name of an HTTP header")
-            })?;
+            let name = HeaderName::try_from(name)
+                .map_err(|_| Error::usage(name.as_str(), "this is not a valid name of an HTTP header"))?;
             headers.insert(name, value);
         }
         self.headers.add_to(&mut headers)?;
@@ -123,8 +117,8 @@ impl Access {
 
     /// HTTP client for all requests, with a time limit for connecting only.
     ///
-    /// It follows no redirects: a POST would become a GET, and the key would be sent to another address. Proxies come from the
-    /// environment (`HTTPS_PROXY`, `NO_PROXY`, …); requests to this machine use none.
+    /// It follows no redirects: a POST would become a GET, and the key would be sent to another address. Proxies come
+    /// from the environment (`HTTPS_PROXY`, `NO_PROXY`, …); requests to this machine use none.
     pub(super) fn client(&self, timeout: Duration, scrub: &Scrub) -> Result<Client> {
         // An error means that a crypto provider is already installed.
         let _ = default_provider().install_default();
@@ -159,9 +153,8 @@ impl Authorities {
     /// If the file cannot be read or has no valid certificate.
     pub fn load(path: &Path) -> Result<Self> {
         let pem = reading::settings(path)?;
-        let certificates: Vec<_> = CertificateDer::pem_slice_iter(pem.as_bytes())
-            .collect::<Result<_, _>>()
-            .unwrap_or_default();
+        let certificates: Vec<_> =
+            CertificateDer::pem_slice_iter(pem.as_bytes()).collect::<Result<_, _>>().unwrap_or_default();
         if certificates.is_empty() {
             return Err(Error::usage(
                 "--ca-file",
@@ -196,11 +189,7 @@ mod tests {
     use super::*;
 
     fn access(base: &str, key_header: KeyHeader) -> Access {
-        Access {
-            key: Some(Secret::new("sk-0123", "KEY").unwrap()),
-            key_header,
-            ..Access::new(base.parse().unwrap())
-        }
+        Access { key: Some(Secret::new("sk-0123", "KEY").unwrap()), key_header, ..Access::new(base.parse().unwrap()) }
     }
 
     #[test]
@@ -209,18 +198,8 @@ mod tests {
         for (base, header, name, value) in [
             (azure, KeyHeader::Auto, "api-key", "sk-0123"),
             (azure, KeyHeader::Bearer, "authorization", "Bearer sk-0123"),
-            (
-                "https://api.openai.com/v1",
-                KeyHeader::Auto,
-                "authorization",
-                "Bearer sk-0123",
-            ),
-            (
-                "https://gateway.example/v1",
-                KeyHeader::ApiKey,
-                "api-key",
-                "sk-0123",
-            ),
+            ("https://api.openai.com/v1", KeyHeader::Auto, "authorization", "Bearer sk-0123"),
+            ("https://gateway.example/v1", KeyHeader::ApiKey, "api-key", "sk-0123"),
         ] {
             let headers = access(base, header).headers(Wire::Chat).unwrap();
             assert_eq!(headers.len(), 1);

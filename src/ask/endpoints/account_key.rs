@@ -9,8 +9,8 @@ use super::access::Access;
 use crate::ask::secrets::{Scrub, Secret};
 use crate::ask::wire_kind::Wire;
 
-/// The key of an endpoint. If it comes from a file, the file is read again after a refusal with status 401: tokens of cloud accounts are
-/// valid for an hour, and keys are rotated.
+/// The key of an endpoint. If it comes from a file, the file is read again after a refusal with status 401: tokens of
+/// cloud accounts are valid for an hour, and keys are rotated.
 #[derive(Debug)]
 pub(crate) struct AccountKey {
     access: Access,
@@ -37,14 +37,7 @@ pub(crate) struct KeyedHeaders {
 
 impl AccountKey {
     pub(super) fn new(access: Access, scrub: Scrub) -> Self {
-        Self {
-            access,
-            state: Mutex::new(State {
-                renewed: None,
-                renewals: 0,
-                scrub: Arc::new(scrub),
-            }),
-        }
+        Self { access, state: Mutex::new(State { renewed: None, renewals: 0, scrub: Arc::new(scrub) }) }
     }
 
     /// Filter that removes the keys and passwords of the endpoint from text of the server.
@@ -61,13 +54,11 @@ impl AccountKey {
         {
             headers.extend(latest);
         }
-        KeyedHeaders {
-            headers,
-            renewals: state.renewals,
-        }
+        KeyedHeaders { headers, renewals: state.renewals }
     }
 
-    /// Reads the file of the key again, after the server refused the key of a request. Returns true if there is another key since.
+    /// Reads the file of the key again, after the server refused the key of a request. Returns true if there is another
+    /// key since.
     pub(super) fn renew(&self, refused: &KeyedHeaders) -> bool {
         let Some(path) = &self.access.key_file else {
             return false;
@@ -122,15 +113,10 @@ mod tests {
         assert!(key.renew(&first));
         assert!(key.renew(&first), "another request has read it");
         let second = key.add_to(&base);
-        assert_eq!(
-            second.headers["authorization"],
-            "Bearer sk-second-0123456789"
-        );
+        assert_eq!(second.headers["authorization"], "Bearer sk-second-0123456789");
         assert!(second.headers["authorization"].is_sensitive());
         assert!(!key.renew(&second), "no newer one");
-        let text = key
-            .scrub()
-            .line("sk-first-0123456789 and sk-second-0123456789");
+        let text = key.scrub().line("sk-first-0123456789 and sk-second-0123456789");
         assert_eq!(text, "[secret] and [secret]");
     }
 

@@ -20,22 +20,15 @@ pub(super) struct Attempts {
 impl Attempts {
     /// The attempts of a question of which this many requests count as charged from the start.
     pub(super) fn with_charged(charged: u32) -> Self {
-        Self {
-            unfinished: charged,
-            ..Self::default()
-        }
+        Self { unfinished: charged, ..Self::default() }
     }
 
-    /// Adds a failed request; `replies` is the number of replies of the endpoint so far. A second quick timeout after a reply to another
-    /// request becomes a [`Unfinished::RepeatedTimeout`].
+    /// Adds a failed request; `replies` is the number of replies of the endpoint so far. A second quick timeout after a
+    /// reply to another request becomes a [`Unfinished::RepeatedTimeout`].
     pub(super) fn add(&mut self, failed: AskError, replies: u64) -> AskError {
-        let is_repeated = self
-            .replies_at_timeout
-            .is_some_and(|before| replies > before);
+        let is_repeated = self.replies_at_timeout.is_some_and(|before| replies > before);
         let failed = match failed.unfinished {
-            Unfinished::QuickTimeout if is_repeated => {
-                failed.with_unfinished(Unfinished::RepeatedTimeout)
-            }
+            Unfinished::QuickTimeout if is_repeated => failed.with_unfinished(Unfinished::RepeatedTimeout),
             Unfinished::QuickTimeout => {
                 self.replies_at_timeout.get_or_insert(replies);
                 failed
@@ -58,7 +51,8 @@ impl Attempts {
         failed.with_attempts(self.sent, self.lost)
     }
 
-    /// The error of a question with more charged requests than `--retries paid` allows; `remedy` is the one for a gateway timeout.
+    /// The error of a question with more charged requests than `--retries paid` allows; `remedy` is the one for a
+    /// gateway timeout.
     pub(super) fn give_up(&self, mut failed: AskError, remedy: &str) -> AskError {
         let tokens = self.lost.usage.total().unwrap_or_default();
         let reason = if failed.unfinished.is_timeout() {
@@ -66,8 +60,7 @@ impl Attempts {
                 "given up: a gateway ends the request before the reply is complete, and the server may charge it each time; {remedy}"
             )
         } else if failed.unfinished == Unfinished::BrokeOff && self.lost.attempts == 0 {
-            "given up: each request that breaks off may be charged; more --retries paid asks again"
-                .to_owned()
+            "given up: each request that breaks off may be charged; more --retries paid asks again".to_owned()
         } else {
             format!(
                 "{} charged without a reply, {tokens} tokens; remedies: a larger --max-tokens, --thinking off, or more --retries paid",
@@ -85,8 +78,7 @@ mod tests {
     use crate::types::FailureKind;
 
     fn timeout() -> AskError {
-        AskError::new(FailureKind::Server, "504".to_owned())
-            .with_unfinished(Unfinished::QuickTimeout)
+        AskError::new(FailureKind::Server, "504".to_owned()).with_unfinished(Unfinished::QuickTimeout)
     }
 
     #[test]
@@ -101,9 +93,6 @@ mod tests {
         slow.add(timeout(), 3);
         let failed = slow.add(timeout(), 4);
         assert!(failed.unfinished.is_timeout());
-        assert_eq!(
-            (slow.charged(), failed.failure.kind),
-            (1, FailureKind::Timeout)
-        );
+        assert_eq!((slow.charged(), failed.failure.kind), (1, FailureKind::Timeout));
     }
 }

@@ -24,12 +24,12 @@ use crate::error::Result;
 use crate::files;
 use crate::types::FailureKind;
 
-/// Maximum size of a decompressed response, in bytes; chosen. A reply of a few tokens is far smaller, and a server must not exhaust the
-/// memory.
+/// Maximum size of a decompressed response, in bytes; chosen. A reply of a few tokens is far smaller, and a server must
+/// not exhaust the memory.
 const MAX_RESPONSE: usize = 16 << 20;
 
-/// Maximum time of a stream, as a multiple of the timeout; chosen: a server that only sends comments to keep a connection open must not
-/// block a run forever.
+/// Maximum time of a stream, as a multiple of the timeout; chosen: a server that only sends comments to keep a
+/// connection open must not block a run forever.
 const STREAM_TIMEOUTS: u32 = 30;
 
 /// Maximum time to download a file of replies; chosen.
@@ -47,26 +47,17 @@ pub(crate) struct Deadline {
 impl Deadline {
     /// Limits for a response in one piece.
     pub(crate) fn total(timeout: Duration) -> Self {
-        Self {
-            total: timeout,
-            idle: None,
-        }
+        Self { total: timeout, idle: None }
     }
 
     /// Limits for a streamed response.
     pub(super) fn stream(timeout: Duration) -> Self {
-        Self {
-            total: timeout.saturating_mul(STREAM_TIMEOUTS),
-            idle: Some(timeout),
-        }
+        Self { total: timeout.saturating_mul(STREAM_TIMEOUTS), idle: Some(timeout) }
     }
 
     /// Limits for the download of a file.
     pub(super) fn download(timeout: Duration) -> Self {
-        Self {
-            total: MAX_DOWNLOAD,
-            idle: Some(timeout),
-        }
+        Self { total: MAX_DOWNLOAD, idle: Some(timeout) }
     }
 }
 
@@ -79,10 +70,7 @@ struct AttemptTimer {
 
 impl AttemptTimer {
     fn new(deadline: Deadline) -> Self {
-        Self {
-            deadline,
-            total: TimeLimit::new(deadline.total),
-        }
+        Self { deadline, total: TimeLimit::new(deadline.total) }
     }
 
     /// Runs one step of the attempt.
@@ -138,21 +126,15 @@ pub(crate) struct HttpResponse {
 impl HttpResponse {
     /// Value of a header as text; empty if the header is missing or not text.
     pub(super) fn header(&self, name: &str) -> &str {
-        self.headers
-            .get(name)
-            .and_then(|value| value.to_str().ok())
-            .unwrap_or_default()
+        self.headers.get(name).and_then(|value| value.to_str().ok()).unwrap_or_default()
     }
 }
 
-/// The failure of a request without a response, after this time. A connection that is lost after a long silence was closed by a gateway.
+/// The failure of a request without a response, after this time. A connection that is lost after a long silence was
+/// closed by a gateway.
 fn lost_after(error: AskError, time: Duration) -> AskError {
     let is_lost = error.failure.kind == FailureKind::Connection && error.may_have_effect;
-    if is_lost && time >= LONG_SILENCE {
-        error.with_unfinished(Unfinished::GatewayTimeout)
-    } else {
-        error
-    }
+    if is_lost && time >= LONG_SILENCE { error.with_unfinished(Unfinished::GatewayTimeout) } else { error }
 }
 
 impl Connection {
@@ -173,7 +155,8 @@ impl Connection {
         self.key.scrub()
     }
 
-    /// Sends a JSON body to a path below the base URL, and again if the server refuses the key and its file has another one.
+    /// Sends a JSON body to a path below the base URL, and again if the server refuses the key and its file has another
+    /// one.
     pub(super) async fn post(
         &self,
         path: &str,
@@ -222,12 +205,7 @@ impl Connection {
     }
 
     /// Builds a request to a path below the base URL, with these fields in its query string.
-    pub(crate) fn request(
-        &self,
-        method: Method,
-        path: &str,
-        query: &[(&str, &str)],
-    ) -> RequestBuilder {
+    pub(crate) fn request(&self, method: Method, path: &str, query: &[(&str, &str)]) -> RequestBuilder {
         let mut url = self.base.join(path);
         if !query.is_empty() {
             url.query_pairs_mut().extend_pairs(query);
@@ -235,8 +213,8 @@ impl Connection {
         self.client.request(method, url)
     }
 
-    /// Sends a request without a streamed body, and again if the server refuses the key and its file has another one. A request with a
-    /// streamed body is sent once.
+    /// Sends a request without a streamed body, and again if the server refuses the key and its file has another one. A
+    /// request with a streamed body is sent once.
     pub(crate) async fn exchange_keyed(
         &self,
         request: RequestBuilder,
@@ -257,13 +235,8 @@ impl Connection {
     }
 
     /// Sends a request once.
-    pub(crate) async fn exchange(
-        &self,
-        request: RequestBuilder,
-        deadline: Deadline,
-    ) -> Result<HttpResponse, AskError> {
-        self.exchange_within(&mut AttemptTimer::new(deadline), request)
-            .await
+    pub(crate) async fn exchange(&self, request: RequestBuilder, deadline: Deadline) -> Result<HttpResponse, AskError> {
+        self.exchange_within(&mut AttemptTimer::new(deadline), request).await
     }
 
     async fn exchange_within(
@@ -287,38 +260,19 @@ impl Connection {
             // The status of a refusal suffices without its body.
             body => body.unwrap_or_default(),
         };
-        Ok(HttpResponse {
-            status,
-            headers,
-            body,
-            duration: started.elapsed().saturating_sub(timer.total.suspended()),
-        })
+        Ok(HttpResponse { status, headers, body, duration: started.elapsed().saturating_sub(timer.total.suspended()) })
     }
 
-    /// Requests the context length and the path of a model, as text, from servers that report them (vLLM does); `None` if the request fails
-    /// or does not list the model.
-    pub(super) async fn model_facts(
-        &self,
-        headers: &HeaderMap,
-        parameters: &Parameters,
-    ) -> Option<String> {
-        let request = self
-            .client
-            .get(self.base.join("models"))
-            .headers(headers.clone());
-        let response = self
-            .exchange(request, Deadline::total(self.timeout))
-            .await
-            .ok()?;
+    /// Requests the context length and the path of a model, as text, from servers that report them (vLLM does); `None`
+    /// if the request fails or does not list the model.
+    pub(super) async fn model_facts(&self, headers: &HeaderMap, parameters: &Parameters) -> Option<String> {
+        let request = self.client.get(self.base.join("models")).headers(headers.clone());
+        let response = self.exchange(request, Deadline::total(self.timeout)).await.ok()?;
         if !response.status.is_success() {
             return None;
         }
         let list = parse(std::str::from_utf8(&response.body).ok()?).ok()?;
-        let model = list
-            .get("data")?
-            .as_array()?
-            .iter()
-            .find(|model| model["id"] == *parameters.model)?;
+        let model = list.get("data")?.as_array()?.iter().find(|model| model["id"] == *parameters.model)?;
         let facts: Vec<String> = ["max_model_len", "root"]
             .into_iter()
             .filter_map(|name| Some(format!("{name} {}", model.get(name)?)))
@@ -326,8 +280,8 @@ impl Connection {
         Some(self.scrub().line(&facts.join(", ")))
     }
 
-    /// Sends a request once, and writes the body of a successful response to a file of at most `max_bytes` bytes; the body of the returned
-    /// response is then empty. The download fails if no byte arrives for the timeout of a request.
+    /// Sends a request once, and writes the body of a successful response to a file of at most `max_bytes` bytes; the
+    /// body of the returned response is then empty. The download fails if no byte arrives for the timeout of a request.
     pub(crate) async fn download(
         &self,
         request: RequestBuilder,
@@ -358,8 +312,7 @@ impl Connection {
             while let Some(chunk) = self.run_step(&mut timer, response.chunk()).await? {
                 written += chunk.len() as u64;
                 if written > max_bytes {
-                    let message =
-                        format!("{} sent a file of more than {max_bytes} bytes", self.base);
+                    let message = format!("{} sent a file of more than {max_bytes} bytes", self.base);
                     return Err(AskError::new(FailureKind::Response, message));
                 }
                 file.write_all(&chunk).map_err(write_error)?;
@@ -369,20 +322,11 @@ impl Connection {
         } else {
             self.receive(&mut timer, response).await.unwrap_or_default()
         };
-        Ok(HttpResponse {
-            status,
-            headers,
-            body,
-            duration: started.elapsed(),
-        })
+        Ok(HttpResponse { status, headers, body, duration: started.elapsed() })
     }
 
     /// Reads the decompressed body of a response, up to [`MAX_RESPONSE`].
-    async fn receive(
-        &self,
-        timer: &mut AttemptTimer,
-        mut response: Response,
-    ) -> Result<Vec<u8>, AskError> {
+    async fn receive(&self, timer: &mut AttemptTimer, mut response: Response) -> Result<Vec<u8>, AskError> {
         let mut body = Vec::new();
         while let Some(chunk) = self.run_step(timer, response.chunk()).await? {
             if body.len() + chunk.len() > MAX_RESPONSE {
@@ -403,25 +347,17 @@ impl Connection {
         let message = match timer.run(step).await {
             Ok(result) => return result.map_err(|error| self.request_error(error)),
             Err(ReachedLimit::Total(limit)) => self.timeout_message(limit),
-            Err(ReachedLimit::Idle(limit)) => format!(
-                "{} sent nothing for {} s; allow more with --timeout",
-                self.base,
-                limit.as_secs_f64()
-            ),
+            Err(ReachedLimit::Idle(limit)) => {
+                format!("{} sent nothing for {} s; allow more with --timeout", self.base, limit.as_secs_f64())
+            }
         };
-        Err(AskError {
-            retry: Retry::AfterDelay,
-            ..AskError::new(FailureKind::Timeout, message)
-        })
+        Err(AskError { retry: Retry::AfterDelay, ..AskError::new(FailureKind::Timeout, message) })
     }
 
     /// Message about a request without a response within a time limit.
     fn timeout_message(&self, limit: Duration) -> String {
         let limit = limit.as_secs_f64();
-        format!(
-            "{} did not answer within {limit} s; allow more with --timeout",
-            self.base
-        )
+        format!("{} did not answer within {limit} s; allow more with --timeout", self.base)
     }
 
     /// Error of a request without a complete response.
@@ -454,9 +390,7 @@ impl Connection {
             None => self.base.to_string(),
         };
         let is_mistyped = !self.has_answered.load(Ordering::Relaxed) && is_unknown_host(&text);
-        let remedy = is_mistyped
-            .then_some(UNKNOWN_HOST)
-            .or_else(|| permanent_cause(&text, self.base.is_plain()));
+        let remedy = is_mistyped.then_some(UNKNOWN_HOST).or_else(|| permanent_cause(&text, self.base.is_plain()));
         let Some(remedy) = remedy else {
             return AskError {
                 retry: Retry::AfterDelay,
@@ -465,9 +399,6 @@ impl Connection {
             };
         };
         let message = format!("{server}: {remedy} ({text})");
-        AskError {
-            reach: Reach::Endpoint,
-            ..AskError::new(FailureKind::Connection, message)
-        }
+        AskError { reach: Reach::Endpoint, ..AskError::new(FailureKind::Connection, message) }
     }
 }

@@ -16,12 +16,7 @@ const PERMANENT_CAUSES: [(&[&str], &str); 8] = [
          basicConstraints=CA:FALSE",
     ),
     (
-        &[
-            "certificate expired",
-            "certificate not valid yet",
-            "NotValidYet",
-            "Expired",
-        ],
+        &["certificate expired", "certificate not valid yet", "NotValidYet", "Expired"],
         "its certificate is not valid at the time of this machine; renew it, or set the clock",
     ),
     (
@@ -33,10 +28,7 @@ const PERMANENT_CAUSES: [(&[&str], &str); 8] = [
         "its certificate is rejected; make another one, or name the authority with --ca-file",
     ),
     (
-        &[
-            "proxy authorization required",
-            "proxy authentication required",
-        ],
+        &["proxy authorization required", "proxy authentication required"],
         "the proxy asks for a user and password: set them in HTTPS_PROXY, or name the host in NO_PROXY",
     ),
     (
@@ -52,7 +44,8 @@ const PERMANENT_CAUSES: [(&[&str], &str); 8] = [
 /// Phrases in errors of plain HTTP requests to a TLS port.
 const TLS_PORT: [&str; 2] = ["invalid HTTP version parsed", "received invalid HTTP"];
 
-/// Remedy for a connection error that a retry does not solve; `None` for other errors. `is_plain` is true for http:// addresses.
+/// Remedy for a connection error that a retry does not solve; `None` for other errors. `is_plain` is true for http://
+/// addresses.
 pub(super) fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str> {
     if is_plain {
         let is_tls = TLS_PORT.iter().any(|phrase| text.contains(phrase));
@@ -80,9 +73,7 @@ const UNKNOWN_HOST_PHRASES: [&str; 5] = [
 
 /// True if the error text reports that the host name does not exist.
 pub(super) fn is_unknown_host(text: &str) -> bool {
-    UNKNOWN_HOST_PHRASES
-        .iter()
-        .any(|phrase| text.contains(phrase))
+    UNKNOWN_HOST_PHRASES.iter().any(|phrase| text.contains(phrase))
 }
 
 /// Error codes for too many open files, in this process or in the system: EMFILE and ENFILE; on Windows WSAEMFILE.
@@ -104,49 +95,22 @@ mod tests {
     #[test]
     fn permanent_causes_have_a_remedy() {
         for (text, is_plain, remedy) in [
-            (
-                "invalid peer certificate: UnknownIssuer",
-                false,
-                "--ca-file",
-            ),
-            (
-                "invalid peer certificate: Other(OtherError(CaUsedAsEndEntity))",
-                false,
-                "CA:FALSE",
-            ),
-            (
-                "invalid peer certificate: certificate expired: x",
-                false,
-                "clock",
-            ),
-            (
-                "client error (Connect): proxy authorization required",
-                false,
-                "HTTPS_PROXY",
-            ),
-            (
-                "received corrupt message of type InvalidContentType",
-                false,
-                "http:// in --base-url",
-            ),
+            ("invalid peer certificate: UnknownIssuer", false, "--ca-file"),
+            ("invalid peer certificate: Other(OtherError(CaUsedAsEndEntity))", false, "CA:FALSE"),
+            ("invalid peer certificate: certificate expired: x", false, "clock"),
+            ("client error (Connect): proxy authorization required", false, "HTTPS_PROXY"),
+            ("received corrupt message of type InvalidContentType", false, "http:// in --base-url"),
             (
                 "tunnel error: failed to create underlying connection: received corrupt message of type InvalidContentType",
                 false,
                 "the proxy speaks plain http",
             ),
-            (
-                "client error: invalid HTTP version parsed",
-                true,
-                "https://",
-            ),
+            ("client error: invalid HTTP version parsed", true, "https://"),
         ] {
             let cause = permanent_cause(text, is_plain).unwrap();
             assert!(cause.contains(remedy), "{text}: {cause}");
         }
-        for text in [
-            "tcp connect error: Connection refused",
-            "connection reset by peer",
-        ] {
+        for text in ["tcp connect error: Connection refused", "connection reset by peer"] {
             assert_eq!(permanent_cause(text, false), None);
             assert_eq!(permanent_cause(text, true), None);
         }
@@ -155,12 +119,8 @@ mod tests {
     #[test]
     fn a_dns_outage_is_not_an_unknown_host() {
         let lookup = "dns error: failed to lookup address information: ";
-        assert!(is_unknown_host(&format!(
-            "{lookup}Name or service not known"
-        )));
-        assert!(!is_unknown_host(&format!(
-            "{lookup}Temporary failure in name resolution"
-        )));
+        assert!(is_unknown_host(&format!("{lookup}Name or service not known")));
+        assert!(!is_unknown_host(&format!("{lookup}Temporary failure in name resolution")));
     }
 
     #[cfg(unix)]
@@ -171,8 +131,6 @@ mod tests {
         struct Outer(#[source] io::Error);
         assert!(lacks_open_files(&Outer(io::Error::from_raw_os_error(24))));
         assert!(!lacks_open_files(&Outer(io::Error::from_raw_os_error(111))));
-        assert!(!lacks_open_files(&Outer(io::Error::other(
-            "Too many open files"
-        ))));
+        assert!(!lacks_open_files(&Outer(io::Error::other("Too many open files"))));
     }
 }

@@ -7,12 +7,11 @@ use rustls::client::verify_server_name;
 use rustls::crypto::CryptoProvider;
 use rustls::pki_types::{CertificateDer, ServerName, UnixTime};
 use rustls::server::ParsedCertificate;
-use rustls::{
-    CertificateError, ClientConfig, DigitallySignedStruct, Error, OtherError, SignatureScheme,
-};
+use rustls::{CertificateError, ClientConfig, DigitallySignedStruct, Error, OtherError, SignatureScheme};
 use rustls_platform_verifier::Verifier;
 
-/// TLS settings of a client that trusts these certificates in addition to the system's, both as authorities and as server certificates.
+/// TLS settings of a client that trusts these certificates in addition to the system's, both as authorities and as
+/// server certificates.
 ///
 /// # Errors
 /// If a certificate cannot be used.
@@ -24,20 +23,16 @@ pub(super) fn client_config(
         platform: Verifier::new_with_extra_roots(trusted.iter().cloned(), Arc::clone(&provider))?,
         trusted: trusted.to_vec(),
     };
-    let config =
-        ClientConfig::builder_with_provider(provider).with_safe_default_protocol_versions()?;
-    let mut config = config
-        .dangerous()
-        .with_custom_certificate_verifier(Arc::new(verifier))
-        .with_no_client_auth();
+    let config = ClientConfig::builder_with_provider(provider).with_safe_default_protocol_versions()?;
+    let mut config = config.dangerous().with_custom_certificate_verifier(Arc::new(verifier)).with_no_client_auth();
     config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
     Ok(config)
 }
 
 /// Verifier of the platform that also accepts a trusted CA certificate as the server's own certificate.
 ///
-/// `openssl req -x509` creates certificates with `CA:TRUE`, which the platform verifier rejects for a server. Other clients accept
-/// such a certificate if the user trusts it.
+/// `openssl req -x509` creates certificates with `CA:TRUE`, which the platform verifier rejects for a server. Other
+/// clients accept such a certificate if the user trusts it.
 #[derive(Debug)]
 struct CustomVerifier {
     platform: Verifier,
@@ -53,13 +48,7 @@ impl ServerCertVerifier for CustomVerifier {
         ocsp_response: &[u8],
         now: UnixTime,
     ) -> Result<ServerCertVerified, Error> {
-        let verified = self.platform.verify_server_cert(
-            end_entity,
-            intermediates,
-            server_name,
-            ocsp_response,
-            now,
-        );
+        let verified = self.platform.verify_server_cert(end_entity, intermediates, server_name, ocsp_response, now);
         // The platform verifier checks the dates before it reports this error.
         match verified {
             Err(Error::InvalidCertificate(CertificateError::Other(OtherError(error))))

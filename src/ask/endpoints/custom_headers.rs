@@ -38,8 +38,8 @@ impl CustomHeaders {
     /// Parses `--header 'NAME: VALUE'` and `--header-env NAME=VARIABLE`.
     ///
     /// # Errors
-    /// If a header cannot be sent, is named twice, has a secret in place of a variable, or names a variable that is not set.
-    /// No error shows a value.
+    /// If a header cannot be sent, is named twice, has a secret in place of a variable, or names a variable that is not
+    /// set. No error shows a value.
     pub(super) fn read(plain: &[String], from_variables: &[String]) -> Result<Self> {
         let mut headers = Self::default();
         for text in plain {
@@ -53,9 +53,9 @@ impl CustomHeaders {
 
     /// Adds a header given as `NAME: VALUE`.
     fn add_plain(&mut self, text: &str) -> Result<()> {
-        let (name, value) = text.split_once(':').ok_or_else(|| {
-            Error::usage("--header", "'NAME: VALUE' expected, as 'X-Team: vision'")
-        })?;
+        let (name, value) = text
+            .split_once(':')
+            .ok_or_else(|| Error::usage("--header", "'NAME: VALUE' expected, as 'X-Team: vision'"))?;
         let (name, value) = (name.trim(), value.trim());
         if is_secret_header(name, value) {
             return Err(Error::usage(
@@ -71,12 +71,9 @@ impl CustomHeaders {
 
     /// Adds a header given as `NAME=VARIABLE`.
     fn add_from_variable(&mut self, text: &str) -> Result<()> {
-        let (name, variable_name) = text.split_once('=').ok_or_else(|| {
-            Error::usage(
-                "--header-env",
-                "NAME=VARIABLE expected, as X-Auth=GATEWAY_TOKEN",
-            )
-        })?;
+        let (name, variable_name) = text
+            .split_once('=')
+            .ok_or_else(|| Error::usage("--header-env", "NAME=VARIABLE expected, as X-Auth=GATEWAY_TOKEN"))?;
         let (name, variable_name) = (name.trim(), variable_name.trim());
         if looks_like_key(variable_name) {
             return Err(Error::usage(
@@ -86,12 +83,8 @@ impl CustomHeaders {
                 ),
             ));
         }
-        let value = variable(variable_name).ok_or_else(|| {
-            Error::usage(
-                "--header-env",
-                format_args!("the variable {variable_name} is not set"),
-            )
-        })?;
+        let value = variable(variable_name)
+            .ok_or_else(|| Error::usage("--header-env", format_args!("the variable {variable_name} is not set")))?;
         let value = value.trim();
         self.add(name, value, "--header-env")?;
         self.secrets.push(value.to_owned());
@@ -105,16 +98,10 @@ impl CustomHeaders {
     /// Adds a header. Errors name `flag`, the flag that the header comes from.
     fn add(&mut self, name: &str, value: &str, flag: &str) -> Result<()> {
         let Ok(header_name) = HeaderName::try_from(name) else {
-            return Err(Error::usage(
-                flag,
-                "this is not a valid name of an HTTP header",
-            ));
+            return Err(Error::usage(flag, "this is not a valid name of an HTTP header"));
         };
         if RESERVED.contains(&header_name.as_str()) {
-            return Err(Error::usage(
-                flag,
-                format_args!("{name} is set by the program itself"),
-            ));
+            return Err(Error::usage(flag, format_args!("{name} is set by the program itself")));
         }
         let Ok(mut header_value) = HeaderValue::try_from(value) else {
             return Err(Error::usage(
@@ -173,10 +160,7 @@ mod tests {
             (&["X-A: b\u{7f}"], "cannot carry"),
         ] {
             let error = read(wrong).unwrap_err().to_string();
-            assert!(
-                error.starts_with("--header: ") && error.contains(part),
-                "{error}"
-            );
+            assert!(error.starts_with("--header: ") && error.contains(part), "{error}");
         }
     }
 
@@ -190,16 +174,11 @@ mod tests {
         ] {
             let error = read(&[secret]).unwrap_err().to_string();
             assert!(error.contains("--header-env"), "{error}");
-            assert!(
-                !error.contains("0123") && !error.contains("abcd"),
-                "{error}"
-            );
+            assert!(!error.contains("0123") && !error.contains("abcd"), "{error}");
         }
         assert!(read(&["X-Team: 0123456789abcdef0123"]).is_ok());
         let secret_as_variable = ["X-Auth=sk-0123456789".to_owned()];
-        let error = CustomHeaders::read(&[], &secret_as_variable)
-            .unwrap_err()
-            .to_string();
+        let error = CustomHeaders::read(&[], &secret_as_variable).unwrap_err().to_string();
         assert!(!error.contains("0123"), "{error}");
     }
 

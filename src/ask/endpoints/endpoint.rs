@@ -33,11 +33,12 @@ const MAX_DELAY: Duration = Duration::from_secs(30);
 /// Maximum time for the comparison of replicas before the first request; chosen.
 const COMPARE_TIMEOUT: Duration = Duration::from_secs(3);
 
-/// Time without an accepted request after which the user is warned that the run waits; at most half of [`Sending::patience`]. Chosen:
-/// pauses because of limits per minute are mostly shorter.
+/// Time without an accepted request after which the user is warned that the run waits; at most half of
+/// [`Sending::patience`]. Chosen: pauses because of limits per minute are mostly shorter.
 const LONG_REFUSAL: Duration = Duration::from_secs(20);
 
-/// Maximum time of a refusal with status 503 by a server that is starting; chosen: such a server does not begin to work on the request.
+/// Maximum time of a refusal with status 503 by a server that is starting; chosen: such a server does not begin to work
+/// on the request.
 const QUICK_REFUSAL: Duration = Duration::from_secs(10);
 
 /// Maximum time between two requests to a server that is starting; chosen: large models load for minutes.
@@ -48,8 +49,9 @@ const STARTING: [&str; 4] = ["loading", "starting", "warming up", "initializing"
 
 /// A server of one replica, or of several replicas that serve the same models.
 ///
-/// With several replicas, a request goes to one with few requests in flight. Requests about the same images go to the same replica if
-/// its load allows it, to reuse its prefix cache. A request that one replica cannot serve goes to another without using a retry.
+/// With several replicas, a request goes to one with few requests in flight. Requests about the same images go to the
+/// same replica if its load allows it, to reuse its prefix cache. A request that one replica cannot serve goes to
+/// another without using a retry.
 #[derive(Debug)]
 pub struct Endpoint {
     replicas: Vec<Replica>,
@@ -77,32 +79,25 @@ impl Endpoint {
         Self::from_addresses(vec![access], sending)
     }
 
-    /// Prepares an endpoint with a replica at each address; nothing is sent yet. The user's limits apply to all replicas together.
+    /// Prepares an endpoint with a replica at each address; nothing is sent yet. The user's limits apply to all
+    /// replicas together.
     ///
     /// # Errors
     /// As [`Endpoint::open`], or if there is no address.
     pub fn from_addresses(addresses: Vec<Access>, sending: Sending) -> Result<Self> {
         let count = addresses.len();
         let replica_sending = if count > 1 {
-            Sending {
-                quota: Quota::default(),
-                concurrency: sending.concurrency.per_replica(count),
-                ..sending
-            }
+            Sending { quota: Quota::default(), concurrency: sending.concurrency.per_replica(count), ..sending }
         } else {
             sending
         };
-        let replicas = addresses
-            .into_iter()
-            .map(|access| Replica::open(access, replica_sending))
-            .collect::<Result<Vec<_>>>()?;
+        let replicas =
+            addresses.into_iter().map(|access| Replica::open(access, replica_sending)).collect::<Result<Vec<_>>>()?;
         if replicas.is_empty() {
             return Err(Error::usage("--base-url", "an address expected"));
         }
         Ok(Self {
-            load_balancer: LoadBalancer::new(
-                replicas.iter().map(|replica| replica.base().to_string()),
-            ),
+            load_balancer: LoadBalancer::new(replicas.iter().map(|replica| replica.base().to_string())),
             quota: (count > 1).then(|| Gate::new(sending.quota)),
             replicas,
             sending,
@@ -119,7 +114,8 @@ impl Endpoint {
         self.load_balancer.add_model(id.to_owned())
     }
 
-    /// Maximum number of requests in flight at the moment, at all replicas that accept this model, within [`Sending::concurrency`].
+    /// Maximum number of requests in flight at the moment, at all replicas that accept this model, within
+    /// [`Sending::concurrency`].
     pub(crate) fn width(&self, model: ModelIndex) -> usize {
         let width: usize = self.accepting_replicas(model).map(Replica::width).sum();
         width.max(1)
@@ -166,10 +162,7 @@ impl Endpoint {
 
     /// Headers of every request through this API, for each replica.
     pub(crate) fn headers(&self, wire: Wire) -> Result<Vec<HeaderMap>> {
-        self.replicas
-            .iter()
-            .map(|replica| replica.headers(wire))
-            .collect()
+        self.replicas.iter().map(|replica| replica.headers(wire)).collect()
     }
 
     /// Client for the Files and Batch APIs of the first replica.
@@ -217,8 +210,8 @@ impl Endpoint {
         }
     }
 
-    /// Sends a request, with retries after temporary failures. While the endpoint accepts no requests, the request waits without using a
-    /// retry, for at most [`Sending::patience`]. The future may be dropped at any time.
+    /// Sends a request, with retries after temporary failures. While the endpoint accepts no requests, the request
+    /// waits without using a retry, for at most [`Sending::patience`]. The future may be dropped at any time.
     pub(crate) async fn ask(&self, request: &Request<'_>) -> Result<Reply, AskError> {
         if self.replicas.len() > 1 {
             self.compared(&request.sent.parameters.model)
@@ -262,11 +255,7 @@ impl Endpoint {
                     self.connection_reported.store(true, Ordering::Relaxed);
                     self.refusal_reported.store(false, Ordering::Relaxed);
                     self.replies.fetch_add(1, Ordering::Relaxed);
-                    return Ok(Reply {
-                        attempts: attempts.sent,
-                        lost: attempts.lost,
-                        ..reply
-                    });
+                    return Ok(Reply { attempts: attempts.sent, lost: attempts.lost, ..reply });
                 }
                 Err(failed) => failed,
             };
@@ -280,9 +269,7 @@ impl Endpoint {
                 return Err(attempts.give_up(failed, request.timeouts.remedy));
             }
             avoided.push(turn.replica);
-            if failover == Failover::OtherReplica
-                && self.load_balancer.has_other(request.model, &avoided)
-            {
+            if failover == Failover::OtherReplica && self.load_balancer.has_other(request.model, &avoided) {
                 failed_over = Some(failed);
                 continue;
             }
@@ -299,8 +286,7 @@ impl Endpoint {
             let base = self.replicas[turn.replica].base();
             let problem = &failed.failure.message;
             // Warn before the retries, which take a minute: the address may be mistyped.
-            if failed.failure.kind == FailureKind::Connection
-                && !self.connection_reported.swap(true, Ordering::Relaxed)
+            if failed.failure.kind == FailureKind::Connection && !self.connection_reported.swap(true, Ordering::Relaxed)
             {
                 let hint = if failed.is_unconnected() {
                     ". Is a server running there? --base-url names the address"
@@ -318,16 +304,14 @@ impl Endpoint {
         }
     }
 
-    /// Lets a request wait, without using a retry, for a server that is starting: it answers 503 at once, and either says that it loads
-    /// a model, or has answered no request yet.
+    /// Lets a request wait, without using a retry, for a server that is starting: it answers 503 at once, and either
+    /// says that it loads a model, or has answered no request yet.
     fn waiting_for_start(&self, mut failed: AskError, took: Duration) -> AskError {
-        let is_unavailable = failed.failure.status == Some(503)
-            && failed.retry == Retry::AfterDelay
-            && took < QUICK_REFUSAL;
+        let is_unavailable =
+            failed.failure.status == Some(503) && failed.retry == Retry::AfterDelay && took < QUICK_REFUSAL;
         let is_starting = || {
             let message = failed.failure.message.to_lowercase();
-            self.replies.load(Ordering::Relaxed) == 0
-                || STARTING.iter().any(|phrase| message.contains(phrase))
+            self.replies.load(Ordering::Relaxed) == 0 || STARTING.iter().any(|phrase| message.contains(phrase))
         };
         if is_unavailable && is_starting() {
             failed.retry = Retry::WhenAccepted;
@@ -335,7 +319,8 @@ impl Endpoint {
         failed
     }
 
-    /// Delay until the next attempt, and the error; `None` to give up. If the patience is exhausted, the error states it.
+    /// Delay until the next attempt, and the error; `None` to give up. If the patience is exhausted, the error states
+    /// it.
     fn retry_delay(
         &self,
         model: ModelIndex,
@@ -361,37 +346,25 @@ impl Endpoint {
         (delay, failed)
     }
 
-    /// Waits until a request may be sent: for the user's quota, a replica that accepts it, and the gate of that replica.
-    async fn wait_for_turn(
-        &self,
-        request: &Request<'_>,
-        avoided: &[usize],
-    ) -> Result<Turn, AskError> {
+    /// Waits until a request may be sent: for the user's quota, a replica that accepts it, and the gate of that
+    /// replica.
+    async fn wait_for_turn(&self, request: &Request<'_>, avoided: &[usize]) -> Result<Turn, AskError> {
         let passed_quota_at = match &self.quota {
             Some(gate) => Some(self.unless_closed(gate.pass()).await?),
             None => None,
         };
-        let chosen = self
-            .load_balancer
-            .choose(request.model, request.affinity, avoided, |index| {
-                let replica = &self.replicas[index];
-                let has_room = self.load_balancer.in_flight(index) < replica.width();
-                has_room && replica.gate.ready_at() <= Instant::now() + SOON
-            });
+        let chosen = self.load_balancer.choose(request.model, request.affinity, avoided, |index| {
+            let replica = &self.replicas[index];
+            let has_room = self.load_balancer.in_flight(index) < replica.width();
+            has_room && replica.gate.ready_at() <= Instant::now() + SOON
+        });
         let Some(replica) = chosen else {
             let id = &request.sent.parameters.model;
             let message = format!("no replica of this endpoint can be asked for {id} any more");
-            return Err(AskError {
-                reach: Reach::Endpoint,
-                ..AskError::new(FailureKind::Connection, message)
-            });
+            return Err(AskError { reach: Reach::Endpoint, ..AskError::new(FailureKind::Connection, message) });
         };
         match self.unless_closed(self.replicas[replica].gate.pass()).await {
-            Ok(sent) => Ok(Turn {
-                replica,
-                sent,
-                passed_quota_at,
-            }),
+            Ok(sent) => Ok(Turn { replica, sent, passed_quota_at }),
             Err(closed) => {
                 self.load_balancer.release(replica);
                 Err(closed)
@@ -401,11 +374,7 @@ impl Endpoint {
 
     /// Sends a request to the replica of its turn.
     async fn send(&self, request: &Request<'_>, turn: Turn) -> Result<Reply, (AskError, Failover)> {
-        let Turn {
-            replica: index,
-            sent,
-            passed_quota_at,
-        } = turn;
+        let Turn { replica: index, sent, passed_quota_at } = turn;
         // Released also if the future is dropped.
         let _in_flight = self.load_balancer.guard(index);
         let replica = &self.replicas[index];
@@ -414,9 +383,7 @@ impl Endpoint {
             Ok(reply) => reply,
             Err(failed) if self.replicas.len() == 1 => return Err((failed, Failover::None)),
             Err(failed) => {
-                let failover = self
-                    .load_balancer
-                    .record_failure(request.model, index, &failed);
+                let failover = self.load_balancer.record_failure(request.model, index, &failed);
                 return Err((failed, failover));
             }
         };
@@ -425,11 +392,7 @@ impl Endpoint {
             gate.record_success(sent, tokens, RateLimits::default(), self.sending.max_wait);
         }
         let served = reply.served_model.as_deref();
-        if self.replicas.len() > 1
-            && !self
-                .load_balancer
-                .record_success(request.model, index, served, sent)
-        {
+        if self.replicas.len() > 1 && !self.load_balancer.record_success(request.model, index, served, sent) {
             let served = reply.served_model.unwrap_or_default();
             let message = format!("{} served the model {served}", replica.base());
             let failed = AskError {
@@ -452,10 +415,7 @@ impl Endpoint {
     async fn compare_replicas(&self, request: &Request<'_>) {
         let mut descriptions = Vec::new();
         for (replica, headers) in self.replicas.iter().zip(request.headers) {
-            let facts = replica
-                .connection
-                .model_facts(headers, request.sent.parameters)
-                .await;
+            let facts = replica.connection.model_facts(headers, request.sent.parameters).await;
             if let Some(facts) = facts {
                 descriptions.push((replica.base().to_string(), facts));
             }
@@ -486,19 +446,14 @@ impl Endpoint {
 
     /// Time for which every replica that accepts this model has refused all requests.
     fn refused_for(&self, model: ModelIndex) -> Duration {
-        self.accepting_replicas(model)
-            .map(|replica| replica.gate.refused_for())
-            .min()
-            .unwrap_or_default()
+        self.accepting_replicas(model).map(|replica| replica.gate.refused_for()).min().unwrap_or_default()
     }
 
     /// Warns once if no request has been accepted for [`LONG_REFUSAL`], so that the run does not wait silently.
     fn warn_about_refusal(&self, model: ModelIndex, problem: &str) {
         let patience = self.sending.patience;
         let refused = self.refused_for(model);
-        if refused >= LONG_REFUSAL.min(patience / 2)
-            && !self.refusal_reported.swap(true, Ordering::Relaxed)
-        {
+        if refused >= LONG_REFUSAL.min(patience / 2) && !self.refusal_reported.swap(true, Ordering::Relaxed) {
             warn!(
                 "{problem}; waiting: no request was accepted for {:.0} s, and the run stops after {:.0} s (--retries patience)",
                 refused.as_secs_f64(),

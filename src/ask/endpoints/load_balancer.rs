@@ -9,14 +9,15 @@ use tracing::warn;
 use crate::ask::failures::{AskError, Reach, Retry};
 use crate::types::FailureKind;
 
-/// A request goes to its preferred replica if that has at most this many more requests in flight than the least loaded one; chosen.
-/// Questions about one image then share a prefix cache.
+/// A request goes to its preferred replica if that has at most this many more requests in flight than the least loaded
+/// one; chosen. Questions about one image then share a prefix cache.
 const AFFINITY_SLACK: usize = 3;
 
 /// Number of consecutive connection or server failures after which a replica is not used for a time; chosen.
 const MAX_FAILURES: u32 = 3;
 
-/// Number of consecutive refusals by a status that concerns all requests after which a replica gets no more requests; chosen.
+/// Number of consecutive refusals by a status that concerns all requests after which a replica gets no more requests;
+/// chosen.
 const MAX_REFUSALS: usize = 3;
 
 /// First time for which a replica is not used. Each further time is longer by this much, up to [`MAX_BACKOFF`]. Chosen.
@@ -27,12 +28,13 @@ const MAX_BACKOFF: Duration = Duration::from_mins(1);
 /// Longest wait stated by a replica that is kept; any longer one outlasts a run, and the clock cannot add all of them.
 const MAX_STATED_WAIT: Duration = Duration::from_hours(365 * 24);
 
-/// Load balancer over the replicas of an endpoint. Health and load are common to all models; a replica can be excluded for one model.
+/// Load balancer over the replicas of an endpoint. Health and load are common to all models; a replica can be excluded
+/// for one model.
 #[derive(Debug)]
 pub(super) struct LoadBalancer(Mutex<State>);
 
-/// Index of a model among the models opened at an endpoint. Two models may have the same id and different settings, and so different
-/// refusals.
+/// Index of a model among the models opened at an endpoint. Two models may have the same id and different settings, and
+/// so different refusals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct ModelIndex(usize);
 
@@ -109,11 +111,7 @@ pub(super) enum Failover {
 
 impl Failover {
     fn to_other_replica_if(condition: bool) -> Self {
-        if condition {
-            Self::OtherReplica
-        } else {
-            Self::None
-        }
+        if condition { Self::OtherReplica } else { Self::None }
     }
 }
 
@@ -142,21 +140,13 @@ impl LoadBalancer {
                 health: Health::Working,
             })
             .collect();
-        Self(Mutex::new(State {
-            replicas,
-            models: Vec::new(),
-        }))
+        Self(Mutex::new(State { replicas, models: Vec::new() }))
     }
 
     /// Adds a model with this id.
     pub(super) fn add_model(&self, id: String) -> ModelIndex {
         let mut state = self.state();
-        state.models.push(ModelState {
-            id,
-            served_model: None,
-            excluded: BTreeSet::new(),
-            refusals: BTreeMap::new(),
-        });
+        state.models.push(ModelState { id, served_model: None, excluded: BTreeSet::new(), refusals: BTreeMap::new() });
         ModelIndex(state.models.len() - 1)
     }
 
@@ -170,11 +160,12 @@ impl LoadBalancer {
         self.state().replicas[index].in_flight
     }
 
-    /// Chooses the replica for a request to a model, and counts the request as in flight there. `None` if every replica is excluded.
+    /// Chooses the replica for a request to a model, and counts the request as in flight there. `None` if every replica
+    /// is excluded.
     ///
-    /// Rendezvous hashing of `affinity` (Thaler and Ravishankar 1998, IEEE/ACM Trans. Netw. 6:1) selects among the replicas with at most
-    /// [`AFFINITY_SLACK`] more requests in flight than the least loaded one. Replicas in `avoided`, and those for which `is_ready` is
-    /// false, are chosen only if no other is left.
+    /// Rendezvous hashing of `affinity` (Thaler and Ravishankar 1998, IEEE/ACM Trans. Netw. 6:1) selects among the
+    /// replicas with at most [`AFFINITY_SLACK`] more requests in flight than the least loaded one. Replicas in
+    /// `avoided`, and those for which `is_ready` is false, are chosen only if no other is left.
     pub(super) fn choose(
         &self,
         model: ModelIndex,
@@ -186,16 +177,12 @@ impl LoadBalancer {
         let count = self.state().replicas.len();
         let ready: Vec<bool> = (0..count).map(is_ready).collect();
         let (now, mut state) = (Instant::now(), self.state());
-        let mut candidates: Vec<usize> = (0..count)
-            .filter(|index| !state.is_excluded(model, *index))
-            .collect();
+        let mut candidates: Vec<usize> = (0..count).filter(|index| !state.is_excluded(model, *index)).collect();
         // If no replica is available, all are tried as a single endpoint would be, with the delays of its retries.
-        prefer(&mut candidates, |index| {
-            match state.replicas[index].health {
-                Health::Working => true,
-                Health::BackoffUntil(end) => end <= now,
-                Health::Probing => false,
-            }
+        prefer(&mut candidates, |index| match state.replicas[index].health {
+            Health::Working => true,
+            Health::BackoffUntil(end) => end <= now,
+            Health::Probing => false,
         });
         prefer(&mut candidates, |index| !avoided.contains(&index));
         prefer(&mut candidates, |index| ready[index]);
@@ -215,10 +202,7 @@ impl LoadBalancer {
 
     /// Guard of a request that [`LoadBalancer::choose`] counted as in flight.
     pub(super) fn guard(&self, index: usize) -> InFlight<'_> {
-        InFlight {
-            balancer: self,
-            replica: index,
-        }
+        InFlight { balancer: self, replica: index }
     }
 
     /// Records that a request at a replica has ended, or was not sent.
@@ -234,7 +218,8 @@ impl LoadBalancer {
 
     /// Records a reply from a replica to the request sent at `sent`. `served_model` is the model name in the reply.
     ///
-    /// Returns false if the other replicas served another model: the reply must not be used, and the replica is excluded for this model.
+    /// Returns false if the other replicas served another model: the reply must not be used, and the replica is
+    /// excluded for this model.
     pub(super) fn record_success(
         &self,
         model: ModelIndex,
@@ -264,12 +249,7 @@ impl LoadBalancer {
     }
 
     /// Records the failure of a request to a model at a replica. Returns whether the request moves to another replica.
-    pub(super) fn record_failure(
-        &self,
-        model: ModelIndex,
-        index: usize,
-        failed: &AskError,
-    ) -> Failover {
+    pub(super) fn record_failure(&self, model: ModelIndex, index: usize, failed: &AskError) -> Failover {
         let (now, mut state) = (Instant::now(), self.state());
         let status = failed.failure.status;
         let is_refused = matches!(status, Some(401 | 403 | 404 | 405 | 410));
@@ -300,10 +280,7 @@ impl LoadBalancer {
         }
         let kind = failed.failure.kind;
         let is_replica_failure = matches!(kind, FailureKind::Connection | FailureKind::Server);
-        if !is_replica_failure
-            || failed.retry != Retry::AfterDelay
-            || failed.reach == Reach::Interrupted
-        {
+        if !is_replica_failure || failed.retry != Retry::AfterDelay || failed.reach == Reach::Interrupted {
             return Failover::None;
         }
         replica.record_failure(now, &failed.failure.message);
@@ -314,8 +291,7 @@ impl LoadBalancer {
 
     /// True if a replica outside `avoided` accepts requests to a model.
     pub(super) fn has_other(&self, model: ModelIndex, avoided: &[usize]) -> bool {
-        self.state()
-            .any_accepts(model, |index| !avoided.contains(&index))
+        self.state().any_accepts(model, |index| !avoided.contains(&index))
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
@@ -362,8 +338,8 @@ fn prefer(replicas: &mut Vec<usize>, is_preferred: impl Fn(usize) -> bool) {
     }
 }
 
-/// Weight of a replica for requests of this affinity; the replica with the highest weight is preferred. If a replica is added or removed,
-/// only the requests that prefer it move.
+/// Weight of a replica for requests of this affinity; the replica with the highest weight is preferred. If a replica is
+/// added or removed, only the requests that prefer it move.
 fn rendezvous_weight(affinity: u64, index: usize) -> u64 {
     let mut bytes = [0; 16];
     bytes[..8].copy_from_slice(&affinity.to_le_bytes());

@@ -12,11 +12,11 @@ use crate::error::{Error, Result};
 /// Valid proxy address, to find out whether `NO_PROXY` exempts an address.
 const SAMPLE_PROXY: &str = "http://127.0.0.1:1";
 
-/// Variable that sets the proxy for an address; `None` if requests are sent directly. The proxy must be usable: reqwest ignores an invalid
-/// one and would connect directly.
+/// Variable that sets the proxy for an address; `None` if requests are sent directly. The proxy must be usable: reqwest
+/// ignores an invalid one and would connect directly.
 ///
-/// Reads the same variables in the same order as reqwest: `HTTP_PROXY` or `HTTPS_PROXY` by the scheme of the address, then
-/// `ALL_PROXY`, each before its lower-case name. An empty variable counts as unset.
+/// Reads the same variables in the same order as reqwest: `HTTP_PROXY` or `HTTPS_PROXY` by the scheme of the address,
+/// then `ALL_PROXY`, each before its lower-case name. An empty variable counts as unset.
 ///
 /// # Errors
 /// If the proxy is not usable. The error names the variable but not its value, which may contain a password.
@@ -31,13 +31,9 @@ pub(super) fn proxy_variable(
     let Ok(address) = base.to_string().parse::<Uri>() else {
         return Ok(None);
     };
-    let by_scheme = if base.is_plain() {
-        ["HTTP_PROXY", "http_proxy"]
-    } else {
-        ["HTTPS_PROXY", "https_proxy"]
-    };
-    let Some((name, value)) = first_set(&variable, by_scheme)
-        .or_else(|| first_set(&variable, ["ALL_PROXY", "all_proxy"]))
+    let by_scheme = if base.is_plain() { ["HTTP_PROXY", "http_proxy"] } else { ["HTTPS_PROXY", "https_proxy"] };
+    let Some((name, value)) =
+        first_set(&variable, by_scheme).or_else(|| first_set(&variable, ["ALL_PROXY", "all_proxy"]))
     else {
         return Ok(None);
     };
@@ -62,31 +58,22 @@ fn first_set(
     variable: &impl Fn(&str) -> Option<OsString>,
     names: [&'static str; 2],
 ) -> Option<(&'static str, OsString)> {
-    names
-        .into_iter()
-        .find_map(|name| Some((name, variable(name)?)))
-        .filter(|(_, value)| !value.is_empty())
+    names.into_iter().find_map(|name| Some((name, variable(name)?))).filter(|(_, value)| !value.is_empty())
 }
 
 /// True if requests can be sent through a proxy at this address.
 fn is_usable(proxy: &str) -> bool {
     let matcher = Matcher::builder().all(proxy.to_owned()).build();
-    matcher
-        .intercept(&Uri::from_static("http://host.example/"))
-        .is_some_and(|proxy| {
-            let is_http = matches!(proxy.uri().scheme_str(), Some("http" | "https"));
-            is_http && proxy.uri().authority().is_some_and(is_valid_authority)
-        })
+    matcher.intercept(&Uri::from_static("http://host.example/")).is_some_and(|proxy| {
+        let is_http = matches!(proxy.uri().scheme_str(), Some("http" | "https"));
+        is_http && proxy.uri().authority().is_some_and(is_valid_authority)
+    })
 }
 
 /// True if an authority has a host and either no port or a valid one.
 fn is_valid_authority(authority: &Authority) -> bool {
-    let port = authority
-        .as_str()
-        .strip_prefix(authority.host())
-        .and_then(|rest| rest.strip_prefix(':'));
-    !authority.host().is_empty()
-        && port.is_none_or(|port| port.parse::<u16>().is_ok_and(|port| port > 0))
+    let port = authority.as_str().strip_prefix(authority.host()).and_then(|rest| rest.strip_prefix(':'));
+    !authority.host().is_empty() && port.is_none_or(|port| port.parse::<u16>().is_ok_and(|port| port > 0))
 }
 
 #[cfg(test)]
@@ -96,9 +83,7 @@ mod tests {
     /// Variable with an unusable proxy for this address and environment.
     fn refused(base: &str, set: &[(&str, &str)]) -> Option<String> {
         let error = proxy_variable(&base.parse().unwrap(), |name| {
-            set.iter()
-                .find(|(known, _)| *known == name)
-                .map(|(_, value)| value.into())
+            set.iter().find(|(known, _)| *known == name).map(|(_, value)| value.into())
         })
         .err()?
         .to_string();
@@ -123,11 +108,7 @@ mod tests {
             "my proxy",
             " http://proxy:3128",
         ] {
-            for (base, name) in [
-                (PLAIN, "HTTP_PROXY"),
-                (ENCRYPTED, "https_proxy"),
-                (ENCRYPTED, "ALL_PROXY"),
-            ] {
+            for (base, name) in [(PLAIN, "HTTP_PROXY"), (ENCRYPTED, "https_proxy"), (ENCRYPTED, "ALL_PROXY")] {
                 let found = refused(base, &[(name, proxy)]);
                 assert_eq!(found.as_deref(), Some(name), "{proxy}");
             }
@@ -136,13 +117,7 @@ mod tests {
 
     #[test]
     fn usable_proxies_are_accepted() {
-        for proxy in [
-            "",
-            "http://proxy:3128",
-            "https://user:pass@proxy",
-            "proxy:3128",
-            "http://[::1]:3128/",
-        ] {
+        for proxy in ["", "http://proxy:3128", "https://user:pass@proxy", "proxy:3128", "http://[::1]:3128/"] {
             assert_eq!(refused(PLAIN, &[("HTTP_PROXY", proxy)]), None, "{proxy}");
         }
     }
@@ -151,10 +126,7 @@ mod tests {
     fn unused_proxies_are_not_checked() {
         let wrong = ("ALL_PROXY", "socks5://proxy");
         assert_eq!(refused("http://127.0.0.1:8000/v1", &[wrong]), None);
-        assert_eq!(
-            refused(PLAIN, &[wrong, ("HTTP_PROXY", "http://proxy")]),
-            None
-        );
+        assert_eq!(refused(PLAIN, &[wrong, ("HTTP_PROXY", "http://proxy")]), None);
         assert_eq!(refused(PLAIN, &[("HTTPS_PROXY", "socks5://proxy")]), None);
         for no_proxy in ["*", "llm.example", ".example, other"] {
             assert_eq!(refused(PLAIN, &[wrong, ("NO_PROXY", no_proxy)]), None);

@@ -12,8 +12,7 @@ use super::sending::Sending;
 use super::served_model::served_model;
 use super::url::BaseUrl;
 use crate::ask::failures::{
-    ApiError, AskError, Reach, Refusal, ReplyError, Retry, Unfinished, Unreadable, implied_status,
-    is_out_of_tokens,
+    ApiError, AskError, Reach, Refusal, ReplyError, Retry, Unfinished, Unreadable, implied_status, is_out_of_tokens,
 };
 use crate::ask::pace::{Gate, RateLimits, Window, retry_after};
 use crate::ask::requests::Request;
@@ -88,11 +87,8 @@ impl Replica {
             Wire::ChatStream => Deadline::stream(timeout),
             Wire::Chat | Wire::Responses => Deadline::total(timeout),
         };
-        let response = self
-            .connection
-            .post(wire.path(), headers, &request.body, deadline)
-            .await
-            .inspect_err(|error| {
+        let response =
+            self.connection.post(wire.path(), headers, &request.body, deadline).await.inspect_err(|error| {
                 if error.failure.kind == FailureKind::Timeout {
                     self.window.record_overload(sent);
                 }
@@ -134,24 +130,14 @@ impl Replica {
                 if let Some(reply) = truncated_reply(&unreadable, limit) {
                     return Ok(self.finish_reply(reply, &response, request, sent));
                 }
-                let Unreadable {
-                    description,
-                    usage,
-                    finish,
-                    broke_off,
-                } = *unreadable;
+                let Unreadable { description, usage, finish, broke_off } = *unreadable;
                 let scrub = self.connection.scrub();
                 let message = format!("{} answered with {}", self.base(), scrub.line(&description));
                 AskError {
                     retry: Retry::AfterDelay,
                     finish: finish.map(|word| scrub.line(&word).into_boxed_str()),
-                    unfinished: if broke_off {
-                        Unfinished::BrokeOff
-                    } else {
-                        Unfinished::None
-                    },
-                    ..AskError::new(FailureKind::Response, message)
-                        .with_charge(with_cost(usage, cost))
+                    unfinished: if broke_off { Unfinished::BrokeOff } else { Unfinished::None },
+                    ..AskError::new(FailureKind::Response, message).with_charge(with_cost(usage, cost))
                 }
             }
         };
@@ -160,18 +146,11 @@ impl Replica {
     }
 
     /// Records the success in the window and the gate, and returns the reply without keys and with its latency.
-    fn finish_reply(
-        &self,
-        reply: Reply,
-        response: &HttpResponse,
-        request: &Request<'_>,
-        sent: Instant,
-    ) -> Reply {
+    fn finish_reply(&self, reply: Reply, response: &HttpResponse, request: &Request<'_>, sent: Instant) -> Reply {
         self.window.record_success(response.duration);
         let limits = RateLimits::read(&response.headers, SystemTime::now());
         let tokens = reply.usage.and_then(|usage| usage.total());
-        self.gate
-            .record_success(sent, tokens, limits, self.sending.max_wait);
+        self.gate.record_success(sent, tokens, limits, self.sending.max_wait);
         let asked = &request.sent.parameters.model;
         let reply = Reply {
             latency_ms: response.duration.as_millis() as u64,
@@ -182,8 +161,8 @@ impl Replica {
         without_secrets(reply, &self.connection.scrub())
     }
 
-    /// Error of a request that the server refused with this status; or an empty truncated reply, if the server says that it generated up to
-    /// the token limit.
+    /// Error of a request that the server refused with this status; or an empty truncated reply, if the server says
+    /// that it generated up to the token limit.
     fn reply_or_refusal(
         &self,
         status: u16,
@@ -245,31 +224,20 @@ impl Replica {
         } else {
             Retry::AfterDelay
         };
-        failed.lost.add(with_cost(
-            body_usage(&String::from_utf8_lossy(&response.body)),
-            cost_in_headers(&response.headers),
-        ));
+        failed
+            .lost
+            .add(with_cost(body_usage(&String::from_utf8_lossy(&response.body)), cost_in_headers(&response.headers)));
         failed.may_have_effect = status >= 500 && !is_rejected_unprocessed(status);
         self.pause(pace_status, sent, &mut failed);
         if failed.retry != Retry::AfterDelay {
             return failed;
         }
         let took = response.duration;
-        failed.with_unfinished(Unfinished::of_refusal(
-            status,
-            took,
-            api_error,
-            &response.body,
-        ))
+        failed.with_unfinished(Unfinished::of_refusal(status, took, api_error, &response.body))
     }
 
     /// Error message for a refused request.
-    fn refusal_message(
-        &self,
-        response: &HttpResponse,
-        api_error: &ApiError,
-        remedy: &str,
-    ) -> String {
+    fn refusal_message(&self, response: &HttpResponse, api_error: &ApiError, remedy: &str) -> String {
         let status = response.status.as_u16();
         // Gateways send errors with a success status.
         let error = match api_error.status() {
@@ -293,8 +261,8 @@ impl Replica {
         message
     }
 
-    /// Pauses all requests as long as the server asks. A request that would wait longer than `--retries max-wait` is given up; its message
-    /// then includes the wait.
+    /// Pauses all requests as long as the server asks. A request that would wait longer than `--retries max-wait` is
+    /// given up; its message then includes the wait.
     fn pause(&self, status: u16, sent: Instant, failed: &mut AskError) {
         let max_wait = self.sending.max_wait;
         match failed.wait {
@@ -324,13 +292,12 @@ impl Replica {
 
     /// The server's id of the request, without secrets; empty if the response has none.
     fn request_id(&self, response: &HttpResponse) -> String {
-        self.connection
-            .scrub()
-            .line(response.header("x-request-id"))
+        self.connection.scrub().line(response.header("x-request-id"))
     }
 }
 
-/// An empty truncated reply, if a body without a reply was charged at least the token limit: a retry would be truncated too.
+/// An empty truncated reply, if a body without a reply was charged at least the token limit: a retry would be truncated
+/// too.
 fn truncated_reply(unreadable: &Unreadable, limit: Option<u32>) -> Option<Reply> {
     let tokens = unreadable.usage?.completion_tokens?;
     let is_truncated = unreadable.finish.is_none() && tokens >= u64::from(limit?);

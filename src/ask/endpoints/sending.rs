@@ -12,8 +12,8 @@ use crate::types::flags::{positive, seconds};
 #[derive(Debug, Clone, Copy, PartialEq, Args)]
 #[command(next_help_heading = "Sending")]
 pub struct Sending {
-    /// Requests in flight: N, fewer if the server is overloaded; MIN-MAX, from MIN up while replies do not slow down; auto is 8-32, down to
-    /// 1
+    /// Requests in flight: N, fewer if the server is overloaded; MIN-MAX, from MIN up while replies do not slow down;
+    /// auto is 8-32, down to 1
     #[arg(long, value_name = "N|MIN-MAX|auto", default_value = "auto", add = Decides::Nothing)]
     pub concurrency: ConcurrencyBounds,
     /// The user's limits per minute.
@@ -28,12 +28,12 @@ pub struct Sending {
     /// Retries of a trial after an attempt that was charged and gave no reply, in all calls together
     #[arg(long, value_name = "N", default_value_t = 1, add = Decides::Nothing)]
     pub paid_retries: u32,
-    /// Wait before the first retry if the server does not ask for one. It doubles with each further retry; each wait is extended at
-    /// random by up to its own length.
+    /// Wait before the first retry if the server does not ask for one. It doubles with each further retry; each wait is
+    /// extended at random by up to its own length.
     #[arg(skip = FIRST_DELAY)]
     pub first_delay: Duration,
-    /// Seconds for which an endpoint may turn all requests away (rate limit, overload, loading a model) before the run stops; these
-    /// refusals do not count as retries
+    /// Seconds for which an endpoint may turn all requests away (rate limit, overload, loading a model) before the run
+    /// stops; these refusals do not count as retries
     #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "1800", add = Decides::Nothing)]
     pub patience: Duration,
     /// Longest wait in seconds that a server may ask for; a longer one fails the request

@@ -11,13 +11,9 @@ const STEP_HEADERS: [&str; 1] = ["cf-aig-step"];
 const NAME_HEADERS: [&str; 2] = ["x-litellm-model-group", "x-litellm-model-name"];
 const ID_HEADERS: [&str; 1] = ["x-litellm-model-id"];
 
-/// Name of the model that served a reply: `named`, the one in the body, unless the headers state that a gateway fell back to another model
-/// and the body repeats the name `asked`.
-pub(super) fn served_model(
-    headers: &HeaderMap,
-    asked: &str,
-    named: Option<String>,
-) -> Option<String> {
+/// Name of the model that served a reply: `named`, the one in the body, unless the headers state that a gateway fell
+/// back to another model and the body repeats the name `asked`.
+pub(super) fn served_model(headers: &HeaderMap, asked: &str, named: Option<String>) -> Option<String> {
     let repeats_name = named.as_deref().is_none_or(|named| named == asked);
     if !repeats_name || !is_fallback(headers) {
         return named;
@@ -31,17 +27,12 @@ pub(super) fn served_model(
             .map(str::to_owned)
     };
     first(&NAME_HEADERS)
-        .or_else(|| {
-            Some(format!(
-                "{asked} (fallback, deployment {})",
-                first(&ID_HEADERS)?
-            ))
-        })
+        .or_else(|| Some(format!("{asked} (fallback, deployment {})", first(&ID_HEADERS)?)))
         .or_else(|| Some(format!("{asked} (fallback)")))
 }
 
-/// True if a header states a fallback: its name contains the word, or it is in [`STEP_HEADERS`], and its value is a number above 0 or
-/// `true`.
+/// True if a header states a fallback: its name contains the word, or it is in [`STEP_HEADERS`], and its value is a
+/// number above 0 or `true`.
 fn is_fallback(headers: &HeaderMap) -> bool {
     headers.iter().any(|(name, value)| {
         let name = name.as_str();
@@ -57,10 +48,7 @@ mod tests {
     use super::*;
 
     fn served(pairs: &[(&'static str, &str)], named: &str) -> Option<String> {
-        let headers = pairs
-            .iter()
-            .map(|(name, value)| (name.parse().unwrap(), value.parse().unwrap()))
-            .collect();
+        let headers = pairs.iter().map(|(name, value)| (name.parse().unwrap(), value.parse().unwrap())).collect();
         served_model(&headers, "gpt-4o", Some(named.to_owned()))
     }
 
@@ -68,16 +56,9 @@ mod tests {
     fn fallbacks_of_gateways_are_named() {
         let attempted = ("x-litellm-attempted-fallbacks", "1");
         for (pairs, expected) in [
+            (vec![attempted, ("x-litellm-model-group", "gpt-4o-mini")], "gpt-4o-mini"),
             (
-                vec![attempted, ("x-litellm-model-group", "gpt-4o-mini")],
-                "gpt-4o-mini",
-            ),
-            (
-                vec![
-                    attempted,
-                    ("x-litellm-model-group", "gpt-4o"),
-                    ("x-litellm-model-id", "3f2a"),
-                ],
+                vec![attempted, ("x-litellm-model-group", "gpt-4o"), ("x-litellm-model-id", "3f2a")],
                 "gpt-4o (fallback, deployment 3f2a)",
             ),
             (vec![("helicone-fallback-index", "2")], "gpt-4o (fallback)"),

@@ -28,16 +28,18 @@ const NO_KEY: &str = "none";
 
 /// The address of an endpoint, its key and its headers.
 ///
-/// The address and the headers are parsed when they are used: the parser of the command line would print an invalid one, with its
-/// password.
+/// The address and the headers are parsed when they are used: the parser of the command line would print an invalid
+/// one, with its password.
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct AccessArgs {
-    /// Endpoint; /chat/completions is appended; repeatable for replicas of one server; default: OPENAI_BASE_URL, else OpenAI's
+    /// Endpoint; /chat/completions is appended; repeatable for replicas of one server; default: OPENAI_BASE_URL, else
+    /// OpenAI's
     #[arg(long, value_name = "URL", add = Decides::Reply)]
     pub base_url: Vec<String>,
-    /// Environment variable with the API key; none for an endpoint without keys; default: the vendor's (ANTHROPIC_API_KEY, GEMINI_API_KEY
-    /// …), else OPENAI_API_KEY, which is never sent to another known vendor by default
+    /// Environment variable with the API key; none for an endpoint without keys; default: the vendor's
+    /// (ANTHROPIC_API_KEY, GEMINI_API_KEY …), else OPENAI_API_KEY, which is never sent to another known vendor by
+    /// default
     #[arg(long, value_name = "NAME|none", conflicts_with = "api_key_file", add = Decides::Nothing)]
     pub api_key_env: Option<String>,
     /// File with the API key; default: none, the variable is read
@@ -84,10 +86,7 @@ impl Server {
 
     /// Addresses of all replicas, without secrets.
     pub(crate) fn addresses(&self) -> Vec<String> {
-        self.replicas
-            .iter()
-            .map(|replica| replica.base.to_string())
-            .collect()
+        self.replicas.iter().map(|replica| replica.base.to_string()).collect()
     }
 }
 
@@ -95,12 +94,7 @@ impl AccessArgs {
     /// The same endpoint, without any key.
     #[must_use]
     pub(crate) fn without_key(&self) -> Self {
-        Self {
-            api_key_env: Some(NO_KEY.to_owned()),
-            api_key_file: None,
-            header_env: Vec::new(),
-            ..self.clone()
-        }
+        Self { api_key_env: Some(NO_KEY.to_owned()), api_key_file: None, header_env: Vec::new(), ..self.clone() }
     }
 
     /// Flags for another endpoint: without the key and the headers of this one.
@@ -191,8 +185,8 @@ impl AccessArgs {
         }
     }
 
-    /// Checks that neither a key nor a custom header is sent to an address from a run folder, which may come from someone else. Addresses
-    /// of vendors in the built-in table are safe.
+    /// Checks that neither a key nor a custom header is sent to an address from a run folder, which may come from
+    /// someone else. Addresses of vendors in the built-in table are safe.
     ///
     /// # Errors
     /// If a key or a custom header would be sent.
@@ -245,8 +239,8 @@ impl AccessArgs {
     }
 }
 
-/// Variables that may hold the key of an endpoint, in order. OpenAI's key is sent to another vendor only if `OPENAI_BASE_URL` has the
-/// same host.
+/// Variables that may hold the key of an endpoint, in order. OpenAI's key is sent to another vendor only if
+/// `OPENAI_BASE_URL` has the same host.
 fn key_variables(base: &BaseUrl, vendor: Option<&'static Vendor>) -> Vec<&'static str> {
     let Some(vendor) = vendor else {
         return vec![OPENAI_KEY];
@@ -278,11 +272,7 @@ fn missing_key_error(base: &BaseUrl, names: &[&str]) -> Error {
     } else {
         ""
     };
-    let variables = if names.len() == 1 {
-        "this variable"
-    } else {
-        "one of these variables"
-    };
+    let variables = if names.len() == 1 { "this variable" } else { "one of these variables" };
     Error::usage(
         names.join(", "),
         format_args!(

@@ -1,7 +1,7 @@
 //! Time limit that excludes suspensions of the process: [`TimeLimit`].
 //!
-//! A suspended process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, but the clock runs on. Replies that arrive during
-//! the suspension are paid for, so they must be read before a timeout is declared.
+//! A suspended process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, but the clock runs on. Replies that
+//! arrive during the suspension are paid for, so they must be read before a timeout is declared.
 
 use std::pin::pin;
 use std::time::Duration;
@@ -15,10 +15,12 @@ const MIN_STEP: Duration = Duration::from_millis(10);
 /// Longest step (chosen).
 const MAX_STEP: Duration = Duration::from_secs(1);
 
-/// Minimum timer delay of a suspension (chosen): a busy machine delays a timer less. The delay must also exceed one step.
+/// Minimum timer delay of a suspension (chosen): a busy machine delays a timer less. The delay must also exceed one
+/// step.
 const MIN_SUSPENSION: Duration = Duration::from_millis(100);
 
-/// Limit on the running time of one future, or of several futures one after another. Suspensions of the process do not count.
+/// Limit on the running time of one future, or of several futures one after another. Suspensions of the process do not
+/// count.
 #[derive(Debug)]
 pub(super) struct TimeLimit {
     step: Duration,
@@ -30,11 +32,7 @@ pub(super) struct TimeLimit {
 
 impl TimeLimit {
     pub(super) fn new(limit: Duration) -> Self {
-        Self {
-            step: (limit / STEPS).clamp(MIN_STEP, MAX_STEP),
-            left: limit,
-            suspended: Duration::ZERO,
-        }
+        Self { step: (limit / STEPS).clamp(MIN_STEP, MAX_STEP), left: limit, suspended: Duration::ZERO }
     }
 
     /// Runs a future; `None` if the limit is reached before the future is ready.
@@ -112,15 +110,9 @@ mod tests {
         let mut chunks = 0;
         while limit.run(sleep(interval)).await.is_some() {
             chunks += 1;
-            assert!(
-                chunks <= LIMIT.as_millis() / interval.as_millis(),
-                "{chunks}"
-            );
+            assert!(chunks <= LIMIT.as_millis() / interval.as_millis(), "{chunks}");
         }
-        assert!(
-            limit.run(async {}).await.is_some(),
-            "data that has arrived is read"
-        );
+        assert!(limit.run(async {}).await.is_some(), "data that has arrived is read");
     }
 
     #[tokio::test]
@@ -132,16 +124,13 @@ mod tests {
             sleep(LIMIT / 4).await;
         });
         assert!(done.await.is_some());
-        assert!(
-            limit.suspended() > SUSPENSION / 2,
-            "{:?}",
-            limit.suspended()
-        );
+        assert!(limit.suspended() > SUSPENSION / 2, "{:?}", limit.suspended());
     }
 
     #[tokio::test]
     async fn late_output_is_read_after_suspension() {
-        // The suspension is in the last step. The future is ready some polls later, like a socket that another task reads.
+        // The suspension is in the last step. The future is ready some polls later, like a socket that another task
+        // reads.
         let mut limit = TimeLimit::new(LIMIT);
         limit.left = MIN_STEP;
         let suspension = tokio::spawn(async { thread::sleep(SUSPENSION) });

@@ -41,9 +41,7 @@ impl BaseUrl {
     pub fn is_loopback(&self) -> bool {
         let host = self.host();
         let bare = host.trim_start_matches('[').trim_end_matches(']');
-        host == "localhost"
-            || host.ends_with(".localhost")
-            || bare.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
+        host == "localhost" || host.ends_with(".localhost") || bare.parse::<IpAddr>().is_ok_and(|ip| ip.is_loopback())
     }
 
     /// True for http://: requests are sent unencrypted.
@@ -63,7 +61,8 @@ impl BaseUrl {
         !self.0.username().is_empty() || self.0.password().is_some()
     }
 
-    /// Secrets in the URL: user name and password in every form that a server could repeat, and the values of the query string.
+    /// Secrets in the URL: user name and password in every form that a server could repeat, and the values of the query
+    /// string.
     pub(super) fn secrets(&self) -> Vec<String> {
         let mut secrets = Vec::new();
         if self.has_credentials() {
@@ -104,10 +103,7 @@ impl FromStr for BaseUrl {
             )
         })?;
         if !matches!(url.scheme(), "http" | "https") || url.host_str().is_none() {
-            return Err(Error::usage(
-                "--base-url",
-                "expected an address that begins with https:// or http://",
-            ));
+            return Err(Error::usage("--base-url", "expected an address that begins with https:// or http://"));
         }
         if url.fragment().is_some() {
             return Err(Error::usage(
@@ -156,37 +152,20 @@ mod tests {
     #[test]
     fn the_path_is_used_exactly_as_written() {
         for (base, completions) in [
-            (
-                "https://api.openai.com/v1",
-                "https://api.openai.com/v1/chat/completions",
-            ),
-            (
-                "https://api.openai.com/v1/",
-                "https://api.openai.com/v1/chat/completions",
-            ),
-            (
-                "http://127.0.0.1:4010",
-                "http://127.0.0.1:4010/chat/completions",
-            ),
+            ("https://api.openai.com/v1", "https://api.openai.com/v1/chat/completions"),
+            ("https://api.openai.com/v1/", "https://api.openai.com/v1/chat/completions"),
+            ("http://127.0.0.1:4010", "http://127.0.0.1:4010/chat/completions"),
             (
                 "https://r.example/openai/deployments/a%2Fb?api-version=2024-10-21",
                 "https://r.example/openai/deployments/a%2Fb/chat/completions?api-version=2024-10-21",
             ),
-            (
-                "https://g.example/v1beta/openai//",
-                "https://g.example/v1beta/openai/chat/completions",
-            ),
+            ("https://g.example/v1beta/openai//", "https://g.example/v1beta/openai/chat/completions"),
         ] {
             assert_eq!(url(base).join("chat/completions").as_str(), completions);
         }
-        for wrong in [
-            "",
-            "api.openai.com/v1",
-            "ftp://a/",
-            "http://",
-            "https://a/v1#x",
-            "https://a/v1/chat/completions/",
-        ] {
+        for wrong in
+            ["", "api.openai.com/v1", "ftp://a/", "http://", "https://a/v1#x", "https://a/v1/chat/completions/"]
+        {
             assert!(wrong.parse::<BaseUrl>().is_err(), "{wrong}");
         }
     }
@@ -216,11 +195,7 @@ mod tests {
         ] {
             assert!(url(local).is_loopback(), "{local}");
         }
-        for remote in [
-            "http://192.168.0.1/",
-            "http://localhost.example.com/",
-            "http://[::2]/",
-        ] {
+        for remote in ["http://192.168.0.1/", "http://localhost.example.com/", "http://[::2]/"] {
             assert!(!url(remote).is_loopback(), "{remote}");
         }
     }

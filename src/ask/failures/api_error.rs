@@ -60,14 +60,7 @@ const TEXT_FIELDS: [&str; 10] = [
 ];
 
 /// Names of the code of an error, in the order in which they are searched.
-const CODE_FIELDS: [&str; 6] = [
-    "code",
-    "status",
-    "error_code",
-    "errorCode",
-    "statusCode",
-    "__type",
-];
+const CODE_FIELDS: [&str; 6] = ["code", "status", "error_code", "errorCode", "statusCode", "__type"];
 
 /// Matches a limit of 0 in a text, such as Gemini's `limit: 0`, but not `limit: 0.5`.
 static ZERO_LIMIT: LazyLock<Regex> = LazyLock::new(|| {
@@ -79,8 +72,8 @@ static ZERO_LIMIT: LazyLock<Regex> = LazyLock::new(|| {
 const DAILY: [&str; 6] = ["(rpd)", "(tpd)", "perday", "per day", "per-day", "daily"];
 
 impl ApiError {
-    /// Parses the error at the top level of a body: `error` as an object or text, or the flat shapes of vLLM, FastAPI and
-    /// problem+json. `None` if the body has no error.
+    /// Parses the error at the top level of a body: `error` as an object or text, or the flat shapes of vLLM, FastAPI
+    /// and problem+json. `None` if the body has no error.
     pub(crate) fn from_json(body: &Value) -> Option<Self> {
         // Gemini sends a list of one error.
         if let Value::Array(items) = body {
@@ -103,9 +96,7 @@ impl ApiError {
 
     /// Parses the error in the field `error`; flat shapes are ignored.
     pub(crate) fn in_error(body: &Value) -> Option<Self> {
-        body.get("error")
-            .filter(|error| is_filled(error))
-            .map(Self::from_error)
+        body.get("error").filter(|error| is_filled(error)).map(Self::from_error)
     }
 
     /// Parses an error by its structure: an object with an error code and words, under any name.
@@ -121,15 +112,14 @@ impl ApiError {
     /// Parses an error, and up to `depth` levels of errors nested in its message as an object or as JSON text.
     fn nested(error: &Value, depth: usize) -> Self {
         let outer = Self::flat(error);
-        let inner = error
-            .get("message")
-            .or_else(|| error.get("error"))
-            .filter(|_| depth > 0)
-            .and_then(|message| match message {
-                Value::Object(_) => Some(message.clone()),
-                Value::String(text) => embedded_error(text),
-                _ => None,
-            });
+        let inner =
+            error.get("message").or_else(|| error.get("error")).filter(|_| depth > 0).and_then(
+                |message| match message {
+                    Value::Object(_) => Some(message.clone()),
+                    Value::String(text) => embedded_error(text),
+                    _ => None,
+                },
+            );
         let Some(inner) = inner else {
             return outer;
         };
@@ -166,17 +156,13 @@ impl ApiError {
             kind: field(error, "type").or_else(|| field(error, "error_type")),
             code: CODE_FIELDS.iter().find_map(|name| field(error, name)),
             param: field(error, "param").or_else(|| error_location(error)),
-            is_moderated: metadata.is_some_and(|metadata| {
-                metadata.get("reasons").is_some() || metadata.get("flagged_input").is_some()
-            }),
+            is_moderated: metadata
+                .is_some_and(|metadata| metadata.get("reasons").is_some() || metadata.get("flagged_input").is_some()),
             wait: wait_in_words(&message).max(stated_wait(error)),
-            has_zero_limit: ZERO_LIMIT.is_match(&message)
-                || quota_values(error).any(|value| value == "0"),
+            has_zero_limit: ZERO_LIMIT.is_match(&message) || quota_values(error).any(|value| value == "0"),
             page: None,
             limits: quota_ids(error),
-            reasons: details(error)
-                .filter_map(|detail| text_or_number(detail.get("reason")?))
-                .collect(),
+            reasons: details(error).filter_map(|detail| text_or_number(detail.get("reason")?)).collect(),
             message,
         }
     }
@@ -197,33 +183,19 @@ impl ApiError {
         if let Some(found) = parsed.as_ref().and_then(Self::from_json) {
             return found;
         }
-        let has_text = |body: &Value| {
-            TEXT_FIELDS
-                .iter()
-                .any(|field| body.get(field).is_some_and(is_filled))
-        };
+        let has_text = |body: &Value| TEXT_FIELDS.iter().any(|field| body.get(field).is_some_and(is_filled));
         if let Some(found) = parsed.filter(has_text) {
             return Self::from_error(&found);
         }
         let title = page_title(body);
-        let page = title
-            .as_ref()
-            .map(|_| body[..body.floor_char_boundary(MAX_PAGE)].to_lowercase());
+        let page = title.as_ref().map(|_| body[..body.floor_char_boundary(MAX_PAGE)].to_lowercase());
         let message = title.unwrap_or_else(|| truncated(body.trim().to_owned()));
-        Self {
-            wait: wait_in_words(&message),
-            message,
-            page,
-            ..Self::default()
-        }
+        Self { wait: wait_in_words(&message), message, page, ..Self::default() }
     }
 
     /// True if the code or the kind is one of these.
     pub(crate) fn has_code(&self, codes: &[&str]) -> bool {
-        [&self.code, &self.kind]
-            .into_iter()
-            .flatten()
-            .any(|code| codes.contains(&code.as_str()))
+        [&self.code, &self.kind].into_iter().flatten().any(|code| codes.contains(&code.as_str()))
     }
 
     /// True if the message contains one of these lower-case phrases, ignoring case.
@@ -238,25 +210,19 @@ impl ApiError {
         message.match_indices(&name).any(|(start, found)| {
             let before = message[..start].chars().next_back();
             let after = message[start + found.len()..].chars().next();
-            ![before, after]
-                .into_iter()
-                .flatten()
-                .any(char::is_alphanumeric)
+            ![before, after].into_iter().flatten().any(char::is_alphanumeric)
         })
     }
 
-    /// True if the code, the kind or a cause contains one of these words; case and separators are ignored: `insufficientquota` is in
-    /// `Insufficient_Quota`.
+    /// True if the code, the kind or a cause contains one of these words; case and separators are ignored:
+    /// `insufficientquota` is in `Insufficient_Quota`.
     pub(super) fn has_code_like(&self, words: &[&str]) -> bool {
         [&self.code, &self.kind]
             .into_iter()
             .flatten()
             .chain(&self.reasons)
             .map(|code| {
-                code.chars()
-                    .filter(char::is_ascii_alphanumeric)
-                    .map(|c| c.to_ascii_lowercase())
-                    .collect::<String>()
+                code.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect::<String>()
             })
             .any(|code| words.iter().any(|word| code.contains(word)))
     }
@@ -308,10 +274,7 @@ pub(crate) struct Unreadable {
 impl Unreadable {
     /// A body with this description, without known charges.
     pub(crate) fn new(description: impl Into<String>) -> Self {
-        Self {
-            description: description.into(),
-            ..Self::default()
-        }
+        Self { description: description.into(), ..Self::default() }
     }
 
     /// The same body with the tokens charged for it.
@@ -358,13 +321,12 @@ pub(crate) fn page_title(body: &str) -> Option<String> {
 fn embedded_error(text: &str) -> Option<Value> {
     let object = &text[text.find('{')?..];
     let value = parse_start(object).ok()?;
-    let is_error = ["error", "message", "detail"]
-        .iter()
-        .any(|field| value.get(field).is_some());
+    let is_error = ["error", "message", "detail"].iter().any(|field| value.get(field).is_some());
     is_error.then_some(value)
 }
 
-/// Name of the request field that caused the error: the last part of the first `loc` in `detail` or in a list of errors.
+/// Name of the request field that caused the error: the last part of the first `loc` in `detail` or in a list of
+/// errors.
 fn error_location(error: &Value) -> Option<String> {
     [error.get("detail"), Some(error)]
         .into_iter()
@@ -376,15 +338,11 @@ fn error_location(error: &Value) -> Option<String> {
 
 /// Entries of Google's `details`.
 fn details(error: &Value) -> impl Iterator<Item = &Value> {
-    error
-        .get("details")
-        .and_then(Value::as_array)
-        .into_iter()
-        .flatten()
+    error.get("details").and_then(Value::as_array).into_iter().flatten()
 }
 
-/// Longest wait in the fields of an error, of its `metadata` and the headers in it, and of Google's `details`: `retryDelay`,
-/// `retry_after_seconds`, `estimated_time` and others ([`wait_in_field`]).
+/// Longest wait in the fields of an error, of its `metadata` and the headers in it, and of Google's `details`:
+/// `retryDelay`, `retry_after_seconds`, `estimated_time` and others ([`wait_in_field`]).
 fn stated_wait(error: &Value) -> Option<Duration> {
     let metadata = error.get("metadata");
     let headers = metadata.and_then(|metadata| metadata.get("headers"));
@@ -400,16 +358,12 @@ fn stated_wait(error: &Value) -> Option<Duration> {
 
 /// Violated limits in Google's `details`.
 fn violations(error: &Value) -> impl Iterator<Item = &Value> {
-    details(error)
-        .filter_map(|detail| detail.get("violations")?.as_array())
-        .flatten()
+    details(error).filter_map(|detail| detail.get("violations")?.as_array()).flatten()
 }
 
 /// Ids of the limits in Google's `details`.
 fn quota_ids(error: &Value) -> Vec<String> {
-    violations(error)
-        .filter_map(|violation| text_or_number(violation.get("quotaId")?))
-        .collect()
+    violations(error).filter_map(|violation| text_or_number(violation.get("quotaId")?)).collect()
 }
 
 /// Values of the limits in Google's `details`.
@@ -433,17 +387,16 @@ fn text(value: &Value) -> Option<String> {
     match value {
         Value::String(text) if !text.trim().is_empty() => Some(text.clone()),
         Value::Array(items) => {
-            let texts: Vec<String> = items
-                .iter()
-                .filter_map(|item| text(item).or_else(|| located_text(item)))
-                .collect();
+            let texts: Vec<String> =
+                items.iter().filter_map(|item| text(item).or_else(|| located_text(item))).collect();
             (!texts.is_empty()).then(|| texts.join("; "))
         }
         _ => None,
     }
 }
 
-/// Message of an item of FastAPI's list of errors, after the place in the request that it is about: `seed: Extra inputs are not permitted`.
+/// Message of an item of FastAPI's list of errors, after the place in the request that it is about: `seed: Extra inputs
+/// are not permitted`.
 fn located_text(item: &Value) -> Option<String> {
     let message = text(item.get("msg")?)?;
     let place: Vec<String> = item

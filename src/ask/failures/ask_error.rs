@@ -15,8 +15,8 @@ pub enum Reach {
     Trial,
     /// Every request of this size. Before the first reply of the model: every further request to it.
     Alike,
-    /// Every further request to this model by the meaning of the status alone (403, 404, 410): the server's words name no such cause, so
-    /// that it may be this request. The run stops once several were refused in a row.
+    /// Every further request to this model by the meaning of the status alone (403, 404, 410): the server's words name
+    /// no such cause, so that it may be this request. The run stops once several were refused in a row.
     ByStatus,
     /// Every further request to this model: the cause is the key, the credit, the address, the name or the parameters.
     Endpoint,
@@ -31,7 +31,8 @@ pub(crate) enum Retry {
     Never,
     /// Retry after a delay; this uses one of `--retries`.
     AfterDelay,
-    /// Retry as soon as the endpoint accepts requests again. This does not use a retry; only `--retries patience` ends it.
+    /// Retry as soon as the endpoint accepts requests again. This does not use a retry; only `--retries patience` ends
+    /// it.
     WhenAccepted,
 }
 
@@ -66,15 +67,11 @@ impl Refusal {
             },
             str::to_owned,
         );
-        Self {
-            status,
-            cause,
-            words,
-        }
+        Self { status, cause, words }
     }
 
-    /// The reply that the model did not give, after this number of requests: without text, ended by a filter, with the server's words as
-    /// the refusal. It is scored as the same filter is if the server sends it as a finish reason.
+    /// The reply that the model did not give, after this number of requests: without text, ended by a filter, with the
+    /// server's words as the refusal. It is scored as the same filter is if the server sends it as a finish reason.
     #[must_use]
     pub fn into_reply(self, attempts: u32, lost: LostAttempts) -> Reply {
         Reply {
@@ -121,16 +118,12 @@ pub struct AskError {
 }
 
 impl AskError {
-    /// Error of one request without an HTTP status, which is not retried and does not affect other requests. It may have had an effect if
-    /// it timed out or has a response.
+    /// Error of one request without an HTTP status, which is not retried and does not affect other requests. It may
+    /// have had an effect if it timed out or has a response.
     pub(crate) fn new(kind: FailureKind, message: String) -> Self {
         Self {
             may_have_effect: matches!(kind, FailureKind::Timeout | FailureKind::Response),
-            failure: Failure {
-                kind,
-                status: None,
-                message,
-            },
+            failure: Failure { kind, status: None, message },
             attempts: 1,
             reach: Reach::Trial,
             refused_field: None,
@@ -145,13 +138,11 @@ impl AskError {
         }
     }
 
-    /// Error of a question that was abandoned while its request was in flight. The request may be charged; the same command asks it again.
+    /// Error of a question that was abandoned while its request was in flight. The request may be charged; the same
+    /// command asks it again.
     pub(crate) fn given_up() -> Self {
         let message = "given up while in flight, because the run was interrupted".to_owned();
-        Self {
-            reach: Reach::Interrupted,
-            ..Self::new(FailureKind::Timeout, message)
-        }
+        Self { reach: Reach::Interrupted, ..Self::new(FailureKind::Timeout, message) }
     }
 
     /// Adds a charged attempt with these tokens.
@@ -181,24 +172,19 @@ impl AskError {
 
     /// Turns the error of the last request into the error of the question, with all its attempts and charges.
     pub(crate) fn with_attempts(self, attempts: u32, lost: LostAttempts) -> Self {
-        Self {
-            attempts,
-            lost: Box::new(lost),
-            ..self
-        }
+        Self { attempts, lost: Box::new(lost), ..self }
     }
 
-    /// True if a refusal with this status may concern the content of the request alone: moderation rejected it, or neither the server's
-    /// words nor the size of the request explain it. The message must still be the remedy alone.
+    /// True if a refusal with this status may concern the content of the request alone: moderation rejected it, or
+    /// neither the server's words nor the size of the request explain it. The message must still be the remedy alone.
     pub(crate) fn may_be_content(&self, status: u16) -> bool {
         let is_unexplained = match self.reach {
             Reach::Trial => self.failure.message.is_empty(),
             Reach::ByStatus => true,
             _ => false,
         };
-        let is_refused = self.failure.kind == FailureKind::Request
-            && (400..500).contains(&status)
-            && self.refused_field.is_none();
+        let is_refused =
+            self.failure.kind == FailureKind::Request && (400..500).contains(&status) && self.refused_field.is_none();
         self.failure.kind == FailureKind::Filtered || (is_refused && is_unexplained)
     }
 
@@ -215,10 +201,7 @@ impl AskError {
 
     /// True if the same call of the Files or Batch API would fail again: the key, the address or the request is wrong.
     pub(crate) fn is_permanent(&self) -> bool {
-        let is_temporary = matches!(
-            self.failure.status,
-            None | Some(408 | 409 | 425 | 429 | 500..)
-        );
+        let is_temporary = matches!(self.failure.status, None | Some(408 | 409 | 425 | 429 | 500..));
         !is_temporary && self.quota.is_none()
     }
 

@@ -4,14 +4,13 @@ use super::api_error::ApiError;
 use super::moderation::{is_moderated, is_out_of_tokens};
 use super::vocabulary;
 
-/// The HTTP status that an error implies which came with a success status: its code, or what its words mean. Without either it is a
-/// failure of the server, which may pass.
+/// The HTTP status that an error implies which came with a success status: its code, or what its words mean. Without
+/// either it is a failure of the server, which may pass.
 pub(crate) fn implied_status(api_error: &ApiError) -> u16 {
     if let Some(status) = api_error.status() {
         return status;
     }
-    let is_credit = api_error.has_code_like(&vocabulary::CREDIT_CODES)
-        || api_error.mentions_any(&vocabulary::CREDIT);
+    let is_credit = api_error.has_code_like(&vocabulary::CREDIT_CODES) || api_error.mentions_any(&vocabulary::CREDIT);
     if is_moderated(400, api_error) || is_out_of_tokens(400, api_error) {
         400
     } else if is_credit {
@@ -64,21 +63,9 @@ mod tests {
                 "Open api qps request limit reached",
                 429,
             ),
-            (
-                json!({"code": "10013", "msg": "内容审核不通过"}),
-                "内容审核不通过",
-                400,
-            ),
-            (
-                json!({"errors": [{"code": 10000, "message": "Authentication error"}]}),
-                "Authentication error",
-                401,
-            ),
-            (
-                json!({"Response": {"ErrorCode": 503, "ErrorMsg": "busy"}}),
-                "busy",
-                503,
-            ),
+            (json!({"code": "10013", "msg": "内容审核不通过"}), "内容审核不通过", 400),
+            (json!({"errors": [{"code": 10000, "message": "Authentication error"}]}), "Authentication error", 401),
+            (json!({"Response": {"ErrorCode": 503, "ErrorMsg": "busy"}}), "busy", 503),
             (json!({"code": 7, "msg": "oops"}), "oops", 500),
         ] {
             let expected = (message.to_owned(), expected);

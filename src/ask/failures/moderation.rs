@@ -1,9 +1,11 @@
-//! Refusals of one request for its content: [`is_moderated`]; and replies that a limit ended, sent as a refusal: [`is_out_of_tokens`].
+//! Refusals of one request for its content: [`is_moderated`]; and replies that a limit ended, sent as a refusal:
+//! [`is_out_of_tokens`].
 
 use super::api_error::ApiError;
 
-/// Parts of the codes and kinds of errors by which moderation rejects content, in lower case without separators (Azure: content_filter,
-/// ResponsibleAIPolicyViolation; OpenAI: invalid_prompt, moderation_blocked, content_policy_violation; DashScope: DataInspectionFailed).
+/// Parts of the codes and kinds of errors by which moderation rejects content, in lower case without separators (Azure:
+/// content_filter, ResponsibleAIPolicyViolation; OpenAI: invalid_prompt, moderation_blocked, content_policy_violation;
+/// DashScope: DataInspectionFailed).
 const CODES: [&str; 9] = [
     "contentfilter",
     "contentpolicy",
@@ -16,8 +18,8 @@ const CODES: [&str; 9] = [
     "prohibitedcontent",
 ];
 
-/// Phrases for rejected content (xAI: "Content violates usage guidelines"; MiniMax 1026: "input new_sensitive"; z.AI 1301: "unsafe or
-/// sensitive content", and the same in Chinese; Azure: "content management policy").
+/// Phrases for rejected content (xAI: "Content violates usage guidelines"; MiniMax 1026: "input new_sensitive"; z.AI
+/// 1301: "unsafe or sensitive content", and the same in Chinese; Azure: "content management policy").
 const PHRASES: [&str; 27] = [
     "content violates",
     "violates our",
@@ -65,15 +67,10 @@ const LIMITS: [&str; 8] = [
 ];
 
 /// Phrases for a limit that a generation has used up, as opposed to a limit that is not allowed.
-const USED_UP: [&str; 4] = [
-    "limit was reached",
-    "tokens reached",
-    "could not finish",
-    "ran out of",
-];
+const USED_UP: [&str; 4] = ["limit was reached", "tokens reached", "could not finish", "ran out of"];
 
-/// True if moderation rejected the content of a request, as opposed to its key or its fields: the same request is rejected again.
-/// Statuses of a key, a proxy and a rate are not about content, whatever the words.
+/// True if moderation rejected the content of a request, as opposed to its key or its fields: the same request is
+/// rejected again. Statuses of a key, a proxy and a rate are not about content, whatever the words.
 pub(crate) fn is_moderated(status: u16, api_error: &ApiError) -> bool {
     let may_be_content = (400..500).contains(&status) && !matches!(status, 401 | 407 | 429);
     let is_stated = || {
@@ -85,12 +82,10 @@ pub(crate) fn is_moderated(status: u16, api_error: &ApiError) -> bool {
     may_be_content && is_stated()
 }
 
-/// True if the server generated up to the token limit and sent an error instead of the truncated reply (Azure: "Could not finish the
-/// message because max_tokens or model output limit was reached").
+/// True if the server generated up to the token limit and sent an error instead of the truncated reply (Azure: "Could
+/// not finish the message because max_tokens or model output limit was reached").
 pub(crate) fn is_out_of_tokens(status: u16, api_error: &ApiError) -> bool {
-    (400..500).contains(&status)
-        && api_error.mentions_any(&LIMITS)
-        && api_error.mentions_any(&USED_UP)
+    (400..500).contains(&status) && api_error.mentions_any(&LIMITS) && api_error.mentions_any(&USED_UP)
 }
 
 #[cfg(test)]
@@ -105,22 +100,10 @@ mod tests {
     #[test]
     fn rejected_content_is_recognized() {
         for (status, code, message) in [
-            (
-                403,
-                "permission-denied",
-                "Content violates usage guidelines.",
-            ),
+            (403, "permission-denied", "Content violates usage guidelines."),
             (400, "invalid_prompt", "Invalid prompt: it was flagged"),
-            (
-                400,
-                "1301",
-                "System detected potentially unsafe or sensitive content",
-            ),
-            (
-                400,
-                "1301",
-                "系统检测到输入或生成内容可能包含不安全或敏感内容",
-            ),
+            (400, "1301", "System detected potentially unsafe or sensitive content"),
+            (400, "1301", "系统检测到输入或生成内容可能包含不安全或敏感内容"),
             (400, "content_filter", "The prompt triggered Azure's policy"),
             (400, "ResponsibleAIPolicyViolation", "x"),
             (400, "DataInspectionFailed", "x"),

@@ -15,12 +15,8 @@ pub(crate) struct QuotaRefusal {
 impl QuotaRefusal {
     /// Recognizes such a refusal; `None` for other errors.
     pub(crate) fn from_api_error(api_error: &ApiError, scrub: &Scrub) -> Option<Self> {
-        let is_quota = api_error.has_code(&["token_limit_exceeded"])
-            || api_error.mentions_any(&["enqueued token"]);
-        is_quota.then(|| Self {
-            limit: stated_limit(&api_error.message),
-            message: scrub.line(&api_error.message),
-        })
+        let is_quota = api_error.has_code(&["token_limit_exceeded"]) || api_error.mentions_any(&["enqueued token"]);
+        is_quota.then(|| Self { limit: stated_limit(&api_error.message), message: scrub.line(&api_error.message) })
     }
 }
 

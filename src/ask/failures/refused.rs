@@ -1,7 +1,8 @@
-//! Classification of refused requests, [`AskError::refused`]: whether to retry, which other requests would fail, and which flag helps.
+//! Classification of refused requests, [`AskError::refused`]: whether to retry, which other requests would fail, and
+//! which flag helps.
 //!
-//! The rules go by the evidence: numbers, codes and fields in the body first, then the words of `wordings.toml` and of [`vocabulary`], the
-//! status last. If no rule finds the cause, the message has the server's words and no remedy.
+//! The rules go by the evidence: numbers, codes and fields in the body first, then the words of `wordings.toml` and of
+//! [`vocabulary`], the status last. If no rule finds the cause, the message has the server's words and no remedy.
 
 use std::sync::LazyLock;
 
@@ -13,8 +14,7 @@ use super::moderation::is_moderated;
 use super::vocabulary;
 use super::wording::Wording;
 use crate::ask::requests::{
-    AdaptableField, FieldState, RequestField, SentFields, for_judge, is_unsupported,
-    least_temperature,
+    AdaptableField, FieldState, RequestField, SentFields, for_judge, is_unsupported, least_temperature,
 };
 use crate::ask::wire::requested_wire;
 use crate::ask::wire_kind::Wire;
@@ -27,15 +27,13 @@ const TOO_LARGE: [&str; 2] = ["request too large", "request is too large"];
 const SMALLER: &str = "send smaller images: --image max-side=N, or --image jpeg:95";
 
 /// Remedy for a limit that resets once a day.
-const NEXT_DAY: &str =
-    "a limit for the day is reached: continue with --resume when the day is over";
+const NEXT_DAY: &str = "a limit for the day is reached: continue with --resume when the day is over";
 
 /// Remedy for an account without credit.
 const ADD_CREDIT: &str = "the account has no credit left: add some, then continue with --resume";
 
 /// Remedy for a payment of an unknown kind.
-const PAY: &str =
-    "the server asks for payment, credit or a plan: the same command continues after it";
+const PAY: &str = "the server asks for payment, credit or a plan: the same command continues after it";
 
 /// Remedy for a limit of 0.
 const NO_QUOTA: &str = "the account has a limit of 0 for this model, which no waiting changes: enable billing at the server, or choose another \
@@ -55,19 +53,20 @@ const CHECK_ADDRESS: &str = "check --base-url (many end with /v1) and --model";
 const CHECK_MODEL: &str = "the server knows no model of this name: check --model and --base-url";
 
 /// Remedy for settings of the account.
-const CHANGE_SETTINGS: &str = "the settings of the account exclude the request: change them at the server, or choose another --model";
+const CHANGE_SETTINGS: &str =
+    "the settings of the account exclude the request: change them at the server, or choose another --model";
 
 /// Cause of a web page instead of the API's answer.
 const PAGE: &str = "a web page, not the API: a firewall or gateway in front of the server may block requests with images, which its operator can \
      allow; or --base-url leads to a web site";
 
 /// Cause of a refusal by a firewall.
-const BLOCKED: &str = "a firewall or gateway in front of the server blocks the request; its operator can allow requests with images";
+const BLOCKED: &str =
+    "a firewall or gateway in front of the server blocks the request; its operator can allow requests with images";
 
 /// Matches the number of tokens for which the credit is enough. Group 1 is the number.
 static AFFORDABLE: LazyLock<Regex> = LazyLock::new(|| {
-    Regex::new(r"(?i)\bafford\D{0,30}?(\d[\d,]*)")
-        .unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
+    Regex::new(r"(?i)\bafford\D{0,30}?(\d[\d,]*)").unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
 });
 
 /// Matches a statement that a model does not exist.
@@ -84,13 +83,9 @@ static NO_MODEL: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 impl AskError {
-    /// Classifies a refused request by its status and the server's error. The message is only the remedy; empty if none is known.
-    pub(crate) fn refused(
-        status: u16,
-        api_error: &ApiError,
-        wire: Wire,
-        sent: SentFields<'_>,
-    ) -> Self {
+    /// Classifies a refused request by its status and the server's error. The message is only the remedy; empty if none
+    /// is known.
+    pub(crate) fn refused(status: u16, api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Self {
         let mut failed = Self::by_evidence(status, api_error, wire, sent)
             .unwrap_or_else(|| Self::by_status(status, api_error, wire, sent));
         if sent.parameters.origin.is_judge {
@@ -100,12 +95,7 @@ impl AskError {
     }
 
     /// Classifies a refusal by what the server says; `None` if it says nothing that decides.
-    fn by_evidence(
-        status: u16,
-        api_error: &ApiError,
-        wire: Wire,
-        sent: SentFields<'_>,
-    ) -> Option<Self> {
+    fn by_evidence(status: u16, api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
         let is_refusal = (400..500).contains(&status);
         if let Some(wanted) = requested_wire(api_error, wire).filter(|_| is_refusal) {
             return Some(Self::needs_wire(wanted));
@@ -117,11 +107,7 @@ impl AskError {
             || (is_refusal && api_error.mentions_any(&vocabulary::CREDIT));
         if no_credit {
             let failed = Self::permanent(ADD_CREDIT);
-            return Some(if status == 429 {
-                failed.of_kind(FailureKind::RateLimit)
-            } else {
-                failed
-            });
+            return Some(if status == 429 { failed.of_kind(FailureKind::RateLimit) } else { failed });
         }
         // OpenAI refuses logprobs with a status that otherwise concerns the key.
         if status == 403
@@ -133,17 +119,12 @@ impl AskError {
             && status != 401
             && let Some(wording) = Wording::find(api_error, sent.has_image)
         {
-            return Some(Self {
-                reach: wording.reach(),
-                ..Self::permanent(&wording.hint())
-            });
+            return Some(Self { reach: wording.reach(), ..Self::permanent(&wording.hint()) });
         }
         if is_moderated(status, api_error) {
             return Some(Self::new(FailureKind::Filtered, String::new()));
         }
-        if matches!(status, 400 | 403 | 404 | 406 | 410 | 422)
-            || (status == 405 && api_error.page.is_some())
-        {
+        if matches!(status, 400 | 403 | 404 | 406 | 410 | 422) || (status == 405 && api_error.page.is_some()) {
             return Self::from_words(status, api_error, wire, sent);
         }
         None
@@ -166,12 +147,7 @@ impl AskError {
     }
 
     /// Classifies a refusal with a status that has many causes by the server's words.
-    fn from_words(
-        status: u16,
-        api_error: &ApiError,
-        wire: Wire,
-        sent: SentFields<'_>,
-    ) -> Option<Self> {
+    fn from_words(status: u16, api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
         let mentions = |words: &[&str]| api_error.mentions_any(words);
         let field = Self::from_field(api_error, &wire.fields(sent));
         if field.reach == Reach::Endpoint {
@@ -182,10 +158,7 @@ impl AskError {
         }
         let is_about_content = mentions(&vocabulary::CONTENT);
         let is_of_firewall = (mentions(&vocabulary::FIREWALL) && !is_about_content)
-            || api_error
-                .page
-                .as_ref()
-                .is_some_and(|page| vocabulary::FIREWALL.iter().any(|word| page.contains(word)));
+            || api_error.page.as_ref().is_some_and(|page| vocabulary::FIREWALL.iter().any(|word| page.contains(word)));
         if is_of_firewall && !matches!(status, 404 | 410) {
             return Some(Self::alike(BLOCKED));
         }
@@ -195,8 +168,7 @@ impl AskError {
         if mentions(&vocabulary::SETTINGS) && !is_about_content {
             return Some(Self::permanent(CHANGE_SETTINGS));
         }
-        let is_rate =
-            mentions(&vocabulary::RATE) || api_error.has_code_like(&["throttl", "ratelimit"]);
+        let is_rate = mentions(&vocabulary::RATE) || api_error.has_code_like(&["throttl", "ratelimit"]);
         if is_rate || (status == 403 && api_error.wait.is_some()) {
             return Some(if api_error.is_daily() {
                 Self::permanent(NEXT_DAY).of_kind(FailureKind::RateLimit)
@@ -207,8 +179,7 @@ impl AskError {
         if matches!(status, 400 | 422) && mentions(&vocabulary::WRONG_KEY) {
             return Some(Self::permanent(CHECK_KEY));
         }
-        (status == 400 && NO_MODEL.is_match(&api_error.message))
-            .then(|| Self::permanent(CHECK_MODEL))
+        (status == 400 && NO_MODEL.is_match(&api_error.message)).then(|| Self::permanent(CHECK_MODEL))
     }
 
     /// Classifies a refusal whose words do not decide, by its status.
@@ -216,9 +187,7 @@ impl AskError {
         let says_nothing = api_error.message.is_empty();
         let mentions = |words: &[&str]| api_error.mentions_any(words);
         match status {
-            300..=399 => {
-                Self::permanent("redirects are not followed: give the final address as --base-url")
-            }
+            300..=399 => Self::permanent("redirects are not followed: give the final address as --base-url"),
             401 if !sent.has_key => Self::permanent(
                 "no key was sent: set OPENAI_API_KEY, or name another variable or a file with --api-key-env or --api-key-file",
             ),
@@ -230,9 +199,7 @@ impl AskError {
             403 if says_nothing => Self::of_status(CHECK_RIGHT),
             403 if mentions(&vocabulary::CONTENT) => Self::of_status(""),
             403 if mentions(&vocabulary::WRONG_KEY) => Self::permanent(CHECK_RIGHT),
-            403 if mentions(&vocabulary::NO_RIGHT) || mentions(&vocabulary::MODEL) => {
-                Self::of_status(CHECK_RIGHT)
-            }
+            403 if mentions(&vocabulary::NO_RIGHT) || mentions(&vocabulary::MODEL) => Self::of_status(CHECK_RIGHT),
             404 | 410 if says_nothing => Self::of_status(CHECK_ADDRESS),
             404 | 410
                 if api_error.page.is_some()
@@ -244,21 +211,16 @@ impl AskError {
             }
             // The words say something else, which may concern this request alone.
             403 | 404 | 410 => Self::of_status(""),
-            405 => Self::permanent(&format!(
-                "check --base-url: requests go to its path with /{} behind it",
-                wire.path()
-            )),
+            405 => {
+                Self::permanent(&format!("check --base-url: requests go to its path with /{} behind it", wire.path()))
+            }
             408 | 425 => Self::transient(FailureKind::Timeout),
             413 => Self::new(FailureKind::Request, SMALLER.to_owned()),
-            429 if api_error.mentions_any(&TOO_LARGE) => {
-                Self::new(FailureKind::Request, SMALLER.to_owned())
-            }
-            429 if api_error.is_daily() => {
-                Self::permanent(NEXT_DAY).of_kind(FailureKind::RateLimit)
-            }
+            429 if api_error.mentions_any(&TOO_LARGE) => Self::new(FailureKind::Request, SMALLER.to_owned()),
+            429 if api_error.is_daily() => Self::permanent(NEXT_DAY).of_kind(FailureKind::RateLimit),
             429 => Self::transient(FailureKind::RateLimit),
-            // 424: failed generation (Text Generation Inference); 498: no capacity (Groq); 499: connection closed by the client
-            // (nginx).
+            // 424: failed generation (Text Generation Inference); 498: no capacity (Groq); 499: connection closed by
+            // the client (nginx).
             409 | 424 | 498 | 499 | 500.. => Self::transient(FailureKind::Server),
             _ => Self::from_field(api_error, &wire.fields(sent)),
         }
@@ -268,12 +230,7 @@ impl AskError {
     fn without_parameters(sent: SentFields<'_>) -> Self {
         let flags = sent.optional_flags();
         Self {
-            forced: &[
-                "--temperature",
-                "--sampling-seed",
-                "--top-p",
-                "--max-tokens",
-            ],
+            forced: &["--temperature", "--sampling-seed", "--top-p", "--max-tokens"],
             ..Self::permanent(&format!(
                 "the provider lacks a parameter of the request: leave out one of {}, or choose another --model",
                 flags.join(", ")
@@ -289,34 +246,22 @@ impl AskError {
 
     /// Error that other requests of this size may have too.
     fn alike(hint: &str) -> Self {
-        Self {
-            reach: Reach::Alike,
-            ..Self::permanent(hint)
-        }
+        Self { reach: Reach::Alike, ..Self::permanent(hint) }
     }
 
     /// Error that every other request would have too.
     fn permanent(hint: &str) -> Self {
-        Self {
-            reach: Reach::Endpoint,
-            ..Self::new(FailureKind::Request, hint.to_owned())
-        }
+        Self { reach: Reach::Endpoint, ..Self::new(FailureKind::Request, hint.to_owned()) }
     }
 
     /// Error that every other request would have too, by the meaning of its status.
     fn of_status(hint: &str) -> Self {
-        Self {
-            reach: Reach::ByStatus,
-            ..Self::permanent(hint)
-        }
+        Self { reach: Reach::ByStatus, ..Self::permanent(hint) }
     }
 
     /// Error after which the same request may succeed later.
     fn transient(kind: FailureKind) -> Self {
-        Self {
-            retry: Retry::AfterDelay,
-            ..Self::new(kind, String::new())
-        }
+        Self { retry: Retry::AfterDelay, ..Self::new(kind, String::new()) }
     }
 
     /// Error of a request that the server accepts only through another API.
@@ -325,23 +270,19 @@ impl AskError {
             Wire::Responses => "ask the model through the Responses API: --request wire=responses",
             _ => "ask for a stream: --request wire=chat-stream",
         };
-        Self {
-            refused_field: Some(AdaptableField::Wire(wanted)),
-            forced: &["--wire"],
-            ..Self::permanent(hint)
-        }
+        Self { refused_field: Some(AdaptableField::Wire(wanted)), forced: &["--wire"], ..Self::permanent(hint) }
     }
 
-    /// Error of a request that was refused for a field that the program can send in another way; `None` for other refusals.
+    /// Error of a request that was refused for a field that the program can send in another way; `None` for other
+    /// refusals.
     fn from_refused_field(api_error: &ApiError, wire: Wire, sent: SentFields<'_>) -> Option<Self> {
-        Some(Self::from_field(api_error, &wire.fields(sent)))
-            .filter(|failed| failed.refused_field.is_some())
+        Some(Self::from_field(api_error, &wire.fields(sent))).filter(|failed| failed.refused_field.is_some())
     }
 
     /// Error of a request that may have been refused for one of its fields.
     ///
-    /// If the server names a sent field as the cause, every other request with it fails too. If it names a field that is no longer sent,
-    /// every request fails. If the text only mentions a field, the cause may be this request alone.
+    /// If the server names a sent field as the cause, every other request with it fails too. If it names a field that
+    /// is no longer sent, every request fails. If the text only mentions a field, the cause may be this request alone.
     fn from_field(api_error: &ApiError, fields: &[RequestField<'_>]) -> Self {
         let in_state = |state| fields.iter().filter(move |field| field.state == state);
         let named = in_state(FieldState::Sent)
@@ -352,14 +293,13 @@ impl AskError {
             (Reach::Endpoint, field)
         } else if in_state(FieldState::Withdrawn).any(|field| field.is_named(api_error)) {
             return Self::permanent("the server refuses a field that is no longer sent");
-        } else if let Some(field) =
-            in_state(FieldState::Sent).find(|field| field.is_mentioned(api_error))
-        {
+        } else if let Some(field) = in_state(FieldState::Sent).find(|field| field.is_mentioned(api_error)) {
             (Reach::Trial, field)
         } else {
             return Self::new(FailureKind::Request, String::new());
         };
-        // Servers do not call a too large number of logprobs unsupported, and have many words for a temperature that they refuse.
+        // Servers do not call a too large number of logprobs unsupported, and have many words for a temperature that
+        // they refuse.
         let adaptable = field.adaptable.filter(|adaptable| match adaptable {
             AdaptableField::TopLogprobs => true,
             AdaptableField::Temperature { .. } | AdaptableField::Seed => {
@@ -370,9 +310,9 @@ impl AskError {
         Self {
             reach,
             refused_field: adaptable.map(|adaptable| match adaptable {
-                AdaptableField::Temperature { .. } => AdaptableField::Temperature {
-                    least: least_temperature(&api_error.message),
-                },
+                AdaptableField::Temperature { .. } => {
+                    AdaptableField::Temperature { least: least_temperature(&api_error.message) }
+                }
                 other => other,
             }),
             forced: field.forced_flags(),

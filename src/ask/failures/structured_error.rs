@@ -14,8 +14,8 @@ const MESSAGE_FIELDS: [&str; 4] = ["message", "msg", "detail", "description"];
 /// Codes of success.
 const SUCCESS: [&str; 6] = ["0", "200", "ok", "success", "succeeded", "completed"];
 
-/// The error in a JSON body that has no reply, in the form of an error object: of the body, or of an object or list in it, the first with
-/// an error code other than that of success and words.
+/// The error in a JSON body that has no reply, in the form of an error object: of the body, or of an object or list in
+/// it, the first with an error code other than that of success and words.
 pub(crate) fn find_error(body: &Value) -> Option<Value> {
     let fields = body.as_object()?;
     let nested = fields.values().flat_map(|value| match value {

@@ -5,23 +5,16 @@ use std::time::Duration;
 use super::api_error::ApiError;
 use crate::ask::replies::bounded_json::parse;
 
-/// Minimum time after which a timeout stated by the server means that it worked on the request; chosen: the time limits of gateways are 10
-/// to 100 s, and a server that is down is noticed sooner.
+/// Minimum time after which a timeout stated by the server means that it worked on the request; chosen: the time limits
+/// of gateways are 10 to 100 s, and a server that is down is noticed sooner.
 const LONG_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Minimum time after which a page of a gateway, or a lost connection, means that a time limit was reached; chosen: the limits of gateways
-/// that state no timeout are 30 s and more.
+/// Minimum time after which a page of a gateway, or a lost connection, means that a time limit was reached; chosen: the
+/// limits of gateways that state no timeout are 30 s and more.
 pub(crate) const LONG_SILENCE: Duration = Duration::from_secs(25);
 
 /// Phrases for a reached time limit, in lower case.
-const TIMEOUT: [&str; 6] = [
-    "timeout",
-    "time-out",
-    "timed out",
-    "timing out",
-    "time out",
-    "deadline exceeded",
-];
+const TIMEOUT: [&str; 6] = ["timeout", "time-out", "timed out", "timing out", "time out", "deadline exceeded"];
 
 /// Work that a server may have done, and charged, for a request without a reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -31,7 +24,8 @@ pub(crate) enum Unfinished {
     None,
     /// The reply broke off after its first part.
     BrokeOff,
-    /// A gateway answered without a wait that the server behind it is too slow: the server may also be down for a moment.
+    /// A gateway answered without a wait that the server behind it is too slow: the server may also be down for a
+    /// moment.
     QuickTimeout,
     /// The same for the second time, while the server answered other requests: this request takes too long.
     RepeatedTimeout,
@@ -41,15 +35,10 @@ pub(crate) enum Unfinished {
 
 impl Unfinished {
     /// The work on a request that was refused with this status and body after this time.
-    pub(crate) fn of_refusal(
-        status: u16,
-        took: Duration,
-        api_error: &ApiError,
-        body: &[u8],
-    ) -> Self {
+    pub(crate) fn of_refusal(status: u16, took: Duration, api_error: &ApiError, body: &[u8]) -> Self {
         let is_failure = status >= 499 || status == 408;
-        let states_timeout = matches!(status, 408 | 504 | 524 | 598 | 599)
-            || (is_failure && api_error.mentions_any(&TIMEOUT));
+        let states_timeout =
+            matches!(status, 408 | 504 | 524 | 598 | 599) || (is_failure && api_error.mentions_any(&TIMEOUT));
         let is_page = || std::str::from_utf8(body).map_or(true, |body| parse(body).is_err());
         match status {
             // Cloudflare sends it only after its time limit.
@@ -93,18 +82,10 @@ mod tests {
             (502, 55, page),
             (500, 60, ""),
             (503, 30, page),
-            (
-                500,
-                15,
-                r#"{"error":{"message":"upstream request timeout"}}"#,
-            ),
+            (500, 15, r#"{"error":{"message":"upstream request timeout"}}"#),
             (599, 100, ""),
         ] {
-            assert_eq!(
-                refused(status, seconds, body),
-                GatewayTimeout,
-                "{status} {body}"
-            );
+            assert_eq!(refused(status, seconds, body), GatewayTimeout, "{status} {body}");
         }
     }
 
@@ -118,11 +99,7 @@ mod tests {
             (503, 0, r#"{"error":{"message":"Loading model"}}"#),
             (408, 1, ""),
             (429, 60, page),
-            (
-                400,
-                60,
-                r#"{"error":{"message":"timeout must be a number"}}"#,
-            ),
+            (400, 60, r#"{"error":{"message":"timeout must be a number"}}"#),
             (522, 3, page),
         ] {
             assert_eq!(refused(status, seconds, body), None, "{status} {body}");

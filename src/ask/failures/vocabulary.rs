@@ -1,6 +1,8 @@
-//! Words of servers by which the cause of a refusal is recognized, in several languages: one list a cause, in lower case.
+//! Words of servers by which the cause of a refusal is recognized, in several languages: one list a cause, in lower
+//! case.
 //!
-//! Unlike the patterns of `wordings.toml`, they are not copied from one server. A list has only words that no other cause uses.
+//! Unlike the patterns of `wordings.toml`, they are not copied from one server. A list has only words that no other
+//! cause uses.
 
 /// Credit that is used up, in codes without separators.
 pub(super) const CREDIT_CODES: [&str; 13] = [
@@ -178,16 +180,7 @@ pub(super) const NO_RIGHT: [&str; 27] = [
 ];
 
 /// The word for a model.
-pub(super) const MODEL: [&str; 8] = [
-    "model",
-    "deployment",
-    "engine",
-    "模型",
-    "モデル",
-    "모델",
-    "modèle",
-    "модель",
-];
+pub(super) const MODEL: [&str; 8] = ["model", "deployment", "engine", "模型", "モデル", "모델", "modèle", "модель"];
 
 /// A path that the server does not have.
 pub(super) const PATH: [&str; 16] = [

@@ -1,4 +1,5 @@
-//! Causes and remedies of server errors, recognized by their wording: [`Wording::find`], with the table `wordings.toml`.
+//! Causes and remedies of server errors, recognized by their wording: [`Wording::find`], with the table
+//! `wordings.toml`.
 
 use std::sync::LazyLock;
 
@@ -44,10 +45,7 @@ impl Wording {
         let texts = api_error.lower_case_texts();
         WORDINGS.wording.iter().find(|wording| {
             (has_image || !wording.images)
-                && wording
-                    .patterns
-                    .iter()
-                    .any(|pattern| texts.iter().any(|text| text.contains(pattern)))
+                && wording.patterns.iter().any(|pattern| texts.iter().any(|text| text.contains(pattern)))
         })
     }
 
@@ -74,16 +72,8 @@ mod tests {
     #[test]
     fn the_table_is_complete() {
         let all: Wordings = toml::from_str(include_str!("../wordings.toml")).unwrap();
-        let mut patterns: Vec<&String> = all
-            .wording
-            .iter()
-            .flat_map(|wording| &wording.patterns)
-            .collect();
-        assert!(
-            patterns
-                .iter()
-                .all(|p| **p == p.to_lowercase() && p.len() > 8)
-        );
+        let mut patterns: Vec<&String> = all.wording.iter().flat_map(|wording| &wording.patterns).collect();
+        assert!(patterns.iter().all(|p| **p == p.to_lowercase() && p.len() > 8));
         let count = patterns.len();
         patterns.sort();
         patterns.dedup();
@@ -91,8 +81,7 @@ mod tests {
     }
 
     fn flat(message: &str) -> String {
-        json!({"object": "error", "message": message, "type": "BadRequestError", "code": 400})
-            .to_string()
+        json!({"object": "error", "message": message, "type": "BadRequestError", "code": 400}).to_string()
     }
 
     fn error(message: &str) -> String {

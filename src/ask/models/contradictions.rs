@@ -1,4 +1,5 @@
-//! Checks that the settings of a model do not contradict each other or its vendor: [`check_user_fields`], [`check_vendor`].
+//! Checks that the settings of a model do not contradict each other or its vendor: [`check_user_fields`],
+//! [`check_vendor`].
 
 use serde_json::Map;
 use tracing::warn;
@@ -11,18 +12,12 @@ use crate::error::{Error, Result};
 pub(super) fn check_user_fields(parameters: &Parameters, initial: RequestFields) -> Result<()> {
     let extra = &parameters.extra;
     if parameters.constrain != Constrain::None
-        && let Some(field) = ["response_format", "structured_outputs", "text"]
-            .into_iter()
-            .find(|field| extra.adds(field))
+        && let Some(field) =
+            ["response_format", "structured_outputs", "text"].into_iter().find(|field| extra.adds(field))
     {
         return conflict(field, "--request constrain");
     }
-    if let Some(field) = initial
-        .thinking_body()
-        .into_iter()
-        .flat_map(Map::keys)
-        .find(|field| extra.adds(field))
-    {
+    if let Some(field) = initial.thinking_body().into_iter().flat_map(Map::keys).find(|field| extra.adds(field)) {
         return conflict(field, "--thinking");
     }
     // The field of the Responses API, which OpenRouter also accepts in chat completions.
@@ -44,13 +39,12 @@ fn conflict(field: &str, flag: &str) -> Result<()> {
     Err(Error::usage("--extra-body", problem))
 }
 
-/// Checks that the vendor supports a requested constraint and requested probabilities. Warns if requests to it are not repeatable.
+/// Checks that the vendor supports a requested constraint and requested probabilities. Warns if requests to it are not
+/// repeatable.
 pub(super) fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
     if vendor.ignores_constraints() && parameters.constrain != Constrain::None {
-        let problem = format_args!(
-            "{} takes a constraint and ignores it, so it would be none; leave it out",
-            vendor.name
-        );
+        let problem =
+            format_args!("{} takes a constraint and ignores it, so it would be none; leave it out", vendor.name);
         return Err(Error::usage("--request constrain", problem));
     }
     if parameters.probabilities

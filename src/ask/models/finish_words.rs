@@ -1,11 +1,12 @@
 //! Finish reasons that the program does not know, decided by a second try: [`FinishWords`].
 //!
-//! A reply may end by a filter, a loop or a limit under any word of a vendor. At temperature 0 it would end so again: it is the model's,
-//! and scored as unread. Or the server gave the generation up, and another try has the answer. The first reply with an unknown word is
-//! therefore asked again, once; other replies with the same word wait for it. If it ends by the same word, the word is taken for
-//! deliberate for the rest of the run, else for a generation that broke off, and each reply with it is asked again. A trial that ended
-//! twice without an answer is the model's, whatever the words. No trial is paid for more than twice. A resumed run learns its words
-//! again, for one more paid reply a word at most: nothing besides the records is stored, and their words may come from another server.
+//! A reply may end by a filter, a loop or a limit under any word of a vendor. At temperature 0 it would end so again:
+//! it is the model's, and scored as unread. Or the server gave the generation up, and another try has the answer. The
+//! first reply with an unknown word is therefore asked again, once; other replies with the same word wait for it. If it
+//! ends by the same word, the word is taken for deliberate for the rest of the run, else for a generation that broke
+//! off, and each reply with it is asked again. A trial that ended twice without an answer is the model's, whatever the
+//! words. No trial is paid for more than twice. A resumed run learns its words again, for one more paid reply a word at
+//! most: nothing besides the records is stored, and their words may come from another server.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,12 +31,12 @@ type Word = Arc<tokio::sync::Mutex<Option<Verdict>>>;
 pub(super) struct FinishWords(Mutex<HashMap<String, Word>>);
 
 impl FinishWords {
-    /// Returns a reply that counts, in place of one that may end in another way. `may_pay` is false if the question must not be paid for
-    /// again; `ask_again` asks it once more.
+    /// Returns a reply that counts, in place of one that may end in another way. `may_pay` is false if the question
+    /// must not be paid for again; `ask_again` asks it once more.
     ///
     /// # Errors
-    /// If the question was asked again without a reply, or the word means that the generation broke off and the question must not be paid
-    /// for again.
+    /// If the question was asked again without a reply, or the word means that the generation broke off and the
+    /// question must not be paid for again.
     pub(super) async fn settle<F>(
         &self,
         first: Reply,
@@ -85,11 +86,7 @@ fn join(first: Reply, second: Result<Reply, AskError>) -> Result<Reply, AskError
     let mut lost = first.lost;
     lost.add(first.usage);
     match second {
-        Ok(second) => Ok(Reply {
-            attempts: first.attempts + second.attempts,
-            lost: lost.plus(second.lost),
-            ..second
-        }),
+        Ok(second) => Ok(Reply { attempts: first.attempts + second.attempts, lost: lost.plus(second.lost), ..second }),
         Err(error) => {
             let word = match first.finish {
                 Finish::Other(word) => Some(word),
@@ -107,9 +104,8 @@ fn join(first: Reply, second: Result<Reply, AskError>) -> Result<Reply, AskError
 
 /// Error of a reply whose generation broke off, and which must not be paid for again.
 fn broken_off(reply: &Reply, word: String) -> AskError {
-    let message = format!(
-        "a reply that broke off: its finish_reason is {word:?}, and --retries paid allows no other try"
-    );
+    let message =
+        format!("a reply that broke off: its finish_reason is {word:?}, and --retries paid allows no other try");
     let mut lost = reply.lost;
     lost.add(reply.usage);
     AskError {
@@ -131,11 +127,7 @@ mod tests {
         Reply {
             may_heal: finish != Finish::Stop,
             finish,
-            usage: Some(Usage {
-                prompt_tokens: Some(100),
-                completion_tokens: Some(3),
-                ..Usage::default()
-            }),
+            usage: Some(Usage { prompt_tokens: Some(100), completion_tokens: Some(3), ..Usage::default() }),
             ..Reply::local(text.to_owned())
         }
     }
@@ -143,9 +135,7 @@ mod tests {
     /// Settles a first reply; `second` is the reply of a second try, `None` if there must be none.
     fn settle(words: &FinishWords, first: Reply, second: Option<Reply>) -> Result<Reply, AskError> {
         let runtime = tokio::runtime::Builder::new_current_thread().build();
-        runtime
-            .unwrap()
-            .block_on(words.settle(first, true, || async { Ok(second.expect("asked again")) }))
+        runtime.unwrap().block_on(words.settle(first, true, || async { Ok(second.expect("asked again")) }))
     }
 
     #[test]
@@ -173,11 +163,9 @@ mod tests {
     fn failed_second_try_decides_nothing() {
         let words = FinishWords::default();
         let runtime = tokio::runtime::Builder::new_current_thread().build();
-        let failed = runtime
-            .unwrap()
-            .block_on(words.settle(ended("paused", ""), true, || async {
-                Err(AskError::new(FailureKind::Server, "no".into()))
-            }));
+        let failed = runtime.unwrap().block_on(
+            words.settle(ended("paused", ""), true, || async { Err(AskError::new(FailureKind::Server, "no".into())) }),
+        );
         let error = failed.unwrap_err();
         assert_eq!((error.attempts, error.lost.attempts), (2, 1));
         assert_eq!(error.finish.as_deref(), Some("paused"));
@@ -188,11 +176,8 @@ mod tests {
     fn unpaid_second_try_is_not_made() {
         let words = FinishWords::default();
         let runtime = tokio::runtime::Builder::new_current_thread().build();
-        let reply = runtime
-            .unwrap()
-            .block_on(words.settle(ended("paused", ""), false, || async {
-                panic!("asked again")
-            }));
+        let reply =
+            runtime.unwrap().block_on(words.settle(ended("paused", ""), false, || async { panic!("asked again") }));
         assert_eq!(reply.unwrap().attempts, 1);
     }
 
@@ -200,10 +185,7 @@ mod tests {
     fn thoughts_without_an_answer_are_asked_again_once() {
         let words = FinishWords::default();
         for second in ["B", ""] {
-            let first = Reply {
-                may_heal: true,
-                ..ended("stop", "")
-            };
+            let first = Reply { may_heal: true, ..ended("stop", "") };
             let reply = settle(&words, first, Some(ended("stop", second))).unwrap();
             assert_eq!((&*reply.text, reply.attempts), (second, 2));
         }

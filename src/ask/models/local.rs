@@ -25,11 +25,10 @@ pub(crate) struct LocalAnswer {
 }
 
 /// A function that answers a question.
-pub(crate) type AnswerFn =
-    dyn Fn(&Question, &Call<'_>) -> Result<LocalAnswer, String> + Send + Sync;
+pub(crate) type AnswerFn = dyn Fn(&Question, &Call<'_>) -> Result<LocalAnswer, String> + Send + Sync;
 
-/// Model whose answers come from a function. If the function does not know the answer, [`Random`] guesses: the same seed, question,
-/// condition and turn give the same guess.
+/// Model whose answers come from a function. If the function does not know the answer, [`Random`] guesses: the same
+/// seed, question, condition and turn give the same guess.
 pub struct Local {
     name: String,
     digest: Digest,
@@ -46,18 +45,8 @@ impl fmt::Debug for Local {
 impl Local {
     /// Creates a model; `digest` is the digest of everything that decides the function's answers.
     #[must_use]
-    pub(crate) fn new(
-        name: String,
-        digest: Digest,
-        fallback: Random,
-        answer_fn: Box<AnswerFn>,
-    ) -> Self {
-        Self {
-            name,
-            digest,
-            fallback,
-            answer_fn,
-        }
+    pub(crate) fn new(name: String, digest: Digest, fallback: Random, answer_fn: Box<AnswerFn>) -> Self {
+        Self { name, digest, fallback, answer_fn }
     }
 
     pub(super) fn name(&self) -> &str {
@@ -69,19 +58,15 @@ impl Local {
     }
 
     pub(super) fn answer(&self, question: &Question, call: Call<'_>) -> Result<Reply, AskError> {
-        let answer = (self.answer_fn)(question, &call)
-            .map_err(|message| AskError::new(FailureKind::Request, message))?;
+        let answer =
+            (self.answer_fn)(question, &call).map_err(|message| AskError::new(FailureKind::Request, message))?;
         let text = match answer.choice {
             Some(choice) => letter(choice).to_string(),
             None => self.fallback.answer(question, call),
         };
         let reply = Reply::local(text);
         Ok(Reply {
-            finish: if answer.guessed {
-                Finish::Other(GUESS.to_owned())
-            } else {
-                reply.finish
-            },
+            finish: if answer.guessed { Finish::Other(GUESS.to_owned()) } else { reply.finish },
             observed: answer.observed,
             chances: None,
             ..reply

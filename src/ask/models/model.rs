@@ -17,9 +17,9 @@ use crate::ask::requests::{Call, ChangedSetting, Message, Parameters};
 use crate::error::Result;
 use crate::types::{Digest, Reply};
 
-/// Number of CPU cores that the process may use; `None` if unknown. Counted once, because counting reads files of the control group.
-static CORES: LazyLock<Option<usize>> =
-    LazyLock::new(|| std::thread::available_parallelism().ok().map(usize::from));
+/// Number of CPU cores that the process may use; `None` if unknown. Counted once, because counting reads files of the
+/// control group.
+static CORES: LazyLock<Option<usize>> = LazyLock::new(|| std::thread::available_parallelism().ok().map(usize::from));
 
 /// A model, at an endpoint or in this process.
 #[derive(Debug)]
@@ -107,8 +107,7 @@ impl Model {
 
     /// Time for which requests to the model's endpoint had to wait for their turn so far; zero for built-in models.
     pub(crate) fn held_back(&self) -> HeldBack {
-        self.remote()
-            .map_or_else(HeldBack::default, |model| model.endpoint().held_back())
+        self.remote().map_or_else(HeldBack::default, |model| model.endpoint().held_back())
     }
 
     /// Number of tokens of an image of this width and height, in pixels; `None` if unknown.
@@ -118,8 +117,8 @@ impl Model {
         image_tokens(model, *detail, width, height)
     }
 
-    /// Number of tokens of an image of this width and height, in pixels, if the model has more of them for larger images; `None` if it does
-    /// not, or if the number is unknown.
+    /// Number of tokens of an image of this width and height, in pixels, if the model has more of them for larger
+    /// images; `None` if it does not, or if the number is unknown.
     pub(crate) fn scaling_image_tokens(&self, width: u64, height: u64) -> Option<u64> {
         let Parameters { model, detail, .. } = self.remote()?.parameters();
         scaling_image_tokens(model, *detail, width, height)
@@ -136,17 +135,15 @@ impl Model {
         Some(self.remote()?.parameters().max_tokens.get())
     }
 
-    /// Maximum number of charged tokens of a reply, including hidden reasoning; `None` if not all of them are limited. The server may
-    /// exceed it.
+    /// Maximum number of charged tokens of a reply, including hidden reasoning; `None` if not all of them are limited.
+    /// The server may exceed it.
     pub(crate) fn reply_limit(&self) -> Option<u64> {
         self.remote()?.reply_limit()
     }
 
     /// Length of the system message in bytes; 0 without one.
     pub(crate) fn system_bytes(&self) -> usize {
-        self.remote()
-            .and_then(|model| model.parameters().extra.system.as_ref())
-            .map_or(0, String::len)
+        self.remote().and_then(|model| model.parameters().extra.system.as_ref()).map_or(0, String::len)
     }
 
     /// Token limit of replies, if the run began with another one.
@@ -174,21 +171,17 @@ impl Model {
 
     /// True for the judge of open answers.
     pub(crate) fn is_judge(&self) -> bool {
-        self.remote()
-            .is_some_and(|model| model.parameters().origin.is_judge)
+        self.remote().is_some_and(|model| model.parameters().origin.is_judge)
     }
 
     /// Body of a request as it would be sent now; `None` for built-in models.
     #[must_use]
-    pub fn body(
-        &self,
-        message: Message<'_>,
-        choices: usize,
-    ) -> Option<Result<Vec<u8>, serde_json::Error>> {
+    pub fn body(&self, message: Message<'_>, choices: usize) -> Option<Result<Vec<u8>, serde_json::Error>> {
         Some(self.remote()?.body(message, choices))
     }
 
-    /// A line of an input file for the Batch API, with a line end; `None` for built-in models. `url` is the path of the API in the line.
+    /// A line of an input file for the Batch API, with a line end; `None` for built-in models. `url` is the path of the
+    /// API in the line.
     ///
     /// # Errors
     /// If the line cannot be written as JSON.
@@ -221,9 +214,7 @@ impl Model {
     /// # Errors
     /// If a header value has characters that HTTP does not allow.
     pub(crate) fn batch_server(&self) -> Result<Option<BatchServer>> {
-        self.remote()
-            .map(|model| model.endpoint().batch_server())
-            .transpose()
+        self.remote().map(|model| model.endpoint().batch_server()).transpose()
     }
 
     /// True if both models use the same account for files and batches; false for built-in models.
@@ -240,15 +231,13 @@ impl Model {
     /// Adapts further requests after a refusal in the output of a batch. Returns true if the request may succeed now.
     #[must_use]
     pub(crate) fn adapt_to_refusal(&self, status: u16, body: &[u8]) -> bool {
-        self.remote()
-            .is_some_and(|model| model.adapt_to_refusal(status, body))
+        self.remote().is_some_and(|model| model.adapt_to_refusal(status, body))
     }
 
     /// True if a line of a batch may have been refused for its content alone.
     #[must_use]
     pub(crate) fn may_refuse_content(&self, status: u16, body: &[u8]) -> bool {
-        self.remote()
-            .is_some_and(|model| model.may_refuse_content(status, body))
+        self.remote().is_some_and(|model| model.may_refuse_content(status, body))
     }
 
     fn remote(&self) -> Option<&Remote> {
@@ -263,8 +252,8 @@ impl Model {
         self.ask_within(call, None, false).await
     }
 
-    /// Asks one question; the reservation covers the cost of each of its requests. A question that timed out at a gateway in an earlier
-    /// call (`has_timed_out`) is given up at the next timeout.
+    /// Asks one question; the reservation covers the cost of each of its requests. A question that timed out at a
+    /// gateway in an earlier call (`has_timed_out`) is given up at the next timeout.
     pub(crate) async fn ask_within(
         &self,
         call: Call<'_>,
@@ -274,9 +263,7 @@ impl Model {
         match self {
             Self::Remote(model) => {
                 let choices = call.query.choice_count();
-                model
-                    .ask_within(call.message, choices, reservation, has_timed_out)
-                    .await
+                model.ask_within(call.message, choices, reservation, has_timed_out).await
             }
             Self::Random(random) => {
                 let question = call.query.require_choices()?;

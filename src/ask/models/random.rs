@@ -6,8 +6,8 @@ use crate::ask::requests::Call;
 use crate::types::questions::letter;
 use crate::types::{Digest, Question};
 
-/// A model that answers with the letter of a random choice; all choices are equally likely. The guess depends only on the seed,
-/// question, condition and turn, not on the order in which questions are asked.
+/// A model that answers with the letter of a random choice; all choices are equally likely. The guess depends only on
+/// the seed, question, condition and turn, not on the order in which questions are asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Random {
     /// Seed of the guesses.
@@ -38,10 +38,7 @@ impl Random {
         let limit = u64::MAX - u64::MAX % count;
         loop {
             let (chunks, _) = digest.as_bytes().as_chunks::<8>();
-            let draw = chunks
-                .iter()
-                .map(|bytes| u64::from_le_bytes(*bytes))
-                .find(|draw| *draw < limit);
+            let draw = chunks.iter().map(|bytes| u64::from_le_bytes(*bytes)).find(|draw| *draw < limit);
             if let Some(draw) = draw {
                 return letter((draw % count) as usize).to_string();
             }
@@ -70,12 +67,7 @@ mod tests {
     }
 
     fn guess(seed: u64, question: &Question, condition: Option<&Condition>, turn: u32) -> String {
-        let call = Call {
-            query: Query::Choice(question),
-            condition,
-            message: Message::text_only(""),
-            turn,
-        };
+        let call = Call { query: Query::Choice(question), condition, message: Message::text_only(""), turn };
         Random { seed }.answer(question, call)
     }
 
@@ -87,17 +79,12 @@ mod tests {
             counts[usize::from(reply.as_bytes()[0] - b'A')] += 1;
         }
         // 129 is five standard deviations of the count for uniform guesses.
-        assert!(
-            counts.iter().all(|count| count.abs_diff(1000) < 130),
-            "{counts:?}"
-        );
+        assert!(counts.iter().all(|count| count.abs_diff(1000) < 130), "{counts:?}");
     }
 
     fn guesses(seed: u64, condition: &str) -> String {
         let condition = condition.parse().unwrap();
-        (0..40)
-            .map(|id| guess(seed, &question(id, 4), Some(&condition), 0))
-            .collect()
+        (0..40).map(|id| guess(seed, &question(id, 4), Some(&condition), 0)).collect()
     }
 
     #[test]

@@ -16,8 +16,8 @@ use crate::ask::endpoints::{Endpoint, ModelIndex};
 use crate::ask::failures::{AskError, Reach};
 use crate::ask::requests::constraint::constrained_letter;
 use crate::ask::requests::{
-    AdaptableField, AfterTimeout, Constrain, Message, Parameters, Request, RequestFields,
-    SentFields, Thinking, ThinkingBudget, TokenField,
+    AdaptableField, AfterTimeout, Constrain, Message, Parameters, Request, RequestFields, SentFields, Thinking,
+    ThinkingBudget, TokenField,
 };
 use crate::ask::wire_kind::Wire;
 use crate::error::Result;
@@ -39,7 +39,8 @@ pub struct Remote {
     fields: Mutex<RequestFields>,
     /// Flags of the settings that the server refused.
     forced: Mutex<BTreeSet<&'static str>>,
-    /// Outcome of the first question. The other questions wait for it, so that a refusal that concerns all requests costs a single one.
+    /// Outcome of the first question. The other questions wait for it, so that a refusal that concerns all requests
+    /// costs a single one.
     first_question: tokio::sync::Mutex<FirstQuestion>,
     streams: StreamFallback,
     /// True after the first reply.
@@ -51,8 +52,8 @@ pub struct Remote {
     warned_other_field: AtomicBool,
 }
 
-/// Number of refusals by a status that concerns all questions after which the model is not asked any further, if it has answered none.
-/// Chosen: they cost nothing, and the first image alone may be the cause of one.
+/// Number of refusals by a status that concerns all questions after which the model is not asked any further, if it has
+/// answered none. Chosen: they cost nothing, and the first image alone may be the cause of one.
 const REFUSALS_AT_START: usize = 3;
 
 /// Outcome of the first question to a model.
@@ -70,8 +71,8 @@ impl Remote {
     /// Prepares a model of an endpoint. All models of one endpoint share its connections and its rate limits.
     ///
     /// # Errors
-    /// If a header value has characters that HTTP does not allow, if the server has no known switch for `--thinking`, or if fields of the
-    /// user contradict `--request constrain` or `--thinking`.
+    /// If a header value has characters that HTTP does not allow, if the server has no known switch for `--thinking`,
+    /// or if fields of the user contradict `--request constrain` or `--thinking`.
     pub fn open(endpoint: Arc<Endpoint>, parameters: Parameters) -> Result<Self> {
         let initial = RequestFields::initial(&parameters, endpoint.base(), endpoint.vendor())?;
         check_user_fields(&parameters, initial)?;
@@ -107,7 +108,8 @@ impl Remote {
         &self.endpoint
     }
 
-    /// Maximum number of requests in flight at the endpoint at the moment, within [`Sending::concurrency`](crate::ask::Sending).
+    /// Maximum number of requests in flight at the endpoint at the moment, within
+    /// [`Sending::concurrency`](crate::ask::Sending).
     #[must_use]
     pub fn width(&self) -> usize {
         self.endpoint.width(self.index)
@@ -119,8 +121,8 @@ impl Remote {
         &self.parameters
     }
 
-    /// Maximum number of charged tokens of a reply, including hidden reasoning; `None` if not all of them are limited. The server may
-    /// exceed it.
+    /// Maximum number of charged tokens of a reply, including hidden reasoning; `None` if not all of them are limited.
+    /// The server may exceed it.
     pub(super) fn reply_limit(&self) -> Option<u64> {
         let parameters = &self.parameters;
         let is_omitted = self.fields().token_field == TokenField::Omit;
@@ -128,10 +130,7 @@ impl Remote {
             return None;
         }
         let limit = u64::from(parameters.max_tokens.get());
-        let thinks_beyond_limit = self
-            .endpoint
-            .vendor()
-            .is_some_and(|vendor| vendor.thinks_beyond_limit);
+        let thinks_beyond_limit = self.endpoint.vendor().is_some_and(|vendor| vendor.thinks_beyond_limit);
         match parameters.extra.thinking_budget() {
             Some(ThinkingBudget::Unlimited) => None,
             _ if !thinks_beyond_limit || parameters.thinking == Some(Thinking::Off) => Some(limit),
@@ -140,7 +139,8 @@ impl Remote {
         }
     }
 
-    /// Changes to requests after the server refused a field. Only settings with the value `auto` are adapted, for all further requests.
+    /// Changes to requests after the server refused a field. Only settings with the value `auto` are adapted, for all
+    /// further requests.
     #[must_use]
     pub fn adapted(&self) -> Vec<String> {
         let mut changes = self.fields().changes(self.initial);
@@ -170,8 +170,8 @@ impl Remote {
         self.ask_within(message, choices, None, false).await
     }
 
-    /// Like [`Self::ask`]; the reservation covers the cost of each request. A question that timed out at a gateway in an earlier call
-    /// (`has_timed_out`) is given up at the next timeout.
+    /// Like [`Self::ask`]; the reservation covers the cost of each request. A question that timed out at a gateway in
+    /// an earlier call (`has_timed_out`) is given up at the next timeout.
     pub(super) async fn ask_within(
         &self,
         message: Message<'_>,
@@ -179,11 +179,8 @@ impl Remote {
         reservation: Option<&Reservation>,
         has_timed_out: bool,
     ) -> Result<Reply, AskError> {
-        let before = if has_timed_out {
-            AskedBefore::timed_out(self.endpoint.paid_retries())
-        } else {
-            AskedBefore::default()
-        };
+        let before =
+            if has_timed_out { AskedBefore::timed_out(self.endpoint.paid_retries()) } else { AskedBefore::default() };
         let mut first_question = self.first_question.lock().await;
         let refused = match &*first_question {
             FirstQuestion::Pending(refused) => *refused,
@@ -195,11 +192,7 @@ impl Remote {
                     .map_err(|error| self.resolve_reach(error, Reach::Trial, 0));
             }
             FirstQuestion::Refused(error) => {
-                return Err(AskError {
-                    attempts: 0,
-                    lost: Box::default(),
-                    ..error.clone()
-                });
+                return Err(AskError { attempts: 0, lost: Box::default(), ..error.clone() });
             }
         };
         let outcome = self
@@ -215,16 +208,13 @@ impl Remote {
         outcome
     }
 
-    /// Decides which requests a failure affects. Before the first reply, [`Reach::Alike`] becomes `alike`; and [`Reach::ByStatus`] is
-    /// every request, if `refused` earlier questions make it [`REFUSALS_AT_START`]. After the first reply, such a status may concern one
-    /// question.
+    /// Decides which requests a failure affects. Before the first reply, [`Reach::Alike`] becomes `alike`; and
+    /// [`Reach::ByStatus`] is every request, if `refused` earlier questions make it [`REFUSALS_AT_START`]. After the
+    /// first reply, such a status may concern one question.
     fn resolve_reach(&self, error: AskError, alike: Reach, refused: usize) -> AskError {
         let reach = match error.reach {
             Reach::Alike => alike,
-            Reach::ByStatus
-                if !self.has_answered.load(Ordering::Relaxed)
-                    && refused + 1 >= REFUSALS_AT_START =>
-            {
+            Reach::ByStatus if !self.has_answered.load(Ordering::Relaxed) && refused + 1 >= REFUSALS_AT_START => {
                 Reach::Endpoint
             }
             reach => reach,
@@ -240,9 +230,7 @@ impl Remote {
         reservation: Option<&Reservation>,
         before: AskedBefore,
     ) -> Result<Reply, AskError> {
-        let first = self
-            .ask_adapting(message, choices, reservation, before)
-            .await?;
+        let first = self.ask_adapting(message, choices, reservation, before).await?;
         self.has_answered.store(true, Ordering::Relaxed);
         if !first.may_heal {
             return Ok(first);
@@ -254,8 +242,7 @@ impl Remote {
         self.finish_words
             .settle(first, may_pay, || async {
                 self.endpoint.wait_to_ask_again().await;
-                self.ask_adapting(message, choices, reservation, before)
-                    .await
+                self.ask_adapting(message, choices, reservation, before).await
             })
             .await
     }
@@ -273,13 +260,9 @@ impl Remote {
         loop {
             let fields = self.fields();
             let wire = self.streams.wire(&self.parameters, fields.wire, before);
-            let timeouts = self
-                .streams
-                .after_timeout(&self.parameters, wire, before, paid_retries);
+            let timeouts = self.streams.after_timeout(&self.parameters, wire, before, paid_retries);
             let sent = RequestFields { wire, ..fields };
-            let outcome = self
-                .ask_with(sent, timeouts, message, choices, reservation)
-                .await;
+            let outcome = self.ask_with(sent, timeouts, message, choices, reservation).await;
             if let Err(error) = &outcome {
                 let mut forced = self.forced.lock().unwrap_or_else(PoisonError::into_inner);
                 forced.extend(error.forced);
@@ -292,9 +275,7 @@ impl Remote {
                         continue;
                     }
                     let wires = (wire, fields.wire);
-                    let next = self
-                        .streams
-                        .next(self.name(), &error, wires, before, timeouts);
+                    let next = self.streams.next(self.name(), &error, wires, before, timeouts);
                     match next {
                         Some(next) => before = next,
                         None => return Err(error.with_attempts(attempts, lost)),
@@ -325,9 +306,7 @@ impl Remote {
     /// If it cannot be written as JSON.
     pub fn body(&self, message: Message<'_>, choices: usize) -> Result<Vec<u8>, serde_json::Error> {
         let fields = self.fields();
-        let body = fields
-            .wire
-            .body(&self.parameters, fields, message, choices)?;
+        let body = fields.wire.body(&self.parameters, fields, message, choices)?;
         Ok(body.concat())
     }
 
@@ -335,11 +314,7 @@ impl Remote {
     ///
     /// # Errors
     /// If it cannot be written as JSON.
-    pub(super) fn batch_body(
-        &self,
-        message: Message<'_>,
-        choices: usize,
-    ) -> Result<Vec<u8>, serde_json::Error> {
+    pub(super) fn batch_body(&self, message: Message<'_>, choices: usize) -> Result<Vec<u8>, serde_json::Error> {
         let fields = self.fields();
         let wire = fields.wire.in_batch();
         let body = wire.body(&self.parameters, fields, message, choices)?;
@@ -356,16 +331,10 @@ impl Remote {
         reservation: Option<&Reservation>,
     ) -> Result<Reply, AskError> {
         let parameters = &self.parameters;
-        let body = fields
-            .wire
-            .body(parameters, fields, message, choices)
-            .map_err(|error| {
-                let message = format!("the request could not be written: {error}");
-                AskError {
-                    attempts: 0,
-                    ..AskError::new(FailureKind::Request, message)
-                }
-            })?;
+        let body = fields.wire.body(parameters, fields, message, choices).map_err(|error| {
+            let message = format!("the request could not be written: {error}");
+            AskError { attempts: 0, ..AskError::new(FailureKind::Request, message) }
+        })?;
         let request = Request {
             model: self.index,
             wire: fields.wire,
@@ -400,7 +369,8 @@ impl Remote {
         *self.fields.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Changes the field for which a request with the fields `sent` was refused, if its setting is `auto`. Returns true to ask again.
+    /// Changes the field for which a request with the fields `sent` was refused, if its setting is `auto`. Returns true
+    /// to ask again.
     fn adapt(&self, sent: RequestFields, refused_field: Option<AdaptableField>) -> bool {
         let Some(field) = refused_field else {
             return false;
@@ -414,10 +384,7 @@ impl Remote {
             return false;
         };
         for change in adapted.changes(sent) {
-            warn!(
-                "{}: {change} for the whole run, because the server refuses what was sent before",
-                self.name()
-            );
+            warn!("{}: {change} for the whole run, because the server refuses what was sent before", self.name());
         }
         *current = adapted;
         true
@@ -430,17 +397,11 @@ impl Remote {
             return true;
         }
         // The batch may have been created before the fields were changed.
-        self.refused_in_batch(status, body, self.initial)
-            .is_some_and(|field| fields.differs(field, self.initial))
+        self.refused_in_batch(status, body, self.initial).is_some_and(|field| fields.differs(field, self.initial))
     }
 
     /// Field for which a line of a batch with these fields was refused, if the program can send it in another way.
-    fn refused_in_batch(
-        &self,
-        status: u16,
-        body: &[u8],
-        fields: RequestFields,
-    ) -> Option<AdaptableField> {
+    fn refused_in_batch(&self, status: u16, body: &[u8], fields: RequestFields) -> Option<AdaptableField> {
         self.refusal_in_batch(status, body, fields).refused_field
     }
 
@@ -452,19 +413,15 @@ impl Remote {
 
     /// The refusal of a line of a batch with these fields.
     fn refusal_in_batch(&self, status: u16, body: &[u8], fields: RequestFields) -> AskError {
-        let sent = SentFields {
-            parameters: &self.parameters,
-            fields,
-            has_image: true,
-            has_key: self.endpoint.has_key(),
-        };
+        let sent =
+            SentFields { parameters: &self.parameters, fields, has_image: true, has_key: self.endpoint.has_key() };
         let wire = fields.wire.in_batch();
         let api_error = wire.parse_error(body);
         AskError::refused(status, &api_error, wire, sent)
     }
 
-    /// The reply with the text of another field, if its content is empty and the text of that field is an answer. Warns about the first
-    /// reply whose content is empty.
+    /// The reply with the text of another field, if its content is empty and the text of that field is an answer. Warns
+    /// about the first reply whose content is empty.
     fn with_other_field(&self, mut reply: Reply, choices: usize) -> Reply {
         let Some(field) = reply.other_field.take() else {
             return reply;
@@ -499,7 +456,8 @@ impl Remote {
         reply
     }
 
-    /// Letter in a constrained reply, otherwise the whole text. Warns once if the server does not follow the constraint.
+    /// Letter in a constrained reply, otherwise the whole text. Warns once if the server does not follow the
+    /// constraint.
     fn letter_or_text(&self, text: String, choices: usize) -> String {
         let constrain = self.parameters.constrain;
         if constrain == Constrain::None {
@@ -518,8 +476,8 @@ impl Remote {
     }
 }
 
-/// True for a text that is an answer and nothing else, so that it cannot be thoughts: the letter of a choice, or a number if there are no
-/// choices.
+/// True for a text that is an answer and nothing else, so that it cannot be thoughts: the letter of a choice, or a
+/// number if there are no choices.
 fn is_bare_answer(text: &str, choices: usize) -> bool {
     let text = text.trim();
     let bare = text.strip_prefix('(').unwrap_or(text);
@@ -532,13 +490,9 @@ fn is_bare_answer(text: &str, choices: usize) -> bool {
 
 /// Hash of the images of a message, in any order.
 fn image_hash(message: Message<'_>) -> u64 {
-    message
-        .images
-        .iter()
-        .map(|image| image.facts().digest)
-        .fold(0, |sum, digest| {
-            let mut first = [0; 8];
-            first.copy_from_slice(&digest.as_bytes()[..8]);
-            sum ^ u64::from_le_bytes(first)
-        })
+    message.images.iter().map(|image| image.facts().digest).fold(0, |sum, digest| {
+        let mut first = [0; 8];
+        first.copy_from_slice(&digest.as_bytes()[..8]);
+        sum ^ u64::from_le_bytes(first)
+    })
 }

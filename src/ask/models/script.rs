@@ -13,8 +13,8 @@ use crate::types::{Condition, Digest, FailureKind, QuestionId, Reply};
 
 /// Model that replies from a JSONL file.
 ///
-/// A line is `{"question": "<id>", "reply": ".."}`, optionally with `"condition": "L3-noise"` for a single condition, or
-/// `{"default": ".."}` for all other questions. The most specific line applies.
+/// A line is `{"question": "<id>", "reply": ".."}`, optionally with `"condition": "L3-noise"` for a single condition,
+/// or `{"default": ".."}` for all other questions. The most specific line applies.
 #[derive(Debug)]
 pub struct Script {
     name: String,
@@ -44,9 +44,7 @@ impl ScriptLine {
     /// The scope and the reply; `None` for an invalid combination of fields.
     fn scope_and_reply(self) -> Option<(Scope, String)> {
         match (self.question, self.condition, self.reply, self.default) {
-            (Some(id), Some(condition), Some(reply), None) => {
-                Some((Scope::InCondition(id, condition), reply))
-            }
+            (Some(id), Some(condition), Some(reply), None) => Some((Scope::InCondition(id, condition), reply)),
             (Some(id), None, Some(reply), None) => Some((Scope::Question(id), reply)),
             (None, None, None, Some(reply)) => Some((Scope::Default, reply)),
             _ => None,
@@ -68,8 +66,8 @@ impl Script {
             if line.trim().is_empty() {
                 continue;
             }
-            let line: ScriptLine = serde_json::from_str(line)
-                .map_err(|error| Error::json_line(path, number, &error))?;
+            let line: ScriptLine =
+                serde_json::from_str(line).map_err(|error| Error::json_line(path, number, &error))?;
             let (scope, reply) = line.scope_and_reply().ok_or_else(|| {
                 Error::line(
                     path,
@@ -78,9 +76,7 @@ impl Script {
                 )
             })?;
             if let Some(first) = line_numbers.insert(scope.clone(), number) {
-                let problem = format_args!(
-                    "answers the same question as line {first}; keep one of the two lines"
-                );
+                let problem = format_args!("answers the same question as line {first}; keep one of the two lines");
                 return Err(Error::line(path, number, problem));
             }
             replies.insert(scope, reply);
@@ -103,25 +99,16 @@ impl Script {
         json!({"script": self.digest})
     }
 
-    pub(super) fn answer(
-        &self,
-        id: &QuestionId,
-        condition: Option<&Condition>,
-    ) -> Result<Reply, AskError> {
+    pub(super) fn answer(&self, id: &QuestionId, condition: Option<&Condition>) -> Result<Reply, AskError> {
         condition
-            .and_then(|condition| {
-                self.replies
-                    .get(&Scope::InCondition(id.clone(), condition.clone()))
-            })
+            .and_then(|condition| self.replies.get(&Scope::InCondition(id.clone(), condition.clone())))
             .or_else(|| self.replies.get(&Scope::Question(id.clone())))
             .or_else(|| self.replies.get(&Scope::Default))
             .cloned()
             .map(Reply::local)
             .ok_or_else(|| {
-                let message = format!(
-                    r#"{} has no reply to question {id} and no {{"default": ".."}} line"#,
-                    self.path.display()
-                );
+                let message =
+                    format!(r#"{} has no reply to question {id} and no {{"default": ".."}} line"#, self.path.display());
                 AskError::new(FailureKind::Request, message)
             })
     }
@@ -150,9 +137,6 @@ mod tests {
     #[test]
     fn errors_name_the_line_once() {
         let error = load("\n{\n").unwrap_err().to_string();
-        assert!(
-            error.ends_with(", line 2: EOF while parsing an object"),
-            "{error}"
-        );
+        assert!(error.ends_with(", line 2: EOF while parsing an object"), "{error}");
     }
 }

@@ -13,8 +13,7 @@ use crate::types::FailureKind;
 const STREAM: &str = "--request wire=chat-stream asks for a stream, which gateways let through";
 
 /// Remedy if the Responses API was used.
-const CHAT_STREAM: &str =
-    "if the model takes chat completions, --request wire=chat-stream asks for a stream of them";
+const CHAT_STREAM: &str = "if the model takes chat completions, --request wire=chat-stream asks for a stream of them";
 
 /// Remedy if a stream does not help.
 const SHORTER: &str = "a shorter reply helps (--thinking off, a lower --reasoning-effort or --max-tokens), or an address without the \
@@ -45,19 +44,12 @@ pub(super) struct AskedBefore {
 impl AskedBefore {
     /// A question that timed out at a gateway in an earlier call: its next timeout is the last.
     pub(super) fn timed_out(paid_retries: u32) -> Self {
-        Self {
-            charged: paid_retries,
-            as_stream: true,
-            is_too_long: false,
-        }
+        Self { charged: paid_retries, as_stream: true, is_too_long: false }
     }
 
     /// The same question after more charged requests.
     pub(super) fn with_charged(self, more: u32) -> Self {
-        Self {
-            charged: self.charged + more,
-            ..self
-        }
+        Self { charged: self.charged + more, ..self }
     }
 
     /// True if a stream of the question shows that others should be streamed too.
@@ -67,7 +59,8 @@ impl AskedBefore {
 }
 
 impl StreamFallback {
-    /// True if a request that is sent as `wire` may be sent as a stream: nobody has chosen the API, and the server refuses no stream.
+    /// True if a request that is sent as `wire` may be sent as a stream: nobody has chosen the API, and the server
+    /// refuses no stream.
     fn is_possible(&self, parameters: &Parameters, wire: Wire) -> bool {
         parameters.wire == WireSetting::Auto
             && wire == Wire::Chat
@@ -80,22 +73,16 @@ impl StreamFallback {
         self.is_used.store(true, Ordering::Relaxed);
     }
 
-    /// Change to requests, as a phrase for messages; `None` if no reply is from a stream in place of a reply in one piece.
+    /// Change to requests, as a phrase for messages; `None` if no reply is from a stream in place of a reply in one
+    /// piece.
     pub(super) fn change(&self) -> Option<String> {
-        let phrase =
-            "replies that a gateway cut were asked for as streams (--request wire=chat-stream)";
-        self.is_used
-            .load(Ordering::Relaxed)
-            .then(|| phrase.to_owned())
+        let phrase = "replies that a gateway cut were asked for as streams (--request wire=chat-stream)";
+        self.is_used.load(Ordering::Relaxed).then(|| phrase.to_owned())
     }
 
     /// API of the next request about a question.
     pub(super) fn wire(&self, parameters: &Parameters, wire: Wire, before: AskedBefore) -> Wire {
-        if before.as_stream && self.is_possible(parameters, wire) {
-            Wire::ChatStream
-        } else {
-            wire
-        }
+        if before.as_stream && self.is_possible(parameters, wire) { Wire::ChatStream } else { wire }
     }
 
     /// Handling of gateway timeouts of a request that is sent as `wire`.
@@ -113,15 +100,11 @@ impl StreamFallback {
             Wire::ChatStream => SHORTER,
             Wire::Responses => CHAT_STREAM,
         };
-        AfterTimeout {
-            charged: before.charged,
-            asks_otherwise,
-            remedy,
-        }
+        AfterTimeout { charged: before.charged, asks_otherwise, remedy }
     }
 
-    /// How to ask a question again after this error of a request that was sent as `sent`; `None` if the error is final. `wire` is the API
-    /// of other requests.
+    /// How to ask a question again after this error of a request that was sent as `sent`; `None` if the error is final.
+    /// `wire` is the API of other requests.
     pub(super) fn next(
         &self,
         name: &str,
@@ -132,9 +115,7 @@ impl StreamFallback {
     ) -> Option<AskedBefore> {
         if error.unfinished.is_timeout() && timeouts.asks_otherwise {
             if !self.has_warned.swap(true, Ordering::Relaxed) {
-                warn!(
-                    "{name}: {error}; asked again as a stream, as all would be with --request wire=chat-stream"
-                );
+                warn!("{name}: {error}; asked again as a stream, as all would be with --request wire=chat-stream");
             }
             return Some(AskedBefore {
                 charged: before.charged + 1,
@@ -143,14 +124,11 @@ impl StreamFallback {
             });
         }
         // The key and the credit are not about streams.
-        let is_refusal = error.failure.kind == FailureKind::Request
-            && !matches!(error.failure.status, Some(401 | 402 | 403 | 407));
+        let is_refusal =
+            error.failure.kind == FailureKind::Request && !matches!(error.failure.status, Some(401 | 402 | 403 | 407));
         if sent != wire && is_refusal {
             self.is_refused.store(true, Ordering::Relaxed);
-            return Some(AskedBefore {
-                as_stream: false,
-                ..before
-            });
+            return Some(AskedBefore { as_stream: false, ..before });
         }
         None
     }

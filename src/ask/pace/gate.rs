@@ -119,13 +119,7 @@ impl Gate {
     /// Records the success of the request sent at `sent`: its tokens, and the limits that the response reports.
     ///
     /// A reported pause longer than `max_wait` is ignored.
-    pub(crate) fn record_success(
-        &self,
-        sent: Instant,
-        tokens: Option<u64>,
-        limits: RateLimits,
-        max_wait: Duration,
-    ) {
+    pub(crate) fn record_success(&self, sent: Instant, tokens: Option<u64>, limits: RateLimits, max_wait: Duration) {
         let now = Instant::now();
         let mut state = self.state();
         state.refused_since = None;

@@ -35,11 +35,7 @@ impl fmt::Display for PaceCause {
 pub(crate) struct HeldBack([Duration; 3]);
 
 impl HeldBack {
-    const CAUSES: [PaceCause; 3] = [
-        PaceCause::Quota,
-        PaceCause::Refusals,
-        PaceCause::ReportedLimits,
-    ];
+    const CAUSES: [PaceCause; 3] = [PaceCause::Quota, PaceCause::Refusals, PaceCause::ReportedLimits];
 
     /// Adds a wait.
     pub(super) fn add(&mut self, cause: PaceCause, time: Duration) {
@@ -49,18 +45,14 @@ impl HeldBack {
     /// The longer wait for each cause, of two queues that waited at the same time.
     #[must_use]
     pub(crate) fn longest(self, other: Self) -> Self {
-        Self(std::array::from_fn(|cause| {
-            self.0[cause].max(other.0[cause])
-        }))
+        Self(std::array::from_fn(|cause| self.0[cause].max(other.0[cause])))
     }
 
     /// The cause of the longest wait, with its time.
     #[must_use]
     pub(crate) fn main_cause(self) -> (PaceCause, Duration) {
         let waits = Self::CAUSES.into_iter().zip(self.0);
-        waits
-            .max_by_key(|(_, time)| *time)
-            .unwrap_or((PaceCause::Quota, Duration::ZERO))
+        waits.max_by_key(|(_, time)| *time).unwrap_or((PaceCause::Quota, Duration::ZERO))
     }
 }
 

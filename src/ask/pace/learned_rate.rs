@@ -1,10 +1,11 @@
 //! Request rate that an endpoint accepts, learned from its refusals: [`LearnedRate`].
 //!
-//! There is no rate before the first refusal. A refusal with a stated wait, or six refusals among the last ten answers, starts a pause
-//! of all requests. The time between two pauses is a phase. Its rate is measured when the following pause ends, not when it starts,
-//! because replies that were in flight then count too. The rate grows with time, not with successes: fast while it is a guess and far
-//! below the ceiling, slowly near the ceiling. A single refusal without a stated wait starts no pause: only its own trial is delayed.
-//! All constants were chosen by simulations of token buckets, fixed and sliding minutes, and random refusals.
+//! There is no rate before the first refusal. A refusal with a stated wait, or six refusals among the last ten answers,
+//! starts a pause of all requests. The time between two pauses is a phase. Its rate is measured when the following
+//! pause ends, not when it starts, because replies that were in flight then count too. The rate grows with time, not
+//! with successes: fast while it is a guess and far below the ceiling, slowly near the ceiling. A single refusal
+//! without a stated wait starts no pause: only its own trial is delayed. All constants were chosen by simulations of
+//! token buckets, fixed and sliding minutes, and random refusals.
 
 use std::collections::VecDeque;
 
@@ -27,7 +28,8 @@ const RELIABLE_SECONDS: f64 = 10.0;
 const SLOWDOWN_RELIABLE: f64 = 0.95;
 const SLOWDOWN_GUESSED: f64 = 0.6;
 
-/// Growth of the rate per second: for a guessed rate below [`FAR`] of the ceiling; for any rate below [`NEAR`] of it; above.
+/// Growth of the rate per second: for a guessed rate below [`FAR`] of the ceiling; for any rate below [`NEAR`] of it;
+/// above.
 const GROWTH: [f64; 3] = [0.6, 0.03, 0.003];
 const FAR: f64 = 0.8;
 const NEAR: f64 = 0.95;
@@ -35,8 +37,8 @@ const NEAR: f64 = 0.95;
 /// Factor of the rate while requests use the credit that accumulated at the server during a pause.
 const CATCH_UP: f64 = 3.0;
 
-/// Number of recent answers to inspect, and number of refusals among them that starts a pause without a stated wait. A server that
-/// refuses 5 % at random reaches it once in 300,000 answers.
+/// Number of recent answers to inspect, and number of refusals among them that starts a pause without a stated wait. A
+/// server that refuses 5 % at random reaches it once in 300,000 answers.
 const RECENT_ANSWERS: usize = 10;
 const MIN_REFUSALS: usize = 6;
 
@@ -173,7 +175,8 @@ impl LearnedRate {
                 self.burst = 0.0;
                 rate
             }
-            // A wait as short as one or two requests means that the rate is nearly right. A short phase reveals no ceiling.
+            // A wait as short as one or two requests means that the rate is nearly right. A short phase reveals no
+            // ceiling.
             Some(rate) if wait * rate < 2.0 => {
                 if phase >= 1.0 {
                     self.is_reliable = true;
@@ -182,11 +185,7 @@ impl LearnedRate {
                 SLOWDOWN_RELIABLE * rate
             }
             Some(rate) => {
-                let slower = if self.is_reliable {
-                    SLOWDOWN_RELIABLE
-                } else {
-                    SLOWDOWN_GUESSED
-                };
+                let slower = if self.is_reliable { SLOWDOWN_RELIABLE } else { SLOWDOWN_GUESSED };
                 self.ceiling = Some(rate);
                 self.is_reliable |= phase >= 1.0;
                 rate * slower
@@ -206,18 +205,15 @@ impl LearnedRate {
     /// Accepted requests per second in the last [`MEASURED_SECONDS`] before a pause.
     fn late_rate(&self, pause_start: Instant) -> f64 {
         let window = Duration::from_secs_f64(MEASURED_SECONDS);
-        self.recently_accepted
-            .iter()
-            .filter(|sent| pause_start.saturating_duration_since(**sent) < window)
-            .count() as f64
+        self.recently_accepted.iter().filter(|sent| pause_start.saturating_duration_since(**sent) < window).count()
+            as f64
             / MEASURED_SECONDS
     }
 
     /// True if a pause started less than a second after accumulated credit was used.
     fn used_credit_before(&self, pause_start: Instant) -> bool {
-        self.credit_used_at.is_some_and(|used_at| {
-            pause_start.saturating_duration_since(used_at) < Duration::from_secs(1)
-        })
+        self.credit_used_at
+            .is_some_and(|used_at| pause_start.saturating_duration_since(used_at) < Duration::from_secs(1))
     }
 
     /// Records that the request sent at `sent` was accepted.
@@ -236,14 +232,13 @@ impl LearnedRate {
         self.remember(false);
         self.consecutive_pauses = 0;
         if let Some(rate) = self.rate.filter(|_| self.pause.is_none()) {
-            let growth =
-                if !self.is_reliable && self.ceiling.is_none_or(|ceiling| rate < FAR * ceiling) {
-                    GROWTH[0]
-                } else if self.ceiling.is_none_or(|ceiling| rate < NEAR * ceiling) {
-                    GROWTH[1]
-                } else {
-                    GROWTH[2]
-                };
+            let growth = if !self.is_reliable && self.ceiling.is_none_or(|ceiling| rate < FAR * ceiling) {
+                GROWTH[0]
+            } else if self.ceiling.is_none_or(|ceiling| rate < NEAR * ceiling) {
+                GROWTH[1]
+            } else {
+                GROWTH[2]
+            };
             let seconds = (now - self.grown_at).as_secs_f64().min(1.0);
             self.rate = Some(rate * libm::pow(1.0 + growth, seconds));
         }
@@ -260,11 +255,7 @@ impl LearnedRate {
             }
             return;
         }
-        let refusals = self
-            .recent_answers
-            .iter()
-            .filter(|refused| **refused)
-            .count();
+        let refusals = self.recent_answers.iter().filter(|refused| **refused).count();
         if wait.is_none() && refusals < MIN_REFUSALS {
             if let Some(rate) = self.rate {
                 self.ceiling = Some(rate);
@@ -282,26 +273,15 @@ impl LearnedRate {
             return;
         };
         self.paused_until = self.paused_until.max(until);
-        self.pause = Some(Pause {
-            phase_start: self.phase_start,
-            start: now,
-            length,
-            rate: self.rate,
-        });
+        self.pause = Some(Pause { phase_start: self.phase_start, start: now, length, rate: self.rate });
     }
 
     /// Removes the limit if slower rates did not delay the last pauses: then the rate is not the cause of the refusals.
     fn check_cause(&mut self, wait: Option<Duration>) {
         let is_ineffective = self.rate.is_some()
             && wait.is_none()
-            && self
-                .accepted_before_pause
-                .is_some_and(|before| self.accepted < 2 * before);
-        self.ineffective_pauses = if is_ineffective {
-            self.ineffective_pauses + 1
-        } else {
-            0
-        };
+            && self.accepted_before_pause.is_some_and(|before| self.accepted < 2 * before);
+        self.ineffective_pauses = if is_ineffective { self.ineffective_pauses + 1 } else { 0 };
         self.accepted_before_pause = Some(self.accepted);
         if self.ineffective_pauses >= MAX_INEFFECTIVE_PAUSES {
             self.rate = None;

@@ -1,8 +1,9 @@
 //! The times at which requests are sent, and the number of requests in flight.
 //!
-//! All requests to one endpoint pass one [`Gate`]. It obeys the user's limits (`--rpm`, `--tpm`), the remaining limits that the
-//! server reports ([`RateLimits`]) and the pauses that the server asks for ([`retry_after()`]). The [`Window`] controls the number in
-//! flight independently: a long pause must not narrow the window, and a wide window must not shorten a pause.
+//! All requests to one endpoint pass one [`Gate`]. It obeys the user's limits (`--rpm`, `--tpm`), the remaining limits
+//! that the server reports ([`RateLimits`]) and the pauses that the server asks for ([`retry_after()`]). The [`Window`]
+//! controls the number in flight independently: a long pause must not narrow the window, and a wide window must not
+//! shorten a pause.
 
 mod gate;
 mod held_back;

@@ -1,4 +1,5 @@
-//! The user's limits per minute ([`Quota`]), and the requests of the last minute that count toward them ([`QuotaWindow`]).
+//! The user's limits per minute ([`Quota`]), and the requests of the last minute that count toward them
+//! ([`QuotaWindow`]).
 
 use std::collections::VecDeque;
 use std::num::NonZeroU32;
@@ -20,7 +21,8 @@ pub struct Quota {
     pub tokens: Option<NonZeroU32>,
 }
 
-/// Length of the sliding window of a quota: one minute, plus half a second of tolerance for clock and network differences.
+/// Length of the sliding window of a quota: one minute, plus half a second of tolerance for clock and network
+/// differences.
 const WINDOW: Duration = Duration::from_millis(60_500);
 
 /// Assumed number of tokens of a request until a reply reports one: an image and a letter.
@@ -31,7 +33,8 @@ pub(super) const MAX_TOKENS: f64 = 1e7;
 
 /// Sliding window of the requests and tokens of the last minute.
 ///
-/// In any 60 seconds of a run at most the quota is sent, whether or not requests fail. Quota that a pause leaves unused is lost.
+/// In any 60 seconds of a run at most the quota is sent, whether or not requests fail. Quota that a pause leaves unused
+/// is lost.
 #[derive(Debug)]
 pub(super) struct QuotaWindow {
     quota: Quota,
@@ -56,20 +59,12 @@ struct SentRequest {
 
 impl QuotaWindow {
     pub(super) fn new(quota: Quota, now: Instant) -> Self {
-        Self {
-            quota,
-            sent: VecDeque::new(),
-            tokens: 0.0,
-            largest: None,
-            next_at: now,
-        }
+        Self { quota, sent: VecDeque::new(), tokens: 0.0, largest: None, next_at: now }
     }
 
     /// Half of the quota on requests, in requests per second; 0 without a quota. A learned rate need not be lower.
     pub(super) fn half_rate(quota: Quota) -> f64 {
-        quota
-            .requests
-            .map_or(0.0, |max| f64::from(max.get()) / 120.0)
+        quota.requests.map_or(0.0, |max| f64::from(max.get()) / 120.0)
     }
 
     /// Earliest time at which the next request may be sent.
@@ -105,11 +100,7 @@ impl QuotaWindow {
             return;
         }
         let tokens = self.expected_tokens();
-        self.sent.push_back(SentRequest {
-            at: now,
-            tokens,
-            is_reported: false,
-        });
+        self.sent.push_back(SentRequest { at: now, tokens, is_reported: false });
         self.tokens += tokens;
         if let Some(max) = self.quota.requests {
             self.next_at = now + Duration::from_mins(1) / max.get();

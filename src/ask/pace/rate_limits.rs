@@ -5,8 +5,8 @@ use std::time::{Duration, SystemTime};
 use jiff::{SignedDuration, Timestamp};
 use reqwest::header::HeaderMap;
 
-/// Maximum time until the reset of a limit that spaces requests; chosen. Limits per minute reset within a minute. A limit per hour or day
-/// is a budget: requests need not be spread over the rest of the day.
+/// Maximum time until the reset of a limit that spaces requests; chosen. Limits per minute reset within a minute. A
+/// limit per hour or day is a budget: requests need not be spread over the rest of the day.
 const MAX_PERIOD: Duration = Duration::from_mins(2);
 
 /// One rate limit, in requests or in tokens.
@@ -38,16 +38,14 @@ pub(super) enum PaceAdvice {
 }
 
 impl RateLimits {
-    /// Reads the response headers `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and compatible servers),
-    /// `x-ratelimit-{limit,remaining,reset}` (OpenRouter, for requests) and
-    /// `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit without `remaining` or `reset` is ignored.
+    /// Reads the response headers `x-ratelimit-{limit,remaining,reset}-{requests,tokens}` (OpenAI and compatible
+    /// servers), `x-ratelimit-{limit,remaining,reset}` (OpenRouter, for requests) and
+    /// `anthropic-ratelimit-{requests,tokens}-{limit,remaining,reset}`. A limit without `remaining` or `reset` is
+    /// ignored.
     pub(crate) fn read(headers: &HeaderMap, now: SystemTime) -> Self {
         let limit_on = |kind: &str| {
-            rate_limit(headers, now, &|field| format!("x-ratelimit-{field}-{kind}")).or_else(|| {
-                rate_limit(headers, now, &|field| {
-                    format!("anthropic-ratelimit-{kind}-{field}")
-                })
-            })
+            rate_limit(headers, now, &|field| format!("x-ratelimit-{field}-{kind}"))
+                .or_else(|| rate_limit(headers, now, &|field| format!("anthropic-ratelimit-{kind}-{field}")))
         };
         Self {
             requests: limit_on("requests")
@@ -68,19 +66,13 @@ impl RateLimits {
 
     /// Advice for requests of `tokens` tokens each; the stricter limit decides.
     pub(super) fn advice(&self, tokens: f64) -> PaceAdvice {
-        let requests = self
-            .requests
-            .map_or(PaceAdvice::Nothing, |limit| limit.advice(1.0));
-        let tokens = self
-            .tokens
-            .map_or(PaceAdvice::Nothing, |limit| limit.advice(tokens));
+        let requests = self.requests.map_or(PaceAdvice::Nothing, |limit| limit.advice(1.0));
+        let tokens = self.tokens.map_or(PaceAdvice::Nothing, |limit| limit.advice(tokens));
         match (requests, tokens) {
             (PaceAdvice::Pause(a), PaceAdvice::Pause(b)) => PaceAdvice::Pause(a.max(b)),
             (PaceAdvice::Spacing(a), PaceAdvice::Spacing(b)) => PaceAdvice::Spacing(a.max(b)),
             (PaceAdvice::Pause(wait), _) | (_, PaceAdvice::Pause(wait)) => PaceAdvice::Pause(wait),
-            (PaceAdvice::Spacing(wait), _) | (_, PaceAdvice::Spacing(wait)) => {
-                PaceAdvice::Spacing(wait)
-            }
+            (PaceAdvice::Spacing(wait), _) | (_, PaceAdvice::Spacing(wait)) => PaceAdvice::Spacing(wait),
             (PaceAdvice::Nothing, PaceAdvice::Nothing) => PaceAdvice::Nothing,
         }
     }
@@ -91,11 +83,7 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
 }
 
 /// Reads a rate limit; `name` makes the name of a header from its field.
-fn rate_limit(
-    headers: &HeaderMap,
-    now: SystemTime,
-    name: &dyn Fn(&str) -> String,
-) -> Option<RateLimit> {
+fn rate_limit(headers: &HeaderMap, now: SystemTime, name: &dyn Fn(&str) -> String) -> Option<RateLimit> {
     let number = |field| text(headers, &name(field))?.parse::<f64>().ok();
     let remaining = number("remaining").filter(|n| n.is_finite())?;
     Some(RateLimit {
@@ -106,11 +94,12 @@ fn rate_limit(
 }
 
 impl RateLimit {
-    /// Advice for requests that each use `cost` of the limit: none above half of the limit, or if the limit resets after more than
-    /// [`MAX_PERIOD`]; otherwise the remaining amount is spread evenly over the time until reset.
+    /// Advice for requests that each use `cost` of the limit: none above half of the limit, or if the limit resets
+    /// after more than [`MAX_PERIOD`]; otherwise the remaining amount is spread evenly over the time until reset.
     ///
-    /// If the limit refills continuously (OpenAI), requests at half of the limit match the refill rate, and slow down below, so the
-    /// remaining amount settles at half. If it refills at the end of each minute, the remaining amount lasts until then.
+    /// If the limit refills continuously (OpenAI), requests at half of the limit match the refill rate, and slow down
+    /// below, so the remaining amount settles at half. If it refills at the end of each minute, the remaining amount
+    /// lasts until then.
     fn advice(self, cost: f64) -> PaceAdvice {
         if self.reset.is_zero() || self.limit.is_some_and(|limit| self.remaining > limit / 2.0) {
             return PaceAdvice::Nothing;
@@ -129,20 +118,14 @@ impl RateLimit {
 /// Smallest number that is a Unix timestamp in seconds; smaller numbers are durations in seconds.
 const MIN_TIMESTAMP: f64 = 1e9;
 
-/// Time until a reset, from a duration (`6m0s`, `17ms` or seconds) or a date (RFC 3339, or a Unix timestamp in seconds or
-/// milliseconds); zero for a date in the past, `None` for any other text.
+/// Time until a reset, from a duration (`6m0s`, `17ms` or seconds) or a date (RFC 3339, or a Unix timestamp in seconds
+/// or milliseconds); zero for a date in the past, `None` for any other text.
 fn time_until_reset(text: &str, now: SystemTime) -> Option<Duration> {
     if let Ok(number) = text.parse::<f64>() {
-        let seconds = Duration::try_from_secs_f64(if number >= MIN_TIMESTAMP * 1e3 {
-            number / 1e3
-        } else {
-            number
-        })
-        .ok()?;
+        let seconds =
+            Duration::try_from_secs_f64(if number >= MIN_TIMESTAMP * 1e3 { number / 1e3 } else { number }).ok()?;
         return if number >= MIN_TIMESTAMP {
-            SystemTime::UNIX_EPOCH
-                .checked_add(seconds)
-                .map(|date| time_until(now, date))
+            SystemTime::UNIX_EPOCH.checked_add(seconds).map(|date| time_until(now, date))
         } else {
             Some(seconds)
         };
@@ -192,11 +175,7 @@ mod tests {
             ("NaN", None),
             ("inf", None),
         ] {
-            assert_eq!(
-                time_until_reset(text, now),
-                ms.map(Duration::from_millis),
-                "{text}"
-            );
+            assert_eq!(time_until_reset(text, now), ms.map(Duration::from_millis), "{text}");
         }
     }
 
@@ -213,18 +192,9 @@ mod tests {
     fn remaining_requests_are_spread_until_reset() {
         assert_eq!(openai("499", "120ms"), PaceAdvice::Nothing);
         // 250 left of 500 a minute: the spacing matches the refill rate, one request in 120 ms.
-        assert_eq!(
-            openai("250", "30s"),
-            PaceAdvice::Spacing(Duration::from_millis(120))
-        );
-        assert_eq!(
-            openai("100", "48s"),
-            PaceAdvice::Spacing(Duration::from_millis(480))
-        );
-        assert_eq!(
-            openai("0", "1m0s"),
-            PaceAdvice::Pause(Duration::from_mins(1))
-        );
+        assert_eq!(openai("250", "30s"), PaceAdvice::Spacing(Duration::from_millis(120)));
+        assert_eq!(openai("100", "48s"), PaceAdvice::Spacing(Duration::from_millis(480)));
+        assert_eq!(openai("0", "1m0s"), PaceAdvice::Pause(Duration::from_mins(1)));
     }
 
     #[test]
@@ -234,14 +204,8 @@ mod tests {
             ("anthropic-ratelimit-tokens-remaining", "10000"),
             ("anthropic-ratelimit-tokens-reset", "2026-01-01T00:00:30Z"),
         ]);
-        assert_eq!(
-            tokens.advice(1000.0),
-            PaceAdvice::Spacing(Duration::from_secs(3))
-        );
-        assert_eq!(
-            tokens.advice(20_000.0),
-            PaceAdvice::Pause(Duration::from_secs(30))
-        );
+        assert_eq!(tokens.advice(1000.0), PaceAdvice::Spacing(Duration::from_secs(3)));
+        assert_eq!(tokens.advice(20_000.0), PaceAdvice::Pause(Duration::from_secs(30)));
     }
 
     #[test]
@@ -263,19 +227,13 @@ mod tests {
         let none = Duration::from_hours(24);
         assert_eq!(groq("0", "24h0m0s"), PaceAdvice::Pause(none));
         // The same numbers as a limit per minute.
-        assert_eq!(
-            groq("100", "50s"),
-            PaceAdvice::Spacing(Duration::from_millis(500))
-        );
+        assert_eq!(groq("100", "50s"), PaceAdvice::Spacing(Duration::from_millis(500)));
     }
 
     #[test]
     fn limit_without_reset_is_ignored() {
         assert_eq!(
-            read(&[
-                ("x-ratelimit-limit-requests", "500"),
-                ("x-ratelimit-remaining-requests", "400")
-            ]),
+            read(&[("x-ratelimit-limit-requests", "500"), ("x-ratelimit-remaining-requests", "400")]),
             RateLimits::default()
         );
     }

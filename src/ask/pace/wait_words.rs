@@ -40,8 +40,8 @@ const WAIT_PHRASES: [&str; 25] = [
 /// Pattern of one number with a unit, in English and in the languages of [`WAIT_PHRASES`].
 const NUMBER_WITH_UNIT: &str = r"(\d+(?:[.,]\d+)?)\s*(milliseconds?|ms|minut(?:es?|os?|en|i)|mins?|минут\w*|hours?|hrs?|heures?|horas?|stunden?|час\w*|days?|jours?|días?|tagen?|seconds?|secs?|sekunden?|segundos?|secondes?|secondi|секунд\w*|分钟|分鐘|小时|小時|時間|시간|秒|초|분|分|天|d|h|m|s)";
 
-/// Matches a preposition and the duration that follows, such as `1h2m3.5s`, `250ms`, `6 seconds` or `1 minute and 3 seconds`. Group 1 is
-/// the duration.
+/// Matches a preposition and the duration that follows, such as `1h2m3.5s`, `250ms`, `6 seconds` or `1 minute and 3
+/// seconds`. Group 1 is the duration.
 static DURATION: LazyLock<Regex> = LazyLock::new(|| {
     compiled(&format!(
         r"(?i)\b(?:in|after|for|within|wait|retry-after:?|en|dans|nach|em|tra|fra|через)\s+(?:about\s+)?((?:{NUMBER_WITH_UNIT}[,\s]*(?:and\s+)?)+)"
@@ -49,19 +49,16 @@ static DURATION: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// Matches a duration with Chinese, Japanese or Korean units, which need no preposition. Group 1 is the duration.
-static CJK_DURATION: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(r"((?:\d+(?:\.\d+)?\s*(?:分钟|分鐘|小时|小時|時間|시간|秒|초|분|分|天)\s*)+)")
-});
+static CJK_DURATION: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"((?:\d+(?:\.\d+)?\s*(?:分钟|分鐘|小时|小時|時間|시간|秒|초|분|分|天)\s*)+)"));
 
 /// Matches one number and its unit. Group 1 is the number, group 2 the unit.
-static NUMBER_AND_UNIT: LazyLock<Regex> =
-    LazyLock::new(|| compiled(&format!("(?i){NUMBER_WITH_UNIT}")));
+static NUMBER_AND_UNIT: LazyLock<Regex> = LazyLock::new(|| compiled(&format!("(?i){NUMBER_WITH_UNIT}")));
 
-/// Matches a duration such as `00:12:34`, or `1.02:03:04` with days, behind a preposition. The groups are days, hours, minutes and seconds.
+/// Matches a duration such as `00:12:34`, or `1.02:03:04` with days, behind a preposition. The groups are days, hours,
+/// minutes and seconds.
 static CLOCK: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(
-        r"(?i)\b(?:in|after|for|within|wait|retry-after:?)\s+(?:(\d+)\.)?(\d{1,3}):([0-5]\d):([0-5]\d)\b",
-    )
+    compiled(r"(?i)\b(?:in|after|for|within|wait|retry-after:?)\s+(?:(\d+)\.)?(\d{1,3}):([0-5]\d):([0-5]\d)\b")
 });
 
 /// Matches a duration of ISO 8601, such as `PT12M`.
@@ -72,7 +69,8 @@ static ISO_DURATION: LazyLock<Regex> =
 static BARE_SECONDS: LazyLock<Regex> =
     LazyLock::new(|| compiled(r"(?i)\bretry[-_ ]?after\s*[:=]\s*(\d+(?:\.\d+)?)(?:[\s.,;)]|$)"));
 
-/// Matches a point in time with its zone, of RFC 3339 or in seconds or milliseconds since 1970, behind a preposition. Group 1 is the time.
+/// Matches a point in time with its zone, of RFC 3339 or in seconds or milliseconds since 1970, behind a preposition.
+/// Group 1 is the time.
 static MOMENT: LazyLock<Regex> = LazyLock::new(|| {
     compiled(
         r"(?i)\b(?:at|until|after|on|is|by)\s*:?\s*(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:\.\d+)?\s?(?:Z|UTC|GMT|[+-]\d\d:?\d\d)|1\d{9}(?:\d{3})?)\b",
@@ -113,65 +111,34 @@ fn wait_in_sentence(sentence: &str, now: Timestamp) -> Option<Duration> {
         .filter(|found| {
             // Skip a match that ends inside a word: “in 2 months” is not two minutes.
             let next_char = sentence[found.end()..].chars().next();
-            found.as_str().ends_with(char::is_whitespace)
-                || !next_char.is_some_and(char::is_alphabetic)
+            found.as_str().ends_with(char::is_whitespace) || !next_char.is_some_and(char::is_alphabetic)
         })
         .chain(CJK_DURATION.find_iter(sentence))
         .filter_map(|found| parse_duration(found.as_str()));
     let clocks = CLOCK.captures_iter(sentence).filter_map(|captures| {
-        let part = |group: usize| {
-            captures
-                .get(group)
-                .and_then(|part| part.as_str().parse().ok())
-        };
-        let [days, hours, minutes, seconds] =
-            [1, 2, 3, 4].map(|group| part(group).unwrap_or(0_u64));
-        nonzero(Duration::from_secs(
-            days * 86_400 + hours * 3600 + minutes * 60 + seconds,
-        ))
+        let part = |group: usize| captures.get(group).and_then(|part| part.as_str().parse().ok());
+        let [days, hours, minutes, seconds] = [1, 2, 3, 4].map(|group| part(group).unwrap_or(0_u64));
+        nonzero(Duration::from_secs(days * 86_400 + hours * 3600 + minutes * 60 + seconds))
     });
-    let iso = ISO_DURATION
-        .find_iter(sentence)
-        .filter_map(|found| iso_duration(found.as_str()));
-    let bare = BARE_SECONDS
-        .captures_iter(sentence)
-        .filter_map(|captures| seconds(&captures[1]));
-    let moments = MOMENT
-        .captures_iter(sentence)
-        .filter_map(|captures| until(&captures[1], now));
-    durations
-        .chain(clocks)
-        .chain(iso)
-        .chain(bare)
-        .chain(moments)
-        .max()
+    let iso = ISO_DURATION.find_iter(sentence).filter_map(|found| iso_duration(found.as_str()));
+    let bare = BARE_SECONDS.captures_iter(sentence).filter_map(|captures| seconds(&captures[1]));
+    let moments = MOMENT.captures_iter(sentence).filter_map(|captures| until(&captures[1], now));
+    durations.chain(clocks).chain(iso).chain(bare).chain(moments).max()
 }
 
-/// Wait in a field of an error or a header embedded in it, by its name: `retry_after`, `retryAfterMs`, `estimated_time`, `reset_at`. A value
-/// is a number of seconds (milliseconds if the name ends so), a duration or a moment. `None` for other fields and without a wait.
+/// Wait in a field of an error or a header embedded in it, by its name: `retry_after`, `retryAfterMs`,
+/// `estimated_time`, `reset_at`. A value is a number of seconds (milliseconds if the name ends so), a duration or a
+/// moment. `None` for other fields and without a wait.
 pub(crate) fn wait_in_field(name: &str, value: &str) -> Option<Duration> {
     wait_in_field_at(name, value, Timestamp::now())
 }
 
 fn wait_in_field_at(name: &str, value: &str, now: Timestamp) -> Option<Duration> {
-    let name: String = name
-        .chars()
-        .filter(char::is_ascii_alphanumeric)
-        .map(|c| c.to_ascii_lowercase())
-        .collect();
-    let is_wait = [
-        "retryafter",
-        "retrydelay",
-        "retryin",
-        "waitseconds",
-        "estimatedtime",
-        "resetafter",
-        "resetin",
-    ]
-    .iter()
-    .any(|known| name.contains(known));
-    let is_moment =
-        name.contains("resetat") || name.contains("resetsat") || name.ends_with("reset");
+    let name: String = name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+    let is_wait = ["retryafter", "retrydelay", "retryin", "waitseconds", "estimatedtime", "resetafter", "resetin"]
+        .iter()
+        .any(|known| name.contains(known));
+    let is_moment = name.contains("resetat") || name.contains("resetsat") || name.ends_with("reset");
     let value = value.trim();
     if !(is_wait || is_moment) {
         return None;
@@ -197,9 +164,7 @@ fn is_duration(text: &str) -> bool {
 fn until(moment: &str, now: Timestamp) -> Option<Duration> {
     let moment = moment.trim();
     let timestamp = match moment.parse::<i64>() {
-        Ok(number) if (1_000_000_000..10_000_000_000).contains(&number) => {
-            Timestamp::from_second(number).ok()?
-        }
+        Ok(number) if (1_000_000_000..10_000_000_000).contains(&number) => Timestamp::from_second(number).ok()?,
         Ok(number) if (1_000_000_000_000..10_000_000_000_000).contains(&number) => {
             Timestamp::from_millisecond(number).ok()?
         }
@@ -208,10 +173,7 @@ fn until(moment: &str, now: Timestamp) -> Option<Duration> {
             let zoned = ["UTC", "GMT"]
                 .iter()
                 .find_map(|zone| moment.strip_suffix(zone))
-                .map_or_else(
-                    || moment.to_owned(),
-                    |local| format!("{}Z", local.trim_end()),
-                );
+                .map_or_else(|| moment.to_owned(), |local| format!("{}Z", local.trim_end()));
             zoned.parse().ok()?
         }
     };
@@ -226,16 +188,12 @@ fn iso_duration(text: &str) -> Option<Duration> {
     let span: Span = text.parse().ok()?;
     // A day has 24 hours here.
     let seconds = span.total(jiff::SpanTotal::from(jiff::Unit::Second).days_are_24_hours());
-    Duration::try_from_secs_f64(seconds.ok()?)
-        .ok()
-        .and_then(nonzero)
+    Duration::try_from_secs_f64(seconds.ok()?).ok().and_then(nonzero)
 }
 
 /// Parses a positive number of seconds.
 fn seconds(text: &str) -> Option<Duration> {
-    Duration::try_from_secs_f64(text.parse().ok()?)
-        .ok()
-        .and_then(nonzero)
+    Duration::try_from_secs_f64(text.parse().ok()?).ok().and_then(nonzero)
 }
 
 fn nonzero(wait: Duration) -> Option<Duration> {
@@ -293,10 +251,7 @@ mod tests {
             ("RETRY AFTER 250 ms", 0.25),
             ("Please try again in 1 day and 2 hours.", 93_600.0),
             ("Retry in 5s. Retry in 9s.", 9.0),
-            (
-                "Out of call volume quota. Quota will be replenished in 00:12:34.",
-                754.0,
-            ),
+            ("Out of call volume quota. Quota will be replenished in 00:12:34.", 754.0),
             ("Quota resets in 1.00:00:10.", 86_410.0),
             ("Quota will be renewed in 754 seconds", 754.0),
             ("Try again after PT12M.", 720.0),
@@ -315,10 +270,7 @@ mod tests {
         ] {
             let now = "2026-11-29T10:00:00Z".parse().unwrap();
             let found = wait_in_words_at(text, now).map(|wait| wait.as_secs_f64());
-            assert!(
-                found.is_some_and(|found| (found - seconds).abs() < 1e-9),
-                "{text}: {found:?}"
-            );
+            assert!(found.is_some_and(|found| (found - seconds).abs() < 1e-9), "{text}: {found:?}");
         }
     }
 

@@ -17,24 +17,17 @@ pub struct ConcurrencyBounds {
 
 impl ConcurrencyBounds {
     /// The default, `auto`: from 8 up to 32 while replies do not get slower, down to 1 if the server is overloaded.
-    pub const DEFAULT: Self = Self {
-        min: NonZeroUsize::MIN,
-        initial: NonZeroUsize::new(8).unwrap(),
-        max: NonZeroUsize::new(32).unwrap(),
-    };
+    pub const DEFAULT: Self =
+        Self { min: NonZeroUsize::MIN, initial: NonZeroUsize::new(8).unwrap(), max: NonZeroUsize::new(32).unwrap() };
 
-    /// Bounds for each of `count` replicas, so that these bounds apply to all replicas together, with at least one request each. The
-    /// default bounds are not divided: each replica gets them whole.
+    /// Bounds for each of `count` replicas, so that these bounds apply to all replicas together, with at least one
+    /// request each. The default bounds are not divided: each replica gets them whole.
     #[must_use]
     pub(crate) fn per_replica(self, count: usize) -> Self {
         if self == Self::DEFAULT {
             return self;
         }
-        Self {
-            min: share(count, self.min),
-            initial: share(count, self.initial),
-            max: share(count, self.max),
-        }
+        Self { min: share(count, self.min), initial: share(count, self.initial), max: share(count, self.max) }
     }
 
     /// The maximum number of requests in flight.
@@ -50,11 +43,7 @@ fn share(count: usize, number: NonZeroUsize) -> NonZeroUsize {
 
 impl fmt::Display for ConcurrencyBounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if self.initial == self.max {
-            write!(f, "{}", self.max)
-        } else {
-            write!(f, "{}-{}", self.initial, self.max)
-        }
+        if self.initial == self.max { write!(f, "{}", self.max) } else { write!(f, "{}-{}", self.initial, self.max) }
     }
 }
 
@@ -69,11 +58,9 @@ impl FromStr for ConcurrencyBounds {
         let is_range = text.contains('-');
         let (initial, max) = text.split_once('-').unwrap_or((text, text));
         match (initial.trim().parse::<NonZeroUsize>(), max.trim().parse()) {
-            (Ok(initial), Ok(max)) if initial <= max => Ok(Self {
-                min: if is_range { initial } else { NonZeroUsize::MIN },
-                initial,
-                max,
-            }),
+            (Ok(initial), Ok(max)) if initial <= max => {
+                Ok(Self { min: if is_range { initial } else { NonZeroUsize::MIN }, initial, max })
+            }
             _ => Err("a number of requests from 1 on, or a range like 4-64, expected".to_owned()),
         }
     }
@@ -82,15 +69,15 @@ impl FromStr for ConcurrencyBounds {
 /// Factor by which an overload narrows the window; chosen.
 const DECREASE: f64 = 0.7;
 
-/// Ratio of a round's mean reply time to the fastest round's from which the window stays: the server only queues further requests.
-/// Chosen.
+/// Ratio of a round's mean reply time to the fastest round's from which the window stays: the server only queues
+/// further requests. Chosen.
 const QUEUEING_RATIO: f64 = 1.5;
 
-/// Window of requests in flight at an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989, Comput. Netw. ISDN Syst.
-/// 17:1).
+/// Window of requests in flight at an endpoint: additive increase, multiplicative decrease (Chiu and Jain 1989,
+/// Comput. Netw. ISDN Syst. 17:1).
 ///
-/// Each round of successes widens it by one request while replies do not get slower. An overload (429, 503, 529, a timeout)
-/// narrows it by 30 %, once for all requests in flight at that time.
+/// Each round of successes widens it by one request while replies do not get slower. An overload (429, 503, 529, a
+/// timeout) narrows it by 30 %, once for all requests in flight at that time.
 #[derive(Debug)]
 pub(crate) struct Window {
     bounds: ConcurrencyBounds,

@@ -26,8 +26,8 @@ pub(crate) fn blind(question: &str) -> String {
     fill(BLIND.trim(), &[("question", question)])
 }
 
-/// Extracts the answer from a blind model's reply, as upstream's `parse_output`: the rest of the line after the first "A:", without any
-/// further "A:". `None` for a reply without "A:", which is an error upstream.
+/// Extracts the answer from a blind model's reply, as upstream's `parse_output`: the rest of the line after the first
+/// "A:", without any further "A:". `None` for a reply without "A:", which is an error upstream.
 #[must_use]
 pub(crate) fn blind_answer(reply: &str) -> Option<String> {
     let (_, after) = reply.split_once("A:")?;
@@ -35,20 +35,11 @@ pub(crate) fn blind_answer(reply: &str) -> Option<String> {
     Some(line.replace("A:", "").trim().to_owned())
 }
 
-/// Prompt that asks the judge to rate `prediction` against the reference `answer`. Extra answers, even an empty list, select another
-/// template.
+/// Prompt that asks the judge to rate `prediction` against the reference `answer`. Extra answers, even an empty list,
+/// select another template.
 #[must_use]
-pub(crate) fn judge_prompt(
-    question: &str,
-    answer: &str,
-    extra: Option<&[String]>,
-    prediction: &str,
-) -> String {
-    let values = [
-        ("question", question),
-        ("answer", answer),
-        ("prediction", prediction),
-    ];
+pub(crate) fn judge_prompt(question: &str, answer: &str, extra: Option<&[String]>, prediction: &str) -> String {
+    let values = [("question", question), ("answer", answer), ("prediction", prediction)];
     match extra {
         None => fill(MATCH.trim(), &values),
         Some(extra) => {
@@ -59,7 +50,8 @@ pub(crate) fn judge_prompt(
     }
 }
 
-/// Fills the `{name}` fields of a template, as Python's `str.format`. Braces in a value are plain text, and unknown names are dropped.
+/// Fills the `{name}` fields of a template, as Python's `str.format`. Braces in a value are plain text, and unknown
+/// names are dropped.
 fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut text = String::new();
     let mut rest = template;
@@ -82,17 +74,14 @@ fn python_list(texts: &[String]) -> String {
     format!("[{}]", texts.join(", "))
 }
 
-/// Matches one character that Python's `str.isprintable` rejects: the categories "Other" and "Separator", except the space.
-static UNPRINTABLE: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new(r"^[\p{C}\p{Z}--\x20]$").ok());
+/// Matches one character that Python's `str.isprintable` rejects: the categories "Other" and "Separator", except the
+/// space.
+static UNPRINTABLE: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(r"^[\p{C}\p{Z}--\x20]$").ok());
 
-/// Formats a string as Python's `repr`: in single quotes, or in double quotes if it has a single quote and no double quote.
+/// Formats a string as Python's `repr`: in single quotes, or in double quotes if it has a single quote and no double
+/// quote.
 fn python_repr(text: &str) -> String {
-    let quote = if text.contains('\'') && !text.contains('"') {
-        '"'
-    } else {
-        '\''
-    };
+    let quote = if text.contains('\'') && !text.contains('"') { '"' } else { '\'' };
     let mut printed = String::from(quote);
     for c in text.chars() {
         match c {
@@ -124,10 +113,7 @@ fn escape(code: u32) -> String {
 fn is_unprintable(c: char) -> bool {
     let mut buffer = [0; 4];
     let text: &str = c.encode_utf8(&mut buffer);
-    !c.is_ascii_graphic()
-        && UNPRINTABLE
-            .as_ref()
-            .is_some_and(|pattern| pattern.is_match(text))
+    !c.is_ascii_graphic() && UNPRINTABLE.as_ref().is_some_and(|pattern| pattern.is_match(text))
 }
 
 #[cfg(test)]
@@ -149,10 +135,7 @@ mod tests {
         ("\u{a0}nbsp", "'\u{5c}xa0nbsp'"),
         ("\u{200b}zero", "'\u{5c}u200bzero'"),
         ("\u{ad}", "'\u{5c}xad'"),
-        (
-            "\u{0}\u{1f}\u{7f}\u{85}",
-            "'\u{5c}x00\u{5c}x1f\u{5c}x7f\u{5c}x85'",
-        ),
+        ("\u{0}\u{1f}\u{7f}\u{85}", "'\u{5c}x00\u{5c}x1f\u{5c}x7f\u{5c}x85'"),
         ("\u{1f600}", "'\u{1f600}'"),
         ("\u{e0001}", "'\u{5c}U000e0001'"),
         ("\u{2028}", "'\u{5c}u2028'"),
@@ -165,18 +148,8 @@ mod tests {
     #[test]
     fn template_lengths_match_upstream() {
         // Sizes in bytes of the trimmed files at cfa3fce.
-        for (template, bytes) in [
-            (VISION, 321),
-            (BLIND, 613),
-            (MATCH, 669),
-            (MATCH_EXTRA, 997),
-        ] {
-            assert_eq!(
-                template.trim().len(),
-                bytes,
-                "{}",
-                Digest::from_bytes(template.as_bytes())
-            );
+        for (template, bytes) in [(VISION, 321), (BLIND, 613), (MATCH, 669), (MATCH_EXTRA, 997)] {
+            assert_eq!(template.trim().len(), bytes, "{}", Digest::from_bytes(template.as_bytes()));
         }
     }
 
@@ -207,11 +180,7 @@ mod tests {
     #[test]
     fn judge_prompt_keeps_braces_of_values() {
         let plain = judge_prompt("Q {prediction}", "it's", None, "{answer}");
-        assert!(
-            plain.ends_with(
-                "Your Turn:\nQuestion: Q {prediction}\nAnswer: it's\nResponse: {answer}"
-            )
-        );
+        assert!(plain.ends_with("Your Turn:\nQuestion: Q {prediction}\nAnswer: it's\nResponse: {answer}"));
     }
 
     #[test]

@@ -34,15 +34,13 @@ impl Prompts {
     /// Reads the prompts in a folder; the built-in prompts replace missing ones.
     ///
     /// # Errors
-    /// If the folder has no prompt, if it contains a file that is not a prompt, README.md or a hidden file, or if a template is invalid or
-    /// omits the question or a choice.
+    /// If the folder has no prompt, if it contains a file that is not a prompt, README.md or a hidden file, or if a
+    /// template is invalid or omits the question or a choice.
     pub fn load(dir: &Path) -> Result<Self> {
         let mut sources = Sources::default();
         let mut found = false;
         for entry in fs::read_dir(dir).map_err(|error| Error::file(dir, "read", error))? {
-            let path = entry
-                .map_err(|error| Error::file(dir, "read", error))?
-                .path();
+            let path = entry.map_err(|error| Error::file(dir, "read", error))?.path();
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             let source = match &*name {
                 CHOICE => &mut sources.choice,
@@ -61,10 +59,7 @@ impl Prompts {
             found = true;
         }
         if !found {
-            return Err(prompt_error(
-                &dir.display().to_string(),
-                "the folder holds neither choice.txt nor blind.txt",
-            ));
+            return Err(prompt_error(&dir.display().to_string(), "the folder holds neither choice.txt nor blind.txt"));
         }
         Self::new(sources)
     }
@@ -75,9 +70,7 @@ impl Prompts {
         templates.set_auto_escape_callback(|_| AutoEscape::None);
         let digest = Digest::from_parts([sources.choice.as_bytes(), sources.blind.as_bytes()]);
         for (name, source) in [(CHOICE, sources.choice), (BLIND, sources.blind)] {
-            templates
-                .add_template_owned(name, source)
-                .map_err(|error| prompt_error(name, error))?;
+            templates.add_template_owned(name, source).map_err(|error| prompt_error(name, error))?;
         }
         let prompts = Self { templates, digest };
         let sample = sample_question()?;
@@ -96,18 +89,16 @@ impl Prompts {
     /// Renders the prompt for one question. The texts of the question and the choices are inserted unchanged.
     ///
     /// # Errors
-    /// If the template fails, or if the prompt omits the question or a choice: its reply would cost money and measure nothing.
+    /// If the template fails, or if the prompt omits the question or a choice: its reply would cost money and measure
+    /// nothing.
     pub fn render(&self, view: View, question: &Question) -> Result<String> {
         let name = match view {
             View::Image => CHOICE,
             View::Blind => BLIND,
         };
         let texts = question.choices.texts();
-        let choices: Vec<Value> = (0..)
-            .map(letter)
-            .zip(texts)
-            .map(|(letter, text)| context! { letter => letter, text => text })
-            .collect();
+        let choices: Vec<Value> =
+            (0..).map(letter).zip(texts).map(|(letter, text)| context! { letter => letter, text => text }).collect();
         let values = context! { question => question.text.as_str(), choices => choices };
         let rendered = self
             .templates
@@ -115,10 +106,7 @@ impl Prompts {
             .and_then(|template| template.render(values))
             .map_err(|error| prompt_error(name, error))?;
         if !rendered.contains(&question.text) {
-            return Err(prompt_error(
-                name,
-                "the question does not occur in it; write {{ question }} where it belongs",
-            ));
+            return Err(prompt_error(name, "the question does not occur in it; write {{ question }} where it belongs"));
         }
         if let Some(text) = texts.iter().find(|text| !rendered.contains(*text)) {
             return Err(prompt_error(
@@ -148,10 +136,7 @@ impl Default for Sources {
 }
 
 fn prompt_error(name: &str, problem: impl std::fmt::Display) -> Error {
-    Error::Prompt {
-        name: name.to_owned(),
-        problem: problem.to_string(),
-    }
+    Error::Prompt { name: name.to_owned(), problem: problem.to_string() }
 }
 
 /// Question that checks templates: its texts are so unusual that no template contains them by chance.
@@ -174,11 +159,7 @@ mod tests {
 
     fn question(text: &str, choices: &[&str]) -> Question {
         let texts = choices.iter().map(|&text| text.to_owned()).collect();
-        Question {
-            text: text.into(),
-            choices: Choices::new(texts, 0).unwrap(),
-            ..sample_question().unwrap()
-        }
+        Question { text: text.into(), choices: Choices::new(texts, 0).unwrap(), ..sample_question().unwrap() }
     }
 
     fn load(files: &[(&str, &str)]) -> Result<Prompts> {
@@ -201,10 +182,7 @@ mod tests {
         assert!(blind.starts_with("What type of room is this?\nA. Kitchen\nB. Bedroom\nThe image"));
         assert!(blind.ends_with("directly."));
         let line = regex::Regex::new(r"(?m)^\s*\(?([A-Z])[.):]\s*(.+?)\s*$").unwrap();
-        let lines: Vec<_> = line
-            .captures_iter(&blind)
-            .map(|c| [c[1].to_owned(), c[2].to_owned()])
-            .collect();
+        let lines: Vec<_> = line.captures_iter(&blind).map(|c| [c[1].to_owned(), c[2].to_owned()]).collect();
         assert_eq!(lines, [["A", "Kitchen"], ["B", "Bedroom"]]);
     }
 
@@ -218,10 +196,7 @@ mod tests {
         for view in [View::Image, View::Blind] {
             let rendered = prompts.render(view, &hostile).unwrap();
             assert!(rendered.starts_with(&hostile.text));
-            assert!(
-                rendered.contains("A. {{ question }}\nB. a & b\nC. {# gone #}\n"),
-                "{rendered}"
-            );
+            assert!(rendered.contains("A. {{ question }}\nB. a & b\nC. {# gone #}\n"), "{rendered}");
         }
     }
 
@@ -230,15 +205,9 @@ mod tests {
         let own = "Q: {{ question }}\r\n{% for c in choices %}({{ c.letter }}) {{ c.text }}\r\n{% endfor %}";
         let prompts = load(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
         let asked = question("Red?", &["yes", "no"]);
-        assert_eq!(
-            prompts.render(View::Image, &asked).unwrap(),
-            "Q: Red?\n(A) yes\n(B) no\n"
-        );
+        assert_eq!(prompts.render(View::Image, &asked).unwrap(), "Q: Red?\n(A) yes\n(B) no\n");
         let built_in = Prompts::built_in().unwrap();
-        assert_eq!(
-            prompts.render(View::Blind, &asked).unwrap(),
-            built_in.render(View::Blind, &asked).unwrap()
-        );
+        assert_eq!(prompts.render(View::Blind, &asked).unwrap(), built_in.render(View::Blind, &asked).unwrap());
         assert_ne!(prompts.digest(), built_in.digest());
     }
 
@@ -251,16 +220,10 @@ mod tests {
             (vec![("choice.txt", choices)], "question"),
             (vec![("blind.txt", "{{ question }}")], "sample-choice-1"),
             (
-                vec![(
-                    "choice.txt",
-                    "{{ question }}{% for c in choices[:4] %}{{ c.text }}{% endfor %}",
-                )],
+                vec![("choice.txt", "{{ question }}{% for c in choices[:4] %}{{ c.text }}{% endfor %}")],
                 "sample-choice-5",
             ),
-            (
-                vec![("choice.txt", "{{ question }}{{ choice }}")],
-                "undefined",
-            ),
+            (vec![("choice.txt", "{{ question }}{{ choice }}")], "undefined"),
             (vec![("choice.txt", "{% for %}")], "choice.txt"),
         ] {
             let error = load(&files).unwrap_err().to_string();

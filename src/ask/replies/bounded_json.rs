@@ -1,7 +1,8 @@
 //! Parsing of JSON from a server with bounded memory: [`parse`].
 //!
-//! A body of 16 MB of small objects would take 1.5 GB as a tree of values, and no reply needs so many. Lists and objects are read to their
-//! end, but values beyond the bounds are dropped, so that a field after a long list is still found.
+//! A body of 16 MB of small objects would take 1.5 GB as a tree of values, and no reply needs so many. Lists and
+//! objects are read to their end, but values beyond the bounds are dropped, so that a field after a long list is still
+//! found.
 
 use std::cell::Cell;
 use std::fmt;
@@ -22,11 +23,7 @@ pub(crate) const MAX_ITEMS: usize = 10_000;
 /// # Errors
 /// If the text is not a single complete JSON value.
 pub(crate) fn parse(text: &str) -> serde_json::Result<Value> {
-    parse_valid(text).or_else(|error| {
-        repaired(text)
-            .and_then(|text| parse_valid(&text).ok())
-            .ok_or(error)
-    })
+    parse_valid(text).or_else(|error| repaired(text).and_then(|text| parse_valid(&text).ok()).ok_or(error))
 }
 
 /// Parses a text that is one valid JSON value.
@@ -45,9 +42,7 @@ pub(crate) fn parse_start(text: &str) -> serde_json::Result<Value> {
     bounded(&mut serde_json::Deserializer::from_str(text))
 }
 
-fn bounded<'j>(
-    json: impl Deserializer<'j, Error = serde_json::Error>,
-) -> serde_json::Result<Value> {
+fn bounded<'j>(json: impl Deserializer<'j, Error = serde_json::Error>) -> serde_json::Result<Value> {
     let left = Cell::new(MAX_VALUES);
     Bounded { left: &left }.deserialize(json)
 }
@@ -151,10 +146,7 @@ mod tests {
             " 7 ",
             r#"{"a":1,"a":2}"#,
         ] {
-            assert_eq!(
-                parse(text).unwrap(),
-                serde_json::from_str::<Value>(text).unwrap()
-            );
+            assert_eq!(parse(text).unwrap(), serde_json::from_str::<Value>(text).unwrap());
         }
         for text in ["", "{", "[1,]", "{} x", "[1e999]", "nul"] {
             let expected = serde_json::from_str::<Value>(text).unwrap_err();

@@ -3,12 +3,12 @@
 /// Numbers that Python writes and JSON does not have.
 const NON_NUMBERS: [&[u8]; 3] = [b"NaN", b"Infinity", b"-Infinity"];
 
-/// The JSON text with every unpaired surrogate escape (`\ud800`–`\udfff`) replaced by `\ufffd`, and every `NaN` and `Infinity` outside of
-/// strings by `null`; `None` if nothing was replaced.
+/// The JSON text with every unpaired surrogate escape (`\ud800`–`\udfff`) replaced by `\ufffd`, and every `NaN` and
+/// `Infinity` outside of strings by `null`; `None` if nothing was replaced.
 ///
-/// Servers that cut a reply inside an emoji send unpaired surrogates. The grammar of JSON allows them (RFC 8259, section 8.2), but a
-/// Rust string cannot contain them. Servers in Python send log probabilities that are no numbers. Without the repair, a paid reply would be
-/// lost.
+/// Servers that cut a reply inside an emoji send unpaired surrogates. The grammar of JSON allows them (RFC 8259,
+/// section 8.2), but a Rust string cannot contain them. Servers in Python send log probabilities that are no numbers.
+/// Without the repair, a paid reply would be lost.
 pub(crate) fn repaired(json: &str) -> Option<String> {
     let bytes = json.as_bytes();
     let mut text = String::new();
@@ -42,14 +42,11 @@ pub(crate) fn repaired(json: &str) -> Option<String> {
     Some(text)
 }
 
-/// Length of the escape at a byte position, a whole surrogate pair included, and its replacement if it is an unpaired surrogate.
+/// Length of the escape at a byte position, a whole surrogate pair included, and its replacement if it is an unpaired
+/// surrogate.
 fn escape(bytes: &[u8], position: usize) -> (usize, Option<&'static str>) {
     match utf16_unit(bytes, position) {
-        Some(0xD800..=0xDBFF)
-            if matches!(utf16_unit(bytes, position + 6), Some(0xDC00..=0xDFFF)) =>
-        {
-            (12, None)
-        }
+        Some(0xD800..=0xDBFF) if matches!(utf16_unit(bytes, position + 6), Some(0xDC00..=0xDFFF)) => (12, None),
         Some(0xD800..=0xDFFF) => (6, Some("\\ufffd")),
         // Other escapes: the backslash and the byte after it, which may be a backslash or a quotation mark.
         _ => (2, None),
@@ -71,10 +68,7 @@ mod tests {
     fn only_unpaired_surrogates_are_replaced() {
         for (json, expected) in [
             (r#""B \ud83d""#, Some(r#""B \ufffd""#)),
-            (
-                r#""\udc00\ud83d\ud83d\ude00""#,
-                Some(r#""\ufffd\ufffd\ud83d\ude00""#),
-            ),
+            (r#""\udc00\ud83d\ud83d\ude00""#, Some(r#""\ufffd\ufffd\ud83d\ude00""#)),
             (r#""\ud83d\ude00 \\ud83d \n""#, None),
             (r#""\ud83""#, None),
             (r#""NaN \" NaN""#, None),

@@ -45,13 +45,8 @@ impl<'a> Query<'a> {
         match self {
             Self::Choice(question) => Ok(question),
             Self::Open(id) => {
-                let message =
-                    format!("question {id} has no choices, and this model can only choose");
-                Err(AskError {
-                    attempts: 0,
-                    reach: Reach::Endpoint,
-                    ..AskError::new(FailureKind::Request, message)
-                })
+                let message = format!("question {id} has no choices, and this model can only choose");
+                Err(AskError { attempts: 0, reach: Reach::Endpoint, ..AskError::new(FailureKind::Request, message) })
             }
         }
     }
@@ -64,8 +59,8 @@ pub enum ImagePlaces {
     /// All images between the two texts.
     #[default]
     Together,
-    /// Each image at its first mark in a text, such as `<image 2>` for the second image; images without a mark between the two texts.
-    /// Further marks of the same image remain text, so that each image is sent once.
+    /// Each image at its first mark in a text, such as `<image 2>` for the second image; images without a mark between
+    /// the two texts. Further marks of the same image remain text, so that each image is sent once.
     Marked,
 }
 
@@ -94,12 +89,7 @@ impl<'a> Message<'a> {
     /// A message of text, without images.
     #[must_use]
     pub fn text_only(text: &'a str) -> Self {
-        Self {
-            before: text,
-            images: &[],
-            after: "",
-            places: ImagePlaces::Together,
-        }
+        Self { before: text, images: &[], after: "", places: ImagePlaces::Together }
     }
 
     /// Parts of the message, in order.
@@ -119,9 +109,7 @@ impl<'a> Message<'a> {
     /// Parts of one text of the message, with the marked images that are not yet placed.
     fn text_parts(&self, text: &'a str, is_placed: &mut [bool]) -> Vec<MessagePart<'a>> {
         pieces(text, |index| match is_placed.get_mut(index) {
-            Some(is_placed) if self.places == ImagePlaces::Marked => {
-                !std::mem::replace(is_placed, true)
-            }
+            Some(is_placed) if self.places == ImagePlaces::Marked => !std::mem::replace(is_placed, true),
             _ => false,
         })
         .into_iter()
@@ -134,9 +122,7 @@ impl<'a> Message<'a> {
 }
 
 /// Images among the parts of a message, in order.
-pub(crate) fn images<'a>(
-    parts: &[MessagePart<'a>],
-) -> impl Iterator<Item = &'a Arc<Payload>> + Clone {
+pub(crate) fn images<'a>(parts: &[MessagePart<'a>]) -> impl Iterator<Item = &'a Arc<Payload>> + Clone {
     parts.iter().filter_map(|part| match part {
         MessagePart::Text(_) => None,
         MessagePart::Image(image) => Some(*image),
@@ -170,12 +156,7 @@ mod tests {
                 Arc::new(Payload::encode(&image, PayloadFormat::Png).unwrap())
             })
             .collect();
-        let message = Message {
-            before,
-            images: &images,
-            after,
-            places,
-        };
+        let message = Message { before, images: &images, after, places };
         message
             .parts()
             .into_iter()
@@ -194,28 +175,14 @@ mod tests {
             ([text, ""], 2, Together, vec![text, "1", "2"]),
             (["", text], 2, Together, vec!["1", "2", text]),
             ([text, ""], 2, Marked, vec!["Is ", "2", " like ", "1", "?"]),
-            (
-                ["", text],
-                3,
-                Marked,
-                vec!["3", "Is ", "2", " like ", "1", "?"],
-            ),
+            (["", text], 3, Marked, vec!["3", "Is ", "2", " like ", "1", "?"]),
             ([text, ""], 1, Marked, vec!["Is <image 2> like ", "1", "?"]),
-            (
-                ["<image 1><image 1>", ""],
-                2,
-                Marked,
-                vec!["1", "<image 1>", "2"],
-            ),
+            (["<image 1><image 1>", ""], 2, Marked, vec!["1", "<image 1>", "2"]),
             (["Which?", ""], 2, Marked, vec!["Which?", "1", "2"]),
             ([text, ""], 0, Marked, vec![text]),
             (["", ""], 0, Together, vec![]),
         ] {
-            assert_eq!(
-                parts(texts, images, places),
-                expected,
-                "{texts:?} {images} {places:?}"
-            );
+            assert_eq!(parts(texts, images, places), expected, "{texts:?} {images} {places:?}");
         }
     }
 }

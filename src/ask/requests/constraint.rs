@@ -17,11 +17,7 @@ pub(crate) fn schema(letters: &[char]) -> Value {
 }
 
 /// Letter in a constrained reply; `None` without a constraint, or if the server did not follow it.
-pub(crate) fn constrained_letter(
-    constrain: Constrain,
-    choices: usize,
-    reply: &str,
-) -> Option<String> {
+pub(crate) fn constrained_letter(constrain: Constrain, choices: usize, reply: &str) -> Option<String> {
     let object: Option<Value> = match constrain {
         Constrain::None => return None,
         Constrain::Json => serde_json::from_str(without_fence(reply)).ok(),
@@ -32,9 +28,7 @@ pub(crate) fn constrained_letter(
         Some(_) => return None,
         None => reply,
     };
-    (0..choices)
-        .map(|index| letter(index).to_string())
-        .find(|letter| letter == text.trim())
+    (0..choices).map(|index| letter(index).to_string()).find(|letter| letter == text.trim())
 }
 
 /// The content of a fenced code block that is the whole text; other texts are returned as they are.
@@ -42,11 +36,7 @@ fn without_fence(text: &str) -> &str {
     let fenced = || {
         let inner = text.trim().strip_prefix("```")?.strip_suffix("```")?;
         let (language, block) = inner.split_once('\n')?;
-        language
-            .trim()
-            .chars()
-            .all(char::is_alphanumeric)
-            .then_some(block)
+        language.trim().chars().all(char::is_alphanumeric).then_some(block)
     };
     fenced().unwrap_or(text)
 }
@@ -73,11 +63,7 @@ mod tests {
             (Choice, "a", None),
             (Choice, "B. yes", None),
         ] {
-            assert_eq!(
-                constrained_letter(constrain, 2, reply).as_deref(),
-                letter,
-                "{reply}"
-            );
+            assert_eq!(constrained_letter(constrain, 2, reply).as_deref(), letter, "{reply}");
         }
     }
 }

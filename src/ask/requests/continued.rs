@@ -41,16 +41,13 @@ impl Continued {
             .filter(|(flag, _)| *flag != ADDRESS)
             .map(|(flag, value)| (parameter_name(flag), value.clone()))
             .collect();
-        Self {
-            content: Value::Object(content),
-            changes,
-        }
+        Self { content: Value::Object(content), changes }
     }
 }
 
 impl ChangedSetting {
-    /// Differences between a run's column of a model and current settings by flag, sorted by flag. The address and null values are
-    /// ignored.
+    /// Differences between a run's column of a model and current settings by flag, sorted by flag. The address and null
+    /// values are ignored.
     pub(super) fn between(column: &Value, now: &Map<String, Value>) -> Vec<Self> {
         let empty = Map::new();
         let first = column.as_object().unwrap_or(&empty);
@@ -90,14 +87,7 @@ mod tests {
 
     #[test]
     fn names_of_parameters_and_flags_correspond() {
-        for name in [
-            "model",
-            "max_tokens",
-            "seed",
-            "deployment",
-            "reply_headers",
-            "extra_body",
-        ] {
+        for name in ["model", "max_tokens", "seed", "deployment", "reply_headers", "extra_body"] {
             assert_eq!(parameter_name(&flag_name(name)), name);
         }
     }

@@ -16,7 +16,8 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Default, PartialEq, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct RequestArgs {
-    /// JSON object, or a file with one, merged into every request (JSON Merge Patch, RFC 7396: null removes a field); default: none
+    /// JSON object, or a file with one, merged into every request (JSON Merge Patch, RFC 7396: null removes a field);
+    /// default: none
     #[arg(long, value_name = "JSON|@FILE", add = Decides::Reply)]
     pub extra_body: Option<String>,
     /// Leave this field out of every request; repeatable; default: none
@@ -30,8 +31,8 @@ pub(crate) struct RequestArgs {
     pub system_file: Option<PathBuf>,
 }
 
-/// Fields set by the program, each with the flag or file that controls it. `--extra-body` cannot set them: the manifest, the cost
-/// estimate and the trial keys are computed from the program's settings.
+/// Fields set by the program, each with the flag or file that controls it. `--extra-body` cannot set them: the
+/// manifest, the cost estimate and the trial keys are computed from the program's settings.
 const PROGRAM_FIELDS: [(&str, &str); 15] = [
     ("model", "--model, or id in a file of models"),
     ("messages", "--system, or --prompts"),
@@ -40,17 +41,11 @@ const PROGRAM_FIELDS: [(&str, &str); 15] = [
     ("stream", "--request wire"),
     ("n", "--repeats"),
     ("max_tokens", "--max-tokens"),
-    (
-        "max_completion_tokens",
-        "--max-tokens with --request token-field",
-    ),
+    ("max_completion_tokens", "--max-tokens with --request token-field"),
     ("max_output_tokens", "--max-tokens"),
     ("temperature", "--temperature"),
     ("top_p", "--top-p"),
-    (
-        "seed",
-        "--sampling-seed of openeqa, or seed in a file of models",
-    ),
+    ("seed", "--sampling-seed of openeqa, or seed in a file of models"),
     ("reasoning_effort", "--reasoning-effort"),
     ("logprobs", "--request probabilities"),
     ("top_logprobs", "--request probabilities"),
@@ -67,7 +62,8 @@ const THINKING_BUDGETS: [&str; 3] = ["thinking_budget", "budget_tokens", "reason
 
 /// Additions to and omissions from every request, and the deployment of the model.
 ///
-/// The JSON form is part of the key of each trial. Unset fields are skipped, so that they do not change the keys of older runs.
+/// The JSON form is part of the key of each trial. Unset fields are skipped, so that they do not change the keys of
+/// older runs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct ExtraFields {
     /// Name that distinguishes deployments of one model, such as the vendor or the quantisation.
@@ -80,11 +76,7 @@ pub struct ExtraFields {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub reply_headers: BTreeMap<String, String>,
     /// Fields merged into the body. Serialised as JSON text, which keeps a null: a null removes a field.
-    #[serde(
-        rename = "extra_body",
-        skip_serializing_if = "Map::is_empty",
-        serialize_with = "as_text"
-    )]
+    #[serde(rename = "extra_body", skip_serializing_if = "Map::is_empty", serialize_with = "as_text")]
     pub body: Map<String, Value>,
     /// Fields omitted from the body, sorted.
     #[serde(rename = "omit_field", skip_serializing_if = "Vec::is_empty")]
@@ -92,10 +84,7 @@ pub struct ExtraFields {
 }
 
 /// Serialises a map as a string of compact JSON with sorted keys.
-fn as_text<S: serde::Serializer>(
-    map: &Map<String, Value>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+fn as_text<S: serde::Serializer>(map: &Map<String, Value>, serializer: S) -> Result<S::Ok, S::Error> {
     let text = serde_json::to_string(map).map_err(serde::ser::Error::custom)?;
     serializer.serialize_str(&text)
 }
@@ -104,8 +93,8 @@ impl RequestArgs {
     /// Reads the files named by the flags and checks the fields.
     ///
     /// # Errors
-    /// If a file cannot be read, the system message is empty, a required field is omitted, the JSON is not an object, or a field is set
-    /// by the program or looks like a secret. The error does not show the secret.
+    /// If a file cannot be read, the system message is empty, a required field is omitted, the JSON is not an object,
+    /// or a field is set by the program or looks like a secret. The error does not show the secret.
     pub(crate) fn resolve(&self) -> Result<ExtraFields> {
         let system = match (&self.system, &self.system_file) {
             (Some(text), _) => Some(text.clone()),
@@ -114,10 +103,7 @@ impl RequestArgs {
         };
         let system = system.map(|text| text.trim().to_owned());
         if system.as_deref() == Some("") {
-            return Err(Error::usage(
-                "--system",
-                "the words of the message are missing",
-            ));
+            return Err(Error::usage("--system", "the words of the message are missing"));
         }
         let mut omit = self.omit_field.clone();
         for field in &mut omit {
@@ -142,10 +128,7 @@ impl RequestArgs {
 
 /// Parses the value of `--extra-body`: JSON, or `@` and the path of a JSON file.
 fn parse_body(value: &str) -> Result<Map<String, Value>> {
-    let file = value
-        .strip_prefix('@')
-        .map(|path| reading::settings(Path::new(path)))
-        .transpose()?;
+    let file = value.strip_prefix('@').map(|path| reading::settings(Path::new(path))).transpose()?;
     let json = file.as_deref().unwrap_or(value);
     // Errors of serde_json have a line and a column but no values, so they cannot show a secret.
     let parsed = serde_json::from_str(json).map_err(|e| {
@@ -153,19 +136,11 @@ fn parse_body(value: &str) -> Result<Map<String, Value>> {
         Error::usage("--extra-body", format_args!("{expected}: {e}"))
     })?;
     let Value::Object(fields) = parsed else {
-        return Err(Error::usage(
-            "--extra-body",
-            "a JSON object expected, as {\"top_k\": 1}",
-        ));
+        return Err(Error::usage("--extra-body", "a JSON object expected, as {\"top_k\": 1}"));
     };
-    let owned = PROGRAM_FIELDS
-        .iter()
-        .find(|(field, _)| fields.contains_key(*field));
+    let owned = PROGRAM_FIELDS.iter().find(|(field, _)| fields.contains_key(*field));
     if let Some((field, setter)) = owned {
-        return Err(Error::usage(
-            "--extra-body",
-            format_args!("{field} is set by the program: use {setter}"),
-        ));
+        return Err(Error::usage("--extra-body", format_args!("{field} is set by the program: use {setter}")));
     }
     refuse_secrets(&fields)?;
     Ok(fields)
@@ -190,9 +165,7 @@ impl ExtraFields {
 
     /// True if a field that limits the tokens of a reply is omitted.
     pub(crate) fn omits_token_limit(&self) -> bool {
-        self.omit
-            .iter()
-            .any(|field| TOKEN_LIMITS.contains(&&**field))
+        self.omit.iter().any(|field| TOKEN_LIMITS.contains(&&**field))
     }
 
     /// Limit of thinking tokens in the added fields, at any depth; `None` without one.
@@ -202,8 +175,8 @@ impl ExtraFields {
 
     /// Applies the user's fields to a request body, given as JSON without its messages.
     ///
-    /// The added fields are merged as a JSON merge patch (RFC 7396), then the omitted fields are removed. With neither, the JSON is
-    /// returned byte for byte; otherwise its keys are sorted.
+    /// The added fields are merged as a JSON merge patch (RFC 7396), then the omitted fields are removed. With neither,
+    /// the JSON is returned byte for byte; otherwise its keys are sorted.
     ///
     /// # Errors
     /// If the body is not a JSON object.
@@ -278,39 +251,15 @@ mod tests {
     fn merge_follows_rfc_7396() {
         for (original, patch, result) in [
             (json!({"a": "b"}), json!({"a": "c"}), json!({"a": "c"})),
-            (
-                json!({"a": "b"}),
-                json!({"b": "c"}),
-                json!({"a": "b", "b": "c"}),
-            ),
+            (json!({"a": "b"}), json!({"b": "c"}), json!({"a": "b", "b": "c"})),
             (json!({"a": "b"}), json!({"a": null}), json!({})),
-            (
-                json!({"a": "b", "b": "c"}),
-                json!({"a": null}),
-                json!({"b": "c"}),
-            ),
+            (json!({"a": "b", "b": "c"}), json!({"a": null}), json!({"b": "c"})),
             (json!({"a": ["b"]}), json!({"a": "c"}), json!({"a": "c"})),
             (json!({"a": "c"}), json!({"a": ["b"]}), json!({"a": ["b"]})),
-            (
-                json!({"a": {"b": "c"}}),
-                json!({"a": {"b": "d", "c": null}}),
-                json!({"a": {"b": "d"}}),
-            ),
-            (
-                json!({"a": [{"b": "c"}]}),
-                json!({"a": [1]}),
-                json!({"a": [1]}),
-            ),
-            (
-                json!({"e": null}),
-                json!({"a": 1}),
-                json!({"e": null, "a": 1}),
-            ),
-            (
-                json!({}),
-                json!({"a": {"bb": {"ccc": null}}}),
-                json!({"a": {"bb": {}}}),
-            ),
+            (json!({"a": {"b": "c"}}), json!({"a": {"b": "d", "c": null}}), json!({"a": {"b": "d"}})),
+            (json!({"a": [{"b": "c"}]}), json!({"a": [1]}), json!({"a": [1]})),
+            (json!({"e": null}), json!({"a": 1}), json!({"e": null, "a": 1})),
+            (json!({}), json!({"a": {"bb": {"ccc": null}}}), json!({"a": {"bb": {}}})),
         ] {
             let mut merged = object(&original);
             merge(&mut merged, &object(&patch));
@@ -322,25 +271,16 @@ mod tests {
     fn program_fields_are_refused() {
         for (field, setter) in PROGRAM_FIELDS {
             let extra_body = Some(json!({field: 1}).to_string());
-            let args = RequestArgs {
-                extra_body,
-                ..RequestArgs::default()
-            };
+            let args = RequestArgs { extra_body, ..RequestArgs::default() };
             let error = args.resolve().unwrap_err().to_string();
-            assert!(
-                error.starts_with("--extra-body: ") && error.contains(setter),
-                "{error}"
-            );
+            assert!(error.starts_with("--extra-body: ") && error.contains(setter), "{error}");
         }
     }
 
     #[test]
     fn invalid_extra_body_is_refused() {
         for wrong in ["", "{", "[1]", "3", "@/nowhere/at/all.json"] {
-            let args = RequestArgs {
-                extra_body: Some(wrong.into()),
-                ..RequestArgs::default()
-            };
+            let args = RequestArgs { extra_body: Some(wrong.into()), ..RequestArgs::default() };
             assert!(args.resolve().is_err(), "{wrong}");
         }
     }
@@ -348,28 +288,19 @@ mod tests {
     #[test]
     fn required_fields_cannot_be_omitted() {
         for wrong in ["model", "messages", " "] {
-            let args = RequestArgs {
-                omit_field: vec![wrong.into()],
-                ..RequestArgs::default()
-            };
+            let args = RequestArgs { omit_field: vec![wrong.into()], ..RequestArgs::default() };
             assert!(args.resolve().is_err(), "{wrong}");
         }
     }
 
     #[test]
     fn blank_system_message_is_refused() {
-        let args = RequestArgs {
-            system: Some("  ".into()),
-            ..RequestArgs::default()
-        };
+        let args = RequestArgs { system: Some("  ".into()), ..RequestArgs::default() };
         assert!(args.resolve().is_err());
     }
 
     fn budget(body: &Value) -> Option<ThinkingBudget> {
-        let fields = ExtraFields {
-            body: object(body),
-            ..ExtraFields::default()
-        };
+        let fields = ExtraFields { body: object(body), ..ExtraFields::default() };
         fields.thinking_budget()
     }
 

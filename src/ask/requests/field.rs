@@ -1,5 +1,5 @@
-//! Request fields that not all servers accept: [`RequestField`] describes one field for the analysis of a refusal, [`RequestFields`] has
-//! the values of the fields that the program adapts.
+//! Request fields that not all servers accept: [`RequestField`] describes one field for the analysis of a refusal,
+//! [`RequestFields`] has the values of the fields that the program adapts.
 
 use serde_json::{Map, Value};
 
@@ -63,16 +63,10 @@ impl RequestFields {
     /// Fields of the first request to a server.
     ///
     /// # Errors
-    /// If the server has no known switch for `--thinking`, or if the switch is the reasoning effort and `--reasoning-effort` is also set.
-    pub(crate) fn initial(
-        parameters: &Parameters,
-        base: &BaseUrl,
-        vendor: Option<&Vendor>,
-    ) -> Result<Self> {
-        let thinking = parameters
-            .thinking
-            .map(|thinking| thinking.switch_for(base))
-            .transpose()?;
+    /// If the server has no known switch for `--thinking`, or if the switch is the reasoning effort and
+    /// `--reasoning-effort` is also set.
+    pub(crate) fn initial(parameters: &Parameters, base: &BaseUrl, vendor: Option<&Vendor>) -> Result<Self> {
+        let thinking = parameters.thinking.map(|thinking| thinking.switch_for(base)).transpose()?;
         let sets_effort = thinking.is_some_and(|switch| switch.effort.is_some());
         if sets_effort && parameters.reasoning_effort.is_some() {
             let problem = "this server takes it as the reasoning effort, which --reasoning-effort sets already";
@@ -95,10 +89,7 @@ impl RequestFields {
 
     /// Reasoning effort: from the user, or from the switch for thinking.
     pub(crate) fn effort<'p>(&self, parameters: &'p Parameters) -> Option<&'p str> {
-        parameters
-            .reasoning_effort
-            .as_deref()
-            .or_else(|| self.thinking?.effort.as_deref())
+        parameters.reasoning_effort.as_deref().or_else(|| self.thinking?.effort.as_deref())
     }
 
     /// Body fields of the switch for thinking.
@@ -108,29 +99,19 @@ impl RequestFields {
 
     /// Body fields of the switch for thinking, as fields that a server may refuse.
     pub(crate) fn thinking_fields<'a>(self) -> impl Iterator<Item = RequestField<'a>> {
-        self.thinking_body()
-            .into_iter()
-            .flat_map(Map::keys)
-            .map(|name| RequestField {
-                name,
-                state: FieldState::Sent,
-                hint: "leave --thinking out: the model or its server has no such switch",
-                adaptable: None,
-            })
+        self.thinking_body().into_iter().flat_map(Map::keys).map(|name| RequestField {
+            name,
+            state: FieldState::Sent,
+            hint: "leave --thinking out: the model or its server has no such switch",
+            adaptable: None,
+        })
     }
 
-    /// Adapts the fields after the refusal of one of them; `None` if the user set the field, or if no other way is left. A token limit is
-    /// first sent under its other name and then omitted.
-    pub(crate) fn after_refusal(
-        self,
-        field: AdaptableField,
-        initial: Self,
-        parameters: &Parameters,
-    ) -> Option<Self> {
+    /// Adapts the fields after the refusal of one of them; `None` if the user set the field, or if no other way is
+    /// left. A token limit is first sent under its other name and then omitted.
+    pub(crate) fn after_refusal(self, field: AdaptableField, initial: Self, parameters: &Parameters) -> Option<Self> {
         let adapted = match field {
-            AdaptableField::Wire(wire) if parameters.wire == WireSetting::Auto => {
-                Self { wire, ..self }
-            }
+            AdaptableField::Wire(wire) if parameters.wire == WireSetting::Auto => Self { wire, ..self },
             AdaptableField::TokenField if parameters.token_field == TokenField::Auto => {
                 let is_initial = self.token_field == initial.token_field;
                 let token_field = match self.token_field {
@@ -143,36 +124,24 @@ impl RequestFields {
                     Wire::Responses => TokenField::Omit,
                     _ => token_field,
                 };
-                Self {
-                    token_field,
-                    ..self
-                }
+                Self { token_field, ..self }
             }
-            AdaptableField::Temperature { least } if parameters.is_default_temperature() => Self {
-                temperature: self.least_accepted(least, parameters),
-                ..self
-            },
+            AdaptableField::Temperature { least } if parameters.is_default_temperature() => {
+                Self { temperature: self.least_accepted(least, parameters), ..self }
+            }
             AdaptableField::Seed if parameters.origin.default_seed => Self { seed: None, ..self },
-            AdaptableField::StreamUsage => Self {
-                stream_usage: false,
-                ..self
-            },
-            AdaptableField::Logprobs => Self {
-                top_logprobs: None,
-                ..self
-            },
-            AdaptableField::TopLogprobs => Self {
-                top_logprobs: Some(FEWER_LOGPROBS)
-                    .filter(|_| self.top_logprobs == Some(TOP_LOGPROBS)),
-                ..self
-            },
+            AdaptableField::StreamUsage => Self { stream_usage: false, ..self },
+            AdaptableField::Logprobs => Self { top_logprobs: None, ..self },
+            AdaptableField::TopLogprobs => {
+                Self { top_logprobs: Some(FEWER_LOGPROBS).filter(|_| self.top_logprobs == Some(TOP_LOGPROBS)), ..self }
+            }
             _ => return None,
         };
         (adapted != self).then_some(adapted)
     }
 
-    /// Temperature after the refusal of a lower one: the least that the server accepts, which is closest to the likeliest answer, or none.
-    /// None with probabilities, because some servers compute them at the temperature.
+    /// Temperature after the refusal of a lower one: the least that the server accepts, which is closest to the
+    /// likeliest answer, or none. None with probabilities, because some servers compute them at the temperature.
     fn least_accepted(self, least: Option<u16>, parameters: &Parameters) -> Option<f64> {
         let least = f64::from(least.filter(|_| !parameters.probabilities)?) / 100.0;
         (self.temperature? < least).then_some(least)
@@ -186,9 +155,7 @@ impl RequestFields {
             AdaptableField::Temperature { .. } => self.temperature != initial.temperature,
             AdaptableField::Seed => self.seed != initial.seed,
             AdaptableField::StreamUsage => self.stream_usage != initial.stream_usage,
-            AdaptableField::Logprobs | AdaptableField::TopLogprobs => {
-                self.top_logprobs != initial.top_logprobs
-            }
+            AdaptableField::Logprobs | AdaptableField::TopLogprobs => self.top_logprobs != initial.top_logprobs,
         }
     }
 
@@ -203,27 +170,21 @@ impl RequestFields {
             TokenField::Omit => "no token limit is sent".to_owned(),
             field => format!("the token limit is sent as {field}"),
         });
-        let temperature =
-            (self.temperature != initial.temperature).then(|| match self.temperature {
-                Some(least) => {
-                    format!("the temperature is sent as {least}, the least that it takes")
-                }
-                None => "no temperature is sent: the server's own is used".to_owned(),
-            });
-        let seed = (self.seed != initial.seed).then(|| {
-            "no seed is sent: replies at a temperature above 0 differ each time".to_owned()
+        let temperature = (self.temperature != initial.temperature).then(|| match self.temperature {
+            Some(least) => {
+                format!("the temperature is sent as {least}, the least that it takes")
+            }
+            None => "no temperature is sent: the server's own is used".to_owned(),
         });
+        let seed = (self.seed != initial.seed)
+            .then(|| "no seed is sent: replies at a temperature above 0 differ each time".to_owned());
         let usage = (self.stream_usage != initial.stream_usage)
             .then(|| "a stream is not asked for the number of its tokens".to_owned());
-        let logprobs =
-            (self.top_logprobs != initial.top_logprobs).then(|| match self.top_logprobs {
-                Some(top) => format!("the probabilities of {top} tokens are asked for"),
-                None => "it states no probabilities: its confidence is not available".to_owned(),
-            });
-        [wire, field, temperature, seed, usage, logprobs]
-            .into_iter()
-            .flatten()
-            .collect()
+        let logprobs = (self.top_logprobs != initial.top_logprobs).then(|| match self.top_logprobs {
+            Some(top) => format!("the probabilities of {top} tokens are asked for"),
+            None => "it states no probabilities: its confidence is not available".to_owned(),
+        });
+        [wire, field, temperature, seed, usage, logprobs].into_iter().flatten().collect()
     }
 }
 
@@ -243,37 +204,19 @@ impl<'a> SentFields<'a> {
         let extra: Vec<&str> = parameters.extra.body.keys().map(String::as_str).collect();
         let flags = [
             (parameters.probabilities, "--request probabilities"),
-            (
-                parameters.constrain != Constrain::None,
-                "--request constrain",
-            ),
+            (parameters.constrain != Constrain::None, "--request constrain"),
             (parameters.reasoning_effort.is_some(), "--reasoning-effort"),
             (parameters.thinking.is_some(), "--thinking"),
             (parameters.top_p.is_some(), "--top-p"),
         ];
-        let own = flags
-            .into_iter()
-            .filter(|(is_sent, _)| *is_sent)
-            .map(|(_, flag)| flag.to_owned());
+        let own = flags.into_iter().filter(|(is_sent, _)| *is_sent).map(|(_, flag)| flag.to_owned());
         let extra = (!extra.is_empty()).then(|| format!("--extra-body ({})", extra.join(", ")));
         let sent = [
-            (
-                self.fields.seed.is_some(),
-                "the seed (--sampling-seed none)",
-            ),
-            (
-                self.fields.temperature.is_some(),
-                "the temperature (--temperature default)",
-            ),
-            (
-                self.fields.token_field != TokenField::Omit,
-                "the token limit (--request token-field=none)",
-            ),
+            (self.fields.seed.is_some(), "the seed (--sampling-seed none)"),
+            (self.fields.temperature.is_some(), "the temperature (--temperature default)"),
+            (self.fields.token_field != TokenField::Omit, "the token limit (--request token-field=none)"),
         ];
-        let sent = sent
-            .into_iter()
-            .filter(|(is_sent, _)| *is_sent)
-            .map(|(_, flag)| flag.to_owned());
+        let sent = sent.into_iter().filter(|(is_sent, _)| *is_sent).map(|(_, flag)| flag.to_owned());
         own.chain(extra).chain(sent).collect()
     }
 
@@ -343,7 +286,8 @@ impl FieldState {
         if sent { Self::Sent } else { Self::Absent }
     }
 
-    /// State of an adaptable field. If it is not sent, either it was omitted from the start or the server has refused it.
+    /// State of an adaptable field. If it is not sent, either it was omitted from the start or the server has refused
+    /// it.
     pub(crate) fn until_refused(sent: bool, omitted: bool) -> Self {
         match (sent, omitted) {
             (true, _) => Self::Sent,
@@ -370,15 +314,9 @@ pub(crate) struct RequestField<'a> {
 
 impl<'a> RequestField<'a> {
     /// The temperature or seed sent, if the error is about it and no other field: it mentions no other sent field.
-    pub(crate) fn subject<'f>(
-        fields: &'f [RequestField<'a>],
-        api_error: &ApiError,
-    ) -> Option<&'f RequestField<'a>> {
+    pub(crate) fn subject<'f>(fields: &'f [RequestField<'a>], api_error: &ApiError) -> Option<&'f RequestField<'a>> {
         let mut mentioned = fields.iter().filter(|field| {
-            let is_adapted = matches!(
-                field.adaptable,
-                Some(AdaptableField::Temperature { .. } | AdaptableField::Seed)
-            );
+            let is_adapted = matches!(field.adaptable, Some(AdaptableField::Temperature { .. } | AdaptableField::Seed));
             let is_ordinary = ORDINARY_WORDS.contains(&field.name) && !is_adapted;
             field.state == FieldState::Sent
                 && field.is_mentioned(api_error)
@@ -387,12 +325,7 @@ impl<'a> RequestField<'a> {
         mentioned
             .next()
             .filter(|_| mentioned.next().is_none())
-            .filter(|field| {
-                matches!(
-                    field.adaptable,
-                    Some(AdaptableField::Temperature { .. } | AdaptableField::Seed)
-                )
-            })
+            .filter(|field| matches!(field.adaptable, Some(AdaptableField::Temperature { .. } | AdaptableField::Seed)))
     }
 
     /// Flags of the setting that decides the field, if a run may continue with another value after a refusal.
@@ -406,7 +339,8 @@ impl<'a> RequestField<'a> {
         }
     }
 
-    /// True if the server names the field as the cause: in the `param` of the error, or in a message about an unsupported field.
+    /// True if the server names the field as the cause: in the `param` of the error, or in a message about an
+    /// unsupported field.
     pub(crate) fn is_named(&self, api_error: &ApiError) -> bool {
         if self.is_param(api_error) {
             return true;
@@ -417,10 +351,7 @@ impl<'a> RequestField<'a> {
 
     /// True if the `param` of the error is the field, alone or at the end of a path.
     pub(crate) fn is_param(&self, api_error: &ApiError) -> bool {
-        api_error
-            .param
-            .as_deref()
-            .is_some_and(|path| last_segment(path) == self.name)
+        api_error.param.as_deref().is_some_and(|path| last_segment(path) == self.name)
     }
 
     /// True if the error message mentions the field.
@@ -446,16 +377,11 @@ fn last_segment(path: &str) -> &str {
 
 /// True if the error is about an unsupported field or value.
 pub(crate) fn is_unsupported(api_error: &ApiError) -> bool {
-    let codes = [
-        "unsupported_parameter",
-        "unsupported_value",
-        "unknown_parameter",
-    ];
+    let codes = ["unsupported_parameter", "unsupported_value", "unknown_parameter"];
     api_error.mentions_any(&UNSUPPORTED) || api_error.has_code(&codes)
 }
 
 /// True if a text contains a name as a whole word: `max_tokens` is not in `max_tokens_total`.
 fn mentions(text: &str, name: &str) -> bool {
-    text.split(|c: char| !c.is_alphanumeric() && c != '_')
-        .any(|word| word == name)
+    text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == name)
 }

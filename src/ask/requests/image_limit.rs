@@ -39,16 +39,7 @@ struct ProviderLimit<T> {
 const MANY: usize = 20;
 
 const fn limit(bytes: usize, side: Option<u32>, origin: &'static str) -> ImageLimit {
-    ImageLimit {
-        bytes,
-        side,
-        origin,
-        request: RequestLimit {
-            images: None,
-            side_many: None,
-            bytes: None,
-        },
-    }
+    ImageLimit { bytes, side, origin, request: RequestLimit { images: None, side_many: None, bytes: None } }
 }
 
 impl ImageLimit {
@@ -80,8 +71,8 @@ impl ImageLimit {
         self
     }
 
-    /// Checks the number of images in a request, and the side of the largest one, `image`, if it is known. The size of the body is not
-    /// checked, because the other images may be smaller: see [`Self::may_exceed`].
+    /// Checks the number of images in a request, and the side of the largest one, `image`, if it is known. The size of
+    /// the body is not checked, because the other images may be smaller: see [`Self::may_exceed`].
     ///
     /// # Errors
     /// [`Error::Data`] about the request, with the remedy.
@@ -108,8 +99,8 @@ impl ImageLimit {
         Ok(())
     }
 
-    /// Warning that the body of a request with `images` images, with `image` as the largest, may be too large in base64. `None` if the
-    /// images fit in any case.
+    /// Warning that the body of a request with `images` images, with `image` as the largest, may be too large in
+    /// base64. `None` if the images fit in any case.
     #[must_use]
     pub(crate) fn may_exceed(&self, images: usize, image: &ImageFacts) -> Option<String> {
         let bytes = images * image.bytes.div_ceil(3) * 4;
@@ -144,10 +135,7 @@ impl ImageLimit {
         if let Some(max) = self.side
             && side > max as usize
         {
-            let problem = format!(
-                "a side of {side} pixels is more than the {max} of {}; {remedy}",
-                self.origin
-            );
+            let problem = format!("a side of {side} pixels is more than the {max} of {}; {remedy}", self.origin);
             return Err(Error::data("image", problem));
         }
         Ok(())
@@ -156,11 +144,7 @@ impl ImageLimit {
     /// The stricter value of each limit; the origin is that of the smaller file size.
     #[must_use]
     pub(crate) fn stricter(self, other: Self) -> Self {
-        let (small, large) = if self.bytes <= other.bytes {
-            (self, other)
-        } else {
-            (other, self)
-        };
+        let (small, large) = if self.bytes <= other.bytes { (self, other) } else { (other, self) };
         let side = small.side.into_iter().chain(large.side).min();
         let (one, two) = (small.request, large.request);
         let request = RequestLimit {
@@ -168,11 +152,7 @@ impl ImageLimit {
             side_many: one.side_many.into_iter().chain(two.side_many).min(),
             bytes: one.bytes.into_iter().chain(two.bytes).min(),
         };
-        Self {
-            side,
-            request,
-            ..small
-        }
+        Self { side, request, ..small }
     }
 
     /// Limit from `--image max-mb`.
@@ -187,11 +167,7 @@ fn megabytes(bytes: usize) -> f64 {
 }
 
 /// The stricter of a limit and the limit `max` of the provider `origin`.
-fn stricter<T: Ord>(
-    limit: Option<ProviderLimit<T>>,
-    max: Option<T>,
-    origin: &'static str,
-) -> Option<ProviderLimit<T>> {
+fn stricter<T: Ord>(limit: Option<ProviderLimit<T>>, max: Option<T>, origin: &'static str) -> Option<ProviderLimit<T>> {
     let other = max.map(|max| ProviderLimit { max, origin });
     limit.into_iter().chain(other).min()
 }
@@ -207,10 +183,7 @@ mod tests {
     #[test]
     fn the_host_decides_the_limit() {
         assert_eq!(limit_at("https://api.anthropic.com/v1").side, Some(8000));
-        assert_eq!(
-            limit_at("https://r.openai.azure.com/openai/v1").origin,
-            "Azure"
-        );
+        assert_eq!(limit_at("https://r.openai.azure.com/openai/v1").origin, "Azure");
         assert_eq!(limit_at("http://127.0.0.1:8000/v1"), ImageLimit::UNKNOWN);
     }
 
@@ -230,22 +203,14 @@ mod tests {
 
     #[test]
     fn images_beyond_the_limit_are_errors() {
-        let limit = ImageLimit::from_access(&Access::new(
-            "https://api.anthropic.com/v1".parse().unwrap(),
-        ));
+        let limit = ImageLimit::from_access(&Access::new("https://api.anthropic.com/v1".parse().unwrap()));
         assert!(limit.check(&image(7_500_000, 8000)).is_ok());
         for beyond in [image(7_500_001, 10), image(10, 8001)] {
             let error = limit.check(&beyond).unwrap_err().to_string();
-            assert!(
-                error.contains("Anthropic") && error.contains("--image max-side"),
-                "{error}"
-            );
+            assert!(error.contains("Anthropic") && error.contains("--image max-side"), "{error}");
         }
         let both = limit.stricter(ImageLimit::from_user(5));
-        assert_eq!(
-            (both.bytes, both.side, both.origin),
-            (5, Some(8000), "--image max-mb")
-        );
+        assert_eq!((both.bytes, both.side, both.origin), (5, Some(8000), "--image max-mb"));
         assert!(ImageLimit::from_user(5).check(&image(6, 10)).is_err());
     }
 
@@ -258,18 +223,12 @@ mod tests {
         let groq = user_limit_at("https://api.groq.com/openai/v1");
         assert!(groq.check_request(5, None).is_ok());
         let error = groq.check_request(6, None).unwrap_err().to_string();
-        assert!(
-            error.contains("6 images") && error.contains("5 of Groq"),
-            "{error}"
-        );
+        assert!(error.contains("6 images") && error.contains("5 of Groq"), "{error}");
         let anthropic = user_limit_at("https://api.anthropic.com/v1");
         let wide = image(10, 2001);
         assert!(anthropic.check_request(20, Some(&wide)).is_ok());
         let error = anthropic.check_request(21, Some(&wide)).unwrap_err();
-        assert!(
-            error.to_string().contains("--image max-side=2000"),
-            "{error}"
-        );
+        assert!(error.to_string().contains("--image max-side=2000"), "{error}");
         assert!(anthropic.check_request(21, Some(&image(10, 2000))).is_ok());
         // 50 images of 300 kB are 20 MB of base64.
         let gemini = user_limit_at("https://generativelanguage.googleapis.com/v1beta/openai");

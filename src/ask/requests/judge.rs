@@ -12,11 +12,7 @@ const FLAGS: [(&str, &str); 6] = [
 
 /// Replaces the flags of models in a message by those of the judge.
 pub(crate) fn for_judge(message: &str) -> String {
-    FLAGS
-        .iter()
-        .fold(message.to_owned(), |text, (flag, of_judge)| {
-            text.replace(flag, of_judge)
-        })
+    FLAGS.iter().fold(message.to_owned(), |text, (flag, of_judge)| text.replace(flag, of_judge))
 }
 
 #[cfg(test)]

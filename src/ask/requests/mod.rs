@@ -21,9 +21,7 @@ pub(crate) use continued::ChangedSetting;
 pub use extra_fields::ExtraFields;
 pub(crate) use extra_fields::RequestArgs;
 pub(super) use extra_fields::ThinkingBudget;
-pub(super) use field::{
-    AdaptableField, FieldState, RequestField, RequestFields, SentFields, is_unsupported,
-};
+pub(super) use field::{AdaptableField, FieldState, RequestField, RequestFields, SentFields, is_unsupported};
 pub(crate) use image_limit::ImageLimit;
 pub(super) use judge::for_judge;
 pub(crate) use parameters::by_flag;

@@ -20,16 +20,16 @@ use crate::types::text::words::written_as_text;
 
 /// The name of a model and the settings of its replies; a setting that is `None` is left out of the request.
 ///
-/// The JSON form has everything that can change a reply, and is part of the key of each trial. Settings that are not set are not
-/// written or null, so that a new setting changes no earlier key.
+/// The JSON form has everything that can change a reply, and is part of the key of each trial. Settings that are not
+/// set are not written or null, so that a new setting changes no earlier key.
 #[derive(Debug, Clone, PartialEq, Args, Serialize)]
 #[command(next_help_heading = "Model")]
 pub struct Parameters {
     /// The model, by the endpoint's name.
     #[arg(skip)]
     pub model: String,
-    /// Sampling temperature; default is the server's own; auto is 0; if the model refuses 0, the lowest value that it states, else the
-    /// server's own
+    /// Sampling temperature; default is the server's own; auto is 0; if the model refuses 0, the lowest value that it
+    /// states, else the server's own
     #[arg(long, value_name = "T|auto|default", default_value_t = Temperature::Auto, add = Decides::Reply)]
     pub temperature: Temperature,
     /// Nucleus sampling: draw from the likeliest tokens up to this total probability; default: not sent
@@ -41,7 +41,8 @@ pub struct Parameters {
     /// A letter needs 16; a reasoning model uses hundreds before it.
     #[arg(long, value_name = "N", default_value_t = Self::MAX_TOKENS, add = Decides::Reply)]
     pub max_tokens: NonZeroU32,
-    /// Other token limit with which the run began, which remains in the keys of its trials; `None` if the limit is the same.
+    /// Other token limit with which the run began, which remains in the keys of its trials; `None` if the limit is the
+    /// same.
     #[arg(skip)]
     #[serde(skip)]
     pub first_max_tokens: Option<NonZeroU32>,
@@ -49,7 +50,8 @@ pub struct Parameters {
     #[arg(skip)]
     #[serde(skip)]
     pub origin: SettingsOrigin,
-    /// Field of the token limit; auto is the vendor's field, else max_tokens, or the other one if the server asks for it
+    /// Field of the token limit; auto is the vendor's field, else max_tokens, or the other one if the server asks for
+    /// it
     #[arg(long, value_name = "FIELD", value_enum, default_value_t = TokenField::Auto, add = Decides::Reply)]
     #[serde(skip)]
     pub token_field: TokenField,
@@ -63,11 +65,13 @@ pub struct Parameters {
     /// Image detail requested from the server; default: not sent
     #[arg(long, value_name = "DETAIL", value_enum, add = Decides::Reply)]
     pub detail: Option<ImageDetail>,
-    /// The API: chat in one piece or as a stream, or the Responses API; auto is chat, and what the server asks for instead
+    /// The API: chat in one piece or as a stream, or the Responses API; auto is chat, and what the server asks for
+    /// instead
     #[arg(long, value_name = "WIRE", value_enum, default_value_t, add = Decides::Reply)]
     #[serde(skip)]
     pub wire: WireSetting,
-    /// Seed of the server's sampling, for servers that support it: replies at a temperature above 0 are then more reproducible.
+    /// Seed of the server's sampling, for servers that support it: replies at a temperature above 0 are then more
+    /// reproducible.
     #[arg(skip)]
     pub seed: Option<u64>,
     /// Constraint that the server enforces on the reply.
@@ -141,7 +145,8 @@ impl Parameters {
         ChangedSetting::between(column, &by_flag(own))
     }
 
-    /// The same settings for a run whose column of the model has other ones, with the changes; its trial keys keep the column's settings.
+    /// The same settings for a run whose column of the model has other ones, with the changes; its trial keys keep the
+    /// column's settings.
     pub(crate) fn continuing(&self, column: &Value, changes: Vec<ChangedSetting>) -> Self {
         let first = column["--max-tokens"]
             .as_u64()
@@ -157,21 +162,17 @@ impl Parameters {
         }
     }
 
-    /// The same settings for a run that began with the smaller token limit `first`, which remains in the keys of its trials. `None` if the
-    /// limit of these settings is not larger or not sent.
+    /// The same settings for a run that began with the smaller token limit `first`, which remains in the keys of its
+    /// trials. `None` if the limit of these settings is not larger or not sent.
     pub(crate) fn raised_from(&self, first: NonZeroU32) -> Option<Self> {
         let is_larger = self.limit()? > first.get();
-        is_larger.then(|| Self {
-            first_max_tokens: Some(first),
-            ..self.clone()
-        })
+        is_larger.then(|| Self { first_max_tokens: Some(first), ..self.clone() })
     }
 
     /// The same settings for a run whose column of the model differs only in a smaller token limit; otherwise `None`.
     pub(crate) fn raised_from_column(&self, column: &Value) -> Option<Self> {
         let first = u32::try_from(column["--max-tokens"].as_u64()?).ok()?;
-        self.raised_from(NonZeroU32::new(first)?)
-            .filter(|raised| raised.match_column(column))
+        self.raised_from(NonZeroU32::new(first)?).filter(|raised| raised.match_column(column))
     }
 
     /// True if the settings that decide a reply equal those in a run's column of the model; the address is ignored.
@@ -213,16 +214,14 @@ impl Parameters {
 
 /// Renames the keys of a model's settings to flags.
 pub(crate) fn by_flag(content: Map<String, Value>) -> Map<String, Value> {
-    content
-        .into_iter()
-        .map(|(name, value)| (flag_name(&name), value))
-        .collect()
+    content.into_iter().map(|(name, value)| (flag_name(&name), value)).collect()
 }
 
 /// Where the settings of a model come from, besides their values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SettingsOrigin {
-    /// Settings of the run that these settings continue, which remain in the keys of its trials; `None` if they are the same.
+    /// Settings of the run that these settings continue, which remain in the keys of its trials; `None` if they are the
+    /// same.
     pub(crate) continued: Option<Box<Continued>>,
     /// True if the user did not set the temperature.
     pub(crate) default_temperature: bool,
@@ -299,8 +298,8 @@ pub enum ImageDetail {
     Original,
 }
 
-/// The constraint on a model's reply. Any value but `None` measures something else: the model's answer if it must name a
-/// letter.
+/// The constraint on a model's reply. Any value but `None` measures something else: the model's answer if it must name
+/// a letter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Constrain {
@@ -356,21 +355,14 @@ mod tests {
         for other in &others {
             assert_ne!(other.content(), base.content(), "{other:?}");
         }
-        let renamed = Parameters {
-            token_field: TokenField::MaxTokens,
-            wire: WireSetting::ChatStream,
-            ..base.clone()
-        };
+        let renamed = Parameters { token_field: TokenField::MaxTokens, wire: WireSetting::ChatStream, ..base.clone() };
         assert_eq!(renamed.content(), base.content());
         let mut raised = base.clone();
         raised.max_tokens = NonZeroU32::new(4096).unwrap();
         assert_ne!(raised.content(), base.content());
         let raised = raised.raised_from(base.max_tokens).unwrap();
         assert_eq!(raised.content(), base.content());
-        assert_eq!(
-            (raised.limit(), raised.changed_limit()),
-            (Some(4096), Some(4096))
-        );
+        assert_eq!((raised.limit(), raised.changed_limit()), (Some(4096), Some(4096)));
         assert_eq!(base.raised_from(raised.max_tokens), None);
     }
 
@@ -386,15 +378,7 @@ mod tests {
         own.max_tokens = NonZeroU32::new(400).unwrap();
         let changes = own.changes_from_column(&column);
         let flags: Vec<&str> = changes.iter().map(|change| &*change.flag).collect();
-        assert_eq!(
-            flags,
-            [
-                "--max-tokens",
-                "--sampling-seed",
-                "--temperature",
-                "--top-p"
-            ]
-        );
+        assert_eq!(flags, ["--max-tokens", "--sampling-seed", "--temperature", "--top-p"]);
         let own = own.continuing(&column, changes);
         assert_eq!(own.content(), first.content());
         assert_eq!((own.changed_limit(), own.first_limit()), (Some(400), 1024));

@@ -11,7 +11,8 @@ use crate::ask::wire_kind::Wire;
 /// What follows if a gateway gives up on a request.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AfterTimeout {
-    /// Number of earlier requests of the question that were charged, certainly or probably, and gave no reply that counts.
+    /// Number of earlier requests of the question that were charged, certainly or probably, and gave no reply that
+    /// counts.
     pub(crate) charged: u32,
     /// True if the caller asks the question in another way, so that the request is not repeated.
     pub(crate) asks_otherwise: bool,

@@ -38,15 +38,8 @@ impl Body for RequestBody {
     type Data = Bytes;
     type Error = Infallible;
 
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        _: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Infallible>>> {
-        let skipped = self
-            .rest()
-            .iter()
-            .take_while(|chunk| chunk.is_empty())
-            .count();
+    fn poll_frame(mut self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Result<Frame<Bytes>, Infallible>>> {
+        let skipped = self.rest().iter().take_while(|chunk| chunk.is_empty()).count();
         let chunk = self.rest().get(skipped).cloned();
         self.next += skipped + 1;
         Poll::Ready(chunk.map(|chunk| Ok(Frame::data(chunk))))

@@ -95,8 +95,7 @@ impl ServerRow {
             base.host() == suffix.trim_start_matches('.')
                 || (suffix.starts_with('.') && base.host().ends_with(suffix.as_str()))
         });
-        has_host
-            || (base.is_loopback() && base.port().is_some_and(|port| self.ports.contains(&port)))
+        has_host || (base.is_loopback() && base.port().is_some_and(|port| self.ports.contains(&port)))
     }
 
     /// True for the row of all servers that no other row lists.
@@ -120,21 +119,9 @@ mod tests {
         let template = json!({"chat_template_kwargs": {"enable_thinking": false}});
         for (base, effort, body) in [
             ("https://api.openai.com/v1", Some("none"), json!({})),
-            (
-                "https://r.openai.azure.com/openai/v1",
-                Some("none"),
-                json!({}),
-            ),
-            (
-                "https://dashscope-intl.aliyuncs.com/compatible-mode/v1",
-                None,
-                json!({"enable_thinking": false}),
-            ),
-            (
-                "https://openrouter.ai/api/v1",
-                None,
-                json!({"reasoning": {"enabled": false}}),
-            ),
+            ("https://r.openai.azure.com/openai/v1", Some("none"), json!({})),
+            ("https://dashscope-intl.aliyuncs.com/compatible-mode/v1", None, json!({"enable_thinking": false})),
+            ("https://openrouter.ai/api/v1", None, json!({"reasoning": {"enabled": false}})),
             ("http://127.0.0.1:11434/v1", Some("none"), json!({})),
             ("http://127.0.0.1:8000/v1", None, template.clone()),
             // Ports count only on this machine, and suffixes only as whole domains.
@@ -149,10 +136,9 @@ mod tests {
 
     #[test]
     fn unknown_switches_are_errors() {
-        for (base, thinking) in [
-            ("https://api.mistral.ai/v1", Thinking::Off),
-            ("https://api.openai.com/v1", Thinking::On),
-        ] {
+        for (base, thinking) in
+            [("https://api.mistral.ai/v1", Thinking::Off), ("https://api.openai.com/v1", Thinking::On)]
+        {
             let error = switch_for(base, thinking).unwrap_err().to_string();
             assert!(error.contains("--thinking"), "{error}");
             assert!(error.contains("--reasoning-effort"), "{error}");
@@ -162,29 +148,14 @@ mod tests {
     /// No switch is empty or sets a field of the program.
     #[test]
     fn switches_set_only_thinking_fields() {
-        let program_fields = [
-            "model",
-            "messages",
-            "input",
-            "stream",
-            "temperature",
-            "max_tokens",
-            "reasoning_effort",
-            "logprobs",
-        ];
+        let program_fields =
+            ["model", "messages", "input", "stream", "temperature", "max_tokens", "reasoning_effort", "logprobs"];
         let fallbacks = TABLE.server.iter().filter(|row| row.is_fallback());
         assert_eq!(fallbacks.count(), 1);
         for row in &TABLE.server {
             for switch in row.off.iter().chain(&row.on) {
-                assert!(
-                    switch.effort.is_some() || !switch.body.is_empty(),
-                    "{row:?}"
-                );
-                assert!(
-                    program_fields
-                        .iter()
-                        .all(|field| !switch.body.contains_key(*field))
-                );
+                assert!(switch.effort.is_some() || !switch.body.is_empty(), "{row:?}");
+                assert!(program_fields.iter().all(|field| !switch.body.contains_key(*field)));
             }
         }
     }

@@ -27,9 +27,7 @@ const MIN_LENGTH: usize = 20;
 /// # Errors
 /// [`Error::Usage`] with the name of a field that looks like a secret, without its value.
 pub(crate) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> {
-    fields
-        .iter()
-        .try_for_each(|(name, value)| refuse_in_field(name, value))
+    fields.iter().try_for_each(|(name, value)| refuse_in_field(name, value))
 }
 
 fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
@@ -38,9 +36,7 @@ fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
     }
     match value {
         Value::String(text) if is_secret(name, text) => secret_error(name),
-        Value::Array(items) => items
-            .iter()
-            .try_for_each(|item| refuse_in_field(name, item)),
+        Value::Array(items) => items.iter().try_for_each(|item| refuse_in_field(name, item)),
         Value::Object(fields) if is_key_object(fields) => secret_error(name),
         Value::Object(fields) => refuse_secrets(fields),
         _ => Ok(()),
@@ -55,25 +51,16 @@ fn secret_error(name: &str) -> Result<()> {
     Err(Error::usage("--extra-body", problem))
 }
 
-/// True if the text of a field looks like a secret: it has the form of a key, a private key or a service account, or the field name always means a secret, or the field
-/// name looks secret and the text is a long mixture of letters and digits.
+/// True if the text of a field looks like a secret: it has the form of a key, a private key or a service account, or
+/// the field name always means a secret, or the field name looks secret and the text is a long mixture of letters and
+/// digits.
 fn is_secret(name: &str, text: &str) -> bool {
-    let letters: String = name
-        .chars()
-        .filter(char::is_ascii_alphanumeric)
-        .map(|c| c.to_ascii_lowercase())
-        .collect();
-    let has_secret_suffix = SECRET_SUFFIXES
-        .iter()
-        .any(|suffix| letters.ends_with(suffix));
+    let letters: String = name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+    let has_secret_suffix = SECRET_SUFFIXES.iter().any(|suffix| letters.ends_with(suffix));
     let is_long_key = text.len() >= MIN_LENGTH
-        && text
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c))
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c))
         && text.contains(|c: char| c.is_ascii_digit());
-    is_secret_value(text)
-        || (has_secret_suffix && !text.is_empty())
-        || (is_secret_name(name) && is_long_key)
+    is_secret_value(text) || (has_secret_suffix && !text.is_empty()) || (is_secret_name(name) && is_long_key)
 }
 
 #[cfg(test)]
@@ -93,32 +80,17 @@ mod tests {
             (json!({"user": "sk-0123456789"}), "user"),
             (json!({"a": {"b": [{"X-Api-Key": "0123"}]}}), "X-Api-Key"),
             (json!({"a": ["Bearer 0123"]}), "a"),
-            (
-                json!({"router": {"token": "0123456789abcdef0123"}}),
-                "token",
-            ),
+            (json!({"router": {"token": "0123456789abcdef0123"}}), "token"),
             (json!({"sk-0123456789": 1}), "the name of a field"),
-            (
-                json!({"note": "-----BEGIN PRIVATE KEY-----\n0123\n-----END PRIVATE KEY-----"}),
-                "note",
-            ),
-            (
-                json!({"vertex_credentials": {"type": "service_account", "project_id": "0123"}}),
-                "vertex_credentials",
-            ),
-            (
-                json!({"a": "{\"type\": \"service_account\", \"b\": \"0123\"}"}),
-                "a",
-            ),
+            (json!({"note": "-----BEGIN PRIVATE KEY-----\n0123\n-----END PRIVATE KEY-----"}), "note"),
+            (json!({"vertex_credentials": {"type": "service_account", "project_id": "0123"}}), "vertex_credentials"),
+            (json!({"a": "{\"type\": \"service_account\", \"b\": \"0123\"}"}), "a"),
             (json!({"jwk": {"kty": "OKP", "d": "0123"}}), "jwk"),
         ] {
             let error = refusal(&fields).unwrap_err();
             let expected = format!("--extra-body: {name} looks like a secret");
             assert!(error.starts_with(&expected), "{error}");
-            assert!(
-                error.contains("--header-env") && !error.contains("0123"),
-                "{error}"
-            );
+            assert!(error.contains("--header-env") && !error.contains("0123"), "{error}");
         }
         for fields in [
             json!({"prompt_cache_key": "0f8fad5b-d9cb-469f-a165-70867728950e"}),

@@ -1,4 +1,5 @@
-//! Recognition of text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`], [`is_secret_header`].
+//! Recognition of text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`],
+//! [`is_secret_header`].
 
 use super::private_key;
 
@@ -8,15 +9,15 @@ const KEY_PREFIXES: [&str; 6] = ["sk-", "AIza", "gsk_", "xai-", "hf_", "Bearer "
 /// Minimum length at which a mixture of letters and digits counts as a key; chosen.
 const MIN_LENGTH: usize = 20;
 
-/// True if a text that should be the name of a variable looks like a key: it has the prefix of a key, a character that variable names do
-/// not have, or is a long mixture of letters and digits without an underscore.
+/// True if a text that should be the name of a variable looks like a key: it has the prefix of a key, a character that
+/// variable names do not have, or is a long mixture of letters and digits without an underscore.
 pub(crate) fn looks_like_key(name: &str) -> bool {
     let is_variable_name = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
     is_secret_value(name) || !is_variable_name || is_long_mixture(name)
 }
 
-/// True if the path of a missing file looks like a key: it has the prefix of a key, or is a long mixture of letters and digits without
-/// separators.
+/// True if the path of a missing file looks like a key: it has the prefix of a key, or is a long mixture of letters and
+/// digits without separators.
 pub(super) fn is_key_in_place_of_file(path: &str) -> bool {
     is_secret_value(path) || !path.contains(['/', '\\', '.', ' ']) && is_long_mixture(path)
 }
@@ -27,23 +28,18 @@ fn is_long_mixture(text: &str) -> bool {
 
 /// True if a key is written as in a shell or a `.env` file: in quotation marks, or after the name of a variable.
 pub(super) fn is_shell_text(key: &str) -> bool {
-    let is_quoted = ['"', '\'']
-        .iter()
-        .any(|quote| key.len() > 1 && key.starts_with(*quote) && key.ends_with(*quote));
+    let is_quoted = ['"', '\''].iter().any(|quote| key.len() > 1 && key.starts_with(*quote) && key.ends_with(*quote));
     let is_assigned = key.split_once('=').is_some_and(|(name, value)| {
-        let is_name = name
-            .bytes()
-            .all(|byte| byte.is_ascii_uppercase() || byte == b'_');
+        let is_name = name.bytes().all(|byte| byte.is_ascii_uppercase() || byte == b'_');
         is_name && name.contains('_') && !value.trim_matches('=').is_empty()
     });
     is_quoted || is_assigned
 }
 
-/// True if a value has the form of a secret: the prefix of a key, a private key, a service account or a token with a signature.
+/// True if a value has the form of a secret: the prefix of a key, a private key, a service account or a token with a
+/// signature.
 pub(crate) fn is_secret_value(value: &str) -> bool {
-    KEY_PREFIXES
-        .iter()
-        .any(|prefix| value.starts_with(prefix) && value.len() > prefix.len())
+    KEY_PREFIXES.iter().any(|prefix| value.starts_with(prefix) && value.len() > prefix.len())
         || private_key::is_private_key(value)
         || is_web_token(value)
 }
@@ -52,10 +48,7 @@ pub(crate) fn is_secret_value(value: &str) -> bool {
 fn is_web_token(value: &str) -> bool {
     let parts: Vec<&str> = value.split('.').collect();
     let is_base64 = |part: &&str| {
-        part.len() >= MIN_LENGTH
-            && part
-                .bytes()
-                .all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte))
+        part.len() >= MIN_LENGTH && part.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_".contains(&byte))
     };
     parts.len() == 3 && value.starts_with("eyJ") && parts.iter().all(is_base64)
 }
@@ -76,57 +69,37 @@ const SECRET_WORDS: [&str; 11] = [
 ];
 
 /// Words before `key` in names of keys that are no secrets: `Idempotency-Key`, `prompt_cache_key`.
-const PLAIN_KEYS: [&str; 6] = [
-    "affinity",
-    "cache",
-    "idempotency",
-    "partition",
-    "public",
-    "routing",
-];
+const PLAIN_KEYS: [&str; 6] = ["affinity", "cache", "idempotency", "partition", "public", "routing"];
 
 /// Words that are written in one with `key`: `apikey`.
-const BEFORE_KEY: [&str; 9] = [
-    "access",
-    "account",
-    "api",
-    "auth",
-    "client",
-    "license",
-    "private",
-    "secret",
-    "subscription",
-];
+const BEFORE_KEY: [&str; 9] =
+    ["access", "account", "api", "auth", "client", "license", "private", "secret", "subscription"];
 
-/// True if a header or field of this name usually contains a secret: one of its words says so. A word that only contains such a word is
-/// another one: `x-portkey-trace-id`, `X-Author`, `tokenizer`.
+/// True if a header or field of this name usually contains a secret: one of its words says so. A word that only
+/// contains such a word is another one: `x-portkey-trace-id`, `X-Author`, `tokenizer`.
 pub(crate) fn is_secret_name(name: &str) -> bool {
     let words = name_words(name);
     words.iter().enumerate().any(|(place, word)| {
         let word = word.strip_suffix('s').unwrap_or(word);
         let before = place.checked_sub(1).map(|place| words[place].as_str());
         let is_plain_key = word == "key" && before.is_some_and(|word| PLAIN_KEYS.contains(&word));
-        let is_compound = word
-            .strip_suffix("key")
-            .is_some_and(|before| BEFORE_KEY.iter().any(|known| before.ends_with(known)))
-            || ["token", "secret", "password", "passwd", "cookie"]
-                .iter()
-                .any(|end| word.ends_with(end));
+        let is_compound =
+            word.strip_suffix("key").is_some_and(|before| BEFORE_KEY.iter().any(|known| before.ends_with(known)))
+                || ["token", "secret", "password", "passwd", "cookie"].iter().any(|end| word.ends_with(end));
         !is_plain_key && (SECRET_WORDS.contains(&word) || is_compound)
     })
 }
 
-/// True if the value of a header is a secret: by its form, or by the name and a length of at least [`MIN_LENGTH`]. A name whose last word
-/// only ends with `key` (`x-mykey`) counts if the value is one long mixture of letters and digits.
+/// True if the value of a header is a secret: by its form, or by the name and a length of at least [`MIN_LENGTH`]. A
+/// name whose last word only ends with `key` (`x-mykey`) counts if the value is one long mixture of letters and digits.
 pub(crate) fn is_secret_header(name: &str, value: &str) -> bool {
     let ends_like_key = name.to_lowercase().ends_with("key");
     is_secret_value(value)
-        || value.len() >= MIN_LENGTH
-            && (is_secret_name(name) || ends_like_key && is_random_text(value))
+        || value.len() >= MIN_LENGTH && (is_secret_name(name) || ends_like_key && is_random_text(value))
 }
 
-/// True for a text of letters and digits without separators, with both: the form of most keys, but not of addresses, JSON, ids with
-/// hyphens and names.
+/// True for a text of letters and digits without separators, with both: the form of most keys, but not of addresses,
+/// JSON, ids with hyphens and names.
 fn is_random_text(text: &str) -> bool {
     text.bytes().all(|byte| byte.is_ascii_alphanumeric())
         && text.bytes().any(|byte| byte.is_ascii_digit())
@@ -138,8 +111,8 @@ fn name_words(name: &str) -> Vec<String> {
     let mut words = vec![String::new()];
     let mut before = ' ';
     for letter in name.chars() {
-        let begins = !letter.is_alphanumeric()
-            || letter.is_uppercase() && (before.is_lowercase() || before.is_ascii_digit());
+        let begins =
+            !letter.is_alphanumeric() || letter.is_uppercase() && (before.is_lowercase() || before.is_ascii_digit());
         if begins {
             words.push(String::new());
         }
@@ -161,15 +134,7 @@ mod tests {
         for name in ["OPENAI_API_KEY", "HF_TOKEN", "none", "key", "my_key_2", "K"] {
             assert!(!looks_like_key(name), "{name}");
         }
-        for key in [
-            "sk-proj-1",
-            "AIzaSy123",
-            "gsk_abc",
-            "xai-abc",
-            "a b",
-            "0123456789abcdef0123456789abcdef",
-            "a.b",
-        ] {
+        for key in ["sk-proj-1", "AIzaSy123", "gsk_abc", "xai-abc", "a b", "0123456789abcdef0123456789abcdef", "a.b"] {
             assert!(looks_like_key(key), "{key}");
         }
     }

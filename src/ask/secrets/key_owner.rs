@@ -5,8 +5,8 @@ use crate::ask::endpoints::BaseUrl;
 use crate::ask::vendors::VendorTable;
 use crate::error::{Error, Result};
 
-/// Checks that a key does not look like the key of another vendor: a wrong variable, or an address from someone else, would disclose it.
-/// Any key may be sent to this machine, which may run a gateway.
+/// Checks that a key does not look like the key of another vendor: a wrong variable, or an address from someone else,
+/// would disclose it. Any key may be sent to this machine, which may run a gateway.
 ///
 /// # Errors
 /// If the key belongs to another vendor. The error names the vendor and the address, but never the key.
@@ -44,21 +44,15 @@ mod tests {
             ("sk-ant-123", "http://127.0.0.1:4000/v1"),
             ("sk-123", "https://api.example.org/v1"),
         ] {
-            assert_eq!(
-                check(VendorTable::default(), key, address),
-                Ok(()),
-                "{address}"
-            );
+            assert_eq!(check(VendorTable::default(), key, address), Ok(()), "{address}");
         }
         for address in ["https://api.openai.com/v1", "https://api.example.org/v1"] {
             let error = check(own, "sk-ant-123", address).unwrap_err();
-            assert!(
-                error.contains("looks like one of Anthropic")
-                    && error.contains("--allow key-mismatch")
-            );
+            assert!(error.contains("looks like one of Anthropic") && error.contains("--allow key-mismatch"));
             assert!(!error.contains("sk-ant"), "{error}");
         }
-        // The user's table can add key forms. Its hosts may receive keys of these forms, even if they are another vendor's.
+        // The user's table can add key forms. Its hosts may receive keys of these forms, even if they are another
+        // vendor's.
         let gateway = "https://llm.example/v1";
         assert_eq!(check(own, "camp-123", gateway), Ok(()));
         assert_eq!(check(own, "sk-proj-123", gateway), Ok(()));

@@ -7,12 +7,7 @@ use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
 use serde_json::Value;
 
 /// Texts that only files with private keys have: PEM of any kind, PGP, PuTTY, and age.
-const MARKS: [&str; 4] = [
-    "PRIVATE KEY-----",
-    "PRIVATE KEY BLOCK-----",
-    "PuTTY-User-Key-File",
-    "AGE-SECRET-KEY-",
-];
+const MARKS: [&str; 4] = ["PRIVATE KEY-----", "PRIVATE KEY BLOCK-----", "PuTTY-User-Key-File", "AGE-SECRET-KEY-"];
 
 /// Maximum length of a text that is decoded from base64, in bytes (chosen). The largest private keys in use have 13 kB.
 const MAX_ENCODED: usize = 64 << 10;
@@ -22,8 +17,8 @@ pub(super) fn is_private_key(text: &str) -> bool {
     has_mark(text) || decode(text).is_some_and(|decoded| has_mark(&decoded))
 }
 
-/// True for JSON of a private key (JWK) or of a service account. Its fields tell them: `kty` with `d` or `k`, `type` with the text
-/// `service_account`.
+/// True for JSON of a private key (JWK) or of a service account. Its fields tell them: `kty` with `d` or `k`, `type`
+/// with the text `service_account`.
 pub(super) fn is_key_object(fields: &serde_json::Map<String, Value>) -> bool {
     let has = |name: &str| fields.get(name).is_some_and(Value::is_string);
     let is_account = fields.get("type").and_then(Value::as_str) == Some("service_account");
@@ -32,8 +27,7 @@ pub(super) fn is_key_object(fields: &serde_json::Map<String, Value>) -> bool {
 
 fn has_mark(text: &str) -> bool {
     let is_object = text.trim_start().starts_with('{')
-        && serde_json::from_str::<Value>(text)
-            .is_ok_and(|value| value.as_object().is_some_and(is_key_object));
+        && serde_json::from_str::<Value>(text).is_ok_and(|value| value.as_object().is_some_and(is_key_object));
     is_object || MARKS.iter().any(|mark| text.contains(mark))
 }
 
@@ -43,12 +37,9 @@ fn decode(text: &str) -> Option<String> {
         return None;
     }
     let letters: String = text.split_whitespace().collect();
-    let config =
-        GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
+    let config = GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
     [STANDARD, URL_SAFE].iter().find_map(|alphabet| {
-        let bytes = GeneralPurpose::new(alphabet, config)
-            .decode(&letters)
-            .ok()?;
+        let bytes = GeneralPurpose::new(alphabet, config).decode(&letters).ok()?;
         String::from_utf8(bytes).ok()
     })
 }

@@ -31,16 +31,15 @@ pub(crate) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
         }
         .shorten(),
         chances: reply.chances.map(|chances| map_tokens(chances, name)),
-        other_field: reply.other_field.map(|field| OtherField {
-            name: name(field.name),
-            text: shortened(scrub.reply(field.text)),
-        }),
+        other_field: reply
+            .other_field
+            .map(|field| OtherField { name: name(field.name), text: shortened(scrub.reply(field.text)) }),
         ..reply
     }
 }
 
-/// Cuts the middle of a text longer than [`MAX_TEXT`] and replaces it by a note. The end remains, because a long answer states its choice
-/// there.
+/// Cuts the middle of a text longer than [`MAX_TEXT`] and replaces it by a note. The end remains, because a long answer
+/// states its choice there.
 fn shortened(text: String) -> String {
     if text.len() <= MAX_TEXT {
         return text;
@@ -49,11 +48,7 @@ fn shortened(text: String) -> String {
     let start = text.floor_char_boundary(half);
     let end = text.ceil_char_boundary(text.len() - half);
     let omitted = end - start;
-    format!(
-        "{}\n[… {omitted} bytes omitted …]\n{}",
-        &text[..start],
-        &text[end..]
-    )
+    format!("{}\n[… {omitted} bytes omitted …]\n{}", &text[..start], &text[end..])
 }
 
 /// Applies a function to all tokens.
@@ -63,11 +58,7 @@ fn map_tokens(chances: TokenChances, map: impl Fn(String) -> String) -> TokenCha
             .positions
             .into_iter()
             .map(|position| TokenPosition {
-                likeliest: position
-                    .likeliest
-                    .into_iter()
-                    .map(|(token, logprob)| (map(token), logprob))
-                    .collect(),
+                likeliest: position.likeliest.into_iter().map(|(token, logprob)| (map(token), logprob)).collect(),
                 token: map(position.token),
             })
             .collect(),

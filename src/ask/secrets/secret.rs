@@ -19,15 +19,12 @@ impl Secret {
     /// Creates a key from a text, without surrounding white space; `origin` is its variable or file, for errors.
     ///
     /// # Errors
-    /// If the key is empty or has characters other than visible ASCII, which an HTTP header cannot carry. The error does not show
-    /// the key.
+    /// If the key is empty or has characters other than visible ASCII, which an HTTP header cannot carry. The error
+    /// does not show the key.
     pub fn new(text: &str, origin: &str) -> Result<Self> {
         let key = text.trim();
         if key.is_empty() {
-            return Err(Error::usage(
-                origin,
-                "the key is empty; for an endpoint without keys use --api-key-env none",
-            ));
+            return Err(Error::usage(origin, "the key is empty; for an endpoint without keys use --api-key-env none"));
         }
         if !key.bytes().all(|byte| byte.is_ascii_graphic()) {
             return Err(Error::usage(
@@ -47,8 +44,8 @@ impl Secret {
     /// Reads a key from a file.
     ///
     /// # Errors
-    /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error shows neither its
-    /// content nor a key in place of the path.
+    /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error
+    /// shows neither its content nor a key in place of the path.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let bytes = reading::at_most(path, MAX_FILE).map_err(|error| {
             if path.to_str().is_some_and(is_key_in_place_of_file) {
@@ -63,8 +60,7 @@ impl Secret {
         let origin = format!("--api-key-file {}", path.display());
         let text = String::from_utf8_lossy(&bytes);
         if text.contains("-----BEGIN") {
-            let problem =
-                "this is a private key or a certificate, not an API key; nothing of it was sent";
+            let problem = "this is a private key or a certificate, not an API key; nothing of it was sent";
             return Err(Error::usage(origin, problem));
         }
         Self::new(text.trim_start_matches('\u{feff}'), &origin)
@@ -88,15 +84,16 @@ const MAX_LINE: usize = 300;
 /// Number of bytes of a server text to inspect for such a line; chosen.
 const MAX_READ: usize = 64 << 10;
 
-/// Minimum length of a secret to remove, in bytes. Shorter ones are placeholders such as `x` for servers that accept any key; their removal
-/// would damage ordinary words.
+/// Minimum length of a secret to remove, in bytes. Shorter ones are placeholders such as `x` for servers that accept
+/// any key; their removal would damage ordinary words.
 const MIN_SECRET: usize = 4;
 
-/// Minimum length of a secret to remove from the reply of a model, in bytes. Real keys are longer, and an answer may contain a shorter
-/// word.
+/// Minimum length of a secret to remove from the reply of a model, in bytes. Real keys are longer, and an answer may
+/// contain a shorter word.
 const MIN_SECRET_IN_REPLY: usize = 16;
 
-/// Filter that makes the text of a server safe for terminals, logs and tables: removes secrets and control characters, and shortens it.
+/// Filter that makes the text of a server safe for terminals, logs and tables: removes secrets and control characters,
+/// and shortens it.
 #[derive(Clone, Default)]
 pub(crate) struct Scrub {
     /// Secrets, longest first: if one secret contains another, no part of the longer one must remain.
@@ -108,10 +105,7 @@ pub(crate) struct Scrub {
 impl Scrub {
     /// Creates a filter for these secrets.
     pub(crate) fn new(secrets: impl IntoIterator<Item = String>) -> Self {
-        let mut secrets: Vec<String> = secrets
-            .into_iter()
-            .filter(|secret| secret.len() >= MIN_SECRET)
-            .collect();
+        let mut secrets: Vec<String> = secrets.into_iter().filter(|secret| secret.len() >= MIN_SECRET).collect();
         secrets.sort_by_key(|secret| std::cmp::Reverse(secret.len()));
         secrets.dedup();
         let parts = SecretParts::new(keys(&secrets));
@@ -133,7 +127,8 @@ impl Scrub {
         self.parts.masked(self.without_whole_keys(text))
     }
 
-    /// Removes keys from a line of JSON. Each string is filtered alone. Ids of requests in a batch are not searched for parts of keys.
+    /// Removes keys from a line of JSON. Each string is filtered alone. Ids of requests in a batch are not searched for
+    /// parts of keys.
     pub(crate) fn json_line(&self, line: String) -> String {
         let line = self.without_whole_keys(line);
         let parts: Vec<&str> = line.split('"').collect();
@@ -142,11 +137,7 @@ impl Scrub {
             .enumerate()
             .map(|(index, part)| {
                 let is_id = index >= 2 && parts[index - 2] == "custom_id";
-                if is_id {
-                    (*part).to_owned()
-                } else {
-                    self.parts.masked((*part).to_owned())
-                }
+                if is_id { (*part).to_owned() } else { self.parts.masked((*part).to_owned()) }
             })
             .collect::<Vec<_>>()
             .join("\"")
@@ -154,13 +145,7 @@ impl Scrub {
 
     /// Replaces whole keys, but not parts of them.
     fn without_whole_keys(&self, text: String) -> String {
-        keys(&self.secrets).fold(text, |text, key| {
-            if text.contains(key) {
-                text.replace(key, MASK)
-            } else {
-                text
-            }
-        })
+        keys(&self.secrets).fold(text, |text, key| if text.contains(key) { text.replace(key, MASK) } else { text })
     }
 
     /// Puts a text on one line of at most 300 characters, without secrets and hidden characters.
@@ -183,10 +168,7 @@ impl Scrub {
 
 /// Secrets that are long enough to remove from replies.
 fn keys(secrets: &[String]) -> impl Iterator<Item = &str> {
-    secrets
-        .iter()
-        .map(String::as_str)
-        .filter(|secret| secret.len() >= MIN_SECRET_IN_REPLY)
+    secrets.iter().map(String::as_str).filter(|secret| secret.len() >= MIN_SECRET_IN_REPLY)
 }
 
 /// True for control characters other than white space, and for characters that reverse or hide text.
@@ -262,12 +244,7 @@ mod tests {
         ] {
             let error = read_text(file.path(), wrong).unwrap_err();
             assert!(error.contains(&*file.path().to_string_lossy()), "{error}");
-            assert!(
-                !["sk-", "abc", "aaa"]
-                    .iter()
-                    .any(|part| error.contains(part)),
-                "{error}"
-            );
+            assert!(!["sk-", "abc", "aaa"].iter().any(|part| error.contains(part)), "{error}");
         }
     }
 
@@ -281,16 +258,10 @@ mod tests {
     #[test]
     fn secrets_are_removed_before_shortening() {
         let scrub = Scrub::new(["sk-abcdef".to_owned(), "sk-abcdef-long".to_owned()]);
-        assert_eq!(
-            scrub.line("key \u{1b}[31msk-abc\u{200b}def-long,\r\n\tsk-abcdef"),
-            "key [31m[secret], [secret]"
-        );
+        assert_eq!(scrub.line("key \u{1b}[31msk-abc\u{200b}def-long,\r\n\tsk-abcdef"), "key [31m[secret], [secret]");
         let long = format!("{}sk-abcdef", "x".repeat(MAX_LINE - 4));
         assert!(!scrub.line(&long).contains("sk-"));
         assert_eq!(scrub.line(&"é".repeat(400)).chars().count(), MAX_LINE + 1);
-        assert_eq!(
-            Scrub::new(["x".to_owned()]).line("an axe\u{202e}"),
-            "an axe"
-        );
+        assert_eq!(Scrub::new(["x".to_owned()]).line("an axe\u{202e}"), "an axe");
     }
 }

@@ -6,8 +6,8 @@ use std::ops::Range;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD_NO_PAD;
 
-/// Number of consecutive letters and digits that identify a part of a key; chosen. A random text of 64 kB contains such a part with a
-/// probability of 1e-6.
+/// Number of consecutive letters and digits that identify a part of a key; chosen. A random text of 64 kB contains such
+/// a part with a probability of 1e-6.
 const PART: usize = 8;
 
 /// Minimum length of a part without digits; chosen. Keys of gateways contain words that also occur in replies.
@@ -99,8 +99,8 @@ struct Letter {
     end: usize,
 }
 
-/// ASCII letters and digits of a text, including escaped ones such as `\u0073` in JSON or `%73` in a URL. The letter of other escapes,
-/// such as `\n`, does not count.
+/// ASCII letters and digits of a text, including escaped ones such as `\u0073` in JSON or `%73` in a URL. The letter of
+/// other escapes, such as `\n`, does not count.
 fn letters(text: &str) -> impl Iterator<Item = Letter> {
     let bytes = text.as_bytes();
     let mut start = 0;
@@ -108,11 +108,7 @@ fn letters(text: &str) -> impl Iterator<Item = Letter> {
         while start < bytes.len() {
             let (value, length) = letter(&bytes[start..]);
             let end = start + length;
-            let found = value.is_ascii_alphanumeric().then(|| Letter {
-                value: value.to_ascii_lowercase(),
-                start,
-                end,
-            });
+            let found = value.is_ascii_alphanumeric().then(|| Letter { value: value.to_ascii_lowercase(), start, end });
             start = end;
             if found.is_some() {
                 return found;
@@ -182,13 +178,7 @@ mod tests {
 
     #[test]
     fn other_text_is_unchanged() {
-        for text in [
-            "sk-proj",
-            "the project Ab12",
-            "Zm9v12345678",
-            "%zz \\ud83d %",
-            "é\\",
-        ] {
+        for text in ["sk-proj", "the project Ab12", "Zm9v12345678", "%zz \\ud83d %", "é\\"] {
             assert_eq!(masked(text), text);
         }
         let words = SecretParts::new(["bathroom-gateway-key-4711"].into_iter());

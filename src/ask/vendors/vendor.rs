@@ -11,7 +11,8 @@ use crate::ask::requests::TokenField;
 use crate::ask::secrets::KeyHeader;
 use crate::error::Error;
 
-/// A vendor that hosts models, and the properties of its endpoints. `None` means unknown, unless a field states otherwise.
+/// A vendor that hosts models, and the properties of its endpoints. `None` means unknown, unless a field states
+/// otherwise.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Vendor {
@@ -105,8 +106,7 @@ struct Vendors {
 }
 
 static VENDORS: LazyLock<Vendors> = LazyLock::new(|| {
-    toml::from_str(include_str!("../vendors.toml"))
-        .unwrap_or_else(|e| unreachable!("a test reads vendors.toml: {e}"))
+    toml::from_str(include_str!("../vendors.toml")).unwrap_or_else(|e| unreachable!("a test reads vendors.toml: {e}"))
 });
 
 impl Vendor {
@@ -115,32 +115,26 @@ impl Vendor {
         VENDORS.vendor.iter().find(|vendor| vendor.owns_host(host))
     }
 
-    /// Finds the vendor in the built-in table that uses keys of this form; `None` if several vendors do, or if that is unknown.
+    /// Finds the vendor in the built-in table that uses keys of this form; `None` if several vendors do, or if that is
+    /// unknown.
     pub(super) fn by_key(key: &str) -> Option<&'static Self> {
         VENDORS.vendor.iter().find(|vendor| vendor.has_key(key))
     }
 
     /// True if a key has a form that only this vendor uses.
     pub(super) fn has_key(&self, key: &str) -> bool {
-        self.key_form
-            .iter()
-            .any(|pattern| matches_key_pattern(key, pattern))
+        self.key_form.iter().any(|pattern| matches_key_pattern(key, pattern))
     }
 
-    /// True if the built-in table lists exactly this host name. A name below a listed domain may belong to any customer.
+    /// True if the built-in table lists exactly this host name. A name below a listed domain may belong to any
+    /// customer.
     pub(crate) fn has_host(host: &str) -> bool {
-        VENDORS
-            .vendor
-            .iter()
-            .flat_map(|vendor| &vendor.hosts)
-            .any(|known| known == host)
+        VENDORS.vendor.iter().flat_map(|vendor| &vendor.hosts).any(|known| known == host)
     }
 
     /// True if the host belongs to this vendor.
     pub(crate) fn owns_host(&self, host: &str) -> bool {
-        self.hosts
-            .iter()
-            .any(|suffix| matches_host_suffix(host, suffix))
+        self.hosts.iter().any(|suffix| matches_host_suffix(host, suffix))
     }
 
     /// Checks that `hosts` is a non-empty list of host name suffixes, which the types do not ensure.
@@ -150,8 +144,7 @@ impl Vendor {
     pub(super) fn check(&self) -> Result<(), String> {
         if self.hosts.is_empty() || !self.hosts.iter().all(|text| is_host_suffix(text)) {
             return Err(
-                "hosts: ends of host names expected, such as \"api.example.com\" or \".example.com\""
-                    .to_owned(),
+                "hosts: ends of host names expected, such as \"api.example.com\" or \".example.com\"".to_owned()
             );
         }
         Ok(())
@@ -211,16 +204,12 @@ impl Vendor {
 /// True if a key starts with a pattern, in which `*` matches any text between two parts.
 fn matches_key_pattern(key: &str, pattern: &str) -> bool {
     let (prefix, infix) = pattern.split_once('*').unwrap_or((pattern, ""));
-    key.strip_prefix(prefix)
-        .is_some_and(|rest| rest.contains(infix))
+    key.strip_prefix(prefix).is_some_and(|rest| rest.contains(infix))
 }
 
 /// True for a non-empty text of ASCII letters, digits, dots and hyphens.
 fn is_host_suffix(text: &str) -> bool {
-    !text.is_empty()
-        && text
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-'))
+    !text.is_empty() && text.chars().all(|c| c.is_ascii_alphanumeric() || matches!(c, '.' | '-'))
 }
 
 /// True if a host is the suffix itself or a subdomain of it. `notapi.example.com` does not match `api.example.com`.
@@ -248,14 +237,7 @@ mod tests {
             assert!(!vendor.key.is_empty(), "{}", vendor.name);
             assert_eq!(vendor.check(), Ok(()), "{}", vendor.name);
             hosts.extend(&vendor.hosts);
-            assert!(
-                vendor
-                    .key
-                    .iter()
-                    .all(|name| !crate::ask::secrets::looks_like_key(name)),
-                "{}",
-                vendor.name
-            );
+            assert!(vendor.key.iter().all(|name| !crate::ask::secrets::looks_like_key(name)), "{}", vendor.name);
         }
         let count = hosts.len();
         hosts.sort();
@@ -285,19 +267,10 @@ mod tests {
     #[test]
     fn the_token_field_depends_on_the_host() {
         let auto = TokenField::Auto;
-        assert_eq!(
-            token_field_at("api.openai.com", auto),
-            TokenField::MaxCompletionTokens
-        );
+        assert_eq!(token_field_at("api.openai.com", auto), TokenField::MaxCompletionTokens);
         assert_eq!(token_field_at("localhost", auto), TokenField::MaxTokens);
-        assert_eq!(
-            token_field_at("api.mistral.ai", auto),
-            TokenField::MaxTokens
-        );
-        assert_eq!(
-            token_field_at("api.openai.com", TokenField::Omit),
-            TokenField::Omit
-        );
+        assert_eq!(token_field_at("api.mistral.ai", auto), TokenField::MaxTokens);
+        assert_eq!(token_field_at("api.openai.com", TokenField::Omit), TokenField::Omit);
     }
 
     fn check_base(text: &str) -> Option<Result<(), Error>> {
@@ -309,14 +282,8 @@ mod tests {
     fn some_vendors_require_a_path() {
         let bare = "https://r.openai.azure.com/?api-version=2024-10-21";
         let error = check_base(bare).unwrap().unwrap_err().to_string();
-        assert!(
-            error.contains("Azure needs a path: https://RESOURCE"),
-            "{error}"
-        );
-        for base in [
-            "https://r.openai.azure.com/openai/v1",
-            "https://api.openai.com",
-        ] {
+        assert!(error.contains("Azure needs a path: https://RESOURCE"), "{error}");
+        for base in ["https://r.openai.azure.com/openai/v1", "https://api.openai.com"] {
             assert!(check_base(base).unwrap().is_ok(), "{base}");
         }
     }
@@ -327,14 +294,9 @@ mod tests {
         assert_eq!(vendor_at("eu.api.openai.com"), Some("OpenAI"));
         assert_eq!(vendor_at("r.openai.azure.com"), Some("Azure"));
         assert_eq!(vendor_at("dashscope-intl.aliyuncs.com"), Some("DashScope"));
-        for other in [
-            "127.0.0.1",
-            "notapi.openai.com",
-            "evil-openrouter.ai",
-            "openrouter.ai.example",
-            "openai.azure.com",
-            "",
-        ] {
+        for other in
+            ["127.0.0.1", "notapi.openai.com", "evil-openrouter.ai", "openrouter.ai.example", "openai.azure.com", ""]
+        {
             assert_eq!(vendor_at(other), None, "{other}");
         }
     }

@@ -2,14 +2,16 @@
 //!
 //! Only charges in US dollars count:
 //!
-//! - a field whose name says so: `cost_in_usd_ticks` of xAI (10¹⁰ to the dollar, docs.x.ai/developers/cost-tracking), `cost_usd_total` of
-//!   LLM Gateway (docs.llmgateway.io/features/cost-breakdown), `total_cost_usd`, `cost_in_usd_nanos` and the like;
-//! - in `usage`, `cost` of OpenRouter, whose credits are US dollars (openrouter.ai/docs, "Usage Accounting"); with the user's own key for
-//!   the provider (`is_byok`), what that provider charges is added;
-//! - in `usage`, `cost.total_cost` of Perplexity (docs.perplexity.ai), and `estimated_cost` of DeepInfra (docs.deepinfra.com);
+//! - a field whose name says so: `cost_in_usd_ticks` of xAI (10¹⁰ to the dollar, docs.x.ai/developers/cost-tracking),
+//!   `cost_usd_total` of LLM Gateway (docs.llmgateway.io/features/cost-breakdown), `total_cost_usd`,
+//!   `cost_in_usd_nanos` and the like;
+//! - in `usage`, `cost` of OpenRouter, whose credits are US dollars (openrouter.ai/docs, "Usage Accounting"); with the
+//!   user's own key for the provider (`is_byok`), what that provider charges is added;
+//! - in `usage`, `cost.total_cost` of Perplexity (docs.perplexity.ai), and `estimated_cost` of DeepInfra
+//!   (docs.deepinfra.com);
 //! - `provider_metadata.gateway.cost` of a message from Vercel's AI Gateway (vercel.com/docs/ai-gateway);
-//! - the header `x-litellm-response-cost` of LiteLLM (docs.litellm.ai/docs/proxy/response_headers), and others whose name says that it
-//!   is the cost of the request or response in US dollars.
+//! - the header `x-litellm-response-cost` of LiteLLM (docs.litellm.ai/docs/proxy/response_headers), and others whose
+//!   name says that it is the cost of the request or response in US dollars.
 //!
 //! A currency or unit that stands beside a charge must be the US dollar.
 
@@ -87,13 +89,12 @@ fn cost_in_usage(usage: &Map<String, Value>) -> Option<StatedCost> {
         Some(upstream) => cost.plus(upstream),
         None => cost,
     });
-    let total = ["total_cost", "estimated_cost"]
-        .iter()
-        .find_map(|name| plain(usage, name, name));
+    let total = ["total_cost", "estimated_cost"].iter().find_map(|name| plain(usage, name, name));
     named.max(cost).max(total)
 }
 
-/// The provider's charge for a request with the user's own key for this provider, which OpenRouter does not include in `cost`.
+/// The provider's charge for a request with the user's own key for this provider, which OpenRouter does not include in
+/// `cost`.
 fn own_key_cost(usage: &Map<String, Value>) -> Option<StatedCost> {
     usage.get("is_byok").filter(|own| **own == true)?;
     let details = usage.get("cost_details")?.as_object()?;
@@ -139,7 +140,8 @@ const WORDS: [&str; 13] = [
     "cents",
 ];
 
-/// The highest charge among fields whose names say that they are in US dollars. Names with other words are parts of the charge, or sums.
+/// The highest charge among fields whose names say that they are in US dollars. Names with other words are parts of the
+/// charge, or sums.
 fn named_in_dollars(fields: &Map<String, Value>) -> Option<StatedCost> {
     fields
         .iter()
@@ -170,18 +172,14 @@ fn named_in_dollars(fields: &Map<String, Value>) -> Option<StatedCost> {
 fn in_dollars(name: &str, dollars: f64) -> Option<StatedCost> {
     let cost = StatedCost::from_dollars(dollars);
     if cost.is_none() {
-        warn_once(&format!(
-            "{name} of {dollars}, no plausible charge in US dollars"
-        ));
+        warn_once(&format!("{name} of {dollars}, no plausible charge in US dollars"));
     }
     cost
 }
 
 /// Parses a number, or a number in a string.
 fn number(value: &Value) -> Option<f64> {
-    value
-        .as_f64()
-        .or_else(|| value.as_str()?.trim().trim_start_matches('$').parse().ok())
+    value.as_f64().or_else(|| value.as_str()?.trim().trim_start_matches('$').parse().ok())
 }
 
 /// Maximum number of warnings about charges that do not count; chosen.
@@ -222,41 +220,21 @@ mod tests {
                 json!({"usage": {"cost": 0.006, "is_byok": true, "cost_details": {"upstream_inference_cost": 0.12}}}),
                 0.126,
             ),
-            (
-                "xAI",
-                json!({"usage": {"cost_in_usd_ticks": 37_756_000}}),
-                0.003_775_6,
-            ),
+            ("xAI", json!({"usage": {"cost_in_usd_ticks": 37_756_000}}), 0.003_775_6),
             (
                 "Perplexity",
                 json!({"usage": {"cost": {"input_tokens_cost": 0.001, "request_cost": 0.005, "total_cost": 0.006}}}),
                 0.006,
             ),
-            (
-                "DeepInfra",
-                json!({"usage": {"estimated_cost": 2.6e-5}}),
-                2.6e-5,
-            ),
+            ("DeepInfra", json!({"usage": {"estimated_cost": 2.6e-5}}), 2.6e-5),
             (
                 "LLM Gateway",
                 json!({"usage": {"cost_usd_total": 0.000_125, "cost_usd_input": 0.5, "cost_usd_request": 0.25}}),
                 0.000_125,
             ),
-            (
-                "Vercel",
-                json!({"choices": [{"message": {"provider_metadata": vercel}}]}),
-                0.004_540_5,
-            ),
-            (
-                "another one",
-                json!({"usage": {"cost": "0.02", "currency": "USD"}}),
-                0.02,
-            ),
-            (
-                "nanos",
-                json!({"usage": {"cost_in_usd_nanos": 5_000_000}}),
-                0.005,
-            ),
+            ("Vercel", json!({"choices": [{"message": {"provider_metadata": vercel}}]}), 0.004_540_5),
+            ("another one", json!({"usage": {"cost": "0.02", "currency": "USD"}}), 0.02),
+            ("nanos", json!({"usage": {"cost_in_usd_nanos": 5_000_000}}), 0.005),
             ("beside the usage", json!({"total_cost_usd": 0.25}), 0.25),
         ] {
             let found = dollars(&body).unwrap_or(-1.0);
@@ -305,19 +283,10 @@ mod tests {
     #[test]
     fn tiers_are_read() {
         for (body, expected) in [
-            (
-                json!({"service_tier": "priority"}),
-                Some(ServiceTier::Priority),
-            ),
-            (
-                json!({"service_tier": "default"}),
-                Some(ServiceTier::Standard),
-            ),
+            (json!({"service_tier": "priority"}), Some(ServiceTier::Priority)),
+            (json!({"service_tier": "default"}), Some(ServiceTier::Standard)),
             (json!({"service_tier": null}), None),
-            (
-                json!({"usage": {"service_tier": "standard"}}),
-                Some(ServiceTier::Standard),
-            ),
+            (json!({"usage": {"service_tier": "standard"}}), Some(ServiceTier::Standard)),
             (json!({"usage": {"service_tier": "batch"}}), None),
             (json!({"service_tier": "turbo"}), Some(ServiceTier::Other)),
         ] {

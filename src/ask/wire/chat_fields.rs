@@ -1,17 +1,13 @@
 //! Fields of chat completion requests that servers may refuse: [`fields`].
 
-use crate::ask::requests::{
-    AdaptableField, Constrain, FieldState, RequestField, SentFields, Temperature, TokenField,
-};
+use crate::ask::requests::{AdaptableField, Constrain, FieldState, RequestField, SentFields, Temperature, TokenField};
 use crate::ask::wire_kind::Wire;
 
 /// Remedy for a server without token probabilities.
-pub(super) const OMIT_PROBABILITIES: &str =
-    "leave --request probabilities out: the server states none";
+pub(super) const OMIT_PROBABILITIES: &str = "leave --request probabilities out: the server states none";
 
 /// Remedy for a server without a seed.
-const OMIT_SEED: &str =
-    "send no seed: --sampling-seed none, or leave seed out of the file of models";
+const OMIT_SEED: &str = "send no seed: --sampling-seed none, or leave seed out of the file of models";
 
 /// Name of `top_logprobs` in the refusals of Text Generation Inference.
 const TGI_TOP_LOGPROBS: &str = "top_n_tokens";
@@ -26,9 +22,7 @@ fn sampling_fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
     let parameters = sent.parameters;
     let is_omitted = parameters.token_field == TokenField::Omit;
     let current = sent.fields.token_field;
-    let limit_state = |field| {
-        FieldState::until_refused(current == field, is_omitted || current != TokenField::Omit)
-    };
+    let limit_state = |field| FieldState::until_refused(current == field, is_omitted || current != TokenField::Omit);
     Vec::from([
         RequestField {
             name: "temperature",
@@ -96,10 +90,7 @@ fn format_fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
         },
         RequestField {
             name: "logprobs",
-            state: FieldState::until_refused(
-                sent.fields.top_logprobs.is_some(),
-                !parameters.probabilities,
-            ),
+            state: FieldState::until_refused(sent.fields.top_logprobs.is_some(), !parameters.probabilities),
             adaptable: Some(AdaptableField::Logprobs),
             hint: OMIT_PROBABILITIES,
         },

@@ -14,9 +14,10 @@ use crate::types::{Finish, Reply, Thought, TokenChances, Usage};
 
 /// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
-/// Errors may be at the top level or in the choice, because gateways send both with status 200. Optional fields may be missing, null
-/// or of another type; hidden reasoning is ignored. Invalid UTF-8 and unpaired surrogates become replacement characters, because a small
-/// model at temperature 0 would send them again in each retry. An event stream is accepted even if it was not requested.
+/// Errors may be at the top level or in the choice, because gateways send both with status 200. Optional fields may be
+/// missing, null or of another type; hidden reasoning is ignored. Invalid UTF-8 and unpaired surrogates become
+/// replacement characters, because a small model at temperature 0 would send them again in each retry. An event stream
+/// is accepted even if it was not requested.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
     let completion = parse(&json_body::text(body), content_type)?;
     // A completion may have a field "message", so only the field `error` counts there.
@@ -36,9 +37,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     }
     let reason = choice.get("finish_reason").and_then(Value::as_str);
     let Ending { finish, may_heal } = finish_reason::read(reason.unwrap_or_default(), usage)
-        .map_err(|incomplete| {
-            error_in_text(choice).unwrap_or(ReplyError::Unreadable(incomplete))
-        })?;
+        .map_err(|incomplete| error_in_text(choice).unwrap_or(ReplyError::Unreadable(incomplete)))?;
     let message = choice
         .get("message")
         .filter(|message| message.is_object())
@@ -81,12 +80,8 @@ fn parse(text: &str, content_type: &str) -> Result<Value, ReplyError> {
     if stream::is_stream(text, content_type) {
         return stream::assemble(text).map_err(|broken| {
             let description = "an event stream without a complete chat completion";
-            Unreadable {
-                usage: usage::alone(broken.usage),
-                broke_off: broken.has_text,
-                ..Unreadable::new(description)
-            }
-            .into()
+            Unreadable { usage: usage::alone(broken.usage), broke_off: broken.has_text, ..Unreadable::new(description) }
+                .into()
         });
     }
     json_body::parse_body(text, content_type)
@@ -94,10 +89,7 @@ fn parse(text: &str, content_type: &str) -> Result<Value, ReplyError> {
 
 /// The choice with index 0, or the first one if none has that index.
 fn first_choice(completion: &Value) -> Result<&Value, &'static str> {
-    let choices = completion
-        .get("choices")
-        .and_then(Value::as_array)
-        .ok_or("JSON without choices")?;
+    let choices = completion.get("choices").and_then(Value::as_array).ok_or("JSON without choices")?;
     choices
         .iter()
         .find(|choice| choice.get("index").and_then(Value::as_u64) == Some(0))
@@ -166,10 +158,7 @@ mod tests {
             (r#"{"content":"B"}"#, "B"),
             (r#"{"content":null}"#, ""),
             (r#"{"role":"assistant"}"#, ""),
-            (
-                r#"{"content":"","reasoning_content":"A","reasoning":"A"}"#,
-                "",
-            ),
+            (r#"{"content":"","reasoning_content":"A","reasoning":"A"}"#, ""),
             (
                 r#"{"content":[{"type":"thinking","thinking":[{"type":"text","text":"A"}]},{"type":"text","text":"B"},{"type":"text","text":"."},7,null,{"type":"text","text":null}]}"#,
                 "B.",
@@ -182,10 +171,7 @@ mod tests {
         let refusal = message(r#"{"content":null,"refusal":"I cannot see"}"#);
         assert_eq!(refusal.refusal.as_deref(), Some("I cannot see"));
         let part = message(r#"{"content":[{"type":"refusal","refusal":"no"}],"refusal":""}"#);
-        assert_eq!(
-            (part.text.as_str(), part.refusal.as_deref()),
-            ("", Some("no"))
-        );
+        assert_eq!((part.text.as_str(), part.refusal.as_deref()), ("", Some("no")));
         assert!(json(r#"{"choices":[{"message":{"content":{"a":1}}}]}"#).is_err());
     }
 
@@ -197,16 +183,9 @@ mod tests {
         };
         let reply = call(r#"{"answer": "B", "why": "a bed"}"#);
         assert_eq!(reply.text, "B");
-        assert_eq!(
-            reply.other_field.unwrap().name,
-            "tool_calls (answer, reply)"
-        );
+        assert_eq!(reply.other_field.unwrap().name, "tool_calls (answer, reply)");
         assert_eq!(call(r#"{"mark": 4}"#).text, "4");
-        for arguments in [
-            r#"{"query": "kitchen"}"#,
-            r#"{"answer": "A", "choice": "B"}"#,
-            "not JSON",
-        ] {
+        for arguments in [r#"{"query": "kitchen"}"#, r#"{"answer": "A", "choice": "B"}"#, "not JSON"] {
             let reply = call(arguments);
             assert_eq!(reply.text, "", "{arguments}");
             assert_eq!(reply.other_field.unwrap().text, arguments);
@@ -215,10 +194,7 @@ mod tests {
             ("reasoning_content", r#""A""#),
             ("reasoning", r#""A""#),
             ("thoughts_of_zork", r#""A""#),
-            (
-                "reasoning_details",
-                r#"[{"type": "reasoning.text", "text": "A"}]"#,
-            ),
+            ("reasoning_details", r#"[{"type": "reasoning.text", "text": "A"}]"#),
         ] {
             let reply = message(&format!(r#"{{"content":null,"{field}":{value}}}"#));
             let found = reply.other_field.unwrap();
@@ -227,10 +203,7 @@ mod tests {
             let beside = message(&format!(r#"{{"content":"B","{field}":{value}}}"#));
             assert_eq!((beside.text.as_str(), beside.other_field), ("B", None));
         }
-        assert_eq!(
-            message(r#"{"role":"assistant","content":""}"#).other_field,
-            None
-        );
+        assert_eq!(message(r#"{"role":"assistant","content":""}"#).other_field, None);
     }
 
     #[test]
@@ -244,12 +217,7 @@ mod tests {
             let streamed = read(delta.as_bytes(), "text/event-stream").unwrap();
             assert_eq!(streamed.refusal.as_deref(), Some("no"), "{field}");
         }
-        for field in [
-            r#"{"refusal":null}"#,
-            r#"{"refusal":""}"#,
-            r#"{"a":"no"}"#,
-            "7",
-        ] {
+        for field in [r#"{"refusal":null}"#, r#"{"refusal":""}"#, r#"{"a":"no"}"#, "7"] {
             let body = format!(r#"{{"content":"B","provider_specific_fields":{field}}}"#);
             assert_eq!(message(&body).refusal, None, "{field}");
         }
@@ -271,24 +239,16 @@ mod tests {
         assert_eq!(reply.served_model.as_deref(), Some("m-1"));
         assert_eq!(reply.usage.unwrap().prompt_tokens, Some(9));
         assert_eq!(reply.usage.unwrap().cached_tokens, None);
-        let cached = whole.replace(
-            "\"prompt_tokens\":9",
-            "\"prompt_tokens\":9,\"prompt_tokens_details\":{\"cached_tokens\":5}",
-        );
+        let cached =
+            whole.replace("\"prompt_tokens\":9", "\"prompt_tokens\":9,\"prompt_tokens_details\":{\"cached_tokens\":5}");
         assert_eq!(json(&cached).unwrap().usage.unwrap().cached_tokens, Some(5));
-        let anthropic = whole.replace(
-            "\"prompt_tokens\":9",
-            "\"prompt_tokens\":9,\"cache_read_input_tokens\":6",
-        );
+        let anthropic = whole.replace("\"prompt_tokens\":9", "\"prompt_tokens\":9,\"cache_read_input_tokens\":6");
         let usage = json(&anthropic).unwrap().usage.unwrap();
         assert_eq!(usage.cached_tokens, Some(6));
         assert_eq!(reply.usage.unwrap().completion_tokens, None);
         let bare = r#"{"model":7,"choices":[{"finish_reason":null,"message":{"content":"B"}}],"usage":null}"#;
         let reply = json(bare).unwrap();
-        assert_eq!(
-            (reply.finish, reply.usage, reply.served_model),
-            (Finish::Unknown, None, None)
-        );
+        assert_eq!((reply.finish, reply.usage, reply.served_model), (Finish::Unknown, None, None));
         for (reason, finish) in [
             ("STOP", Finish::Stop),
             ("MAX_TOKENS", Finish::Length),
@@ -335,17 +295,9 @@ mod tests {
             ("", "application/json", "empty"),
             ("{\"choices\":[", "application/json", "not complete JSON"),
             ("{\"choices\":null}", "application/json", "without choices"),
-            (
-                "{\"choices\":null,\"message\":\"x\"}",
-                "application/json",
-                "without choices",
-            ),
+            ("{\"choices\":null,\"message\":\"x\"}", "application/json", "without choices"),
             ("{\"choices\":[]}", "application/json", "no choices"),
-            (
-                "{\"choices\":[null]}",
-                "application/json",
-                "without a message",
-            ),
+            ("{\"choices\":[null]}", "application/json", "without a message"),
             (
                 "{\"choices\":[{\"finish_reason\":\"error\",\"message\":{\"content\":\"B\"}}]}",
                 "application/json",
@@ -375,18 +327,14 @@ mod tests {
         let none = r#"{"prompt_tokens":0,"completion_tokens":0}"#;
         for usage in [none, r#"{"prompt_tokens":300,"completion_tokens":0}"#] {
             for content in ["null", "\"\"", "[]"] {
-                let Err(ReplyError::Unreadable(lost)) = json(&reply_body(content, "stop", usage))
-                else {
+                let Err(ReplyError::Unreadable(lost)) = json(&reply_body(content, "stop", usage)) else {
                     panic!("{content} {usage}");
                 };
                 assert!(lost.description.contains("lost"));
             }
         }
         let ended = r#"{"prompt_tokens":300,"completion_tokens":1}"#;
-        assert!(
-            json(&reply_body("null", "stop", ended)).is_ok(),
-            "the model returned no text"
-        );
+        assert!(json(&reply_body("null", "stop", ended)).is_ok(), "the model returned no text");
         assert!(json(&reply_body("null", "length", none)).is_ok());
         assert!(json(&reply_body("\"B\"", "stop", none)).is_ok());
     }
@@ -412,19 +360,13 @@ mod tests {
         let usage = r#""usage":{"prompt_tokens":300,"completion_tokens":1024}"#;
         for body in [
             format!(r#"{{"choices":[],{usage}}}"#),
-            format!(
-                r#"{{"choices":[{{"finish_reason":"abort","message":{{"content":"A"}}}}],{usage}}}"#
-            ),
+            format!(r#"{{"choices":[{{"finish_reason":"abort","message":{{"content":"A"}}}}],{usage}}}"#),
             format!("data: {{\"choices\":[],{usage}}}\n\ndata: [DONE]\n\n"),
         ] {
             let Err(ReplyError::Unreadable(found)) = json(&body) else {
                 panic!("{body}");
             };
-            assert_eq!(
-                found.usage.and_then(|usage| usage.total()),
-                Some(1324),
-                "{body}"
-            );
+            assert_eq!(found.usage.and_then(|usage| usage.total()), Some(1324), "{body}");
         }
     }
 
@@ -433,8 +375,7 @@ mod tests {
         let body = b"\xef\xbb\xbf{\"choices\":[{\"message\":{\"content\":\"B \xff\xfe\"}}]}";
         assert_eq!(read(body, "").unwrap().text, "B \u{FFFD}\u{FFFD}");
         assert_eq!(message(r#"{"content":"B \ud83d"}"#).text, "B \u{FFFD}");
-        let stream =
-            "data: {\"choices\":[{\"delta\":{\"content\":\"B\"},\"finish_reason\":\"stop\"}]}\n\n";
+        let stream = "data: {\"choices\":[{\"delta\":{\"content\":\"B\"},\"finish_reason\":\"stop\"}]}\n\n";
         let reply = read(stream.as_bytes(), "text/event-stream").unwrap();
         assert_eq!((reply.text.as_str(), reply.finish), ("B", Finish::Stop));
     }

@@ -5,8 +5,8 @@ use serde_json::{Map, Value, json};
 
 use super::image_places::with_images;
 use crate::ask::requests::{
-    Constrain, ImageDetail, Message, MessagePart, Parameters, RequestBody, RequestFields,
-    TokenField, constraint, images,
+    Constrain, ImageDetail, Message, MessagePart, Parameters, RequestBody, RequestFields, TokenField, constraint,
+    images,
 };
 use crate::ask::wire_kind::Wire;
 use crate::types::questions::letter;
@@ -102,24 +102,13 @@ pub(super) fn body(
         thinking: fields.thinking_body(),
     })?;
     let head = parameters.extra.apply(head)?;
-    let system = parameters.extra.system.as_deref().map(|text| ChatMessage {
-        role: "system",
-        content: Content::Text(text),
-    });
+    let system =
+        parameters.extra.system.as_deref().map(|text| ChatMessage { role: "system", content: Content::Text(text) });
     let parts = message.parts();
-    let question = ChatMessage {
-        role: "user",
-        content: content(&parts, parameters.detail),
-    };
+    let question = ChatMessage { role: "user", content: content(&parts, parameters.detail) };
     let messages: Vec<ChatMessage<'_>> = system.into_iter().chain([question]).collect();
     let messages = serde_json::to_string(&messages)?;
-    Ok(with_images(
-        &head,
-        "messages",
-        &messages,
-        IMAGE_PLACE,
-        images(&parts),
-    ))
+    Ok(with_images(&head, "messages", &messages, IMAGE_PLACE, images(&parts)))
 }
 
 /// Content of a message, with a placeholder for each image.
@@ -132,9 +121,7 @@ fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Conten
                 .iter()
                 .map(|part| match part {
                     MessagePart::Text(text) => Part::Text { text },
-                    MessagePart::Image(_) => Part::ImageUrl {
-                        image_url: ImageUrl { detail, url: "" },
-                    },
+                    MessagePart::Image(_) => Part::ImageUrl { image_url: ImageUrl { detail, url: "" } },
                 })
                 .collect(),
         ),

@@ -1,8 +1,9 @@
 //! Parsing of the finish reason that a server sends: [`read`], with the known reasons in `finish_reasons.toml`.
 //!
-//! A reply that the server ended deliberately and would end so again, by a filter, a limit or a loop, is the model's: it is scored as
-//! unread and asked once. A generation that the server gave up is a failure and asked again. A word in no list may mean either;
-//! [`FinishWords`](crate::ask::models) decides it by a second try, so that a vendor's choice of words moves no accuracy.
+//! A reply that the server ended deliberately and would end so again, by a filter, a limit or a loop, is the model's:
+//! it is scored as unread and asked once. A generation that the server gave up is a failure and asked again. A word in
+//! no list may mean either; [`FinishWords`](crate::ask::models) decides it by a second try, so that a vendor's choice
+//! of words moves no accuracy.
 
 use std::sync::LazyLock;
 
@@ -58,20 +59,12 @@ pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Ending, Box<Unr
         return Err(Box::new(Unreadable {
             usage,
             finish: Some(reason.to_owned()),
-            ..Unreadable::new(format!(
-                "a reply that broke off: its finish_reason is {reason:?}"
-            ))
+            ..Unreadable::new(format!("a reply that broke off: its finish_reason is {reason:?}"))
         }));
     } else {
-        return Ok(Ending {
-            finish: other,
-            may_heal: true,
-        });
+        return Ok(Ending { finish: other, may_heal: true });
     };
-    Ok(Ending {
-        finish,
-        may_heal: false,
-    })
+    Ok(Ending { finish, may_heal: false })
 }
 
 /// True if a finish reason means that prompt and reply are as long as the model's context.
@@ -85,41 +78,24 @@ mod tests {
 
     #[test]
     fn each_reason_is_listed_once() {
-        let Reasons {
-            stop,
-            length,
-            filter,
-            context,
-            loops,
-            broken,
-        } = toml::from_str(include_str!("finish_reasons.toml")).unwrap();
+        let Reasons { stop, length, filter, context, loops, broken } =
+            toml::from_str(include_str!("finish_reasons.toml")).unwrap();
         let mut all = [stop, length, filter, context, loops, broken].concat();
         let count = all.len();
         all.sort();
         all.dedup();
         assert_eq!(all.len(), count);
         assert!(all.iter().all(|word| *word == Finish::normalized(word)));
-        assert!(
-            all.iter()
-                .all(|word| !Finish::Other(word.clone()).is_whole())
-        );
+        assert!(all.iter().all(|word| !Finish::Other(word.clone()).is_whole()));
     }
 
     fn certain(finish: Finish) -> Ending {
-        Ending {
-            finish,
-            may_heal: false,
-        }
+        Ending { finish, may_heal: false }
     }
 
     #[test]
     fn interrupted_generation_is_an_error() {
-        for word in [
-            "abort",
-            "Cancelled",
-            "network_error",
-            "insufficient-system-resource",
-        ] {
+        for word in ["abort", "Cancelled", "network_error", "insufficient-system-resource"] {
             let broken = read(word, None).unwrap_err();
             assert!(broken.description.contains("broke off"), "{word}");
         }
@@ -128,22 +104,14 @@ mod tests {
     #[test]
     fn words_of_context_and_loops_are_kept() {
         for word in ["model_context_window_exceeded", "Repetition", "repeat"] {
-            assert_eq!(
-                read(word, None),
-                Ok(certain(Finish::Other(word.to_owned())))
-            );
+            assert_eq!(read(word, None), Ok(certain(Finish::Other(word.to_owned()))));
         }
         assert!(is_context_full("MODEL-LENGTH") && !is_context_full("length"));
     }
 
     #[test]
     fn unknown_reason_is_doubtful() {
-        for word in [
-            "zeitgeist",
-            "MALFORMED_FUNCTION_CALL",
-            "NO_IMAGE",
-            "language",
-        ] {
+        for word in ["zeitgeist", "MALFORMED_FUNCTION_CALL", "NO_IMAGE", "language"] {
             let ending = read(word, None).unwrap();
             assert_eq!(ending.finish, Finish::Other(word.to_owned()));
             assert!(ending.may_heal && !ending.finish.is_whole());
@@ -153,18 +121,9 @@ mod tests {
     #[test]
     fn known_reasons_are_parsed_in_any_case() {
         assert_eq!(read("END_TURN", None), Ok(certain(Finish::Stop)));
-        assert_eq!(
-            read("tool_use", None),
-            Ok(certain(Finish::Other("tool_use".to_owned())))
-        );
+        assert_eq!(read("tool_use", None), Ok(certain(Finish::Other("tool_use".to_owned()))));
         assert_eq!(read("MAX_TOKENS", None), Ok(certain(Finish::Length)));
-        for word in [
-            "SAFETY",
-            "RECITATION",
-            "PROHIBITED_CONTENT",
-            "guardrail_intervened",
-            "sensitive",
-        ] {
+        for word in ["SAFETY", "RECITATION", "PROHIBITED_CONTENT", "guardrail_intervened", "sensitive"] {
             assert_eq!(read(word, None), Ok(certain(Finish::Filter)), "{word}");
         }
         assert_eq!(read("", None), Ok(certain(Finish::Unknown)));

@@ -5,11 +5,11 @@ use std::sync::Arc;
 use crate::ask::requests::RequestBody;
 use crate::pictures::Payload;
 
-/// Builds a request body from the JSON object `fields` and one more field with the value `json`, in which each `place` is replaced by
-/// the data URL of an image. The bytes of the images are shared, not copied.
+/// Builds a request body from the JSON object `fields` and one more field with the value `json`, in which each `place`
+/// is replaced by the data URL of an image. The bytes of the images are shared, not copied.
 ///
-/// A place is a field with an empty value, such as `"url":""`. The text of a question cannot contain one, because JSON escapes every
-/// quotation mark. `fields` is not searched for places, because it may contain fields of the user.
+/// A place is a field with an empty value, such as `"url":""`. The text of a question cannot contain one, because JSON
+/// escapes every quotation mark. `fields` is not searched for places, because it may contain fields of the user.
 pub(super) fn with_images<'a>(
     fields: &str,
     name: &str,

@@ -30,7 +30,7 @@ fn unreadable(text: &str, content_type: &str, error: &serde_json::Error) -> Unre
     if text.trim().is_empty() {
         return Unreadable::new("an empty body");
     }
-    let description = page_title(text)
-        .unwrap_or_else(|| format!("{content_type:?} that is not complete JSON ({error}): {text}"));
+    let description =
+        page_title(text).unwrap_or_else(|| format!("{content_type:?} that is not complete JSON ({error}): {text}"));
     Unreadable::new(description)
 }

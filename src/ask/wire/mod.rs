@@ -1,6 +1,7 @@
 //! Request bodies and reply parsing for each API ([`Wire`]).
 //!
-//! Retries, rate limits and the removal of keys ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not depend on the API.
+//! Retries, rate limits and the removal of keys ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not
+//! depend on the API.
 
 mod charge;
 mod chat_fields;
@@ -51,14 +52,9 @@ impl Wire {
         message: Message<'_>,
         choices: usize,
     ) -> Result<RequestBody, serde_json::Error> {
-        let fields = RequestFields {
-            wire: self,
-            ..fields
-        };
+        let fields = RequestFields { wire: self, ..fields };
         match self {
-            Self::Chat | Self::ChatStream => {
-                chat_request::body(parameters, fields, message, choices)
-            }
+            Self::Chat | Self::ChatStream => chat_request::body(parameters, fields, message, choices),
             Self::Responses => responses_request::body(parameters, fields, message, choices),
         }
     }
@@ -88,9 +84,7 @@ impl Wire {
     /// Parses the error in the body of a refused request.
     pub(super) fn parse_error(self, body: &[u8]) -> ApiError {
         match self {
-            Self::Chat | Self::ChatStream | Self::Responses => {
-                ApiError::from_body(&String::from_utf8_lossy(body))
-            }
+            Self::Chat | Self::ChatStream | Self::Responses => ApiError::from_body(&String::from_utf8_lossy(body)),
         }
     }
 }
@@ -99,11 +93,7 @@ impl Wire {
 pub(super) fn batch_reply(body: &str) -> Result<Reply, ReplyError> {
     let parsed = parse(body).ok();
     let is_response = parsed.is_some_and(|body| body.get("output").is_some());
-    let wire = if is_response {
-        Wire::Responses
-    } else {
-        Wire::Chat
-    };
+    let wire = if is_response { Wire::Responses } else { Wire::Chat };
     wire.reply(body.as_bytes(), "application/json")
 }
 

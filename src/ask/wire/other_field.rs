@@ -1,5 +1,5 @@
-//! Replies without content whose text is in another field: in the arguments of a tool call ([`tool_call`]), which are read, or among the
-//! thoughts, which are named.
+//! Replies without content whose text is in another field: in the arguments of a tool call ([`tool_call`]), which are
+//! read, or among the thoughts, which are named.
 
 use serde_json::Value;
 
@@ -9,8 +9,8 @@ use crate::types::OtherField;
 
 /// Parts of the names of arguments that hold an answer; chosen.
 const ANSWER_WORDS: [&str; 12] = [
-    "answer", "choice", "option", "letter", "select", "response", "reply", "result", "verdict",
-    "mark", "score", "rating",
+    "answer", "choice", "option", "letter", "select", "response", "reply", "result", "verdict", "mark", "score",
+    "rating",
 ];
 
 /// Text fields of a message that never hold its text.
@@ -32,8 +32,8 @@ const OTHER_FIELDS: [&str; 15] = [
     "stop_reason",
 ];
 
-/// The text of a chat message without content, and the field that holds it. The answer in the only tool call becomes the text; other
-/// fields do not.
+/// The text of a chat message without content, and the field that holds it. The answer in the only tool call becomes
+/// the text; other fields do not.
 pub(super) fn of_message(text: String, message: &Value) -> (String, Option<OtherField>) {
     let calls = message.get("tool_calls").and_then(Value::as_array);
     let functions: Vec<&Value> = calls
@@ -50,8 +50,8 @@ pub(super) fn of_message(text: String, message: &Value) -> (String, Option<Other
     (text, thoughts(message))
 }
 
-/// The answer in the arguments of a function call, and the field; `None` without arguments. The answer is `None` unless exactly one
-/// argument is named like one.
+/// The answer in the arguments of a function call, and the field; `None` without arguments. The answer is `None` unless
+/// exactly one argument is named like one.
 pub(super) fn tool_call(function: &Value) -> Option<(Option<String>, OtherField)> {
     let arguments = function.get("arguments")?;
     let text = match arguments {
@@ -97,10 +97,7 @@ fn thoughts(message: &Value) -> Option<OtherField> {
         .iter()
         .filter(|(name, _)| !OTHER_FIELDS.contains(&&***name))
         .chain(fields.get_key_value("content"))
-        .map(|(name, value)| OtherField {
-            name: name.clone(),
-            text: text_of(value),
-        })
+        .map(|(name, value)| OtherField { name: name.clone(), text: text_of(value) })
         .filter(|field| !field.text.trim().is_empty())
         .max_by_key(|field| field.text.len())
 }

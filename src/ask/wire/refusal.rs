@@ -17,11 +17,8 @@ const STREAM_ONLY: [&str; 8] = [
 ];
 
 /// Phrases of OpenAI for models that are available only through the Responses API.
-const RESPONSES_ONLY: [&str; 3] = [
-    "only supported in v1/responses",
-    "only supported in /v1/responses",
-    "use /v1/responses",
-];
+const RESPONSES_ONLY: [&str; 3] =
+    ["only supported in v1/responses", "only supported in /v1/responses", "use /v1/responses"];
 
 /// API that a server asks for when it refuses a request; `None` if it asks for no other API.
 pub(crate) fn requested_wire(api_error: &ApiError, sent: Wire) -> Option<Wire> {
@@ -52,26 +49,11 @@ mod tests {
                 "This model only support stream mode, please enable the stream parameter to access the model.",
                 Some(ChatStream),
             ),
-            (
-                "parameter.enable_thinking must be set to false for non-streaming calls",
-                Some(ChatStream),
-            ),
-            (
-                "enable thinking can not be support when `stream=False`",
-                Some(ChatStream),
-            ),
-            (
-                "parameter.enable_thinking 必须在非流式调用中设置为 false",
-                Some(ChatStream),
-            ),
-            (
-                "current user api does not support http call",
-                Some(ChatStream),
-            ),
-            (
-                "This model is only supported in v1/responses and not in v1/chat/completions.",
-                Some(Responses),
-            ),
+            ("parameter.enable_thinking must be set to false for non-streaming calls", Some(ChatStream)),
+            ("enable thinking can not be support when `stream=False`", Some(ChatStream)),
+            ("parameter.enable_thinking 必须在非流式调用中设置为 false", Some(ChatStream)),
+            ("current user api does not support http call", Some(ChatStream)),
+            ("This model is only supported in v1/responses and not in v1/chat/completions.", Some(Responses)),
             ("Unknown parameter: 'stream_options'.", None),
             ("a streaming error occurred", None),
             ("", None),

@@ -15,14 +15,13 @@ use crate::types::{Finish, OtherField, Reply, Thought, TokenChances, Usage};
 
 /// Parses a response body; `latency_ms` and `attempts` remain zero.
 ///
-/// The text is the text of all parts of type `output_text` in items of type `message`; reasoning items are ignored, and so are messages of
-/// another phase than the final answer. A failed response has an error; an incomplete response has a reason, which becomes the finish
-/// reason.
+/// The text is the text of all parts of type `output_text` in items of type `message`; reasoning items are ignored, and
+/// so are messages of another phase than the final answer. A failed response has an error; an incomplete response has a
+/// reason, which becomes the finish reason.
 pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
     let text = json_body::text(body);
     let response = if stream::is_stream(&text, content_type) {
-        last_response(&text)
-            .ok_or_else(|| Unreadable::new("an event stream without a complete response"))?
+        last_response(&text).ok_or_else(|| Unreadable::new("an event stream without a complete response"))?
     } else {
         json_body::parse_body(&text, content_type)?
     };
@@ -42,20 +41,15 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     // Tokens without any item: the answer was lost in transit.
     let has_tokens = usage.is_some_and(|usage| usage.completion_tokens > Some(0));
     if items.is_empty() && finish == Finish::Stop && has_tokens {
-        return Err(Unreadable::new("a response without an output")
-            .with_usage(usage)
-            .into());
+        return Err(Unreadable::new("a response without an output").with_usage(usage).into());
     }
     let messages = answer_messages(items);
     let (text, refusal) = text_and_refusal(&messages);
     let chances = chances(&messages, items, &response, &text);
-    let has_thought = has_summary(items)
-        || logprobs::thought(&response, response.get("usage"), &text) == Thought::Before;
-    let (text, other_field) = if text.trim().is_empty() && refusal.is_empty() {
-        other_field(text, items)
-    } else {
-        (text, None)
-    };
+    let has_thought =
+        has_summary(items) || logprobs::thought(&response, response.get("usage"), &text) == Thought::Before;
+    let (text, other_field) =
+        if text.trim().is_empty() && refusal.is_empty() { other_field(text, items) } else { (text, None) };
     // The answer after the thoughts may have been lost, or the model gave none.
     let is_empty = text.trim().is_empty() && refusal.is_empty();
     let may_heal = may_heal || (is_empty && has_thought && is_end(&finish));
@@ -76,9 +70,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
 /// Response in the last event of an unrequested stream; `None` if the stream was truncated.
 fn last_response(stream: &str) -> Option<Value> {
     stream::events(stream).find_map(|event| match event.get("type")?.as_str()? {
-        "response.completed" | "response.incomplete" | "response.failed" => {
-            event.get("response").cloned()
-        }
+        "response.completed" | "response.incomplete" | "response.failed" => event.get("response").cloned(),
         "error" => Some(event),
         _ => None,
     })
@@ -91,25 +83,15 @@ fn last_response(stream: &str) -> Option<Value> {
 fn finish(response: &Value, usage: Option<Usage>) -> Result<Ending, ReplyError> {
     let status = owned_text(response.get("status")).unwrap_or_default();
     match &*status {
-        "" | "completed" => Ok(Ending {
-            finish: if status.is_empty() {
-                Finish::Unknown
-            } else {
-                Finish::Stop
-            },
-            may_heal: false,
-        }),
+        "" | "completed" => {
+            Ok(Ending { finish: if status.is_empty() { Finish::Unknown } else { Finish::Stop }, may_heal: false })
+        }
         "incomplete" => {
             let details = response.get("incomplete_details");
             let reason = owned_text(details.and_then(|details| details.get("reason")));
-            finish_reason::read(reason.as_deref().unwrap_or("incomplete"), usage)
-                .map_err(ReplyError::Unreadable)
+            finish_reason::read(reason.as_deref().unwrap_or("incomplete"), usage).map_err(ReplyError::Unreadable)
         }
-        status => Err(
-            Unreadable::new(format!("a response whose status is {status:?}"))
-                .with_usage(usage)
-                .into(),
-        ),
+        status => Err(Unreadable::new(format!("a response whose status is {status:?}")).with_usage(usage).into()),
     }
 }
 
@@ -118,12 +100,7 @@ fn owned_text(value: Option<&Value>) -> Option<String> {
 }
 
 /// Token probabilities of the first text that has them, and whether the model thought before it; `None` without any.
-fn chances(
-    messages: &[&Value],
-    items: &[Value],
-    response: &Value,
-    text: &str,
-) -> Option<TokenChances> {
+fn chances(messages: &[&Value], items: &[Value], response: &Value, text: &str) -> Option<TokenChances> {
     let positions = messages
         .iter()
         .filter_map(|item| item.get("content")?.as_array())
@@ -131,22 +108,12 @@ fn chances(
         .map(|part| part.get("logprobs"))
         .find_map(logprobs::positions)?;
     let thought = logprobs::thought(response, response.get("usage"), text);
-    Some(TokenChances {
-        positions,
-        thought: if has_summary(items) {
-            Thought::Before
-        } else {
-            thought
-        },
-    })
+    Some(TokenChances { positions, thought: if has_summary(items) { Thought::Before } else { thought } })
 }
 
 /// True if a response has a summary of the model's reasoning.
 fn has_summary(items: &[Value]) -> bool {
-    items
-        .iter()
-        .filter_map(|item| item.get("summary")?.as_array())
-        .any(|summary| !summary.is_empty())
+    items.iter().filter_map(|item| item.get("summary")?.as_array()).any(|summary| !summary.is_empty())
 }
 
 /// The messages with the answer: those of the final phase, or those without a phase.
@@ -154,50 +121,33 @@ fn answer_messages(items: &[Value]) -> Vec<&Value> {
     let messages = || items.iter().filter(|item| is_message(item));
     let phase = |item: &Value| owned_text(item.get("phase"));
     let of_phase = |is_wanted: fn(Option<String>) -> bool| {
-        messages()
-            .filter(move |item| is_wanted(phase(item)))
-            .collect::<Vec<&Value>>()
+        messages().filter(move |item| is_wanted(phase(item))).collect::<Vec<&Value>>()
     };
-    let finals = of_phase(|phase| {
-        phase.is_some_and(|phase| phase.contains("final") || phase.contains("answer"))
-    });
-    if finals.is_empty() {
-        of_phase(|phase| phase.is_none())
-    } else {
-        finals
-    }
+    let finals = of_phase(|phase| phase.is_some_and(|phase| phase.contains("final") || phase.contains("answer")));
+    if finals.is_empty() { of_phase(|phase| phase.is_none()) } else { finals }
 }
 
 fn is_message(item: &Value) -> bool {
     item.get("type").is_none_or(|kind| kind == "message")
 }
 
-/// The text of a response without an answer, and the item that holds it. The answer in the only function call becomes the text; thoughts
-/// and messages of other phases do not.
+/// The text of a response without an answer, and the item that holds it. The answer in the only function call becomes
+/// the text; thoughts and messages of other phases do not.
 fn other_field(text: String, items: &[Value]) -> (String, Option<OtherField>) {
-    let calls: Vec<&Value> = items
-        .iter()
-        .filter(|item| item.get("type").is_some_and(|kind| kind == "function_call"))
-        .collect();
+    let calls: Vec<&Value> =
+        items.iter().filter(|item| item.get("type").is_some_and(|kind| kind == "function_call")).collect();
     if let [call] = calls[..]
         && let Some((answer, field)) = tool_call(call)
     {
         return (answer.unwrap_or(text), Some(field));
     }
     let field = items.iter().find_map(|item| {
-        let kind = item
-            .get("type")
-            .and_then(Value::as_str)
-            .unwrap_or("message");
+        let kind = item.get("type").and_then(Value::as_str).unwrap_or("message");
         let name = match owned_text(item.get("phase")) {
             Some(phase) => format!("{kind}, phase {phase}"),
             None => kind.to_owned(),
         };
-        let text: String = ["content", "summary"]
-            .iter()
-            .filter_map(|field| item.get(*field))
-            .map(text_of)
-            .collect();
+        let text: String = ["content", "summary"].iter().filter_map(|field| item.get(*field)).map(text_of).collect();
         (!text.trim().is_empty()).then_some(OtherField { name, text })
     });
     (text, field)
@@ -206,10 +156,7 @@ fn other_field(text: String, items: &[Value]) -> (String, Option<OtherField>) {
 /// Text of messages, and the text of the refusals in them.
 fn text_and_refusal(messages: &[&Value]) -> (String, String) {
     let (mut text, mut refusal) = (String::new(), String::new());
-    let parts = messages
-        .iter()
-        .filter_map(|item| item.get("content")?.as_array())
-        .flatten();
+    let parts = messages.iter().filter_map(|item| item.get("content")?.as_array()).flatten();
     for part in parts {
         match part.get("type").and_then(Value::as_str) {
             Some("output_text" | "text") => text += words(part, "text"),
@@ -241,22 +188,12 @@ mod tests {
         assert_eq!((reply.text.as_str(), &reply.finish), ("B.", &Finish::Stop));
         assert_eq!(reply.served_model.as_deref(), Some("o-1"));
         let usage = reply.usage.unwrap();
-        assert_eq!(
-            (
-                usage.prompt_tokens,
-                usage.completion_tokens,
-                usage.cached_tokens
-            ),
-            (Some(90), Some(7), Some(64))
-        );
+        assert_eq!((usage.prompt_tokens, usage.completion_tokens, usage.cached_tokens), (Some(90), Some(7), Some(64)));
         let refused = json(
             r#"{"status":"completed","output":[{"type":"message","content":[{"type":"refusal","refusal":"I cannot"}]}]}"#,
         )
         .unwrap();
-        assert_eq!(
-            (refused.text.as_str(), refused.refusal.as_deref()),
-            ("", Some("I cannot"))
-        );
+        assert_eq!((refused.text.as_str(), refused.refusal.as_deref()), ("", Some("I cannot")));
     }
 
     fn output(items: &serde_json::Value) -> Reply {
@@ -281,17 +218,12 @@ mod tests {
     #[test]
     fn answers_in_other_items_are_found() {
         use serde_json::json;
-        let call =
-            json!({"type": "function_call", "name": "reply", "arguments": "{\"answer\":\"B\"}"});
+        let call = json!({"type": "function_call", "name": "reply", "arguments": "{\"answer\":\"B\"}"});
         assert_eq!(output(&json!([call])).text, "B");
         assert_eq!(output(&json!([call, call])).text, "", "two calls");
-        let thoughts =
-            json!({"type": "reasoning", "summary": [{"type": "summary_text", "text": "A"}]});
+        let thoughts = json!({"type": "reasoning", "summary": [{"type": "summary_text", "text": "A"}]});
         let reply = output(&json!([thoughts]));
-        assert_eq!(
-            (reply.text.as_str(), reply.other_field.unwrap().name),
-            ("", "reasoning".to_owned())
-        );
+        assert_eq!((reply.text.as_str(), reply.other_field.unwrap().name), ("", "reasoning".to_owned()));
     }
 
     #[test]
@@ -299,14 +231,8 @@ mod tests {
         for (status, finish) in [
             (r#""status":"completed","#, Finish::Stop),
             ("", Finish::Unknown),
-            (
-                r#""status":"incomplete","incomplete_details":{"reason":"max_output_tokens"},"#,
-                Finish::Length,
-            ),
-            (
-                r#""status":"incomplete","incomplete_details":{"reason":"content_filter"},"#,
-                Finish::Filter,
-            ),
+            (r#""status":"incomplete","incomplete_details":{"reason":"max_output_tokens"},"#, Finish::Length),
+            (r#""status":"incomplete","incomplete_details":{"reason":"content_filter"},"#, Finish::Filter),
         ] {
             let reply = json(&format!(r#"{{{status}"output":[]}}"#)).unwrap();
             assert_eq!(reply.finish, finish, "{status}");
@@ -329,16 +255,10 @@ mod tests {
     fn incomplete_responses_are_described() {
         for (body, expected) in [
             (r#"{"status":"in_progress","output":[]}"#, "in_progress"),
-            (
-                r#"{"status":"completed","output":[],"usage":{"output_tokens":9}}"#,
-                "without an output",
-            ),
+            (r#"{"status":"completed","output":[],"usage":{"output_tokens":9}}"#, "without an output"),
             (r#"{"choices":[]}"#, "without output"),
             ("", "empty"),
-            (
-                r#"data: {"type":"response.created","response":{}}"#,
-                "without a complete response",
-            ),
+            (r#"data: {"type":"response.created","response":{}}"#, "without a complete response"),
         ] {
             let Err(ReplyError::Unreadable(found)) = json(body) else {
                 panic!("{body}");

@@ -8,9 +8,8 @@ use serde_json::{Map, Value, json};
 use super::chat_fields::OMIT_PROBABILITIES;
 use super::image_places::with_images;
 use crate::ask::requests::{
-    AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters,
-    RequestBody, RequestField, RequestFields, SentFields, Temperature, TokenField, constraint,
-    images,
+    AdaptableField, Constrain, FieldState, ImageDetail, Message, MessagePart, Parameters, RequestBody, RequestField,
+    RequestFields, SentFields, Temperature, TokenField, constraint, images,
 };
 use crate::types::questions::letter;
 
@@ -85,33 +84,20 @@ pub(super) fn body(
         reasoning: effort.map(|effort| json!({"effort": effort})),
         text: (constrain == Constrain::Json).then(|| text_format(&letters)),
         structured_outputs: (constrain == Constrain::Choice).then(|| json!({"choice": letters})),
-        include: fields
-            .top_logprobs
-            .map(|_| ["message.output_text.logprobs"]),
+        include: fields.top_logprobs.map(|_| ["message.output_text.logprobs"]),
         top_logprobs: fields.top_logprobs,
         instructions: parameters.extra.system.as_deref(),
         thinking: fields.thinking_body(),
     })?;
     let head = parameters.extra.apply(head)?;
     let parts = message.parts();
-    let input = serde_json::to_string(&[InputMessage {
-        role: "user",
-        content: content(&parts, parameters.detail),
-    }])?;
-    Ok(with_images(
-        &head,
-        "input",
-        &input,
-        IMAGE_PLACE,
-        images(&parts),
-    ))
+    let input = serde_json::to_string(&[InputMessage { role: "user", content: content(&parts, parameters.detail) }])?;
+    Ok(with_images(&head, "input", &input, IMAGE_PLACE, images(&parts)))
 }
 
 /// Token limit in a request; this API has only one name for it.
 fn limit(parameters: &Parameters, fields: RequestFields) -> Option<u32> {
-    parameters
-        .limit()
-        .filter(|_| fields.token_field != TokenField::Omit)
+    parameters.limit().filter(|_| fields.token_field != TokenField::Omit)
 }
 
 /// Content of a message, with a placeholder for each image.
@@ -123,10 +109,7 @@ fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<Pa
         .iter()
         .map(|part| match part {
             MessagePart::Text(text) => Part::InputText { text },
-            MessagePart::Image(_) => Part::InputImage {
-                detail,
-                image_url: "",
-            },
+            MessagePart::Image(_) => Part::InputImage { detail, image_url: "" },
         })
         .collect()
 }
@@ -140,17 +123,11 @@ fn text_format(letters: &[char]) -> Value {
 /// Fields that a server may refuse.
 pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
     let parameters = sent.parameters;
-    let probabilities = FieldState::until_refused(
-        sent.fields.top_logprobs.is_some(),
-        !parameters.probabilities,
-    );
+    let probabilities = FieldState::until_refused(sent.fields.top_logprobs.is_some(), !parameters.probabilities);
     Vec::from([
         field(
             "temperature",
-            FieldState::until_refused(
-                sent.fields.temperature.is_some(),
-                parameters.temperature == Temperature::Server,
-            ),
+            FieldState::until_refused(sent.fields.temperature.is_some(), parameters.temperature == Temperature::Server),
             Some(AdaptableField::Temperature { least: None }),
             "leave the temperature to the server: --temperature default",
         ),
@@ -175,18 +152,8 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             Some(AdaptableField::TokenField),
             "send no limit: --request token-field=none, or another --max-tokens",
         ),
-        field(
-            "effort",
-            FieldState::sent_if(sent.fields.effort(parameters).is_some()),
-            None,
-            OMIT_EFFORT,
-        ),
-        field(
-            "reasoning",
-            FieldState::sent_if(sent.fields.effort(parameters).is_some()),
-            None,
-            OMIT_EFFORT,
-        ),
+        field("effort", FieldState::sent_if(sent.fields.effort(parameters).is_some()), None, OMIT_EFFORT),
+        field("reasoning", FieldState::sent_if(sent.fields.effort(parameters).is_some()), None, OMIT_EFFORT),
         field(
             "detail",
             FieldState::sent_if(sent.has_image && parameters.detail.is_some()),
@@ -205,18 +172,8 @@ pub(super) fn fields(sent: SentFields<'_>) -> Vec<RequestField<'static>> {
             Some(AdaptableField::TopLogprobs),
             OMIT_PROBABILITIES,
         ),
-        field(
-            "logprobs",
-            probabilities,
-            Some(AdaptableField::Logprobs),
-            OMIT_PROBABILITIES,
-        ),
-        field(
-            "include",
-            probabilities,
-            Some(AdaptableField::Logprobs),
-            OMIT_PROBABILITIES,
-        ),
+        field("logprobs", probabilities, Some(AdaptableField::Logprobs), OMIT_PROBABILITIES),
+        field("include", probabilities, Some(AdaptableField::Logprobs), OMIT_PROBABILITIES),
         field(
             "structured_outputs",
             FieldState::sent_if(parameters.constrain == Constrain::Choice),
@@ -232,14 +189,8 @@ fn field(
     adaptable: Option<AdaptableField>,
     hint: &'static str,
 ) -> RequestField<'static> {
-    RequestField {
-        name,
-        state,
-        hint,
-        adaptable,
-    }
+    RequestField { name, state, hint, adaptable }
 }
 
 /// Remedy for a reasoning effort that the model does not accept.
-const OMIT_EFFORT: &str =
-    "leave --reasoning-effort (or --thinking) out, or give a value the model takes";
+const OMIT_EFFORT: &str = "leave --reasoning-effort (or --thinking) out, or give a value the model takes";

@@ -9,9 +9,7 @@ use crate::ask::replies::bounded_json::{MAX_ITEMS, parse};
 /// True if a body is an event stream, by its content type or its first characters.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {
     let text = text.trim_start();
-    content_type.starts_with("text/event-stream")
-        || text.starts_with("data:")
-        || text.starts_with("event:")
+    content_type.starts_with("text/event-stream") || text.starts_with("data:") || text.starts_with("event:")
 }
 
 /// Events of a stream up to `[DONE]`, as JSON. A truncated event, which is not JSON, becomes null.
@@ -29,10 +27,7 @@ pub(super) fn events(stream: &str) -> impl Iterator<Item = Value> {
 
 /// True if a stream has the event `[DONE]`, which servers send last.
 fn is_done(stream: &str) -> bool {
-    stream
-        .split(['\n', '\r'])
-        .filter_map(|line| line.strip_prefix("data:"))
-        .any(|data| data.trim() == "[DONE]")
+    stream.split(['\n', '\r']).filter_map(|line| line.strip_prefix("data:")).any(|data| data.trim() == "[DONE]")
 }
 
 /// An event stream without a complete chat completion.
@@ -44,10 +39,11 @@ pub(super) struct BrokenStream {
     pub(super) has_text: bool,
 }
 
-/// Joins the chunks of the choice with index 0 to a completion in the form of an unstreamed one. An error event is returned in its place.
+/// Joins the chunks of the choice with index 0 to a completion in the form of an unstreamed one. An error event is
+/// returned in its place.
 ///
-/// A stream is complete if it has a finish reason. Some gateways send none: then it is complete if it has a part of the reply and ends
-/// with `[DONE]`, or with the final token counts, which follow the last token.
+/// A stream is complete if it has a finish reason. Some gateways send none: then it is complete if it has a part of the
+/// reply and ends with `[DONE]`, or with the final token counts, which follow the last token.
 ///
 /// # Errors
 /// If the stream is not a chat completion, or is truncated.
@@ -57,10 +53,7 @@ pub(super) fn assemble(stream: &str) -> Result<Value, BrokenStream> {
     let mut ends_with_counts = false;
     for event in events(stream) {
         if event.is_null() {
-            return Err(BrokenStream {
-                usage: completion.remove("usage"),
-                has_text: joined.has_text(),
-            });
+            return Err(BrokenStream { usage: completion.remove("usage"), has_text: joined.has_text() });
         }
         if let Some(error) = error_event(&event) {
             return Ok(error);
@@ -88,10 +81,7 @@ pub(super) fn assemble(stream: &str) -> Result<Value, BrokenStream> {
     let has_text = joined.has_text();
     let is_complete = joined.is_finished() || (has_text && (ends_with_counts || is_done(stream)));
     if !is_complete {
-        return Err(BrokenStream {
-            usage: completion.remove("usage"),
-            has_text,
-        });
+        return Err(BrokenStream { usage: completion.remove("usage"), has_text });
     }
     completion.insert("choices".to_owned(), json!([joined.into_choice()]));
     Ok(Value::Object(completion))
@@ -110,16 +100,11 @@ fn error_event(event: &Value) -> Option<Value> {
     if event.get("error").is_some_and(|error| !error.is_null()) {
         return Some(event.clone());
     }
-    let is_named = ["type", "object"]
-        .iter()
-        .any(|field| event.get(field).is_some_and(|kind| kind == "error"));
+    let is_named = ["type", "object"].iter().any(|field| event.get(field).is_some_and(|kind| kind == "error"));
     if is_named {
         return Some(json!({"error": event}));
     }
-    let has_choices = event
-        .get("choices")
-        .and_then(Value::as_array)
-        .is_some_and(|choices| !choices.is_empty());
+    let has_choices = event.get("choices").and_then(Value::as_array).is_some_and(|choices| !choices.is_empty());
     let error = find_error(event).filter(|_| !has_choices)?;
     Some(json!({"error": error}))
 }
@@ -211,10 +196,7 @@ impl JoinedChoice {
             self.calls.resize(index + 1, empty);
         }
         for field in ["name", "arguments"] {
-            if let Some(text) = piece
-                .pointer(&format!("/function/{field}"))
-                .and_then(Value::as_str)
-            {
+            if let Some(text) = piece.pointer(&format!("/function/{field}")).and_then(Value::as_str) {
                 append(&mut self.calls[index]["function"][field], text);
             }
         }
@@ -237,10 +219,7 @@ impl JoinedChoice {
 
     /// True if a chunk had a part of the reply or of the reasoning before it.
     fn has_text(&self) -> bool {
-        self.content
-            .iter()
-            .chain(self.texts.values())
-            .any(|part| part != "")
+        self.content.iter().chain(self.texts.values()).any(|part| part != "")
     }
 
     /// The choice; its finish reason is null if no chunk had one.
@@ -255,8 +234,7 @@ impl JoinedChoice {
             Err(parts) if parts.is_empty() => None,
             Err(parts) => message.insert("content".to_owned(), json!(parts)),
         };
-        let mut choice =
-            json!({"index": 0, "message": message, "finish_reason": self.finish_reason});
+        let mut choice = json!({"index": 0, "message": message, "finish_reason": self.finish_reason});
         if !self.logprobs.is_empty() {
             choice["logprobs"] = self.logprobs.into();
         }
@@ -302,8 +280,7 @@ mod tests {
             piece(json!({"zork_text": "dark"})),
             piece(call("{\"answer\": ")),
             piece(call("\"B\"}")),
-            "data: {\"choices\":[{\"index\":0,\"delta\":{},\"finish_reason\":\"tool_calls\"}]}\n\n"
-                .to_owned(),
+            "data: {\"choices\":[{\"index\":0,\"delta\":{},\"finish_reason\":\"tool_calls\"}]}\n\n".to_owned(),
         ];
         let function = json!({"name": "reply", "arguments": "{\"answer\": \"B\"}"});
         assert_eq!(
@@ -328,40 +305,23 @@ mod tests {
         let cut = assemble(&format!("{prompt}{piece}"));
         assert_eq!(cut, broken(Some(json!({"prompt_tokens": 3})), true));
         let counts = "data: {\"choices\":[],\"usage\":{\"completion_tokens\":3}}\n\n";
-        assert!(
-            assemble(&format!("{counts}{piece}")).is_err(),
-            "counts so far"
-        );
-        assert_eq!(
-            assemble(&format!("{piece}data: {{\"choi")),
-            broken(None, true)
-        );
+        assert!(assemble(&format!("{counts}{piece}")).is_err(), "counts so far");
+        assert_eq!(assemble(&format!("{piece}data: {{\"choi")), broken(None, true));
         let role = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"\"}}]}\n\n";
         for empty in ["", ": keep-alive\n\n", "data: [DONE]\n\n", role] {
             assert_eq!(assemble(empty), broken(None, false), "{empty}");
         }
-        assert_eq!(
-            assemble(&format!("{role}data: [DONE]\n\n")),
-            broken(None, false)
-        );
+        assert_eq!(assemble(&format!("{role}data: [DONE]\n\n")), broken(None, false));
         let error = "data: {\"error\":{\"message\":\"overloaded\"}}\n\n";
-        assert_eq!(
-            assemble(&format!("{piece}{error}")).unwrap()["error"]["message"],
-            "overloaded"
-        );
+        assert_eq!(assemble(&format!("{piece}{error}")).unwrap()["error"]["message"], "overloaded");
         let error = "event: error\ndata: {\"type\":\"error\",\"message\":\"overloaded\"}\n\n";
-        assert_eq!(
-            assemble(&format!("{piece}{error}")).unwrap()["error"]["message"],
-            "overloaded"
-        );
+        assert_eq!(assemble(&format!("{piece}{error}")).unwrap()["error"]["message"], "overloaded");
     }
 
     #[test]
     fn streams_without_a_finish_reason_are_complete_at_their_end() {
         let chunk = |finish: &str| {
-            format!(
-                "data: {{\"choices\":[{{\"index\":0,\"delta\":{{\"content\":\"B\"}}{finish}}}]}}\n\n"
-            )
+            format!("data: {{\"choices\":[{{\"index\":0,\"delta\":{{\"content\":\"B\"}}{finish}}}]}}\n\n")
         };
         let done = "data: [DONE]\n\n";
         let counts = "data: {\"choices\":[],\"usage\":{\"completion_tokens\":1}}\n\n";
@@ -388,16 +348,10 @@ mod tests {
         let whole = [piece("\"B\"", "B", "null"), piece("\".\"", ".", "\"stop\"")].concat();
         let choice = &assemble(&whole).unwrap()["choices"][0];
         assert_eq!(choice["message"]["content"], "B.");
-        assert_eq!(
-            choice["logprobs"],
-            json!({"content": [{"token": "B"}, {"token": "."}]})
-        );
+        assert_eq!(choice["logprobs"], json!({"content": [{"token": "B"}, {"token": "."}]}));
         let thought = r#"[{"type":"thinking","thinking":[]}]"#;
         let parts = [piece(thought, "A", "null"), whole].concat();
         let choice = &assemble(&parts).unwrap()["choices"][0];
-        assert_eq!(
-            choice["message"]["content"],
-            json!([{"type": "thinking", "thinking": []}, "B."])
-        );
+        assert_eq!(choice["message"]["content"], json!([{"type": "thinking", "thinking": []}, "B."]));
     }
 }

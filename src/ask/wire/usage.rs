@@ -5,7 +5,8 @@ use serde_json::{Value, json};
 use super::charge;
 use crate::types::{StatedCost, Usage};
 
-/// Parses the `usage` in a body, with the charge and the service tier that the body states. `None` if it states none of them.
+/// Parses the `usage` in a body, with the charge and the service tier that the body states. `None` if it states none of
+/// them.
 pub(super) fn in_body(body: &Value) -> Option<Usage> {
     let usage = Usage {
         cost: charge::cost_in_body(body),
@@ -15,17 +16,12 @@ pub(super) fn in_body(body: &Value) -> Option<Usage> {
     (usage != Usage::default()).then_some(usage)
 }
 
-/// Adds the charge that the headers of a response state; the higher one counts. Without a usage, a charge of 0 states nothing.
+/// Adds the charge that the headers of a response state; the higher one counts. Without a usage, a charge of 0 states
+/// nothing.
 pub(crate) fn with_cost(usage: Option<Usage>, cost: Option<StatedCost>) -> Option<Usage> {
     match (usage, cost) {
-        (Some(usage), cost) => Some(Usage {
-            cost: usage.cost.max(cost),
-            ..usage
-        }),
-        (None, Some(cost)) if cost.dollars() > 0.0 => Some(Usage {
-            cost: Some(cost),
-            ..Usage::default()
-        }),
+        (Some(usage), cost) => Some(Usage { cost: usage.cost.max(cost), ..usage }),
+        (None, Some(cost)) if cost.dollars() > 0.0 => Some(Usage { cost: Some(cost), ..Usage::default() }),
         (None, _) => None,
     }
 }
@@ -35,11 +31,13 @@ pub(super) fn alone(usage: Option<Value>) -> Option<Usage> {
     in_body(&json!({"usage": usage?}))
 }
 
-/// Parses the `usage` of chat completions (`prompt_tokens`, `completion_tokens`) or of responses (`input_tokens`, `output_tokens`).
+/// Parses the `usage` of chat completions (`prompt_tokens`, `completion_tokens`) or of responses (`input_tokens`,
+/// `output_tokens`).
 ///
-/// Some servers charge reasoning tokens without counting them as reply tokens (xAI, Gemini's compatible route). The number of reply
-/// tokens is therefore the maximum of: the reported number; the total minus the prompt; and the reported number plus the reasoning
-/// tokens, if these are more than the reported number and so cannot be part of it. `None` without any number.
+/// Some servers charge reasoning tokens without counting them as reply tokens (xAI, Gemini's compatible route). The
+/// number of reply tokens is therefore the maximum of: the reported number; the total minus the prompt; and the
+/// reported number plus the reasoning tokens, if these are more than the reported number and so cannot be part of it.
+/// `None` without any number.
 fn read(usage: Option<&Value>) -> Option<Usage> {
     let usage = usage?;
     let prompt = first_of(usage, ["prompt_tokens", "input_tokens"]);
@@ -52,23 +50,13 @@ fn read(usage: Option<&Value>) -> Option<Usage> {
     // Anthropic does not count tokens that are read from or written to its cache as prompt tokens.
     let uncounted = read.unwrap_or(0).saturating_add(written);
     let exceeds_prompt = total.is_none() && prompt.is_some_and(|prompt| uncounted > prompt);
-    let is_uncounted =
-        uncounted > 0 && (exceeds_prompt || sum([prompt, completion, Some(uncounted)]) == total);
-    let prompt = prompt.map(|prompt| {
-        if is_uncounted {
-            prompt.saturating_add(uncounted)
-        } else {
-            prompt
-        }
-    });
-    let uncounted_reasoning =
-        reasoning(usage).filter(|reasoning| completion.is_some_and(|c| *reasoning > c));
+    let is_uncounted = uncounted > 0 && (exceeds_prompt || sum([prompt, completion, Some(uncounted)]) == total);
+    let prompt = prompt.map(|prompt| if is_uncounted { prompt.saturating_add(uncounted) } else { prompt });
+    let uncounted_reasoning = reasoning(usage).filter(|reasoning| completion.is_some_and(|c| *reasoning > c));
     let completion = [
         completion,
         uncounted_reasoning.and_then(|reasoning| completion?.checked_add(reasoning)),
-        total
-            .zip(prompt)
-            .and_then(|(all, prompt)| all.checked_sub(prompt)),
+        total.zip(prompt).and_then(|(all, prompt)| all.checked_sub(prompt)),
     ];
     let usage = Usage {
         prompt_tokens: prompt,
@@ -92,15 +80,12 @@ const REPLY_DETAILS: [&str; 2] = ["completion_tokens_details", "output_tokens_de
 
 /// Number of reasoning tokens; `None` if the server does not report it.
 pub(super) fn reasoning(usage: &Value) -> Option<u64> {
-    detail(usage, REPLY_DETAILS, "reasoning_tokens")
-        .or_else(|| number_in(usage, "reasoning_tokens"))
+    detail(usage, REPLY_DETAILS, "reasoning_tokens").or_else(|| number_in(usage, "reasoning_tokens"))
 }
 
 /// Number in the first of several objects that has it.
 fn detail(usage: &Value, objects: [&str; 2], name: &str) -> Option<u64> {
-    objects
-        .iter()
-        .find_map(|object| number_in(usage.get(*object)?, name))
+    objects.iter().find_map(|object| number_in(usage.get(*object)?, name))
 }
 
 fn number_in(object: &Value, name: &str) -> Option<u64> {
@@ -130,9 +115,7 @@ fn number(value: &Value) -> Option<u64> {
 
 /// Rounds a fraction up; `None` if it is not a plausible number of tokens.
 fn round_up(number: f64) -> Option<u64> {
-    (0.0..=MAX_TOKENS as f64)
-        .contains(&number)
-        .then_some(number.ceil() as u64)
+    (0.0..=MAX_TOKENS as f64).contains(&number).then_some(number.ceil() as u64)
 }
 
 #[cfg(test)]
@@ -212,11 +195,9 @@ mod tests {
 
     #[test]
     fn caches_outside_the_prompt_are_added() {
-        let large =
-            json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 2000});
+        let large = json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 2000});
         assert_eq!(prompt_tokens(&large), Some(2100));
-        let within =
-            json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 60});
+        let within = json!({"input_tokens": 100, "output_tokens": 1, "cache_read_input_tokens": 60});
         assert_eq!(prompt_tokens(&within), Some(100));
     }
 
@@ -233,13 +214,7 @@ mod tests {
 
     #[test]
     fn implausible_numbers_are_ignored() {
-        for tokens in [
-            json!(u64::MAX),
-            json!(-1),
-            json!("1e99"),
-            json!("nan"),
-            json!(null),
-        ] {
+        for tokens in [json!(u64::MAX), json!(-1), json!("1e99"), json!("nan"), json!(null)] {
             let stated = json!({"prompt_tokens": tokens, "completion_tokens": tokens, "cache_read_input_tokens": 3});
             let usage = read(Some(&stated)).unwrap();
             assert_eq!((usage.prompt_tokens, usage.completion_tokens), (None, None));

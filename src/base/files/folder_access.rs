@@ -8,8 +8,8 @@ use crate::error::{Error, Result};
 /// The access of other users of this machine to a new folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FolderAccess {
-    /// No access, because a run contains replies and pictures of homes. Nobody else can enter the folder, so its files are private
-    /// whatever their modes are, and `chmod` of the folder alone shares them later.
+    /// No access, because a run contains replies and pictures of homes. Nobody else can enter the folder, so its files
+    /// are private whatever their modes are, and `chmod` of the folder alone shares them later.
     #[default]
     Private,
     /// The system's default for new folders (`umask`).
@@ -19,11 +19,7 @@ pub enum FolderAccess {
 impl FolderAccess {
     /// The access for a value of the flag `--shared`.
     pub fn new(is_shared: bool) -> Self {
-        if is_shared {
-            Self::Shared
-        } else {
-            Self::Private
-        }
+        if is_shared { Self::Shared } else { Self::Private }
     }
 
     /// Creates a folder. Missing parents get the system's default mode; an existing folder keeps its mode.
@@ -31,8 +27,7 @@ impl FolderAccess {
     /// # Errors
     /// If it cannot be created.
     pub fn create(self, path: &Path) -> Result<()> {
-        self.create_io(path)
-            .map_err(|e| Error::file(path, "create", e))
+        self.create_io(path).map_err(|e| Error::file(path, "create", e))
     }
 
     /// Creates a folder as [`create`](Self::create) does, but returns the bare error of the operating system.
@@ -64,8 +59,7 @@ mod tests {
     #[test]
     fn only_new_private_folders_get_a_mode() {
         let folder = tempfile::tempdir().unwrap();
-        let [runs, private, shared, file] =
-            ["runs", "runs/a", "runs/b", "file"].map(|name| folder.path().join(name));
+        let [runs, private, shared, file] = ["runs", "runs/a", "runs/b", "file"].map(|name| folder.path().join(name));
         FolderAccess::Private.create(&private).unwrap();
         assert_eq!(mode(&private), 0o700);
         FolderAccess::Shared.create(&shared).unwrap();

@@ -1,7 +1,7 @@
 //! Calls of third-party decoders whose panics become errors: [`guarded`].
 //!
-//! A decoder should return an error for every broken file. Some panic instead: the OpenEXR decoder on a few damaged blocks of lossy
-//! compression (found by mutated files). One file must not end a run.
+//! A decoder should return an error for every broken file. Some panic instead: the OpenEXR decoder on a few damaged
+//! blocks of lossy compression (found by mutated files). One file must not end a run.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -42,10 +42,7 @@ mod tests {
         let broken = guarded(|| -> Result<u8, String> { panic!("in a decoder") });
         assert!(broken.unwrap_err().contains("broke down"));
         assert_eq!(guarded(|| Ok(1)), Ok(1));
-        assert_eq!(
-            guarded(|| Err::<u8, _>("no".to_owned())),
-            Err("no".to_owned())
-        );
+        assert_eq!(guarded(|| Err::<u8, _>("no".to_owned())), Err("no".to_owned()));
         let nested = guarded(|| {
             let inner = guarded(|| -> Result<u8, String> { panic!("in an inner decoder") });
             inner.or(Ok(2))

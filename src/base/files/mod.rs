@@ -1,4 +1,5 @@
-//! Files that are written completely or not at all, by [`write()`] and [`write_synced`]; and helpers to read files, in [`reading`].
+//! Files that are written completely or not at all, by [`write()`] and [`write_synced`]; and helpers to read files, in
+//! [`reading`].
 
 pub mod folder_access;
 pub mod guarded;
@@ -14,7 +15,8 @@ use crate::error::{Error, Result};
 /// The ending of a file's name until the file is complete.
 pub const UNFINISHED: &str = ".part";
 
-/// Writes a file that can be regenerated: a killed process leaves the old or the new content, a power cut may lose both.
+/// Writes a file that can be regenerated: a killed process leaves the old or the new content, a power cut may lose
+/// both.
 ///
 /// # Errors
 /// If the folder cannot be created or the file cannot be written.
@@ -35,20 +37,17 @@ pub fn is_unfinished(name: &OsStr) -> bool {
     name.to_string_lossy().ends_with(UNFINISHED)
 }
 
-/// Writes a file through `write`, and forces it to the disk before it returns. A file with the same content is left untouched.
+/// Writes a file through `write`, and forces it to the disk before it returns. A file with the same content is left
+/// untouched.
 ///
 /// # Errors
 /// If the folder cannot be created, the file cannot be written, or `write` fails.
 pub fn write_with(path: &Path, write: impl FnOnce(&mut dyn io::Write) -> Result<()>) -> Result<()> {
     create_folder(path)?;
     let unfinished = unfinished(path);
-    let mut file = create_new(&unfinished)
-        .map(BufWriter::new)
-        .map_err(|e| Error::file(&unfinished, "write", e))?;
+    let mut file = create_new(&unfinished).map(BufWriter::new).map_err(|e| Error::file(&unfinished, "write", e))?;
     write(&mut file)?;
-    file.flush()
-        .and_then(|()| file.get_ref().sync_all())
-        .map_err(|e| Error::file(&unfinished, "write", e))?;
+    file.flush().and_then(|()| file.get_ref().sync_all()).map_err(|e| Error::file(&unfinished, "write", e))?;
     drop(file);
     if has_same_content(path, &unfinished).unwrap_or(false) {
         return fs::remove_file(&unfinished).map_err(|e| Error::file(&unfinished, "write", e));
@@ -60,10 +59,7 @@ fn has_same_content(one: &Path, other: &Path) -> io::Result<bool> {
     if fs::metadata(one)?.len() != fs::metadata(other)?.len() {
         return Ok(false);
     }
-    let [mut one, mut other] = [
-        BufReader::new(File::open(one)?),
-        BufReader::new(File::open(other)?),
-    ];
+    let [mut one, mut other] = [BufReader::new(File::open(one)?), BufReader::new(File::open(other)?)];
     loop {
         let (a, b) = (one.fill_buf()?, other.fill_buf()?);
         let length = a.len().min(b.len());
@@ -84,7 +80,8 @@ pub fn unfinished(path: &Path) -> PathBuf {
     path.with_file_name(format!(".{name}{UNFINISHED}"))
 }
 
-/// Creates an empty file, in place of a file that a killed process left there. A link at the path is replaced, not followed.
+/// Creates an empty file, in place of a file that a killed process left there. A link at the path is replaced, not
+/// followed.
 ///
 /// # Errors
 /// If the path is a folder, or the file cannot be created.
@@ -103,8 +100,8 @@ fn create_folder(path: &Path) -> Result<()> {
     }
 }
 
-// tempfile's `persist` is not used: its random name leaves a further file after each killed process, and its file mode denies
-// access to colleagues who share a results folder.
+// tempfile's `persist` is not used: its random name leaves a further file after each killed process, and its file mode
+// denies access to colleagues who share a results folder.
 fn replace(path: &Path, content: &[u8], sync: impl FnOnce(&File) -> io::Result<()>) -> Result<()> {
     create_folder(path)?;
     let unfinished = unfinished(path);

@@ -39,18 +39,10 @@ pub fn space(name: &str) -> Option<Labels> {
         if cells.next().is_none() {
             expressible.insert(canonical.clone());
         }
-        let label = Label {
-            name: word,
-            canonical,
-        };
+        let label = Label { name: word, canonical };
         labels.insert(id.parse().ok()?, label);
     }
-    Some(Labels {
-        space: name.to_owned(),
-        void: void.iter().copied().collect(),
-        labels,
-        expressible,
-    })
+    Some(Labels { space: name.to_owned(), void: void.iter().copied().collect(), labels, expressible })
 }
 
 /// The canonical classes: mpcat40 without `void` and `unlabeled`.
@@ -85,15 +77,14 @@ struct ClassEntry {
 /// Reads a `classes.json`: `{"schema": "darkqa.classes/1", "space", "void_ids": [0], "classes": [{"id", "name",
 /// "canonical", "expressible"}]}`.
 ///
-/// A canonical class is expressible if one of its labels is marked so. If no label of the file has such a mark, the built-in
-/// space of the same name decides. Without such a space, every class with a label is expressible.
+/// A canonical class is expressible if one of its labels is marked so. If no label of the file has such a mark, the
+/// built-in space of the same name decides. Without such a space, every class with a label is expressible.
 ///
 /// # Errors
 /// With the file, for invalid JSON, another schema, a repeated number, or a canonical class that mpcat40 does not have.
 pub fn read(path: &Path) -> Result<Labels> {
     let file: ClassesFile = reading::json(path)?;
-    file.labels()
-        .map_err(|problem| Error::data(path.display(), problem))
+    file.labels().map_err(|problem| Error::data(path.display(), problem))
 }
 
 impl ClassesFile {
@@ -109,12 +100,7 @@ impl ClassesFile {
         };
         let stated = self.classes.iter().any(|class| class.expressible.is_some());
         for class in self.classes {
-            let ClassEntry {
-                id,
-                name,
-                canonical,
-                expressible,
-            } = class;
+            let ClassEntry { id, name, canonical, expressible } = class;
             if !known.contains(&canonical) {
                 return Err(format!(
                     "class {id} ({name:?}) has the canonical class {canonical:?}, which mpcat40 does not have; one of {} expected",
@@ -124,18 +110,12 @@ impl ClassesFile {
             if expressible.unwrap_or(!stated) {
                 labels.expressible.insert(canonical.clone());
             }
-            if labels
-                .labels
-                .insert(id, Label { name, canonical })
-                .is_some()
-            {
+            if labels.labels.insert(id, Label { name, canonical }).is_some() {
                 return Err(format!("two classes have the number {id}"));
             }
         }
         if let Some(preset) = space(&labels.space).filter(|_| !stated) {
-            labels
-                .expressible
-                .retain(|class| preset.expressible.contains(class));
+            labels.expressible.retain(|class| preset.expressible.contains(class));
         }
         Ok(labels)
     }

@@ -15,39 +15,36 @@ pub mod text;
 pub mod values;
 
 pub use degradations::{
-    Axis, AxisLevel, Condition, ConditionColumns, Degradation, EnhancerName, ExposureFacts,
-    KindSet, PairDark, PairFacts, PhotoName, ProfileName, RunGroup, SetLight, Severity, Treatment,
-    TreatmentSet, Variant,
+    Axis, AxisLevel, Condition, ConditionColumns, Degradation, EnhancerName, ExposureFacts, KindSet, PairDark,
+    PairFacts, PhotoName, ProfileName, RunGroup, SetLight, Severity, Treatment, TreatmentSet, Variant,
 };
 #[cfg(feature = "program")]
 pub use flags::Decides;
 #[cfg(feature = "program")]
 pub use images::Frame;
 pub use images::{
-    DepthKind, FrameId, Image, Intrinsics, Label, Labels, Light, Pixels, Rgb, Rgb16Image, Sample,
-    SegmentName, Segmentation,
+    DepthKind, FrameId, Image, Intrinsics, Label, Labels, Light, Pixels, Rgb, Rgb16Image, Sample, SegmentName,
+    Segmentation,
 };
 #[cfg(feature = "program")]
 pub use manifests::{
-    ColourHandling, ColourNote, DepthNote, Flaw, InputNote, InputSummary, ListedModel, ModelColumn,
-    ModelListing, SeamCounts, SizeLog,
+    ColourHandling, ColourNote, DepthNote, Flaw, InputNote, InputSummary, ListedModel, ModelColumn, ModelListing,
+    SeamCounts, SizeLog,
 };
 #[cfg(feature = "program")]
 pub use questions::{
-    Answer, Choices, Family, PixelBox, Question, QuestionId, RunQuestion, StrictGroup, Truths,
-    UnreadReason,
+    Answer, Choices, Family, PixelBox, Question, QuestionId, RunQuestion, StrictGroup, Truths, UnreadReason,
 };
 #[cfg(feature = "program")]
 pub use records::{
-    AskedItem, AskedParts, ChoiceDetail, ChoiceFacts, ChoiceTables, Failure, FailureKind,
-    ImageFacts, ImageFidelity, KeptTrial, ObjectCrop, OpenDetail, ParsedAnswer, SentImages, Step,
-    StoredDetail, TextPlace, Thumbnail, TrialKey, TrialOutcome, TrialRef, Trials, Via, View,
-    WalkFacts,
+    AskedItem, AskedParts, ChoiceDetail, ChoiceFacts, ChoiceTables, Failure, FailureKind, ImageFacts, ImageFidelity,
+    KeptTrial, ObjectCrop, OpenDetail, ParsedAnswer, SentImages, Step, StoredDetail, TextPlace, Thumbnail, TrialKey,
+    TrialOutcome, TrialRef, Trials, Via, View, WalkFacts,
 };
 #[cfg(feature = "program")]
 pub use replies::{
-    AnswerSource, Control, Finish, LostAttempts, Observed, OptionProbabilities, OtherField, Reply,
-    ServiceTier, StatedCost, Thought, TokenChances, TokenPosition, Unstated, Usage,
+    AnswerSource, Control, Finish, LostAttempts, Observed, OptionProbabilities, OtherField, Reply, ServiceTier,
+    StatedCost, Thought, TokenChances, TokenPosition, Unstated, Usage,
 };
 pub use text::shell_word;
 pub use values::{Digest, Distinct, Shared};
@@ -68,14 +65,10 @@ mod tests {
     fn degradation() -> impl Strategy<Value = Option<Degradation>> {
         let kind = prop::sample::select(&Kind::ALL[..]);
         let reading = prop::option::of("[A-Za-z0-9_.-]{1,12}");
-        prop::option::of(
-            (kind, 1..=1600_u16, reading).prop_map(|(kind, severity, reading)| {
-                let reading = reading
-                    .filter(|_| kind.has_profiles())
-                    .map(|name| ProfileName::new(&name).unwrap());
-                Degradation::new(kind, Severity::from_hundredths(severity), reading).unwrap()
-            }),
-        )
+        prop::option::of((kind, 1..=1600_u16, reading).prop_map(|(kind, severity, reading)| {
+            let reading = reading.filter(|_| kind.has_profiles()).map(|name| ProfileName::new(&name).unwrap());
+            Degradation::new(kind, Severity::from_hundredths(severity), reading).unwrap()
+        }))
     }
 
     proptest! {

@@ -1,4 +1,5 @@
-//! `batch import` reads the output of a Batch API into the records of a run; [`folder`] has the commands for submitted batches.
+//! `batch import` reads the output of a Batch API into the records of a run; [`folder`] has the commands for submitted
+//! batches.
 
 mod folder;
 
@@ -56,7 +57,8 @@ fn import_into<D: Detail>(
     report(&store, manifest, &args.show, &imported, write)
 }
 
-/// Writes the report of a run with new replies. The text for standard output begins with `text`, which describes the new replies.
+/// Writes the report of a run with new replies. The text for standard output begins with `text`, which describes the
+/// new replies.
 fn report<D: Detail>(
     store: &Store<D>,
     manifest: RunManifest,

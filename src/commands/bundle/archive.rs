@@ -23,11 +23,11 @@ const SUMS: &str = "SHA256SUMS";
 /// Compression level, the default of deflate.
 const LEVEL: i64 = 6;
 
-/// True if a file is a bundle. Only the end of the file is read, because the directory of a ZIP file may have millions of entries.
+/// True if a file is a bundle. Only the end of the file is read, because the directory of a ZIP file may have millions
+/// of entries.
 pub(super) fn is_bundle(path: &Path) -> bool {
     // The comment follows the end record, whose last two bytes are the length of the comment.
-    read_end(path, END_RECORD + MARK.len())
-        .is_ok_and(|end| end.starts_with(b"PK\x05\x06") && end.ends_with(MARK))
+    read_end(path, END_RECORD + MARK.len()).is_ok_and(|end| end.starts_with(b"PK\x05\x06") && end.ends_with(MARK))
 }
 
 /// The last `length` bytes of a file.
@@ -39,8 +39,8 @@ fn read_end(path: &Path, length: usize) -> io::Result<Vec<u8>> {
     Ok(end)
 }
 
-/// Packs files into an archive, in a folder of this name, with a file of digests for `sha256sum`. The same files give the same bytes:
-/// names are sorted, and all times are 1980-01-01.
+/// Packs files into an archive, in a folder of this name, with a file of digests for `sha256sum`. The same files give
+/// the same bytes: names are sorted, and all times are 1980-01-01.
 ///
 /// # Errors
 /// If the archive cannot be made.
@@ -57,9 +57,7 @@ pub(super) fn zip_files(folder: &str, mut files: Vec<(String, Vec<u8>)>) -> Resu
             .last_modified_time(DateTime::default())
             .unix_permissions(0o644)
             .large_file(u32::try_from(content.len()).is_err());
-        archive
-            .start_file(format!("{folder}/{name}"), options)
-            .map_err(|e| failed(&e))?;
+        archive.start_file(format!("{folder}/{name}"), options).map_err(|e| failed(&e))?;
         archive.write_all(&content).map_err(|e| failed(&e))?;
     }
     let archive = archive.finish().map_err(|e| failed(&e))?;
@@ -89,9 +87,7 @@ mod tests {
     use super::*;
 
     fn zipped(files: Vec<(&str, &str)>) -> Vec<u8> {
-        let files = files
-            .into_iter()
-            .map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
+        let files = files.into_iter().map(|(name, text)| (name.to_owned(), text.as_bytes().to_vec()));
         zip_files("run", files.collect()).unwrap()
     }
 
@@ -113,11 +109,6 @@ mod tests {
         let mut sums = archive.by_name("run/SHA256SUMS").unwrap();
         let text = std::io::read_to_string(&mut sums).unwrap();
         // echo -n two | sha256sum
-        assert!(
-            text.contains(
-                "3fc4ccfe745870e2c0d99f71f30ff0656c8dedd41cc1d7d3d376b0dbe685e2f3  b.txt\n"
-            ),
-            "{text}"
-        );
+        assert!(text.contains("3fc4ccfe745870e2c0d99f71f30ff0656c8dedd41cc1d7d3d376b0dbe685e2f3  b.txt\n"), "{text}");
     }
 }

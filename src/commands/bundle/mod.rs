@@ -41,10 +41,12 @@ pub(crate) struct BundleArgs {
     pub thumbnails: ThumbnailChoice,
 }
 
-/// Packs a run. Paths, URLs and secrets are removed from all files, and the report is made again from the redacted files.
+/// Packs a run. Paths, URLs and secrets are removed from all files, and the report is made again from the redacted
+/// files.
 ///
 /// # Errors
-/// If the folder has no run, `--out` is an existing file other than a bundle, or private information would be left in a file.
+/// If the folder has no run, `--out` is an existing file other than a bundle, or private information would be left in a
+/// file.
 pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     let replaces = args.out.symlink_metadata().is_ok();
     if replaces && !is_bundle(&args.out) {
@@ -53,48 +55,29 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     }
     let folder_name = file_name(&run_name(&args.run));
     let mut redactor = Redactor::new(&args.run);
-    let RedactedRun {
-        manifest,
-        mut files,
-        run,
-        thumbnails,
-    } = RedactedRun::read(&args.run, &folder_name, args.thumbnails, &mut redactor)?;
+    let RedactedRun { manifest, mut files, run, thumbnails } =
+        RedactedRun::read(&args.run, &folder_name, args.thumbnails, &mut redactor)?;
     let command = command(&manifest, &run);
     let report = whole_report(run)?;
     files.extend(report.files);
-    let mut changes: Vec<String> = redactor
-        .changes
-        .iter()
-        .map(|(change, times)| change.words(*times))
-        .collect();
+    let mut changes: Vec<String> = redactor.changes.iter().map(|(change, times)| change.words(*times)).collect();
     if thumbnails[1] > 0 {
         let all = thumbnails[0] + thumbnails[1];
-        changes.push(format!(
-            "{} of {all} small images are left out",
-            thumbnails[1]
-        ));
+        changes.push(format!("{} of {all} small images are left out", thumbnails[1]));
     }
     let mut others = other_entries(&args.run, &files)?;
     if let Some(table) = others.iter().position(|name| name == RECORDS_PARQUET) {
         // The table is not redacted.
         others.remove(table);
-        changes.push(format!(
-            "{RECORDS_PARQUET} is left out: report writes it again, from records.jsonl"
-        ));
+        changes.push(format!("{RECORDS_PARQUET} is left out: report writes it again, from records.jsonl"));
     }
     match others.len() {
         0 => {}
-        1 => changes
-            .push("1 other file or folder of the run is left out: no report needs it".to_owned()),
-        n => changes.push(format!(
-            "{n} other files or folders of the run are left out: no report needs them"
-        )),
+        1 => changes.push("1 other file or folder of the run is left out: no report needs it".to_owned()),
+        n => changes.push(format!("{n} other files or folders of the run are left out: no report needs them")),
     }
     files.sort();
-    let sizes: Vec<(String, usize)> = files
-        .iter()
-        .map(|(name, content)| (name.clone(), content.len()))
-        .collect();
+    let sizes: Vec<(String, usize)> = files.iter().map(|(name, content)| (name.clone(), content.len())).collect();
     let text = readme(&ReadmeInputs {
         name: &folder_name,
         command: &command,
@@ -108,11 +91,7 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
     let archive = zip_files(&folder_name, files)?;
     files::write(&args.out, &archive)?;
     let verb = if replaces { "replaced" } else { "written" };
-    let mut output = format!(
-        "{}: {verb}, {count} files, {} bytes\n",
-        args.out.display(),
-        archive.len()
-    );
+    let mut output = format!("{}: {verb}, {count} files, {} bytes\n", args.out.display(), archive.len());
     for change in changes {
         let _ = writeln!(output, "{change}");
     }
@@ -136,30 +115,24 @@ fn check_leaks(files: &[(String, Vec<u8>)], redactor: &Redactor) -> Result<()> {
     Ok(())
 }
 
-/// The first line of a file that contains private information, with the field of its JSON: `line 3, field failure.message`.
+/// The first line of a file that contains private information, with the field of its JSON: `line 3, field
+/// failure.message`.
 fn leak_place(content: &[u8], redactor: &Redactor) -> String {
     let text = String::from_utf8_lossy(content);
-    if let Some(field) = serde_json::from_str(&text)
-        .ok()
-        .and_then(|value| leaking_field(&value, redactor))
-    {
+    if let Some(field) = serde_json::from_str(&text).ok().and_then(|value| leaking_field(&value, redactor)) {
         return format!("the field {field}");
     }
-    let leaking = text
-        .lines()
-        .enumerate()
-        .find(|(_, line)| redactor.find_leak(line).is_some());
+    let leaking = text.lines().enumerate().find(|(_, line)| redactor.find_leak(line).is_some());
     let Some((index, line)) = leaking else {
         return "it".to_owned();
     };
-    let field = serde_json::from_str(line)
-        .ok()
-        .and_then(|value| leaking_field(&value, redactor));
+    let field = serde_json::from_str(line).ok().and_then(|value| leaking_field(&value, redactor));
     let field = field.map_or_else(String::new, |field| format!(", field {field}"));
     format!("line {}{field}", index + 1)
 }
 
-/// The path of the first field whose text or name contains private information: `failure.message`. A name that does is not shown.
+/// The path of the first field whose text or name contains private information: `failure.message`. A name that does is
+/// not shown.
 fn leaking_field(value: &Value, redactor: &Redactor) -> Option<String> {
     let joined = |name: &str, inner: String| match inner.as_str() {
         "" => name.to_owned(),
@@ -167,9 +140,10 @@ fn leaking_field(value: &Value, redactor: &Redactor) -> Option<String> {
     };
     match value {
         Value::String(text) => redactor.find_leak(text).map(|_| String::new()),
-        Value::Array(items) => items.iter().enumerate().find_map(|(index, item)| {
-            leaking_field(item, redactor).map(|inner| joined(&index.to_string(), inner))
-        }),
+        Value::Array(items) => items
+            .iter()
+            .enumerate()
+            .find_map(|(index, item)| leaking_field(item, redactor).map(|inner| joined(&index.to_string(), inner))),
         Value::Object(fields) => fields.iter().find_map(|(name, item)| {
             if redactor.find_leak(name).is_some() {
                 return Some("(a name of a field)".to_owned());
@@ -182,15 +156,10 @@ fn leaking_field(value: &Value, redactor: &Redactor) -> Option<String> {
 
 /// Names of the entries of the run folder that are not in the bundle, sorted.
 fn other_entries(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<String>> {
-    let known: BTreeSet<&str> = files
-        .iter()
-        .map(|(name, _)| name.split('/').next().unwrap_or(name))
-        .collect();
+    let known: BTreeSet<&str> = files.iter().map(|(name, _)| name.split('/').next().unwrap_or(name)).collect();
     let mut others = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))? {
-        let name = entry
-            .map_err(|e| Error::file(folder, "read", e))?
-            .file_name();
+        let name = entry.map_err(|e| Error::file(folder, "read", e))?.file_name();
         let name = name.to_string_lossy().into_owned();
         if !known.contains(&*name) {
             others.push(name);
@@ -202,16 +171,7 @@ fn other_entries(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<Strin
 
 /// Converts the name of a run to a folder name that is valid on all systems.
 fn file_name(name: &str) -> String {
-    let name: String = name
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || "-_.+@".contains(c) {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
+    let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_.+@".contains(c) { c } else { '_' }).collect();
     match name.trim_start_matches('.') {
         "" => "run".to_owned(),
         name => name.to_owned(),

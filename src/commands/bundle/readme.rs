@@ -35,7 +35,8 @@ pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     text += "\nIn the folder, to check that nothing changed on the way:\n\n";
     text += &fenced("sha256sum --check SHA256SUMS");
     text += "\n## Ask again\n\n";
-    text += "The command that asks the same, as far as the manifest states it; replace `DIR/` by a folder of yours:\n\n";
+    text +=
+        "The command that asks the same, as far as the manifest states it; replace `DIR/` by a folder of yours:\n\n";
     text += &fenced(inputs.command);
     text += "\n## Changed, or left out\n\n";
     if inputs.changes.is_empty() {
@@ -105,11 +106,7 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     if file.is_some() {
         words.extend(["--models", "models.toml"].map(str::to_owned));
     }
-    for model in asked
-        .seeing
-        .iter()
-        .filter(|model| !is_control(model) && !is_in_file(model))
-    {
+    for model in asked.seeing.iter().filter(|model| !is_control(model) && !is_in_file(model)) {
         words.extend(["--model".to_owned(), word(model)]);
     }
     for model in asked.blind.iter().filter(|model| !is_in_file(model)) {
@@ -134,15 +131,10 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     // Without a models file, the judge uses the address of the models by default.
     if let Some(content) = judge.and_then(|judge| remote.get(&judge.to_owned()))
         && (file.is_some()
-            || tested
-                .iter()
-                .any(|tested| tested["--base-url"] != content["--base-url"])
+            || tested.iter().any(|tested| tested["--base-url"] != content["--base-url"])
             || tested.is_empty())
     {
-        words.extend(flag_words(
-            &judge_flag("--base-url"),
-            &content["--base-url"],
-        ));
+        words.extend(flag_words(&judge_flag("--base-url"), &content["--base-url"]));
     }
     for (flag, value) in &manifest.images {
         words.extend(flag_words(&format!("--{flag}"), value));
@@ -159,19 +151,13 @@ pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
             let is_digest = value.as_str().is_some_and(|text| text.len() >= 64);
             let is_image_flag = manifest.images.contains_key(flag.trim_start_matches("--"));
             let is_written = words.contains(flag);
-            flag.starts_with("--")
-                && !is_image_flag
-                && !is_written
-                && !is_digest
-                && *flag != "--data"
+            flag.starts_with("--") && !is_image_flag && !is_written && !is_digest && *flag != "--data"
         })
         .flat_map(|(flag, value)| flag_words(flag, value))
         .collect();
     words.extend(other_settings);
     let command = words.join(" ");
-    file.map_or(command.clone(), |file| {
-        format!("cat > models.toml <<'END'\n{file}END\n{command}")
-    })
+    file.map_or(command.clone(), |file| format!("cat > models.toml <<'END'\n{file}END\n{command}"))
 }
 
 /// Settings of the models at endpoints, by model name.
@@ -187,12 +173,9 @@ fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
 
 /// Content of a models file (TOML) for a run; `None` if flags suffice.
 ///
-/// Flags do not suffice if models differ in their settings, or if a model has another name in the run than at its endpoint.
-fn models_file(
-    remote: &BTreeMap<&String, &Value>,
-    asked: &RunModels,
-    judge: Option<&str>,
-) -> Option<String> {
+/// Flags do not suffice if models differ in their settings, or if a model has another name in the run than at its
+/// endpoint.
+fn models_file(remote: &BTreeMap<&String, &Value>, asked: &RunModels, judge: Option<&str>) -> Option<String> {
     // Flags define a model that is only a judge.
     let models: Vec<(&String, &Value)> = remote
         .iter()
@@ -200,10 +183,7 @@ fn models_file(
         .filter(|(name, _)| Some(name.as_str()) != judge || asked.seeing.contains(*name))
         .collect();
     let first = without_id(models.first()?.1);
-    if models
-        .iter()
-        .all(|(name, content)| without_id(content) == first && content["--model"] == **name)
-    {
+    if models.iter().all(|(name, content)| without_id(content) == first && content["--model"] == **name) {
         return None;
     }
     let mut text = String::new();
@@ -255,15 +235,10 @@ fn common_flags(models: &[&Value]) -> Vec<String> {
         .filter(|(flag, value)| {
             flag.starts_with("--")
                 && *flag != "--model"
-                && models
-                    .iter()
-                    .all(|other| other.get(flag.as_str()) == Some(value))
+                && models.iter().all(|other| other.get(flag.as_str()) == Some(value))
         })
         .collect();
-    shared
-        .into_iter()
-        .flat_map(|(flag, value)| flag_words(flag, value))
-        .collect()
+    shared.into_iter().flat_map(|(flag, value)| flag_words(flag, value)).collect()
 }
 
 /// Shell words for a flag with its value. A list repeats the flag; null, false and objects give no words.
@@ -273,10 +248,7 @@ fn flag_words(flag: &str, value: &Value) -> Vec<String> {
     let text = match value {
         Value::Null | Value::Bool(false) | Value::Object(_) => return Vec::new(),
         Value::Array(values) => {
-            return values
-                .iter()
-                .flat_map(|value| flag_words(flag, value))
-                .collect();
+            return values.iter().flat_map(|value| flag_words(flag, value)).collect();
         }
         Value::Bool(true) => None,
         Value::String(text) => Some(text.clone()),
@@ -310,14 +282,8 @@ mod tests {
 
     #[test]
     fn flag_words_quote_and_repeat_values() {
-        assert_eq!(
-            flag_words("--x", &serde_json::json!("a b")),
-            ["--x", "'a b'"]
-        );
-        assert_eq!(
-            flag_words("--x", &serde_json::json!(["a", 2])),
-            ["--x", "a", "--x", "2"]
-        );
+        assert_eq!(flag_words("--x", &serde_json::json!("a b")), ["--x", "'a b'"]);
+        assert_eq!(flag_words("--x", &serde_json::json!(["a", 2])), ["--x", "a", "--x", "2"]);
         assert_eq!(flag_words("--x", &serde_json::json!(true)), ["--x"]);
         assert!(flag_words("--x", &Value::Null).is_empty());
     }

@@ -40,9 +40,9 @@ impl Redaction {
             times => format!("{times} times"),
         };
         match self {
-            Self::Path => format!(
-                "paths on the machine of the run are named by their last part, behind DIR/ ({times})"
-            ),
+            Self::Path => {
+                format!("paths on the machine of the run are named by their last part, behind DIR/ ({times})")
+            }
             Self::Address => {
                 format!("users, passwords and queries are left out of addresses ({times})")
             }
@@ -72,13 +72,10 @@ pub(super) enum Paths {
 
 /// An absolute path (group 2) after the start of the text or a delimiter (group 1).
 static PATH: LazyLock<Regex> = LazyLock::new(|| {
-    compile(
-        r#"(^|[\s"'=:,;(\[]|\bfile://)((?:/[^\s"',;:()\[\]/]+){2,}/?|[A-Za-z]:\\[^\s"',;]+|\\\\[^\s"',;]+)"#,
-    )
+    compile(r#"(^|[\s"'=:,;(\[]|\bfile://)((?:/[^\s"',;:()\[\]/]+){2,}/?|[A-Za-z]:\\[^\s"',;]+|\\\\[^\s"',;]+)"#)
 });
 /// The user name and password before a host; group 1 is the URL scheme.
-static USER: LazyLock<Regex> =
-    LazyLock::new(|| compile(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'?#]+@"#));
+static USER: LazyLock<Regex> = LazyLock::new(|| compile(r#"([A-Za-z][A-Za-z0-9+.-]*://)[^/\s"'?#]+@"#));
 /// A URL with a query or fragment; group 1 is the URL without them.
 static QUERY: LazyLock<Regex> = LazyLock::new(|| compile(r#"(https?://[^\s"'?#]+)[?#][^\s"']*"#));
 /// Key formats of known vendors.
@@ -95,34 +92,22 @@ fn compile(text: &str) -> Regex {
 impl Redactor {
     /// A redactor for a run's folder. It knows the home, working and run folders, and the keys in the environment.
     pub(super) fn new(folder: &Path) -> Self {
-        let mut paths: BTreeSet<PathBuf> = ["HOME", "USERPROFILE"]
-            .into_iter()
-            .filter_map(std::env::var_os)
-            .map(PathBuf::from)
-            .collect();
+        let mut paths: BTreeSet<PathBuf> =
+            ["HOME", "USERPROFILE"].into_iter().filter_map(std::env::var_os).map(PathBuf::from).collect();
         paths.extend(std::env::current_dir());
         paths.extend(std::path::absolute(folder));
-        let real_paths: Vec<PathBuf> = paths
-            .iter()
-            .filter_map(|path| path.canonicalize().ok())
-            .collect();
+        let real_paths: Vec<PathBuf> = paths.iter().filter_map(|path| path.canonicalize().ok()).collect();
         paths.extend(real_paths);
         let keys = std::env::vars_os().filter_map(|(name, value)| {
             let name = name.to_string_lossy().to_uppercase();
-            let is_key = KEY_VARIABLE_SUFFIXES
-                .iter()
-                .any(|suffix| name.ends_with(suffix));
+            let is_key = KEY_VARIABLE_SUFFIXES.iter().any(|suffix| name.ends_with(suffix));
             let value = value.into_string().ok()?;
             (is_key && value.trim().len() >= MIN_KEY_BYTES).then(|| value.trim().to_owned())
         });
         let mut keys: Vec<String> = keys.collect();
         // A key may begin with another one.
         keys.sort_by_key(|key| std::cmp::Reverse(key.len()));
-        let mut redactor = Self {
-            private_paths: Vec::new(),
-            keys,
-            changes: BTreeMap::new(),
-        };
+        let mut redactor = Self { private_paths: Vec::new(), keys, changes: BTreeMap::new() };
         for path in paths {
             redactor.add_private_path(&path.to_string_lossy());
         }
@@ -137,8 +122,7 @@ impl Redactor {
             return;
         }
         self.private_paths.push(path.to_owned());
-        self.private_paths
-            .sort_by_key(|path| std::cmp::Reverse(path.len()));
+        self.private_paths.sort_by_key(|path| std::cmp::Reverse(path.len()));
     }
 
     /// Description of a known key or private path that a redacted text still contains; `None` if it contains neither.
@@ -146,10 +130,7 @@ impl Redactor {
         if self.keys.iter().any(|key| text.contains(key)) {
             return Some("a key of the environment");
         }
-        let has_path = self
-            .private_paths
-            .iter()
-            .any(|path| whole_matches(text, path).next().is_some());
+        let has_path = self.private_paths.iter().any(|path| whole_matches(text, path).next().is_some());
         has_path.then_some("a path of this machine")
     }
 
@@ -182,7 +163,8 @@ impl Redactor {
         })
     }
 
-    /// The text without private paths, keys, and user names and passwords in URLs. [`Paths::Any`] also removes queries and fragments.
+    /// The text without private paths, keys, and user names and passwords in URLs. [`Paths::Any`] also removes queries
+    /// and fragments.
     pub(super) fn text(&mut self, text: &str, paths: Paths) -> String {
         if text.starts_with(IMAGE_PREFIX) {
             return text.to_owned();
@@ -196,13 +178,9 @@ impl Redactor {
             for found in PATH.captures_iter(&text) {
                 self.add_private_path(&found[2]);
             }
-            text = self.replace_matches(&QUERY, &text, Redaction::Address, |found| {
-                found[1].to_owned()
-            });
+            text = self.replace_matches(&QUERY, &text, Redaction::Address, |found| found[1].to_owned());
         }
-        text = self.replace_matches(&USER, &text, Redaction::Address, |found| {
-            found[1].to_owned()
-        });
+        text = self.replace_matches(&USER, &text, Redaction::Address, |found| found[1].to_owned());
         for key in &self.keys {
             if text.contains(key) {
                 *self.changes.entry(Redaction::Key).or_default() += text.matches(key).count();
@@ -234,23 +212,15 @@ impl Redactor {
             return text.to_owned();
         }
         *self.changes.entry(change).or_default() += times;
-        pattern
-            .replace_all(text, |found: &Captures<'_>| with(found))
-            .into_owned()
+        pattern.replace_all(text, |found: &Captures<'_>| with(found)).into_owned()
     }
 }
 
 /// True for an absolute path of any system: Unix, Windows drive, or UNC.
 fn is_absolute(text: &str) -> bool {
-    let starts_with_letter = text
-        .chars()
-        .next()
-        .is_some_and(|letter| letter.is_ascii_alphabetic());
-    let is_drive =
-        starts_with_letter && (text[1..].starts_with(":\\") || text[1..].starts_with(":/"));
-    text.len() > 1 && text.starts_with('/') && !text.starts_with("//")
-        || text.starts_with("\\\\")
-        || is_drive
+    let starts_with_letter = text.chars().next().is_some_and(|letter| letter.is_ascii_alphabetic());
+    let is_drive = starts_with_letter && (text[1..].starts_with(":\\") || text[1..].starts_with(":/"));
+    text.len() > 1 && text.starts_with('/') && !text.starts_with("//") || text.starts_with("\\\\") || is_drive
 }
 
 /// Start positions of a path in a text, in bytes, without matches inside a longer name or path.
@@ -289,10 +259,7 @@ mod tests {
             ("/data/sets/home set", "DIR/home set"),
             ("/data", "DIR/data"),
             ("/data/sets/home set/a.png", "DIR/a.png"),
-            (
-                "cannot open \"/mnt/x/y.png\": no",
-                "cannot open \"DIR/y.png\": no",
-            ),
+            ("cannot open \"/mnt/x/y.png\": no", "cannot open \"DIR/y.png\": no"),
             ("script:/mnt/x/z.jsonl", "script:DIR/z.jsonl"),
             ("C:\\Users\\ann\\set", "DIR/set"),
             ("http://ann:word@host:8000/v1?key=1", "http://host:8000/v1"),
@@ -304,15 +271,7 @@ mod tests {
             assert_eq!(redactor.text(text, Paths::Any), expected);
         }
         // Other texts are unchanged.
-        for plain in [
-            "1/2",
-            "and/or",
-            "rooms:frames=2,size=64x48",
-            "http://host:8000/v1",
-            "L3-noise",
-            "/",
-            "me@host",
-        ] {
+        for plain in ["1/2", "and/or", "rooms:frames=2,size=64x48", "http://host:8000/v1", "L3-noise", "/", "me@host"] {
             assert_eq!(redactor.text(plain, Paths::Any), plain);
         }
     }
@@ -320,21 +279,11 @@ mod tests {
     #[test]
     fn replies_lose_only_known_paths() {
         let mut redactor = redactor();
-        assert_eq!(
-            redactor.text("/left /or/right", Paths::Known),
-            "/left /or/right"
-        );
-        assert_eq!(
-            redactor.text("see /home/ann/x and /home/anna", Paths::Known),
-            "see DIR/ann/x and /home/anna"
-        );
+        assert_eq!(redactor.text("/left /or/right", Paths::Known), "/left /or/right");
+        assert_eq!(redactor.text("see /home/ann/x and /home/anna", Paths::Known), "see DIR/ann/x and /home/anna");
         assert_eq!(redactor.text("x/home/ann", Paths::Known), "x/home/ann");
         assert!(redactor.find_leak("in /home/ann/x").is_some());
-        assert!(
-            redactor
-                .find_leak("in /home/anna, http://a-key-of-yours")
-                .is_none()
-        );
+        assert!(redactor.find_leak("in /home/anna, http://a-key-of-yours").is_none());
     }
 
     #[test]

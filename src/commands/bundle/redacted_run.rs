@@ -46,7 +46,8 @@ impl RedactedRun {
     /// Reads and redacts the run in a folder.
     ///
     /// # Errors
-    /// If the folder has no run, a line of a file is broken, or two models would have the same name without their folders.
+    /// If the folder has no run, a line of a file is broken, or two models would have the same name without their
+    /// folders.
     pub(super) fn read(
         folder: &Path,
         name: &str,
@@ -56,8 +57,7 @@ impl RedactedRun {
         let stored = read_run_manifest(folder)?;
         let value = serde_json::to_value(&stored).map_err(|e| broken("manifest.json", &e))?;
         let value = redactor.value(value, Paths::Any)?;
-        let manifest: RunManifest =
-            serde_json::from_value(value).map_err(|e| broken("manifest.json", &e))?;
+        let manifest: RunManifest = serde_json::from_value(value).map_err(|e| broken("manifest.json", &e))?;
         let place = Path::new(name);
         match ExperimentKind::read(folder)? {
             ExperimentKind::Choice => {
@@ -66,8 +66,7 @@ impl RedactedRun {
                 let shown = |all: &[Thumbnail]| fitting_thumbnails(all, &frames);
                 let records = store::read_records(folder)?;
                 let data = RedactedData::new(records, files, thumbnails, shown, redactor)?;
-                let run =
-                    StoredRun::from_records(place, manifest.clone(), data.records, data.lines)?;
+                let run = StoredRun::from_records(place, manifest.clone(), data.records, data.lines)?;
                 Self::new(manifest, data.files, AnyRun::Choice(run), data.thumbnails)
             }
             ExperimentKind::Open => {
@@ -75,29 +74,17 @@ impl RedactedRun {
                 let files = RunFiles::read(folder)?;
                 let shown = <[Thumbnail]>::to_vec;
                 let data = RedactedData::new(records, files, thumbnails, shown, redactor)?;
-                let run =
-                    StoredRun::from_records(place, manifest.clone(), data.records, data.lines)?;
+                let run = StoredRun::from_records(place, manifest.clone(), data.records, data.lines)?;
                 Self::new(manifest, data.files, AnyRun::Open(run), data.thumbnails)
             }
         }
     }
 
-    fn new(
-        manifest: RunManifest,
-        mut files: Vec<NamedFile>,
-        run: AnyRun,
-        thumbnails: [usize; 2],
-    ) -> Result<Self> {
-        let mut text =
-            serde_json::to_vec_pretty(&manifest).map_err(|e| broken("manifest.json", &e))?;
+    fn new(manifest: RunManifest, mut files: Vec<NamedFile>, run: AnyRun, thumbnails: [usize; 2]) -> Result<Self> {
+        let mut text = serde_json::to_vec_pretty(&manifest).map_err(|e| broken("manifest.json", &e))?;
         text.push(b'\n');
         files.push(("manifest.json".to_owned(), text));
-        Ok(Self {
-            manifest,
-            files,
-            run,
-            thumbnails,
-        })
+        Ok(Self { manifest, files, run, thumbnails })
     }
 }
 
@@ -124,18 +111,13 @@ impl<D: Detail> RedactedData<D> {
             ThumbnailChoice::All => lines.thumbnails,
         };
         let (records, records_file) = redact_lines("records.jsonl", records, redactor)?;
-        let (questions, questions_file) =
-            redact_lines("questions.jsonl", lines.questions, redactor)?;
+        let (questions, questions_file) = redact_lines("questions.jsonl", lines.questions, redactor)?;
         let (thumbnails, thumbnails_file) = redact_lines("thumbnails.jsonl", included, redactor)?;
         let (fidelity, fidelity_file) = redact_lines("fidelity.jsonl", lines.fidelity, redactor)?;
         Ok(Self {
             thumbnails: [thumbnails.len(), all - thumbnails.len()],
             records,
-            lines: RunFiles {
-                questions,
-                thumbnails,
-                fidelity,
-            },
+            lines: RunFiles { questions, thumbnails, fidelity },
             // A run without such lines has no such file.
             files: [records_file, questions_file, thumbnails_file, fidelity_file]
                 .into_iter()
@@ -163,7 +145,8 @@ fn redact_lines<T: Serialize + DeserializeOwned>(
     Ok((redacted, (name.to_owned(), file)))
 }
 
-/// Redacts a line. Every path in the message of a failure is redacted, because the message comes from this program or a server.
+/// Redacts a line. Every path in the message of a failure is redacted, because the message comes from this program or a
+/// server.
 fn redact_line(mut value: Value, redactor: &mut Redactor) -> Result<Value> {
     if let Some(Value::String(message)) = value.pointer_mut("/failure/message") {
         *message = redactor.text(message, Paths::Any);

@@ -7,8 +7,8 @@ use crate::error::Result;
 /// Memory limit for the frames in memory, in bytes (chosen). Reading a frame of 24 megapixels takes 0.14 GB.
 const MEMORY: usize = 1 << 30;
 
-/// Calls `work` for the items on all threads, and `take` with the results in the order of the items. `bytes` is the memory for one item;
-/// at least one item is processed at a time.
+/// Calls `work` for the items on all threads, and `take` with the results in the order of the items. `bytes` is the
+/// memory for one item; at least one item is processed at a time.
 ///
 /// # Errors
 /// The error of the first item that fails, in the order of the items.

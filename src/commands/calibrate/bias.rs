@@ -1,7 +1,7 @@
 //! Measurement of the bias frames of a setting: [`BiasFit`].
 //!
-//! The frames are read twice, so that only a few are in memory at once: first for their mean, which reveals light, hot pixels and a fixed
-//! pattern, then for their noise without the hot pixels.
+//! The frames are read twice, so that only a few are in memory at once: first for their mean, which reveals light, hot
+//! pixels and a fixed pattern, then for their noise without the hot pixels.
 
 use std::path::PathBuf;
 
@@ -62,9 +62,7 @@ impl BiasFit {
         notes: &mut Vec<String>,
     ) -> Result<Self> {
         let refused = |problem: String| {
-            let place = files.bias[0]
-                .parent()
-                .map(|folder| folder.display().to_string());
+            let place = files.bias[0].parent().map(|folder| folder.display().to_string());
             Error::data(place.unwrap_or_default(), problem)
         };
         let first = FirstPass::read(reader, &files.bias, inputs)?;
@@ -72,10 +70,7 @@ impl BiasFit {
         notes.extend(check.notes(files.bias.len()));
         let removes_pattern = check.removes_pattern(files.bias.len());
         let centres = if removes_pattern {
-            Centres::MeanFrame {
-                sums: &first.mean.sums,
-                frames: first.mean.frames(),
-            }
+            Centres::MeanFrame { sums: &first.mean.sums, frames: first.mean.frames() }
         } else {
             Centres::RowsAndPlanes
         };
@@ -87,10 +82,8 @@ impl BiasFit {
         } else {
             1.0
         };
-        let (groups, residuals): (Vec<Group>, Vec<Residuals>) = works
-            .into_iter()
-            .map(|work| (work.group, work.residuals))
-            .unzip();
+        let (groups, residuals): (Vec<Group>, Vec<Residuals>) =
+            works.into_iter().map(|work| (work.group, work.residuals)).unzip();
         let read = ReadNoise::fit(&residuals).map_err(refused)?;
         let mut all = Residuals::default();
         for group in &residuals {
@@ -100,10 +93,7 @@ impl BiasFit {
         Ok(Self {
             frames: files.bias.len(),
             hot: check.hot,
-            plot: PlotFit {
-                scale: widened * plot.scale,
-                ..plot
-            },
+            plot: PlotFit { scale: widened * plot.scale, ..plot },
             residuals: all,
             read,
             widened,
@@ -118,10 +108,7 @@ impl BiasFit {
 
     /// Number of pairs of frames.
     pub(super) fn pairs(&self) -> usize {
-        self.groups
-            .iter()
-            .filter(|group| group.noise.is_some())
-            .count()
+        self.groups.iter().filter(|group| group.noise.is_some()).count()
     }
 
     /// Weighted means of the planes in ADU, with one weight for each group.
@@ -155,10 +142,7 @@ fn mean_noise(noises: impl Iterator<Item = (PairNoise, f64)>) -> PairNoise {
         within += weight * noise.within;
         row += weight * noise.row;
     }
-    PairNoise {
-        within: within / sum,
-        row: row / sum,
-    }
+    PairNoise { within: within / sum, row: row / sum }
 }
 
 /// Result of reading the frames for the first time.
@@ -171,10 +155,7 @@ struct FirstPass {
 impl FirstPass {
     fn read(reader: &FrameReader, files: &[PathBuf], inputs: &mut Inputs) -> Result<Self> {
         let groups: Vec<&[PathBuf]> = files.chunks(2).collect();
-        let mut pass = Self {
-            mean: MeanFrame::new(reader.layout),
-            noises: Vec::new(),
-        };
+        let mut pass = Self { mean: MeanFrame::new(reader.layout), noises: Vec::new() };
         let none = HotPixels::none(reader.layout.plane_rows());
         in_batches(
             &groups,
@@ -182,8 +163,7 @@ impl FirstPass {
             |group| {
                 let frames = read_group(reader, group)?;
                 for (path, frame) in group.iter().zip(&frames) {
-                    checks::codes(&frame.samples)
-                        .map_err(|problem| Error::data(path.display(), problem))?;
+                    checks::codes(&frame.samples).map_err(|problem| Error::data(path.display(), problem))?;
                 }
                 let noise = match &frames[..] {
                     [a, b] => {
@@ -226,8 +206,7 @@ fn second_pass(
         |group| {
             let frames = read_group(reader, group)?;
             let work = group_work(reader, &frames, hot, centres);
-            checks::correlation(work.correlation)
-                .map_err(|problem| Error::data(group[0].display(), problem))?;
+            checks::correlation(work.correlation).map_err(|problem| Error::data(group[0].display(), problem))?;
             Ok(work)
         },
         |_, work| {
@@ -242,12 +221,7 @@ fn read_group(reader: &FrameReader, group: &[PathBuf]) -> Result<Vec<Frame>> {
     group.iter().map(|path| reader.read(path)).collect()
 }
 
-fn group_work(
-    reader: &FrameReader,
-    frames: &[Frame],
-    hot: &HotPixels,
-    centres: Centres<'_>,
-) -> GroupWork {
+fn group_work(reader: &FrameReader, frames: &[Frame], hot: &HotPixels, centres: Centres<'_>) -> GroupWork {
     let layout = reader.layout;
     let mut planes = vec![[0; 2]; layout.cfa.planes()];
     let mut residuals = Residuals::default();
@@ -268,10 +242,7 @@ fn group_work(
             let equal = vec![1.0; layout.cfa.planes()];
             pair.neighbours().correlation(&equal)
         }),
-        group: Group {
-            planes,
-            noise: pair.as_ref().map(PairSums::noise),
-        },
+        group: Group { planes, noise: pair.as_ref().map(PairSums::noise) },
         residuals,
     }
 }

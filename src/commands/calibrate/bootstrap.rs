@@ -8,8 +8,8 @@ const DRAWS: usize = 1000;
 
 /// Bootstrap draws of groups of frames.
 ///
-/// A draw has n − 1 of n groups, with replacement, so that the variance of a mean over the draws is unbiased for few groups too (Rao and
-/// Wu 1988, Journal of the American Statistical Association 83:231).
+/// A draw has n − 1 of n groups, with replacement, so that the variance of a mean over the draws is unbiased for few
+/// groups too (Rao and Wu 1988, Journal of the American Statistical Association 83:231).
 #[derive(Debug)]
 pub(super) struct Draws {
     /// Weights of the groups in each draw, with mean 1.

@@ -12,23 +12,12 @@ use darkqa_light::Calibration;
 /// If a number is outside the valid range of a camera file.
 pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
     let mut text = head(camera);
-    let gains: Vec<String> = camera
-        .settings
-        .iter()
-        .map(|fit| number(fit.gain.value))
-        .collect();
+    let gains: Vec<String> = camera.settings.iter().map(|fit| number(fit.gain.value)).collect();
     let [low, high] = [gains.first(), gains.last()].map(|gain| gain.map_or("", String::as_str));
-    let _ = writeln!(
-        text,
-        "name = {}\nadu-range = {:.1}",
-        toml::Value::from(&*camera.name),
-        camera.adu_range()
-    );
-    let _ = writeln!(
-        text,
-        "# The least and the greatest K that was measured.\ngain = [{low}, {high}]"
-    );
-    text += "# Of the DarkQA paper, for every camera: a recording of a sensor says nothing of r.\nratio = [100.0, 300.0]\n";
+    let _ = writeln!(text, "name = {}\nadu-range = {:.1}", toml::Value::from(&*camera.name), camera.adu_range());
+    let _ = writeln!(text, "# The least and the greatest K that was measured.\ngain = [{low}, {high}]");
+    text +=
+        "# Of the DarkQA paper, for every camera: a recording of a sensor says nothing of r.\nratio = [100.0, 300.0]\n";
     let settings = camera.settings.len();
     line(&mut text, "read-scale", &camera.read_scale, settings);
     line(&mut text, "row-deviation", &camera.row_deviation, settings);
@@ -58,12 +47,7 @@ fn head(camera: &CameraFit) -> String {
         camera.frames, camera.cfa, camera.black, camera.white, camera.frames_digest
     );
     if let Some([first, last]) = &camera.dates {
-        let _ = writeln!(
-            text,
-            "# Taken from {} to {}.",
-            one_line(first),
-            one_line(last)
-        );
+        let _ = writeln!(text, "# Taken from {} to {}.", one_line(first), one_line(last));
     }
     text += "# ± is a standard error by bootstrap over frame pairs.\n";
     for warning in &camera.warnings {
@@ -72,7 +56,8 @@ fn head(camera: &CameraFit) -> String {
     text
 }
 
-/// Writes the table of a line, with its source and uncertainty as comments. `total` is the number of settings of the camera.
+/// Writes the table of a line, with its source and uncertainty as comments. `total` is the number of settings of the
+/// camera.
 fn line(text: &mut String, key: &str, line: &NoiseLine, total: usize) {
     let through = match line.settings {
         1 => "1 setting".to_owned(),
@@ -89,15 +74,10 @@ fn line(text: &mut String, key: &str, line: &NoiseLine, total: usize) {
         0 => "",
         _ if line.settings == 0 => "",
         1 => "# 1 setting without visible noise is left out; the line holds for it, too.\n",
-        n => &format!(
-            "# {n} settings without visible noise are left out; the line holds for them, too.\n"
-        ),
+        n => &format!("# {n} settings without visible noise are left out; the line holds for them, too.\n"),
     };
     let error = match (line.deviation_error(), line.slope_from) {
-        (Some(error), _) => format!(
-            "# The deviation is known to ± {:.0} % of itself.\n",
-            100.0 * error
-        ),
+        (Some(error), _) => format!("# The deviation is known to ± {:.0} % of itself.\n", 100.0 * error),
         (None, SlopeSource::Preset) => "# A single setting has no deviation.\n".to_owned(),
         (None, SlopeSource::Settings | SlopeSource::NoNoise) => String::new(),
     };
@@ -159,9 +139,7 @@ fn number(value: f64) -> String {
 
 /// Replaces line breaks and other control characters by spaces, for a comment.
 fn one_line(text: &str) -> String {
-    text.chars()
-        .map(|c| if c.is_control() { ' ' } else { c })
-        .collect()
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,5 @@
-//! Plausibility checks of the calibration frames of one camera setting: severe problems are errors, others become notes.
+//! Plausibility checks of the calibration frames of one camera setting: severe problems are errors, others become
+//! notes.
 
 use super::hot_pixels::HotPixels;
 use super::mean_frame::MeanFrame;
@@ -8,14 +9,16 @@ use super::sums::PairNoise;
 const MAX_ZERO_SHARE: f64 = 1e-3;
 /// Maximum share of hot pixels (heuristic).
 const MAX_HOT_SHARE: f64 = 5e-3;
-/// Maximum correlation of neighbours in the difference of two frames (heuristic: smoothing gives 0.5, independent noise 0.004).
+/// Maximum correlation of neighbours in the difference of two frames (heuristic: smoothing gives 0.5, independent noise
+/// 0.004).
 const MAX_CORRELATION: f64 = 0.02;
 /// Maximum variance of a fixed pattern, relative to the noise variance (heuristic).
 const MAX_PATTERN_SHARE: f64 = 0.2;
-/// Minimum number of bias frames whose mean may be subtracted as the fixed pattern (heuristic: the mean of fewer frames is too noisy).
+/// Minimum number of bias frames whose mean may be subtracted as the fixed pattern (heuristic: the mean of fewer frames
+/// is too noisy).
 const MIN_PATTERN_FRAMES: usize = 16;
-/// Maximum difference between tile means of a bias frame, in standard deviations of the noise (heuristic). A difference beyond both this
-/// limit and [`MAX_TILE_ERRORS`] means that light reached the sensor.
+/// Maximum difference between tile means of a bias frame, in standard deviations of the noise (heuristic). A difference
+/// beyond both this limit and [`MAX_TILE_ERRORS`] means that light reached the sensor.
 const MAX_TILE_DEVIATIONS: f64 = 0.5;
 /// Maximum difference between tile means of a bias frame, in standard errors (heuristic).
 const MAX_TILE_ERRORS: f64 = 8.0;
@@ -44,7 +47,8 @@ pub(super) fn codes(samples: &[u16]) -> Result<(), String> {
     Ok(())
 }
 
-/// Checks that neighbouring sites of one colour have independent noise, given their correlation in the difference of two frames.
+/// Checks that neighbouring sites of one colour have independent noise, given their correlation in the difference of
+/// two frames.
 ///
 /// # Errors
 /// If the correlation exceeds its limit: the frames were smoothed or resized.
@@ -81,8 +85,7 @@ impl BiasCheck {
         let hot_share = hot.count() as f64 / sites as f64;
         let uneven = mean.unevenness(&hot, noise);
         let deviation = noise.within.sqrt();
-        if uneven.difference > (MAX_TILE_DEVIATIONS * deviation).max(MAX_TILE_ERRORS * uneven.error)
-        {
+        if uneven.difference > (MAX_TILE_DEVIATIONS * deviation).max(MAX_TILE_ERRORS * uneven.error) {
             return Err(format!(
                 "light on bias frames: the means of parts of one colour differ by {:.2} ADU over the frame, where noise has a deviation of {deviation:.2} ADU; close the lens and the viewfinder, take the shortest exposure",
                 uneven.difference
@@ -96,14 +99,11 @@ impl BiasCheck {
             ));
         }
         let pattern_share = mean.pattern(&hot, noise) / (noise.within + noise.row.max(0.0));
-        Ok(Self {
-            hot,
-            pattern_share,
-            sites,
-        })
+        Ok(Self { hot, pattern_share, sites })
     }
 
-    /// True if the mean of `frames` bias frames is subtracted: the fixed pattern is strong, and the frames suffice to measure it.
+    /// True if the mean of `frames` bias frames is subtracted: the fixed pattern is strong, and the frames suffice to
+    /// measure it.
     pub(super) fn removes_pattern(&self, frames: usize) -> bool {
         self.pattern_share > MAX_PATTERN_SHARE && frames >= MIN_PATTERN_FRAMES
     }
@@ -119,20 +119,14 @@ impl BiasCheck {
             ));
         }
         if self.pattern_share > MAX_PATTERN_SHARE {
-            let finding = format!(
-                "a fixed pattern has {:.0} % of the variance of the noise",
-                100.0 * self.pattern_share
-            );
+            let finding =
+                format!("a fixed pattern has {:.0} % of the variance of the noise", 100.0 * self.pattern_share);
             let treatment = if self.removes_pattern(frames) {
                 "the mean of all bias frames is taken off".to_owned()
             } else {
-                format!(
-                    "σ_TL holds it, too; with {MIN_PATTERN_FRAMES} bias frames or more their mean is taken off"
-                )
+                format!("σ_TL holds it, too; with {MIN_PATTERN_FRAMES} bias frames or more their mean is taken off")
             };
-            notes.push(format!(
-                "{finding}: {treatment}; the model has no fixed pattern"
-            ));
+            notes.push(format!("{finding}: {treatment}; the model has no fixed pattern"));
         }
         notes
     }

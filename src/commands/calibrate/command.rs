@@ -6,8 +6,7 @@ use clap::Args;
 
 use crate::commands::calibrate::report;
 use crate::commands::calibrate::{
-    CalibrateSettings, CameraFit, Cfa, Crop, ReadOptions, Recording, calibrate as measure,
-    camera_file,
+    CalibrateSettings, CameraFit, Cfa, Crop, ReadOptions, Recording, calibrate as measure, camera_file,
 };
 use crate::data::PixelLimit;
 use crate::engine::images::progress::Progress;
@@ -21,14 +20,16 @@ use crate::types::manifests::Status;
 /// The flags of `calibrate`.
 #[derive(Debug, Args)]
 pub(crate) struct CalibrateArgs {
-    /// The recording: DIR/SETTING/ for each ISO or gain, in it bias/, flat-NAME/ for each exposure (pairs of evenly lit frames), and if
-    /// you have them dark-NAME/ and white/; or DIR/frames.csv with the columns file, setting, kind (bias, flat, dark, white), exposure
+    /// The recording: DIR/SETTING/ for each ISO or gain, in it bias/, flat-NAME/ for each exposure (pairs of evenly lit
+    /// frames), and if you have them dark-NAME/ and white/; or DIR/frames.csv with the columns file, setting, kind
+    /// (bias, flat, dark, white), exposure
     ///
-    /// Frames are mosaics of one channel as 16-bit PNG, TIFF or binary PGM, as `dcraw -D -4 -T -t 0` (`-t 0`: not turned) and rawpy's raw_image_visible give them. RAW
-    /// files of makers (DNG, CR2, NEF) are not read.
+    /// Frames are mosaics of one channel as 16-bit PNG, TIFF or binary PGM, as `dcraw -D -4 -T -t 0` (`-t 0`: not
+    /// turned) and rawpy's raw_image_visible give them. RAW files of makers (DNG, CR2, NEF) are not read.
     #[arg(value_name = "DIR", add = Decides::Pixels)]
     pub recording: PathBuf,
-    /// The camera file to write, for --noise camera, with the ending .toml; its figure goes beside it, with the ending .svg
+    /// The camera file to write, for --noise camera, with the ending .toml; its figure goes beside it, with the ending
+    /// .svg
     #[arg(long, value_name = "FILE", add = Decides::Nothing)]
     pub out: PathBuf,
     /// The colour filters of the upper left corner of the frames, row by row; mono for none
@@ -62,11 +63,7 @@ pub(crate) struct CalibrateArgs {
 /// # Errors
 /// If a frame cannot be used, the recording is unsuitable, or a file cannot be written.
 pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Outcome> {
-    if args
-        .out
-        .extension()
-        .is_none_or(|ending| !ending.eq_ignore_ascii_case("toml"))
-    {
+    if args.out.extension().is_none_or(|ending| !ending.eq_ignore_ascii_case("toml")) {
         let problem = format!(
             "{} does not end in .toml, by which --noise camera recognises a camera file; its figure gets the ending .svg",
             args.out.display()
@@ -78,16 +75,11 @@ pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Out
     let settings = settings(args)?;
     let workers = pool(args.threads.threads)?;
     let bar = progress.bar("settings", recording.settings());
-    let camera =
-        workers.install(|| measure(&args.recording, &recording, &settings, || bar.inc()))?;
+    let camera = workers.install(|| measure(&args.recording, &recording, &settings, || bar.inc()))?;
     drop(bar);
     write(&args.out, camera_file(&camera)?.as_bytes())?;
     write(&figure, report::figure(&camera)?.as_bytes())?;
-    Ok(Outcome::wrote(
-        &args.out,
-        Status::Complete,
-        output(args, &camera, &figure)?,
-    ))
+    Ok(Outcome::wrote(&args.out, Status::Complete, output(args, &camera, &figure)?))
 }
 
 fn settings(args: &CalibrateArgs) -> Result<CalibrateSettings> {
@@ -96,11 +88,7 @@ fn settings(args: &CalibrateArgs) -> Result<CalibrateSettings> {
         None => folder_name(&args.recording)?,
     };
     Ok(CalibrateSettings {
-        read: ReadOptions {
-            cfa: args.cfa,
-            crop: args.crop,
-            most_pixels: args.limit.max_pixels.get(),
-        },
+        read: ReadOptions { cfa: args.cfa, crop: args.crop, most_pixels: args.limit.max_pixels.get() },
         black: args.black,
         white: args.white,
         name,
@@ -109,9 +97,7 @@ fn settings(args: &CalibrateArgs) -> Result<CalibrateSettings> {
 
 /// The name of a folder, also for `.`.
 fn folder_name(folder: &Path) -> Result<String> {
-    let whole = folder
-        .canonicalize()
-        .map_err(|e| Error::file(folder, "read", e))?;
+    let whole = folder.canonicalize().map_err(|e| Error::file(folder, "read", e))?;
     let name = whole.file_name().unwrap_or_default();
     Ok(name.to_string_lossy().into_owned())
 }

@@ -3,18 +3,17 @@
 use super::recording::{Recording, SettingFiles};
 use super::setting::SettingFit;
 
-/// Maximum distance of the offset of a setting from the trend of all settings, in standard deviations of the noise (chosen).
+/// Maximum distance of the offset of a setting from the trend of all settings, in standard deviations of the noise
+/// (chosen).
 const MAX_OFF_TREND: f64 = 5.0;
 
-/// Warnings about settings, which are in the order of the numbers in their names: K must rise, and offsets must follow a trend.
+/// Warnings about settings, which are in the order of the numbers in their names: K must rise, and offsets must follow
+/// a trend.
 pub(super) fn order_doubts(settings: &[SettingFit], recording: &Recording) -> Vec<String> {
     let mut doubts = Vec::new();
     let numbers = recording.settings.iter().map(SettingFiles::number);
-    let numbered: Vec<(&SettingFit, f64)> = settings
-        .iter()
-        .zip(numbers)
-        .filter_map(|(fit, number)| Some((fit, number?)))
-        .collect();
+    let numbered: Vec<(&SettingFit, f64)> =
+        settings.iter().zip(numbers).filter_map(|(fit, number)| Some((fit, number?))).collect();
     for pair in numbered.windows(2) {
         let [(low, first), (high, second)] = [pair[0], pair[1]];
         if first < second && high.gain.value <= low.gain.value {
@@ -28,17 +27,15 @@ pub(super) fn order_doubts(settings: &[SettingFit], recording: &Recording) -> Ve
     doubts
 }
 
-/// Warnings about settings whose offset is far from the trend over ln K. The trend is a line with the median slope (Theil–Sen estimator),
-/// which is robust to outliers among up to a third of the settings; with at most three settings it is their median.
+/// Warnings about settings whose offset is far from the trend over ln K. The trend is a line with the median slope
+/// (Theil–Sen estimator), which is robust to outliers among up to a third of the settings; with at most three settings
+/// it is their median.
 fn off_trend(settings: &[SettingFit]) -> Vec<String> {
     let points: Vec<[f64; 2]> = settings
         .iter()
         .map(|fit| {
             let offsets: f64 = fit.offsets.iter().map(|offset| offset.value).sum();
-            [
-                libm::log(fit.gain.value),
-                offsets / fit.offsets.len() as f64,
-            ]
+            [libm::log(fit.gain.value), offsets / fit.offsets.len() as f64]
         })
         .collect();
     if points.len() < 2 {

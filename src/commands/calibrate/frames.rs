@@ -34,17 +34,9 @@ impl FromStr for Crop {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let numbers: Option<Vec<usize>> = text
-            .split(',')
-            .map(|number| number.trim().parse().ok())
-            .collect();
+        let numbers: Option<Vec<usize>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
         match numbers.as_deref() {
-            Some(&[x, y, width, height]) => Ok(Self {
-                x,
-                y,
-                width,
-                height,
-            }),
+            Some(&[x, y, width, height]) => Ok(Self { x, y, width, height }),
             _ => Err("four whole numbers expected: X,Y,WIDTH,HEIGHT".to_owned()),
         }
     }
@@ -82,25 +74,16 @@ impl FrameReader {
         let mosaic = Mosaic::read(path, options.most_pixels)?;
         let size = [mosaic.width, mosaic.height];
         Ok(Self {
-            layout: layout(options, size)
-                .map_err(|problem| Error::data(path.display(), problem))?,
+            layout: layout(options, size).map_err(|problem| Error::data(path.display(), problem))?,
             options,
-            first: FirstFrame {
-                place: path.display().to_string(),
-                size,
-                facts: mosaic.facts,
-            },
+            first: FirstFrame { place: path.display().to_string(), size, facts: mosaic.facts },
         })
     }
 
     /// Note on rows or columns that are left out; `None` if all are used.
     pub(super) fn omission_note(&self) -> Option<String> {
         let [width, height] = self.first.size;
-        let Layout {
-            width: used_width,
-            height: used_height,
-            ..
-        } = self.layout;
+        let Layout { width: used_width, height: used_height, .. } = self.layout;
         let is_odd = self.options.crop.is_none() && [used_width, used_height] != self.first.size;
         is_odd.then(|| {
             format!("frames of {width} × {height} sites: the last row or column has no whole group of filters and is left out")
@@ -141,10 +124,7 @@ impl FrameReader {
                 .collect::<Vec<_>>()
                 .concat()
         };
-        Ok(Frame {
-            samples,
-            facts: mosaic.facts,
-        })
+        Ok(Frame { samples, facts: mosaic.facts })
     }
 
     /// Describes the first difference from the first frame; `None` if the frames match.
@@ -166,9 +146,7 @@ impl FrameReader {
         if let (Some(camera), Some(first)) = (&mosaic.facts.camera, &facts.camera)
             && camera != first
         {
-            return Some(format!(
-                "taken by {camera}, but {place} by {first}; all frames must be of one camera"
-            ));
+            return Some(format!("taken by {camera}, but {place} by {first}; all frames must be of one camera"));
         }
         None
     }
@@ -179,18 +157,10 @@ fn layout(options: ReadOptions, [width, height]: [usize; 2]) -> Result<Layout, S
     let ReadOptions { cfa, crop, .. } = options;
     let step = cfa.step();
     if let Some(crop) = crop {
-        let ends = [
-            crop.x.checked_add(crop.width),
-            crop.y.checked_add(crop.height),
-        ];
-        let is_inside = ends
-            .iter()
-            .zip([width, height])
-            .all(|(end, size)| end.is_some_and(|end| end <= size));
+        let ends = [crop.x.checked_add(crop.width), crop.y.checked_add(crop.height)];
+        let is_inside = ends.iter().zip([width, height]).all(|(end, size)| end.is_some_and(|end| end <= size));
         if !is_inside {
-            return Err(format!(
-                "--crop reaches beyond the frame of {width} × {height} sites"
-            ));
+            return Err(format!("--crop reaches beyond the frame of {width} × {height} sites"));
         }
         let sides = [crop.x, crop.y, crop.width, crop.height];
         if sides.iter().any(|side| !side.is_multiple_of(step)) {
@@ -206,11 +176,7 @@ fn layout(options: ReadOptions, [width, height]: [usize; 2]) -> Result<Layout, S
         ));
     }
     // The last row or column of an odd side is not part of a complete filter pattern.
-    Ok(Layout {
-        cfa,
-        width: width - width % step,
-        height: height - height % step,
-    })
+    Ok(Layout { cfa, width: width - width % step, height: height - height % step })
 }
 
 #[cfg(test)]

@@ -22,9 +22,7 @@ impl HotPixels {
 
     /// Hot columns in a part of a row.
     pub(super) fn columns(&self, plane_row: usize) -> impl Iterator<Item = usize> + '_ {
-        self.columns[plane_row]
-            .iter()
-            .map(|column| *column as usize)
+        self.columns[plane_row].iter().map(|column| *column as usize)
     }
 
     /// Number of hot pixels.

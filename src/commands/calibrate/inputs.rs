@@ -23,9 +23,7 @@ impl Inputs {
     pub(super) fn add(&mut self, path: &Path, facts: &FrameFacts) {
         self.list.push((path.display().to_string(), facts.digest));
         if let Some(taken) = &facts.taken {
-            let [first, last] = self
-                .dates
-                .get_or_insert_with(|| [taken.clone(), taken.clone()]);
+            let [first, last] = self.dates.get_or_insert_with(|| [taken.clone(), taken.clone()]);
             if taken < first {
                 first.clone_from(taken);
             }
@@ -45,7 +43,8 @@ impl Inputs {
         Ok(())
     }
 
-    /// Checks that a frame is not a copy of an earlier one. Overexposed frames need no check, because they may be identical.
+    /// Checks that a frame is not a copy of an earlier one. Overexposed frames need no check, because they may be
+    /// identical.
     ///
     /// # Errors
     /// If the same frame was used before: copies have no independent noise.
@@ -53,9 +52,7 @@ impl Inputs {
         match self.places.insert(digest, place.to_owned()) {
             Some(first) => Err(Error::data(
                 place,
-                format_args!(
-                    "the same frame as {first}; copies have no noise between them, use each frame once"
-                ),
+                format_args!("the same frame as {first}; copies have no noise between them, use each frame once"),
             )),
             None => Ok(()),
         }

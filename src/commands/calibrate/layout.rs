@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use crate::types::flags::flag_words;
 
-/// Number of tiles of a plane along each side (chosen). Photon transfer is fitted to tiles, so that the fall-off of light towards the
-/// corners adds points and not variance.
+/// Number of tiles of a plane along each side (chosen). Photon transfer is fitted to tiles, so that the fall-off of
+/// light towards the corners adds points and not variance.
 pub(super) const TILES: usize = 8;
 
 /// The colours of the four sites at the upper left corner of a frame, row by row.
@@ -44,8 +44,8 @@ impl Cfa {
         self.step() * self.step()
     }
 
-    /// Plane of the sites in a row whose column modulo the period is `parity`. Planes 0 to 3 are red, green in red rows, green in blue
-    /// rows, and blue; the only plane of a sensor without filters is 0.
+    /// Plane of the sites in a row whose column modulo the period is `parity`. Planes 0 to 3 are red, green in red
+    /// rows, green in blue rows, and blue; the only plane of a sensor without filters is 0.
     pub(super) fn plane(self, row: usize, parity: usize) -> usize {
         let [first_row, first_column] = match self {
             Self::Mono => return 0,
@@ -80,7 +80,8 @@ impl Layout {
         [self.height, self.width].map(|side| side / self.cfa.step())
     }
 
-    /// Number of parts of rows, each with the sites of one plane in one row. They are numbered row by row, and by parity within a row.
+    /// Number of parts of rows, each with the sites of one plane in one row. They are numbered row by row, and by
+    /// parity within a row.
     pub(super) fn plane_rows(self) -> usize {
         self.height * self.cfa.step()
     }
@@ -100,9 +101,7 @@ impl Layout {
     pub(super) fn tile_row(self, row: usize) -> usize {
         let [rows, _] = self.plane_size();
         let row = row / self.cfa.step();
-        (0..TILES)
-            .find(|tile| Self::tile(rows, *tile).contains(&row))
-            .unwrap_or(TILES - 1)
+        (0..TILES).find(|tile| Self::tile(rows, *tile).contains(&row)).unwrap_or(TILES - 1)
     }
 }
 
@@ -123,10 +122,7 @@ mod tests {
             let found = found.map(|[row, parity]| cfa.plane(row, parity));
             assert_eq!(found, planes, "{cfa}");
             // The colours by name: both greens are on a diagonal.
-            let letters: String = found
-                .iter()
-                .map(|plane| &cfa.plane_names()[*plane][..1])
-                .collect();
+            let letters: String = found.iter().map(|plane| &cfa.plane_names()[*plane][..1]).collect();
             if cfa != Cfa::Mono {
                 assert_eq!(letters, cfa.to_string());
             }
@@ -135,11 +131,7 @@ mod tests {
 
     #[test]
     fn tiles_cover_a_plane() {
-        let layout = Layout {
-            cfa: Cfa::Rggb,
-            height: 514,
-            width: 300,
-        };
+        let layout = Layout { cfa: Cfa::Rggb, height: 514, width: 300 };
         assert_eq!(layout.plane_size(), [257, 150]);
         assert_eq!(layout.plane_rows(), 1028);
         let covered: usize = (0..TILES).map(|tile| Layout::tile(150, tile).len()).sum();

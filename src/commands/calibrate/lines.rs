@@ -59,11 +59,8 @@ impl NoiseLine {
 
     /// Fits a line through points (K, σ); points without noise are left out.
     pub(super) fn fit(points: &[[f64; 2]], kind: NoiseKind) -> Self {
-        let logs: Vec<[f64; 2]> = points
-            .iter()
-            .filter(|[_, sigma]| *sigma > 0.0)
-            .map(|point| point.map(libm::log))
-            .collect();
+        let logs: Vec<[f64; 2]> =
+            points.iter().filter(|[_, sigma]| *sigma > 0.0).map(|point| point.map(libm::log)).collect();
         let n = logs.len() as f64;
         if logs.is_empty() {
             // e^−20 ADU: the minimum in a camera file.
@@ -79,31 +76,16 @@ impl NoiseLine {
         let products: f64 = logs.iter().map(|log| (log[0] - x) * (log[1] - y)).sum();
         let squares: f64 = logs.iter().map(|log| (log[0] - x).powi(2)).sum();
         let fits_slope = logs.len() >= MIN_SETTINGS && squares > 0.0;
-        let slope = if fits_slope {
-            products / squares
-        } else {
-            preset_slope(kind)
-        };
-        let residual: f64 = logs
-            .iter()
-            .map(|log| (log[1] - y - slope * (log[0] - x)).powi(2))
-            .sum();
+        let slope = if fits_slope { products / squares } else { preset_slope(kind) };
+        let residual: f64 = logs.iter().map(|log| (log[1] - y - slope * (log[0] - x)).powi(2)).sum();
         // Degrees of freedom: the intercept is fitted, and possibly the slope.
         let free = n - if fits_slope { 2.0 } else { 1.0 };
         Self {
             slope,
             intercept: y - slope * x,
-            deviation: if free > 0.0 {
-                (residual / free).sqrt()
-            } else {
-                0.0
-            },
+            deviation: if free > 0.0 { (residual / free).sqrt() } else { 0.0 },
             settings: logs.len(),
-            slope_from: if fits_slope {
-                SlopeSource::Settings
-            } else {
-                SlopeSource::Preset
-            },
+            slope_from: if fits_slope { SlopeSource::Settings } else { SlopeSource::Preset },
         }
     }
 
@@ -150,10 +132,7 @@ mod tests {
         assert!(three.deviation < 1e-12);
         assert_eq!(three.slope_from, SlopeSource::Settings);
         assert!((three.at(0.5) - on_line(0.5)[1]).abs() < 1e-12);
-        let seven = NoiseLine {
-            settings: 7,
-            ..three
-        };
+        let seven = NoiseLine { settings: 7, ..three };
         assert!((seven.deviation_error().unwrap() - 0.316).abs() < 1e-3);
         for gains in [&[2.0][..], &[0.5, 4.0]] {
             let points: Vec<[f64; 2]> = gains.iter().map(|k| on_line(*k)).collect();

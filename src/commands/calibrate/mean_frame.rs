@@ -6,8 +6,9 @@ use super::hot_pixels::HotPixels;
 use super::layout::{Layout, TILES};
 use super::sums::PairNoise;
 
-/// Minimum distance of the mean of a hot pixel from the median of its plane, in standard deviations of the read noise (chosen). Each of
-/// its samples must also be at half this distance on the same side, because a single distant sample is long-tailed noise.
+/// Minimum distance of the mean of a hot pixel from the median of its plane, in standard deviations of the read noise
+/// (chosen). Each of its samples must also be at half this distance on the same side, because a single distant sample
+/// is long-tailed noise.
 const HOT_DISTANCE: f64 = 10.0;
 
 /// Sum of frames at each site.
@@ -125,11 +126,7 @@ impl MeanFrame {
     }
 
     /// Sums for each part of a row, in order. `add` adds one site to the sums; hot pixels are skipped.
-    fn sums_by_part<const N: usize>(
-        &self,
-        hot: &HotPixels,
-        add: impl Fn(&mut [f64; N], Site) + Sync,
-    ) -> Vec<[f64; N]> {
+    fn sums_by_part<const N: usize>(&self, hot: &HotPixels, add: impl Fn(&mut [f64; N], Site) + Sync) -> Vec<[f64; N]> {
         (0..self.layout.plane_rows())
             .into_par_iter()
             .with_min_len(64)
@@ -138,11 +135,7 @@ impl MeanFrame {
                 let mut sums = [0.0; N];
                 for (column, sum) in self.part(&self.sums, plane_row).enumerate() {
                     if hot.next_if_eq(&column).is_none() {
-                        let site = Site {
-                            plane_row,
-                            column,
-                            mean: f64::from(*sum) / self.frames(),
-                        };
+                        let site = Site { plane_row, column, mean: f64::from(*sum) / self.frames() };
                         add(&mut sums, site);
                     }
                 }
@@ -151,8 +144,8 @@ impl MeanFrame {
             .collect()
     }
 
-    /// Variance of the fixed pattern in ADU²: the variance of the mean frame around the means of its planes, minus the contribution of the
-    /// noise. It may be negative by chance.
+    /// Variance of the fixed pattern in ADU²: the variance of the mean frame around the means of its planes, minus the
+    /// contribution of the noise. It may be negative by chance.
     pub(super) fn pattern(&self, hot: &HotPixels, noise: PairNoise) -> f64 {
         // Relative to the medians, to keep the squares small.
         let medians = self.medians();
@@ -166,21 +159,16 @@ impl MeanFrame {
         let mut planes = vec![[0.0; 3]; self.layout.cfa.planes()];
         for (plane_row, part) in parts.into_iter().enumerate() {
             let plane = &mut planes[self.plane(plane_row)];
-            plane
-                .iter_mut()
-                .zip(part)
-                .for_each(|(sum, more)| *sum += more);
+            plane.iter_mut().zip(part).for_each(|(sum, more)| *sum += more);
         }
         let count: f64 = planes.iter().map(|[count, ..]| count).sum();
-        let squares: f64 = planes
-            .iter()
-            .map(|[count, sum, squares]| squares - sum * sum / count.max(1.0))
-            .sum();
+        let squares: f64 = planes.iter().map(|[count, sum, squares]| squares - sum * sum / count.max(1.0)).sum();
         let free = count - planes.len() as f64;
         squares / free - (noise.within + noise.row) / self.frames()
     }
 
-    /// Unevenness of the plane whose tiles differ most. Row noise contributes to its error, because it shifts all sites of a row together.
+    /// Unevenness of the plane whose tiles differ most. Row noise contributes to its error, because it shifts all sites
+    /// of a row together.
     pub(super) fn unevenness(&self, hot: &HotPixels, noise: PairNoise) -> Unevenness {
         let [rows, columns] = self.layout.plane_size();
         let tiles: Vec<usize> = (0..columns)
@@ -205,27 +193,18 @@ impl MeanFrame {
             }
         }
         let sites = (rows / TILES * (columns / TILES)) as f64;
-        let error =
-            (noise.within / sites + noise.row.max(0.0) / (rows / TILES) as f64) / self.frames();
+        let error = (noise.within / sites + noise.row.max(0.0) / (rows / TILES) as f64) / self.frames();
         sums.chunks(TILES * TILES)
             .map(|tiles| {
                 let [low, high] = tiles
                     .iter()
                     .filter(|[count, _]| *count > 0.0)
                     .map(|[count, sum]| sum / count)
-                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| {
-                        [mean.min(low), mean.max(high)]
-                    });
-                Unevenness {
-                    difference: high - low,
-                    error: error.sqrt(),
-                }
+                    .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], mean| [mean.min(low), mean.max(high)]);
+                Unevenness { difference: high - low, error: error.sqrt() }
             })
             .max_by(|a, b| a.difference.total_cmp(&b.difference))
-            .unwrap_or(Unevenness {
-                difference: 0.0,
-                error: 0.0,
-            })
+            .unwrap_or(Unevenness { difference: 0.0, error: 0.0 })
     }
 }
 
@@ -234,11 +213,7 @@ mod tests {
     use super::*;
     use crate::commands::calibrate::layout::Cfa;
 
-    const LAYOUT: Layout = Layout {
-        cfa: Cfa::Rggb,
-        height: 64,
-        width: 64,
-    };
+    const LAYOUT: Layout = Layout { cfa: Cfa::Rggb, height: 64, width: 64 };
 
     /// Frames of whole noise of the variance 2 (−2 to 2 evenly) about 100, changed by site and frame.
     fn mean_of(frames: usize, change: impl Fn(usize, usize) -> u16) -> MeanFrame {
@@ -247,9 +222,7 @@ mod tests {
         for frame in 0..frames {
             let samples: Vec<u16> = (0..LAYOUT.height * LAYOUT.width)
                 .map(|site| {
-                    state = state
-                        .wrapping_mul(6_364_136_223_846_793_005)
-                        .wrapping_add(1);
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                     98 + ((state >> 33) % 5) as u16 + change(frame, site)
                 })
                 .collect();
@@ -258,10 +231,7 @@ mod tests {
         mean
     }
 
-    const NOISE: PairNoise = PairNoise {
-        within: 2.0,
-        row: 0.0,
-    };
+    const NOISE: PairNoise = PairNoise { within: 2.0, row: 0.0 };
 
     #[test]
     fn consistently_distant_sites_are_hot() {
@@ -273,13 +243,7 @@ mod tests {
         assert_eq!(found.columns(1).collect::<Vec<_>>(), [2]);
         assert_eq!(found.columns(2 * 9).collect::<Vec<_>>(), [4]);
         // As far in the mean, but by one sample.
-        let single = mean_of(4, |frame, site| {
-            if frame == 0 && sites.contains(&site) {
-                120
-            } else {
-                0
-            }
-        });
+        let single = mean_of(4, |frame, site| if frame == 0 && sites.contains(&site) { 120 } else { 0 });
         assert_eq!(single.hot_pixels(NOISE.within).count(), 0);
     }
 
@@ -295,18 +259,10 @@ mod tests {
         // Green in the rows of blue alone is lit, from 0 to 3 ADU over the rows.
         let lit = mean_of(8, |_, site| {
             let (row, column) = (site / 64, site % 64);
-            if row % 2 == 1 && column % 2 == 0 {
-                (row / 16) as u16
-            } else {
-                0
-            }
+            if row % 2 == 1 && column % 2 == 0 { (row / 16) as u16 } else { 0 }
         });
         let found = lit.unevenness(&none, NOISE);
-        assert!(
-            (found.difference - 3.0).abs() < 6.0 * found.error,
-            "{}",
-            found.difference
-        );
+        assert!((found.difference - 3.0).abs() < 6.0 * found.error, "{}", found.difference);
         // Each third site is 3 ADU above: a variance of 2.
         let pattern = mean_of(8, |_, site| if site % 3 == 0 { 3 } else { 0 });
         assert!((pattern.pattern(&none, NOISE) - 2.0).abs() < 0.1);

@@ -1,5 +1,6 @@
-//! Calibration of a camera from its own frames: [`calibrate`] measures the gain, read noise, row noise and offsets of a sensor at each
-//! setting of its gain, from bias frames and pairs of flats. [`camera_file()`] writes them for `--noise camera`.
+//! Calibration of a camera from its own frames: [`calibrate`] measures the gain, read noise, row noise and offsets of a
+//! sensor at each setting of its gain, from bias frames and pairs of flats. [`camera_file()`] writes them for `--noise
+//! camera`.
 //!
 //! ```text
 //! bias frames ─ mean ──► offsets, light, hot pixels, fixed pattern
@@ -9,11 +10,11 @@
 //! settings ──► ln σ over ln K
 //! ```
 //!
-//! Only a few frames are in memory at once, whatever the size of the recording. Sums over sites are integers, so that the result does not
-//! depend on the number of threads.
+//! Only a few frames are in memory at once, whatever the size of the recording. Sums over sites are integers, so that
+//! the result does not depend on the number of threads.
 //!
-//! Sources: Wei et al., "Physics-based noise modeling for extreme low-light photography" (ELD); Janesick, *Photon Transfer*; EMVA
-//! 1288 release 4 Linear.
+//! Sources: Wei et al., "Physics-based noise modeling for extreme low-light photography" (ELD); Janesick, *Photon
+//! Transfer*; EMVA 1288 release 4 Linear.
 
 mod batches;
 mod bias;
@@ -106,14 +107,7 @@ impl CameraFit {
     /// Offsets of the planes of a setting above the black level, in ADU.
     pub(crate) fn bias(&self, setting: &SettingFit) -> Vec<Measured> {
         let black = f64::from(self.black);
-        setting
-            .offsets
-            .iter()
-            .map(|offset| Measured {
-                value: offset.value - black,
-                ..*offset
-            })
-            .collect()
+        setting.offsets.iter().map(|offset| Measured { value: offset.value - black, ..*offset }).collect()
     }
 }
 
@@ -133,11 +127,7 @@ pub(crate) fn calibrate(
     warnings.extend(reader.omission_note());
     let white = match settings.white {
         Some(white) => {
-            if recording
-                .settings
-                .iter()
-                .any(|setting| !setting.white.is_empty())
-            {
+            if recording.settings.iter().any(|setting| !setting.white.is_empty()) {
                 warnings.push("frames in white/ are left out, because --white is set".to_owned());
             }
             white
@@ -146,12 +136,7 @@ pub(crate) fn calibrate(
     };
     let mut fits = Vec::new();
     for files in &recording.settings {
-        let mut context = MeasureContext {
-            reader: &reader,
-            white,
-            inputs: &mut inputs,
-            warnings: &mut warnings,
-        };
+        let mut context = MeasureContext { reader: &reader, white, inputs: &mut inputs, warnings: &mut warnings };
         fits.push(setting::measure(files, &mut context)?);
         step();
     }
@@ -188,8 +173,6 @@ fn black_level(fits: &[SettingFit]) -> u16 {
     let [count, sum] = fits
         .iter()
         .flat_map(|fit| &fit.offsets)
-        .fold([0.0; 2], |[count, sum], offset| {
-            [count + 1.0, sum + offset.value]
-        });
+        .fold([0.0; 2], |[count, sum], offset| [count + 1.0, sum + offset.value]);
     (sum / f64::max(count, 1.0)).round() as u16
 }

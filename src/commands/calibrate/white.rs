@@ -22,11 +22,7 @@ pub(super) fn white_code(
     folder: &Path,
     inputs: &mut Inputs,
 ) -> Result<u16> {
-    let files: Vec<&PathBuf> = recording
-        .settings
-        .iter()
-        .flat_map(|setting| &setting.white)
-        .collect();
+    let files: Vec<&PathBuf> = recording.settings.iter().flat_map(|setting| &setting.white).collect();
     let mut white: Option<(u16, &PathBuf)> = None;
     in_batches(
         &files,
@@ -50,21 +46,14 @@ pub(super) fn white_code(
         },
     )?;
     let problem = "the code of white is not known: state it with --white, or add overexposed frames in SETTING/white/";
-    white.map_or_else(
-        || Err(Error::data(folder.display(), problem)),
-        |(code, _)| Ok(code),
-    )
+    white.map_or_else(|| Err(Error::data(folder.display(), problem)), |(code, _)| Ok(code))
 }
 
 /// Maximum code of an overexposed frame, with the facts of its file.
 fn top_code(reader: &FrameReader, path: &Path) -> Result<(u16, FrameFacts)> {
     let frame = reader.read(path)?;
     let top = frame.samples.iter().copied().max().unwrap_or(0);
-    let with_it = frame
-        .samples
-        .iter()
-        .filter(|sample| **sample == top)
-        .count();
+    let with_it = frame.samples.iter().filter(|sample| **sample == top).count();
     let share = with_it as f64 / frame.samples.len() as f64;
     if share < MIN_AT_WHITE {
         let problem = format!(

@@ -39,14 +39,8 @@ pub(super) const NAME: &str = "darkqa-eval";
 pub(super) const SHORT_HELP: &str = include_str!("short_help.txt");
 
 /// The flags of any command that also have a short form.
-const SHORT_FORMS: [(&str, char); 6] = [
-    ("model", 'm'),
-    ("data", 'd'),
-    ("llie", 'e'),
-    ("dry-run", 'n'),
-    ("out", 'o'),
-    ("quiet", 'q'),
-];
+const SHORT_FORMS: [(&str, char); 6] =
+    [("model", 'm'), ("data", 'd'), ("llie", 'e'), ("dry-run", 'n'), ("out", 'o'), ("quiet", 'q')];
 
 /// The flags of any command that also have a second name: `llie` is the paper's word, `enhancer` that of the pages.
 const SECOND_NAMES: [(&str, &str); 2] = [("llie", "enhancer"), ("llie-on", "enhancer-on")];
@@ -136,7 +130,8 @@ pub(crate) struct CommonArgs {
     /// Colours of results; auto: on a terminal, without NO_COLOR, CLICOLOR=0 and TERM=dumb
     #[arg(long, global = true, value_name = "WHEN", value_enum, default_value = "auto", add = Decides::Nothing)]
     pub color: Colours,
-    /// TOML file of flags by their long names; flags of a single command are in a table of its name; default: DARKQA_CONFIG, else none
+    /// TOML file of flags by their long names; flags of a single command are in a table of its name; default:
+    /// DARKQA_CONFIG, else none
     #[arg(long, global = true, value_name = "FILE", add = Decides::Nothing)]
     pub config: Option<PathBuf>,
 }
@@ -175,19 +170,23 @@ pub(crate) enum Command {
     Batch(BatchCommand),
     /// Ask OpenEQA's open questions about walks through dark houses, the answers marked by a judge (LLM-Match)
     ///
-    /// The frames of each walk are degraded, scaled and sent with upstream's prompts, byte for byte; so are the answers to the
-    /// judge. The same answer to the same question is judged once. What was answered or marked is never asked again.
+    /// The frames of each walk are degraded, scaled and sent with upstream's prompts, byte for byte; so are the answers
+    /// to the judge. The same answer to the same question is judged once. What was answered or marked is never asked
+    /// again.
     #[command(name = "openeqa", mut_args(OpenEqaArgs::own))]
     OpenEqa(Box<OpenEqaArgs>),
     /// Serve the built-in models at an OpenAI-compatible endpoint on this machine, to try clients without keys
     Serve(ServeArgs),
-    /// Show the results of runs, from their records alone: tables, figures and one HTML file; several runs are compared, and shards merged
+    /// Show the results of runs, from their records alone: tables, figures and one HTML file; several runs are
+    /// compared, and shards merged
     Report(ReportCommand),
     /// Draw the figures of runs for a paper, at the width of its columns: PDF, SVG, pgfplots, and their captions
     Figures(FiguresArgs),
-    /// Pack a run as one ZIP file to pass on: records, tables, page and findings, without keys and paths of this machine
+    /// Pack a run as one ZIP file to pass on: records, tables, page and findings, without keys and paths of this
+    /// machine
     Bundle(BundleArgs),
-    /// Write a site of many runs: a leaderboard and the page of each run, to open from a folder or put on any web server
+    /// Write a site of many runs: a leaderboard and the page of each run, to open from a folder or put on any web
+    /// server
     Site(SiteArgs),
     /// Merge the shards of an evaluation into one run; an earlier name of report merge
     #[command(hide = true)]
@@ -218,12 +217,14 @@ pub(crate) enum Command {
 pub(crate) enum BatchCommand {
     /// Ask what an evaluation has left to ask in batches, and wait for their replies
     ///
-    /// Writes the requests as files, uploads them, makes batches of them, waits until they end, and imports the replies. Ctrl-C leaves the
-    /// batches running, and the same command continues. What expires is asked again, up to three times.
+    /// Writes the requests as files, uploads them, makes batches of them, waits until they end, and imports the
+    /// replies. Ctrl-C leaves the batches running, and the same command continues. What expires is asked again, up to
+    /// three times.
     Run(Box<BatchRun>),
     /// Show how far the batches of a run are; changes nothing
     Status(BatchStatusArgs),
-    /// Check the batches of a run once, and import the replies of those that have ended; exit code 0 if everything is answered
+    /// Check the batches of a run once, and import the replies of those that have ended; exit code 0 if everything is
+    /// answered
     Fetch(BatchFolderArgs),
     /// Cancel the batches of a run, and import the replies that there are
     Cancel(BatchFolderArgs),
@@ -301,9 +302,9 @@ pub(crate) enum StudyCommand {
 pub(super) fn command() -> clap::Command {
     let root = with_classes(with_other_forms(with_keyed_flags(Cli::command())));
     let shared: Vec<Arg> = root.get_arguments().cloned().collect();
-    let root = ON_EVALUATIONS.into_iter().fold(root, |root, name| {
-        root.mut_subcommand(name, |command| on_evaluation(command, &shared))
-    });
+    let root = ON_EVALUATIONS
+        .into_iter()
+        .fold(root, |root, name| root.mut_subcommand(name, |command| on_evaluation(command, &shared)));
     first_heading_first(with_rare_openeqa_flags_hidden(root, true))
 }
 
@@ -316,11 +317,7 @@ fn with_rare_openeqa_flags_hidden(root: clap::Command, is_hidden: bool) -> clap:
     root.mut_subcommand("openeqa", |command| {
         command.mut_args(|arg| {
             let long = arg.get_long().unwrap_or_default();
-            if RARE_OPENEQA_FLAGS.contains(&long) {
-                arg.hide_short_help(is_hidden)
-            } else {
-                arg
-            }
+            if RARE_OPENEQA_FLAGS.contains(&long) { arg.hide_short_help(is_hidden) } else { arg }
         })
     })
 }
@@ -343,35 +340,27 @@ pub(super) fn with_other_forms(command: clap::Command) -> clap::Command {
         .mut_subcommands(with_other_forms)
 }
 
-/// A command that takes the flags of an evaluation, or whose subcommands do. Its `-h` leaves out the flags that mean the same as there.
+/// A command that takes the flags of an evaluation, or whose subcommands do. Its `-h` leaves out the flags that mean
+/// the same as there.
 fn on_evaluation(command: clap::Command, shared: &[Arg]) -> clap::Command {
-    if !command
-        .get_arguments()
-        .any(|arg| arg.get_long() == Some("model"))
-    {
+    if !command.get_arguments().any(|arg| arg.get_long() == Some("model")) {
         return command.mut_subcommands(|inner| on_evaluation(inner, shared));
     }
-    command
-        .after_help(TAKES_FLAGS_OF_EVALUATION)
-        .mut_args(|arg| {
-            let is_shared = shared
-                .iter()
-                .any(|own| own.get_id() == arg.get_id() && own.get_help() == arg.get_help());
-            arg.hide_short_help(is_shared)
-        })
+    command.after_help(TAKES_FLAGS_OF_EVALUATION).mut_args(|arg| {
+        let is_shared = shared.iter().any(|own| own.get_id() == arg.get_id() && own.get_help() == arg.get_help());
+        arg.hide_short_help(is_shared)
+    })
 }
 
-/// The command with the flags under [`FIRST_HEADING`] first. Help lists headings in the order of their flags, and a flag that is changed
-/// moves to the end. So every other flag is changed.
+/// The command with the flags under [`FIRST_HEADING`] first. Help lists headings in the order of their flags, and a
+/// flag that is changed moves to the end. So every other flag is changed.
 fn first_heading_first(command: clap::Command) -> clap::Command {
     let others: Vec<Id> = command
         .get_arguments()
         .filter(|arg| arg.get_help_heading() != Some(FIRST_HEADING))
         .map(|arg| arg.get_id().clone())
         .collect();
-    others
-        .into_iter()
-        .fold(command, |command, id| command.mut_arg(id, |arg| arg))
+    others.into_iter().fold(command, |command, id| command.mut_arg(id, |arg| arg))
 }
 
 /// The command and those in it, with the class of each flag that decides something at the end of its help.

@@ -48,22 +48,12 @@ fn with_keyed_flag(command: Command, keyed: &KeyedFlag) -> Command {
             }
         });
     }
-    let (about, default) = keyed
-        .about
-        .split_once("; default: ")
-        .unwrap_or((keyed.about, ""));
+    let (about, default) = keyed.about.split_once("; default: ").unwrap_or((keyed.about, ""));
     let help = format!("{about}: {names}; default: {default}");
-    let has_values = keyed.alone.is_none()
-        && members
-            .iter()
-            .any(|(_, arg)| arg.get_action().takes_values());
+    let has_values = keyed.alone.is_none() && members.iter().any(|(_, arg)| arg.get_action().takes_values());
     let arg = Arg::new(keyed.name)
         .long(keyed.name)
-        .value_name(if has_values {
-            "KEY=VALUE,…"
-        } else {
-            "KEY,…"
-        })
+        .value_name(if has_values { "KEY=VALUE,…" } else { "KEY,…" })
         .action(ArgAction::Append)
         .help_heading(keyed.heading)
         .display_order(first.get_display_order())
@@ -94,11 +84,7 @@ fn with_keys_in_help(arg: Arg, names: &str, lines: &str) -> Arg {
 /// The help of a key: its values, what it decides, and its default.
 fn line(key: &str, arg: &Arg) -> String {
     let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-    let defaults: Vec<_> = arg
-        .get_default_values()
-        .iter()
-        .map(|value| value.to_string_lossy())
-        .collect();
+    let defaults: Vec<_> = arg.get_default_values().iter().map(|value| value.to_string_lossy()).collect();
     let default = match &defaults[..] {
         _ if !arg.get_action().takes_values() => String::new(),
         [] => String::new(),
@@ -118,10 +104,7 @@ pub(super) fn with_value(key: &str, arg: &Arg) -> String {
     match &possible[..] {
         // A key with one possible value is written without it.
         [_] => key.to_owned(),
-        [] => format!(
-            "{key}={}",
-            arg.get_value_names().unwrap_or_default().join(" ")
-        ),
+        [] => format!("{key}={}", arg.get_value_names().unwrap_or_default().join(" ")),
         several => {
             let names: Vec<&str> = several.iter().map(PossibleValue::get_name).collect();
             format!("{key}={}", names.join("|"))
@@ -146,9 +129,7 @@ pub(super) fn spell_as_keys(text: &str) -> String {
 /// The command without hidden flags and commands, for the completions of shells.
 pub(super) fn without_hidden(command: &Command) -> Command {
     let args = command.get_arguments().filter(|arg| !arg.is_hide_set());
-    let commands = command
-        .get_subcommands()
-        .filter(|inner| !inner.is_hide_set());
+    let commands = command.get_subcommands().filter(|inner| !inner.is_hide_set());
     let about = command.get_about().cloned().unwrap_or_default();
     Command::new(leaked(command.get_name()))
         .about(about)
@@ -173,12 +154,11 @@ fn to_completion(arg: &Arg) -> Arg {
         return completion;
     }
     let names = arg.get_value_names().unwrap_or_default().iter().cloned();
-    completion
-        .value_names(names)
-        .value_parser(arg.get_value_parser().clone())
+    completion.value_names(names).value_parser(arg.get_value_parser().clone())
 }
 
-/// A name that lives as long as the process, which the parser requires. The command with this name is made once, so the leak is small.
+/// A name that lives as long as the process, which the parser requires. The command with this name is made once, so the
+/// leak is small.
 fn leaked(name: &str) -> &'static str {
     name.to_owned().leak()
 }

@@ -1,8 +1,8 @@
 //! The sources of a setting: flag, file of models, environment, file of flags.
 //!
-//! Values from the environment and files are turned into words, for flags that were not typed. They are appended to the typed words,
-//! and all words are parsed together, once. Thus a value is read in the same way wherever it comes from. ripgrep reads its
-//! configuration file like this (`crates/core/flags/parse.rs`).
+//! Values from the environment and files are turned into words, for flags that were not typed. They are appended to the
+//! typed words, and all words are parsed together, once. Thus a value is read in the same way wherever it comes from.
+//! ripgrep reads its configuration file like this (`crates/core/flags/parse.rs`).
 
 mod earlier_form;
 mod expansion;
@@ -62,8 +62,8 @@ pub(super) struct Parsed {
     pub(super) typed: BTreeSet<String>,
 }
 
-/// The matches of the typed words, with values from the file of models, the environment and the `--config` file for flags that were
-/// not typed.
+/// The matches of the typed words, with values from the file of models, the environment and the `--config` file for
+/// flags that were not typed.
 ///
 /// # Errors
 /// Names the flag, the variable or the entry of the file that cannot be used.
@@ -89,18 +89,12 @@ pub(super) fn parse(
     let mut set: Vec<&Arg> = settable_flags(command)
         .filter(|arg| own.value_source(arg.get_id().as_str()) == Some(ValueSource::CommandLine))
         .collect();
-    let in_call: BTreeSet<String> = set
-        .iter()
-        .filter_map(|arg| arg.get_long())
-        .map(str::to_owned)
-        .collect();
+    let in_call: BTreeSet<String> = set.iter().filter_map(|arg| arg.get_long()).map(str::to_owned).collect();
     let expansion = Expansion(command);
     let environment = expansion.layer(environment_values(&all, command, &variable)?)?;
     let file = match own.get_one::<PathBuf>(CONFIG) {
         Some(path) => Some(path.clone()),
-        None => variable("DARKQA_CONFIG")
-            .filter(|path| !path.is_empty())
-            .map(PathBuf::from),
+        None => variable("DARKQA_CONFIG").filter(|path| !path.is_empty()).map(PathBuf::from),
     };
     let file_layer = match &file {
         Some(file) => expansion.layer(file_values(file, &all, command, &path)?)?,
@@ -136,13 +130,11 @@ pub(super) fn parse(
     let end = typed.iter().position(|word| word == "--");
     let end = end.unwrap_or(typed.len());
     typed.splice(end..end, words);
-    Ok(Parsed {
-        matches: parse_words(all, typed, &origins)?,
-        typed: in_call,
-    })
+    Ok(Parsed { matches: parse_words(all, typed, &origins)?, typed: in_call })
 }
 
-/// The typed words in their current form: modes as subcommands, and the settings of keyed flags as the hidden flags for them.
+/// The typed words in their current form: modes as subcommands, and the settings of keyed flags as the hidden flags for
+/// them.
 fn current_words(all: &Command, typed: Vec<OsString>) -> Result<Vec<OsString>> {
     let (_, place) = typed_command(all, &typed);
     let typed = in_current_form(typed, place);
@@ -200,32 +192,25 @@ fn called_command(matches: &ArgMatches) -> (Vec<String>, &ArgMatches) {
 }
 
 fn descend<'a>(all: &'a Command, path: &[String]) -> &'a Command {
-    path.iter().fold(all, |command, name| {
-        command.find_subcommand(name).unwrap_or(command)
-    })
+    path.iter().fold(all, |command, name| command.find_subcommand(name).unwrap_or(command))
 }
 
 /// The flags of a command that the environment and a file can set.
 fn settable_flags(command: &Command) -> impl Iterator<Item = &Arg> {
-    command.get_arguments().filter(|arg| {
-        arg.get_long()
-            .is_some_and(|long| !["help", "version", CONFIG].contains(&long))
-    })
+    command
+        .get_arguments()
+        .filter(|arg| arg.get_long().is_some_and(|long| !["help", "version", CONFIG].contains(&long)))
 }
 
-/// Returns true if a flag that is set hides another flag in lower layers. It hides itself, and each flag that conflicts with it.
+/// Returns true if a flag that is set hides another flag in lower layers. It hides itself, and each flag that conflicts
+/// with it.
 fn hides(command: &Command, set: &Arg, other: &Arg) -> bool {
-    set.get_id() == other.get_id()
-        || lists_conflict(command, set, other)
-        || lists_conflict(command, other, set)
+    set.get_id() == other.get_id() || lists_conflict(command, set, other) || lists_conflict(command, other, set)
 }
 
 /// Returns true if the definition of a flag lists `other` among its conflicts.
 fn lists_conflict(command: &Command, arg: &Arg, other: &Arg) -> bool {
-    command
-        .get_arg_conflicts_with(arg)
-        .into_iter()
-        .any(|conflicting| conflicting.get_id() == other.get_id())
+    command.get_arg_conflicts_with(arg).into_iter().any(|conflicting| conflicting.get_id() == other.get_id())
 }
 
 /// The flags that the environment sets: `DARKQA_MAX_TOKENS` is `--max-tokens`; a list is separated by commas.
@@ -236,13 +221,9 @@ fn environment_values(
     command: &Command,
     variable: &impl Fn(&str) -> Option<OsString>,
 ) -> Result<BTreeMap<String, LayeredValue>> {
-    let ours = std::env::vars_os()
-        .filter_map(|(name, _)| name.into_string().ok())
-        .filter(|name| name.starts_with(PREFIX));
-    let mut known: Vec<String> = every_flag(all)
-        .iter()
-        .map(|flag| variable_name(flag))
-        .collect();
+    let ours =
+        std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()).filter(|name| name.starts_with(PREFIX));
+    let mut known: Vec<String> = every_flag(all).iter().map(|flag| variable_name(flag)).collect();
     known.push(variable_name(CONFIG));
     for name in ours {
         if !known.contains(&name) {
@@ -295,9 +276,10 @@ fn file_values(
     Ok(values)
 }
 
-/// Adds the entries of a table, and of those nested tables that lead to the command that is called. `flags` are the flags that the
-/// table may set, `called` is the rest of the path to the called command, and `within` has the names of the tables around this one.
-/// The tables of other commands are only checked: each of their keys must be a flag of its command.
+/// Adds the entries of a table, and of those nested tables that lead to the command that is called. `flags` are the
+/// flags that the table may set, `called` is the rest of the path to the called command, and `within` has the names of
+/// the tables around this one. The tables of other commands are only checked: each of their keys must be a flag of its
+/// command.
 fn read_table(
     flag_values: &mut BTreeMap<String, LayeredValue>,
     path: &Path,
@@ -335,15 +317,10 @@ fn read_table(
         })?;
         flag_values.insert(flag, LayeredValue { origin, values });
     }
-    let tables = table
-        .iter()
-        .filter_map(|(key, value)| Some((key, value.as_table()?)));
+    let tables = table.iter().filter_map(|(key, value)| Some((key, value.as_table()?)));
     for (name, inner) in tables {
         let Some(next) = at.find_subcommand(name) else {
-            let names: Vec<String> = at
-                .get_subcommands()
-                .map(|c| c.get_name().to_owned())
-                .collect();
+            let names: Vec<String> = at.get_subcommands().map(|c| c.get_name().to_owned()).collect();
             let origin = format!("{}, [{name}]", path.display());
             let problem = format_args!("there is no command {name}{}", suggestion(name, &names));
             return Err(Error::usage(origin, problem));
@@ -378,12 +355,10 @@ fn models_values(
     let Some(path) = typed.or_else(|| layered.map(PathBuf::from)) else {
         return Ok(BTreeMap::new());
     };
-    let values = models_file::values(&path, &flags)?
-        .into_iter()
-        .map(|(flag, origin, value)| {
-            let values = vec![value];
-            (flag, LayeredValue { origin, values })
-        });
+    let values = models_file::values(&path, &flags)?.into_iter().map(|(flag, origin, value)| {
+        let values = vec![value];
+        (flag, LayeredValue { origin, values })
+    });
     Ok(values.collect())
 }
 
@@ -423,20 +398,18 @@ fn parse_words(
     words: Vec<OsString>,
     origins: &BTreeMap<String, String>,
 ) -> Result<ArgMatches, Problem> {
-    let matches = command
-        .try_get_matches_from_mut(words)
-        .map_err(|e| match e.kind() {
-            ErrorKind::DisplayHelp
-            | ErrorKind::DisplayVersion
-            | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => Problem::Help(e),
-            _ => Problem::Error(with_origin(&e, origins)),
-        })?;
+    let matches = command.try_get_matches_from_mut(words).map_err(|e| match e.kind() {
+        ErrorKind::DisplayHelp | ErrorKind::DisplayVersion | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            Problem::Help(e)
+        }
+        _ => Problem::Error(with_origin(&e, origins)),
+    })?;
     check_flags_before_command(&command, &matches)?;
     Ok(matches)
 }
 
-/// Refuses a flag of the evaluation in front of a command, as in `--levels L0 report RUN`. Global flags may stand there. This check
-/// replaces clap's `args_conflicts_with_subcommands`, which would refuse global flags too.
+/// Refuses a flag of the evaluation in front of a command, as in `--levels L0 report RUN`. Global flags may stand
+/// there. This check replaces clap's `args_conflicts_with_subcommands`, which would refuse global flags too.
 fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result<()> {
     let Some(name) = matches.subcommand_name() else {
         return Ok(());
@@ -446,9 +419,9 @@ fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result
         source == Some(ValueSource::CommandLine) && !arg.is_global_set()
     });
     match misplaced.and_then(Arg::get_long) {
-        Some(flag) => Err(Error::CommandLine(format!(
-            "--{flag} stands before the command {name}; put its flags after it"
-        ))),
+        Some(flag) => {
+            Err(Error::CommandLine(format!("--{flag} stands before the command {name}; put its flags after it")))
+        }
         None => Ok(()),
     }
 }
@@ -481,12 +454,8 @@ pub(super) fn one_line(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let lines = text.lines().map(str::trim);
     let wanted = lines.take_while(|line| !line.starts_with("Usage:"));
-    let wanted =
-        wanted.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
-    let line = wanted
-        .collect::<Vec<_>>()
-        .join(" ")
-        .replace(" tip: ", "; tip: ");
+    let wanted = wanted.filter(|line| !line.is_empty() && !line.starts_with("For more information"));
+    let line = wanted.collect::<Vec<_>>().join(" ").replace(" tip: ", "; tip: ");
     let line = line.trim_start_matches("error: ");
     // An unknown flag keeps the spelling that was typed.
     match line.split_once("; tip: ") {

@@ -1,8 +1,8 @@
 //! The command line: commands, their flags, and exit codes.
 //!
-//! The flags of a command are a struct in the module of the command. Flags that several commands share are groups in the modules that
-//! use them. The environment and a `--config` file are turned into words before parsing (see `cli/layers.rs`), so one parser reads all
-//! values.
+//! The flags of a command are a struct in the module of the command. Flags that several commands share are groups in
+//! the modules that use them. The environment and a `--config` file are turned into words before parsing (see
+//! `cli/layers.rs`), so one parser reads all values.
 
 mod command;
 mod keyed;
@@ -44,7 +44,8 @@ use command::Cli;
 const WITH_FAILURES: u8 = 1;
 /// Exit code: wrong usage or configuration, or an error that stops everything.
 const FATAL: u8 = 2;
-/// Exit code: stopped by `--max-cost`. The same command would stop again, so a scheduler must not start it again by itself.
+/// Exit code: stopped by `--max-cost`. The same command would stop again, so a scheduler must not start it again by
+/// itself.
 const OVER_BUDGET: u8 = 3;
 
 /// Default log filter. The names of all crates of this workspace begin with `darkqa_`.
@@ -81,11 +82,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         Ok(cli) => cli,
         Err(e) => return fail(&e.to_string()),
     };
-    let verbosity = if cli.common.quiet {
-        Verbosity::Quiet
-    } else {
-        Verbosity::Normal
-    };
+    let verbosity = if cli.common.quiet { Verbosity::Quiet } else { Verbosity::Normal };
     let progress = Progress::new(verbosity);
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
     tracing_subscriber::fmt()
@@ -117,8 +114,7 @@ fn word_text(word: &OsString) -> String {
 /// The command line as a structure, with the image flags that the manifest of a run stores.
 fn to_cli(parsed: &layers::Parsed, words: &[String]) -> Result<Cli> {
     let matches = &parsed.matches;
-    let mut cli = Cli::from_arg_matches(matches)
-        .map_err(|e| Error::usage("the command line", one_line(&e)))?;
+    let mut cli = Cli::from_arg_matches(matches).map_err(|e| Error::usage("the command line", one_line(&e)))?;
     let own = layers::command_matches(matches);
     let job = match &mut cli.command {
         None => Some(&mut cli.evaluate.job),
@@ -165,22 +161,16 @@ fn carry_out(cli: Cli, progress: &Progress) -> Result<Outcome> {
         Command::Models(args) => commands::models::models(&args, progress),
         Command::Enhance(args) => commands::enhance::enhance(&args, progress),
         Command::OpenEqa(args) => openeqa(*args, progress),
-        Command::Batch(BatchCommand::Export(args)) => {
-            export_batch(args.evaluate, &args.files, progress)
-        }
-        Command::Batch(BatchCommand::Run(args)) => {
-            run_batch(args.evaluate, &args.files, &args.batch, progress)
-        }
+        Command::Batch(BatchCommand::Export(args)) => export_batch(args.evaluate, &args.files, progress),
+        Command::Batch(BatchCommand::Run(args)) => run_batch(args.evaluate, &args.files, &args.batch, progress),
         Command::Batch(BatchCommand::Status(args)) => commands::batch::status(&args),
         Command::Batch(BatchCommand::Fetch(args)) => commands::batch::fetch(&args, progress),
         Command::Batch(BatchCommand::Cancel(args)) => commands::batch::cancel(&args, progress),
         Command::Batch(BatchCommand::Import(args)) => commands::batch::import(&args),
         Command::Serve(args) => commands::serve::serve(&args, progress),
-        Command::Merge(args)
-        | Command::Report(ReportCommand {
-            form: Some(ReportForm::Merge(args)),
-            ..
-        }) => merge(&args),
+        Command::Merge(args) | Command::Report(ReportCommand { form: Some(ReportForm::Merge(args)), .. }) => {
+            merge(&args)
+        }
         Command::Report(ReportCommand { report: args, .. }) => report(&args.ok_or_else(no_run)?),
         Command::Figures(args) => commands::figures::figures(&args),
         Command::Bundle(args) => commands::bundle::bundle(&args),
@@ -221,16 +211,8 @@ pub fn check_words(words: impl IntoIterator<Item = OsString>) -> Result<(), Stri
 /// The completions of the command line for a shell.
 fn completions(shell: Shell) -> Outcome {
     let mut script = Vec::new();
-    clap_complete::generate(
-        shell,
-        &mut keyed::without_hidden(&command::command()),
-        NAME,
-        &mut script,
-    );
-    Outcome::text(
-        Status::Complete,
-        String::from_utf8_lossy(&script).into_owned(),
-    )
+    clap_complete::generate(shell, &mut keyed::without_hidden(&command::command()), NAME, &mut script);
+    Outcome::text(Status::Complete, String::from_utf8_lossy(&script).into_owned())
 }
 
 /// Writes the manual pages into a folder.
@@ -238,11 +220,7 @@ fn manual(folder: &Path) -> Result<Outcome> {
     std::fs::create_dir_all(folder).map_err(|e| Error::file(folder, "create", e))?;
     let command = command::command_for_manual().disable_help_subcommand(true);
     clap_mangen::generate_to(command, folder).map_err(|e| Error::file(folder, "write", e))?;
-    Ok(Outcome::wrote(
-        folder,
-        Status::Complete,
-        format!("{}: man {NAME}.1 shows the first page\n", folder.display()),
-    ))
+    Ok(Outcome::wrote(folder, Status::Complete, format!("{}: man {NAME}.1 shows the first page\n", folder.display())))
 }
 
 /// Prints the outcome of a command, and returns the exit code for it.
@@ -256,10 +234,7 @@ fn finish(outcome: &Outcome, verbosity: Verbosity, colours: ColorChoice) -> Exit
             let mut stderr = AutoStream::never(std::io::stderr());
             let _ = stderr.write_all(escape_hidden_except_styles(&outcome.output).as_bytes());
         }
-        outcome
-            .written
-            .iter()
-            .try_for_each(|path| writeln!(stdout, "{}", path.display()))
+        outcome.written.iter().try_for_each(|path| writeln!(stdout, "{}", path.display()))
     };
     match (outcome.status, printed) {
         (Status::Cancelled, _) => ExitCode::from(INTERRUPTED),

@@ -32,14 +32,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         Some(Command::Batch(BatchCommand::Export(args))) => idle.batch_evaluation(&args.evaluate),
         Some(Command::Batch(BatchCommand::Run(args))) => idle.batch_evaluation(&args.evaluate),
         Some(Command::Plan(args)) => {
-            let others = [
-                "timings",
-                "max_failures",
-                "fail_fast",
-                "max_cost",
-                "dry_run",
-                "resume",
-            ];
+            let others = ["timings", "max_failures", "fail_fast", "max_cost", "dry_run", "resume"];
             idle.because("plan asks nothing", &others.map(str::to_owned));
             let why = "a plan is of the whole run, and the same for all its parts";
             idle.because(why, &["shard".to_owned(), "workers".to_owned()]);
@@ -56,12 +49,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
                 idle.light(&args.light);
             }
         }
-        Some(Command::Report(command))
-            if command
-                .report
-                .as_ref()
-                .is_some_and(|args| !args.writes_into_run()) =>
-        {
+        Some(Command::Report(command)) if command.report.as_ref().is_some_and(|args| !args.writes_into_run()) => {
             let why = "the report is not written into the folder of a run";
             idle.because(why, &["no_parquet".into()]);
         }
@@ -69,20 +57,9 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
             idle.light(&args.light);
             idle.enhancement(&args.enhancers, false);
         }
-        Some(Command::Questions(args))
-            if args.shard.as_deref().is_some_and(|shard| shard != "none") =>
-        {
-            let of_all = [
-                "families",
-                "balance",
-                "room",
-                "candidates",
-                "stats",
-                "against",
-                "review",
-                "verdicts",
-                "json",
-            ];
+        Some(Command::Questions(args)) if args.shard.as_deref().is_some_and(|shard| shard != "none") => {
+            let of_all =
+                ["families", "balance", "room", "candidates", "stats", "against", "review", "verdicts", "json"];
             let why = "a part measures its frames, and the same command without --shard makes the questions";
             idle.because(why, &of_all.map(str::to_owned));
         }
@@ -98,10 +75,7 @@ pub(super) fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
 /// The ids of the flags in a group.
 fn ids<A: Args>() -> Vec<String> {
     let command = A::augment_args(Clap::new(""));
-    command
-        .get_arguments()
-        .map(|arg| arg.get_id().to_string())
-        .collect()
+    command.get_arguments().map(|arg| arg.get_id().to_string()).collect()
 }
 
 /// The flags that affect only degraded images. The seed is not one of them: it affects guesses and orders too.
@@ -144,22 +118,16 @@ impl NoEffect {
             let is_flag = matches.try_contains_id(id).unwrap_or(false);
             is_flag && matches.value_source(id) == Some(ValueSource::CommandLine)
         });
-        Self {
-            typed: typed.collect(),
-            lines: Vec::new(),
-        }
+        Self { typed: typed.collect(), lines: Vec::new() }
     }
 
-    /// Adds a warning that names those of the given flags that were typed. Each flag is named once, with the first reason.
+    /// Adds a warning that names those of the given flags that were typed. Each flag is named once, with the first
+    /// reason.
     fn because(&mut self, why: &str, flags: &[String]) {
-        let idle: Vec<String> = flags
-            .iter()
-            .filter(|id| self.typed.remove(*id))
-            .map(|id| flag_spelling(&id.replace('_', "-")))
-            .collect();
+        let idle: Vec<String> =
+            flags.iter().filter(|id| self.typed.remove(*id)).map(|id| flag_spelling(&id.replace('_', "-"))).collect();
         if !idle.is_empty() {
-            self.lines
-                .push(format!("{}: no effect: {why}", idle.join(", ")));
+            self.lines.push(format!("{}: no effect: {why}", idle.join(", ")));
         }
     }
 
@@ -174,11 +142,7 @@ impl NoEffect {
             self.because("no --ask is named", &["ask_per_image".to_owned()]);
         }
         let images = [ids::<ShrinkArgs>(), vec!["image_first".into()]].concat();
-        if !models
-            .model
-            .iter()
-            .any(|name| matches!(name, ModelName::Remote(_)))
-        {
+        if !models.model.iter().any(|name| matches!(name, ModelName::Remote(_))) {
             let why = "no model at an endpoint is shown an image";
             self.because(why, &["image_first".to_owned()]);
         }
@@ -208,13 +172,8 @@ impl NoEffect {
 
     fn open_questions(&mut self, args: &OpenEqaArgs) {
         if args.study.is_some() {
-            let asking = [
-                ids::<AccessArgs>(),
-                ids::<Parameters>(),
-                ids::<RequestArgs>(),
-                ids::<Sending>(),
-                ids::<JudgeArgs>(),
-            ];
+            let asking =
+                [ids::<AccessArgs>(), ids::<Parameters>(), ids::<RequestArgs>(), ids::<Sending>(), ids::<JudgeArgs>()];
             self.because("--study asks no model", &asking.concat());
         }
         let long = ["full".into(), "findings".into()];
@@ -235,14 +194,9 @@ impl NoEffect {
         }
     }
 
-    /// Checks the flags that both experiments have. `images` adds flags for images, `replies` adds flags for requests to servers.
-    fn job(
-        &mut self,
-        args: &JobArgs,
-        images: &[String],
-        replies: &[String],
-        judge: Option<&ModelName>,
-    ) {
+    /// Checks the flags that both experiments have. `images` adds flags for images, `replies` adds flags for requests
+    /// to servers.
+    fn job(&mut self, args: &JobArgs, images: &[String], replies: &[String], judge: Option<&ModelName>) {
         let models = &args.models;
         if models.models.is_none() && (models.blind || models.model.is_empty()) {
             let shown = [
@@ -263,30 +217,15 @@ impl NoEffect {
         self.enhancement(&args.enhancers, may_run);
         let mut names = models.model.iter().chain(&models.blind_model).chain(judge);
         if models.models.is_none() && !names.any(|name| matches!(name, ModelName::Remote(_))) {
-            let sent = [
-                ids::<AccessArgs>(),
-                ids::<Parameters>(),
-                ids::<RequestArgs>(),
-                ids::<Sending>(),
-                replies.to_vec(),
-            ];
+            let sent =
+                [ids::<AccessArgs>(), ids::<Parameters>(), ids::<RequestArgs>(), ids::<Sending>(), replies.to_vec()];
             let others = ["max_cost".into(), "prices".into(), "grace".into()];
-            self.because(
-                "all models are built in",
-                &[sent.concat(), others.to_vec()].concat(),
-            );
+            self.because("all models are built in", &[sent.concat(), others.to_vec()].concat());
         }
         if args.money.dry_run {
             self.because(
                 "--dry-run sends nothing",
-                &[
-                    "grace",
-                    "timings",
-                    "max_failures",
-                    "fail_fast",
-                    "no_parquet",
-                ]
-                .map(String::from),
+                &["grace", "timings", "max_failures", "fail_fast", "no_parquet"].map(String::from),
             );
         }
         if args.stored.images_cache.is_none() {
@@ -319,8 +258,8 @@ impl NoEffect {
         }
     }
 
-    /// Checks the flags for enhancement. Enhancers that no condition uses are an error elsewhere. The model `room-net` needs ONNX Runtime
-    /// too.
+    /// Checks the flags for enhancement. Enhancers that no condition uses are an error elsewhere. The model `room-net`
+    /// needs ONNX Runtime too.
     fn enhancement(&mut self, args: &EnhancerArgs, may_run_room_net: bool) {
         let mut runtime = ids::<RuntimeArgs>();
         runtime.retain(|id| !(may_run_room_net && ["ort_lib", "offline"].contains(&&**id)));
@@ -347,10 +286,7 @@ mod tests {
     use crate::commands::cli::command;
 
     fn lines(words: &str) -> Vec<String> {
-        let words: Vec<OsString> = std::iter::once("darkqa-eval")
-            .chain(words.split(' '))
-            .map(OsString::from)
-            .collect();
+        let words: Vec<OsString> = std::iter::once("darkqa-eval").chain(words.split(' ')).map(OsString::from).collect();
         let parsed = layers::parse(command::command(), words, |_| None);
         let matches = parsed.map_err(|_| "not parsed").unwrap().matches;
         without_effect(&Cli::from_arg_matches(&matches).unwrap(), &matches)
@@ -358,10 +294,7 @@ mod tests {
 
     /// Command lines, each with the beginning of the one warning about it.
     const WITH_WARNING: &[(&str, &str)] = &[
-        (
-            "--model m --blind --llie f.onnx --levels L3",
-            "--levels, --llie: no effect: no model is shown an image",
-        ),
+        ("--model m --blind --llie f.onnx --levels L3", "--levels, --llie: no effect: no model is shown an image"),
         (
             "--blind-model m --max-side 9 --image jpeg:9 --detail low",
             "--image, --image max-side, --image detail: no effect: no model is shown",
@@ -374,10 +307,7 @@ mod tests {
             "--model m --levels L0 --variant ev --ratio 9 --fixed",
             "--noise ratio, --noise fixed, --variant: no effect: the only level is L0",
         ),
-        (
-            "--model m --variant ev --profile eld",
-            "--profile: no effect: no variant has noise",
-        ),
+        ("--model m --variant ev --profile eld", "--profile: no effect: no variant has noise"),
         (
             "--model m --tile whole --offline",
             "--llie-options tile, --llie-options offline: no effect: no --llie is named",
@@ -390,78 +320,33 @@ mod tests {
             "--model random --temperature 0 --rpm 9 --max-cost 1 --grace 9",
             "--temperature, --rpm, --max-cost, --stop grace: no effect: all models are built in",
         ),
-        (
-            "--model random --constrain json",
-            "--request constrain: no effect: all models are built in",
-        ),
-        (
-            "--model random --observer-controls",
-            "--observer-controls: no effect: the observer is not asked",
-        ),
-        (
-            "--model m --ask-per-image 3",
-            "--ask per-image: no effect: no --ask is named",
-        ),
-        (
-            "--model m --trust-models",
-            "--allow models-file: no effect: no file of models is named",
-        ),
-        (
-            "--model m --dry-run --timings --grace 9",
-            "--stop grace, --timings: no effect: --dry-run sends nothing",
-        ),
-        (
-            "batch run --model m --grace 9",
-            "--stop grace: no effect: a batch has no request in flight",
-        ),
-        (
-            "--model m --dry-run --no-parquet",
-            "--no-parquet: no effect: --dry-run sends nothing",
-        ),
+        ("--model random --constrain json", "--request constrain: no effect: all models are built in"),
+        ("--model random --observer-controls", "--observer-controls: no effect: the observer is not asked"),
+        ("--model m --ask-per-image 3", "--ask per-image: no effect: no --ask is named"),
+        ("--model m --trust-models", "--allow models-file: no effect: no file of models is named"),
+        ("--model m --dry-run --timings --grace 9", "--stop grace, --timings: no effect: --dry-run sends nothing"),
+        ("batch run --model m --grace 9", "--stop grace: no effect: a batch has no request in flight"),
+        ("--model m --dry-run --no-parquet", "--no-parquet: no effect: --dry-run sends nothing"),
         (
             "questions data --out q.jsonl --shard 1/2 --balance none --json",
             "--balance, --json: no effect: a part measures its frames, and the same command without --shard makes the questions",
         ),
-        (
-            "report a b --no-parquet",
-            "--no-parquet: no effect: the report is not written",
-        ),
-        (
-            "report a --out b --no-parquet",
-            "--no-parquet: no effect: the report is not written",
-        ),
-        (
-            "--model m --images-cache-size 9",
-            "--images-cache size: no effect: no --images-cache is named",
-        ),
+        ("report a b --no-parquet", "--no-parquet: no effect: the report is not written"),
+        ("report a --out b --no-parquet", "--no-parquet: no effect: the report is not written"),
+        ("--model m --images-cache-size 9", "--images-cache size: no effect: no --images-cache is named"),
         (
             "openeqa --questions q --frames f --model m --judge-temperature 1",
             "--judge-temperature: no effect: no judge is named",
         ),
-        (
-            "openeqa --questions q --frames f --model m --url /v1",
-            "--url: no effect: only --batch",
-        ),
-        (
-            "openeqa --questions q --frames f --study s --rpm 9",
-            "--rpm: no effect: --study asks no model",
-        ),
+        ("openeqa --questions q --frames f --model m --url /v1", "--url: no effect: only --batch"),
+        ("openeqa --questions q --frames f --study s --rpm 9", "--rpm: no effect: --study asks no model"),
         (
             "openeqa --questions q --frames f --model m --levels L0 --gain 1",
             "--noise gain: no effect: the only level is L0",
         ),
-        (
-            "synthesize a --out b --sheet noise --variant ev",
-            "--variant: no effect: this sheet",
-        ),
-        (
-            "--model m --motion speed=3",
-            "--motion: no effect: no variant has motion blur",
-        ),
-        (
-            "--model m --auto gain=3",
-            "--auto: no effect: no variant has automatic exposure",
-        ),
+        ("synthesize a --out b --sheet noise --variant ev", "--variant: no effect: this sheet"),
+        ("--model m --motion speed=3", "--motion: no effect: no variant has motion blur"),
+        ("--model m --auto gain=3", "--auto: no effect: no variant has automatic exposure"),
         (
             "--model m --variant motion --profile eld --gain 1",
             "--profile, --noise gain: no effect: no variant has noise",
@@ -470,30 +355,15 @@ mod tests {
             "--model m --variant auto --profile eld --gain 1 --camera nikon-d850",
             "--profile, --noise gain: no effect: automatic exposure has",
         ),
-        (
-            "export llava a --out b --levels L0 --auto gain=3",
-            "--auto: no effect: the only level is L0",
-        ),
-        (
-            "synthesize a --out b --levels L0 --tone none",
-            "--noise tone: no effect: the only level is L0",
-        ),
-        (
-            "export llava a --out b --llie-on ev",
-            "--llie-on: no effect: no --llie",
-        ),
-        (
-            "realism a --kl-bins kousha --kl-empty drop",
-            "--kl-empty: no effect: the bins of kousha",
-        ),
+        ("export llava a --out b --levels L0 --auto gain=3", "--auto: no effect: the only level is L0"),
+        ("synthesize a --out b --levels L0 --tone none", "--noise tone: no effect: the only level is L0"),
+        ("export llava a --out b --llie-on ev", "--llie-on: no effect: no --llie"),
+        ("realism a --kl-bins kousha --kl-empty drop", "--kl-empty: no effect: the bins of kousha"),
         (
             "plan --model m --out r --shard 1/2 --workers 2",
             "--shard, --shard workers: no effect: a plan is of the whole run",
         ),
-        (
-            "plan --model m --out r --dry-run",
-            "--dry-run: no effect: plan asks nothing",
-        ),
+        ("plan --model m --out r --dry-run", "--dry-run: no effect: plan asks nothing"),
     ];
 
     #[test]

@@ -34,10 +34,7 @@ fn only_keys_are_hidden_and_every_key_belongs_to_a_flag() {
     let mut root = command::command();
     root.build();
     for command in commands(&root) {
-        let wrong: Vec<&Arg> = command
-            .get_arguments()
-            .filter(|arg| arg.is_hide_set() != is_key(arg))
-            .collect();
+        let wrong: Vec<&Arg> = command.get_arguments().filter(|arg| arg.is_hide_set() != is_key(arg)).collect();
         assert!(wrong.is_empty(), "{}: {wrong:?}", command.get_name());
     }
     for command in commands(&root) {
@@ -60,22 +57,10 @@ fn only_keys_are_hidden_and_every_key_belongs_to_a_flag() {
 
 #[test]
 fn completions_offer_no_hidden_flag() {
-    for shell in [
-        Shell::Bash,
-        Shell::Zsh,
-        Shell::Fish,
-        Shell::Elvish,
-        Shell::PowerShell,
-    ] {
+    for shell in [Shell::Bash, Shell::Zsh, Shell::Fish, Shell::Elvish, Shell::PowerShell] {
         let script = completions(shell).output;
-        assert!(
-            script.contains("noise") && !script.contains("amplify "),
-            "{shell}"
-        );
-        assert!(
-            !script.contains("llie-max-side") && script.contains("openeqa"),
-            "{shell}"
-        );
+        assert!(script.contains("noise") && !script.contains("amplify "), "{shell}");
+        assert!(!script.contains("llie-max-side") && script.contains("openeqa"), "{shell}");
     }
 }
 
@@ -108,12 +93,7 @@ fn rare_flags_of_openeqa_exist() {
     let root = command::command();
     let openeqa = root.find_subcommand("openeqa").unwrap();
     for long in command::RARE_OPENEQA_FLAGS {
-        assert!(
-            openeqa
-                .get_arguments()
-                .any(|arg| arg.get_long() == Some(long)),
-            "--{long}"
-        );
+        assert!(openeqa.get_arguments().any(|arg| arg.get_long() == Some(long)), "--{long}");
     }
 }
 
@@ -121,10 +101,8 @@ fn rare_flags_of_openeqa_exist() {
 fn short_help_names_flags_that_exist() {
     let root = command::command();
     let help = help("darkqa-eval -h");
-    let flags: BTreeSet<&str> = help
-        .split(|c: char| c != '-' && !c.is_ascii_alphanumeric())
-        .filter(|word| word.starts_with('-'))
-        .collect();
+    let flags: BTreeSet<&str> =
+        help.split(|c: char| c != '-' && !c.is_ascii_alphanumeric()).filter(|word| word.starts_with('-')).collect();
     assert!(flags.len() > 20, "{flags:?}");
     for flag in flags {
         let exists = root.get_arguments().any(|arg| {
@@ -150,9 +128,7 @@ fn short_help_names_flags_that_exist() {
 #[test]
 fn short_help_names_every_command() {
     let help = help("darkqa-eval -h");
-    let words: BTreeSet<&str> = help
-        .split(|c: char| c != '-' && !c.is_ascii_alphanumeric())
-        .collect();
+    let words: BTreeSet<&str> = help.split(|c: char| c != '-' && !c.is_ascii_alphanumeric()).collect();
     let root = command::command();
     for command in root.get_subcommands().filter(|inner| !inner.is_hide_set()) {
         assert!(words.contains(command.get_name()), "{command}");
@@ -179,18 +155,12 @@ fn commands_on_evaluations_do_not_repeat_its_flags() {
     ] {
         let short = help(&format!("darkqa-eval {command} -h"));
         let long = help(&format!("darkqa-eval {command} --help"));
-        assert!(
-            short.contains("takes the flags of an evaluation"),
-            "{short}"
-        );
+        assert!(short.contains("takes the flags of an evaluation"), "{short}");
         assert!(!short.contains("--top-p") && long.contains("--top-p"));
         assert!(short.contains(own), "{own}: {short}");
     }
     let other = help("darkqa-eval batch status -h");
-    assert!(
-        !other.contains("takes the flags of an evaluation"),
-        "{other}"
-    );
+    assert!(!other.contains("takes the flags of an evaluation"), "{other}");
 }
 
 /// The command line as a structure, in text form, and the flags that were typed.
@@ -209,10 +179,7 @@ fn a_short_form_sets_the_same_as_its_long_flag() {
         parsed("d -m random -d set.tsv -e lift -n -q -o out"),
         parsed("d --model random --data set.tsv --llie lift --dry-run --quiet --out out")
     );
-    assert_eq!(
-        parsed("d -q enhance m.onnx --describe"),
-        parsed("d --quiet enhance describe m.onnx")
-    );
+    assert_eq!(parsed("d -q enhance m.onnx --describe"), parsed("d --quiet enhance describe m.onnx"));
 }
 
 /// All flags of all commands as Markdown.
@@ -230,21 +197,10 @@ fn reference() -> String {
 }
 
 /// Appends a command and those in it. `described` maps each row of the tables so far to the command above it.
-fn section(
-    text: &mut String,
-    described: &mut BTreeMap<String, String>,
-    command: &Clap,
-    name: &str,
-) {
-    let about = command
-        .get_about()
-        .map(ToString::to_string)
-        .unwrap_or_default();
+fn section(text: &mut String, described: &mut BTreeMap<String, String>, command: &Clap, name: &str) {
+    let about = command.get_about().map(ToString::to_string).unwrap_or_default();
     let _ = write!(text, "\n## {name}\n\n{about}\n");
-    let mut args: Vec<&Arg> = command
-        .get_arguments()
-        .filter(|arg| !is_added_by_clap(arg))
-        .collect();
+    let mut args: Vec<&Arg> = command.get_arguments().filter(|arg| !is_added_by_clap(arg)).collect();
     args.sort_by_key(|arg| order(command, arg));
     if !is_only_a_group(command) {
         let mut rows = String::new();
@@ -263,26 +219,15 @@ fn section(
             }
         }
         if !rows.is_empty() {
-            let _ = write!(
-                text,
-                "\n| flag | default | decides | |\n|---|---|---|---|\n{rows}"
-            );
+            let _ = write!(text, "\n| flag | default | decides | |\n|---|---|---|---|\n{rows}");
         }
         for (first, flags) in elsewhere {
             let anchor = first.replace(' ', "-");
             let _ = write!(text, "\nAs in [{first}](#{anchor}): {}\n", flags.join(", "));
         }
     }
-    for inner in command
-        .get_subcommands()
-        .filter(|inner| inner.get_name() != "help" && !inner.is_hide_set())
-    {
-        section(
-            text,
-            described,
-            inner,
-            &format!("{name} {}", inner.get_name()),
-        );
+    for inner in command.get_subcommands().filter(|inner| inner.get_name() != "help" && !inner.is_hide_set()) {
+        section(text, described, inner, &format!("{name} {}", inner.get_name()));
     }
 }
 
@@ -293,9 +238,7 @@ fn is_key(arg: &Arg) -> bool {
 
 /// Returns true if a command only contains other commands.
 fn is_only_a_group(command: &Clap) -> bool {
-    let has_own_flags = command
-        .get_arguments()
-        .any(|arg| !arg.is_global_set() && !is_added_by_clap(arg));
+    let has_own_flags = command.get_arguments().any(|arg| !arg.is_global_set() && !is_added_by_clap(arg));
     command.has_subcommands() && !has_own_flags
 }
 
@@ -332,11 +275,7 @@ fn typed_name(arg: &Arg) -> String {
 fn row(arg: &Arg) -> String {
     let id = arg.get_id().as_str().replace('_', "-");
     let values = arg.get_value_names().unwrap_or_default();
-    let values = if arg.get_action().takes_values() {
-        values.join(" ")
-    } else {
-        String::new()
-    };
+    let values = if arg.get_action().takes_values() { values.join(" ") } else { String::new() };
     let key_flag = typed_key(arg);
     let flag = match arg.get_long() {
         _ if key_flag.is_some() => key_flag.clone().unwrap_or_default(),
@@ -359,11 +298,7 @@ fn row(arg: &Arg) -> String {
         Some((what, default)) => (what.to_owned(), default.to_owned()),
         None => (help, String::new()),
     };
-    let defaults: Vec<String> = arg
-        .get_default_values()
-        .iter()
-        .map(|value| value.to_string_lossy().into())
-        .collect();
+    let defaults: Vec<String> = arg.get_default_values().iter().map(|value| value.to_string_lossy().into()).collect();
     let default = match &defaults[..] {
         _ if !arg.get_action().takes_values() => "off".to_owned(),
         [] if arg.is_required_set() || what.contains("(required") => "required".to_owned(),
@@ -374,10 +309,7 @@ fn row(arg: &Arg) -> String {
         Some(_) => Vec::new(),
         None => arg.get_possible_values(),
     };
-    let words: Vec<String> = possible
-        .iter()
-        .map(|value| format!("`{}`", value.get_name()))
-        .collect();
+    let words: Vec<String> = possible.iter().map(|value| format!("`{}`", value.get_name())).collect();
     let words = if words.is_empty() || !arg.get_action().takes_values() {
         String::new()
     } else {
@@ -405,20 +337,13 @@ fn the_flag_reference_is_up_to_date() {
         fs::write(&path, &reference).unwrap();
     }
     let written = fs::read_to_string(&path).unwrap_or_default();
-    assert!(
-        written == reference,
-        "src/docs/flags.md is out of date: UPDATE=1 cargo test --lib cli:: writes it"
-    );
+    assert!(written == reference, "src/docs/flags.md is out of date: UPDATE=1 cargo test --lib cli:: writes it");
 }
 
 /// All commands, the program itself first.
 fn commands(command: &Clap) -> Vec<&Clap> {
-    let inner = command
-        .get_subcommands()
-        .filter(|inner| inner.get_name() != "help");
-    std::iter::once(command)
-        .chain(inner.flat_map(commands))
-        .collect()
+    let inner = command.get_subcommands().filter(|inner| inner.get_name() != "help");
+    std::iter::once(command).chain(inner.flat_map(commands)).collect()
 }
 
 /// Returns true for the flags that clap adds to commands.
@@ -474,9 +399,7 @@ fn the_manual_has_the_text_of_the_help() {
     let mut wrong = Vec::new();
     for command in commands(&root) {
         let mut page = Vec::new();
-        clap_mangen::Man::new(command.clone())
-            .render(&mut page)
-            .unwrap();
+        clap_mangen::Man::new(command.clone()).render(&mut page).unwrap();
         let page = words_of(&String::from_utf8(page).unwrap());
         let shown = words_of(&command.clone().term_width(0).render_long_help().to_string());
         for arg in command.get_arguments() {
@@ -489,11 +412,7 @@ fn the_manual_has_the_text_of_the_help() {
             let is_in_page = !arg.is_hide_short_help_set();
             for (text, place, expected) in [(&page, "manual", is_in_page), (&shown, "help", true)] {
                 if expected && !text.contains(&help) {
-                    wrong.push(format!(
-                        "{} {}: not in the {place}",
-                        command.get_name(),
-                        arg.get_id()
-                    ));
+                    wrong.push(format!("{} {}: not in the {place}", command.get_name(), arg.get_id()));
                 }
             }
         }

@@ -1,4 +1,5 @@
-//! `enhance doctor`: runs a model on dark frames with each convention, and writes a page, a picture and a proposed sidecar.
+//! `enhance doctor`: runs a model on dark frames with each convention, and writes a page, a picture and a proposed
+//! sidecar.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -34,7 +35,8 @@ pub(super) struct DoctorFileArgs {
 /// Examines the model on dark frames, and writes the page and the picture, with `--write` also the proposed sidecar.
 ///
 /// # Errors
-/// If the model accepts none of the sizes of the probe, a file cannot be written, or `--write` is set and a sidecar exists.
+/// If the model accepts none of the sizes of the probe, a file cannot be written, or `--write` is set and a sidecar
+/// exists.
 pub(super) fn doctor(
     args: &DoctorFileArgs,
     image: ImageOutput,
@@ -49,11 +51,7 @@ pub(super) fn doctor(
         Settled::No => None,
     };
     let model = enhancer.path();
-    let lines: Vec<String> = examination
-        .proposal
-        .iter()
-        .map(|line| format!("`{}`", line.line))
-        .collect();
+    let lines: Vec<String> = examination.proposal.iter().map(|line| format!("`{}`", line.line)).collect();
     let mut sidecar = String::new();
     for line in &examination.proposal {
         let _ = writeln!(sidecar, "{} # {}", line.line, line.reason);
@@ -70,8 +68,7 @@ pub(super) fn doctor(
         let _ = writeln!(output, "\nProposed for {}:\n{sidecar}", path.display());
         if args.write {
             if !model.is_file() {
-                let problem =
-                    "a built-in enhancer is not a file, so no settings can be written next to it";
+                let problem = "a built-in enhancer is not a file, so no settings can be written next to it";
                 return Err(Error::usage("--write", problem));
             }
             if path.exists() {
@@ -91,11 +88,7 @@ pub(super) fn doctor(
     }
     if lines.is_empty() && args.write {
         let path = enhancer.sidecar_path();
-        let _ = writeln!(
-            output,
-            "not written, because no line is proposed: {}",
-            path.display()
-        );
+        let _ = writeln!(output, "not written, because no line is proposed: {}", path.display());
     }
     let _ = writeln!(output, "page: {}", out.join(PAGE).display());
     let _ = writeln!(output, "picture: {}", out.join(PICTURE).display());
@@ -108,8 +101,8 @@ pub(super) fn doctor(
     ))
 }
 
-/// A sentence about burnt-out images of the sample as given and at L1, which are brighter than the frames of the examination; `None` if no
-/// image is burnt out.
+/// A sentence about burnt-out images of the sample as given and at L1, which are brighter than the frames of the
+/// examination; `None` if no image is burnt out.
 fn burnt_out_text(enhancer: &mut Enhancer, sample: &[Rgb]) -> Option<String> {
     let mut parts = Vec::new();
     for (words, drop) in [("as they are", None), ("at L1", Some(Severity::L1))] {
@@ -126,10 +119,7 @@ fn burnt_out_text(enhancer: &mut Enhancer, sample: &[Rgb]) -> Option<String> {
         if !shares.is_empty() {
             let mean = shares.iter().sum::<f64>() / shares.len() as f64;
             let (burnt, all) = (shares.len(), sample.len());
-            parts.push(format!(
-                "{burnt} of {all} {words} ({:.0} % of the pixels)",
-                100.0 * mean
-            ));
+            parts.push(format!("{burnt} of {all} {words} ({:.0} % of the pixels)", 100.0 * mean));
         }
     }
     (!parts.is_empty()).then(|| {
@@ -140,12 +130,7 @@ fn burnt_out_text(enhancer: &mut Enhancer, sample: &[Rgb]) -> Option<String> {
     })
 }
 
-fn html(
-    model: &Path,
-    enhancer: &Enhancer,
-    examination: &Examination,
-    sidecar: &str,
-) -> Result<String> {
+fn html(model: &Path, enhancer: &Enhancer, examination: &Examination, sidecar: &str) -> Result<String> {
     let columns = examination.columns.iter().map(|column| {
         let cells = column.images.iter().map(|image| {
             let facts = image.facts;
@@ -187,10 +172,8 @@ fn data_url(image: &Rgb) -> Result<String> {
 }
 
 fn picture(examination: &Examination) -> Rgb {
-    let mut columns = vec![ContactColumn {
-        label: "dark frame".to_owned(),
-        images: examination.frames.iter().collect(),
-    }];
+    let mut columns =
+        vec![ContactColumn { label: "dark frame".to_owned(), images: examination.frames.iter().collect() }];
     columns.extend(examination.columns.iter().map(|column| ContactColumn {
         label: column.title.clone(),
         images: column.images.iter().map(|image| &image.image).collect(),

@@ -21,9 +21,7 @@ use crate::runs::Outcome;
 use crate::runs::shard_args::{ShardArgs, keep_shard};
 use crate::types::manifests::Status;
 use crate::types::{Decides, Digest, EnhancerName, FrameId, InputNote, Rgb};
-use darkqa_enhance::{
-    Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, burnt_out, list_of_presets,
-};
+use darkqa_enhance::{Enhancer, FRAMES, ImageOutput, ModelFile, SizeArgs, burnt_out, list_of_presets};
 use doctor::DoctorFileArgs;
 
 /// Maximum number of outputs tried as the image. Chosen: models that output each of their steps have fewer.
@@ -48,19 +46,20 @@ enum EnhanceForm {
     Describe(DescribeArgs),
     /// Run the model on dark versions of images with each convention that could be meant, and propose a sidecar
     ///
-    /// Writes doctor.html and doctor.png into the folder of --out, with the sidecar that would repair it. Ends with 0 if there is one
-    /// plausible convention and the model takes the sizes of the images, else with 1.
+    /// Writes doctor.html and doctor.png into the folder of --out, with the sidecar that would repair it. Ends with 0
+    /// if there is one plausible convention and the model takes the sizes of the images, else with 1.
     Doctor(DoctorArgs),
-    /// Print the presets of published enhancers, each with repository, licence, conventions and the command that exports it
+    /// Print the presets of published enhancers, each with repository, licence, conventions and the command that
+    /// exports it
     Presets,
 }
 
 /// The enhancer, and how it is run.
 #[derive(Debug, Args)]
 struct ModelArgs {
-    /// The enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++, ruas-lol,
-    /// ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir, cidnet, llformer,
-    /// restormer, mirnet, kind, agllnet, zero-dce-tf)
+    /// The enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++,
+    /// ruas-lol, ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir,
+    /// cidnet, llformer, restormer, mirnet, kind, agllnet, zero-dce-tf)
     #[arg(value_name = "MODEL", add = Decides::Trials)]
     model: PathBuf,
     /// The flags for running enhancers.
@@ -156,10 +155,7 @@ pub(crate) fn enhance(command: &EnhanceCommand, progress: &Progress) -> Result<O
         (Some(EnhanceForm::Doctor(args)), _) => examine(args, progress),
         (Some(EnhanceForm::Presets), _) => Ok(Outcome::text(Status::Complete, list_of_presets()?)),
         (None, Some(args)) => enhance_images(args, progress),
-        (None, None) => Err(Error::usage(
-            "MODEL",
-            "missing; try `darkqa-eval enhance lift IMAGES… --out DIR`",
-        )),
+        (None, None) => Err(Error::usage("MODEL", "missing; try `darkqa-eval enhance lift IMAGES… --out DIR`")),
     }
 }
 
@@ -173,9 +169,7 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
     }
     let dark = dark_or_darkened(&sample);
     let (model, n) = (args.enhancer.model.display(), dark.len());
-    progress.print_on_terminal(&format!(
-        "{model}: enhancing {n} dark images with each value range and colour order"
-    ));
+    progress.print_on_terminal(&format!("{model}: enhancing {n} dark images with each value range and colour order"));
     doctor::doctor(&args.files, image, &mut enhancer, &dark, &sample)
 }
 
@@ -202,10 +196,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     if !sample.is_empty() {
         enhancer.probe(&dark_or_darkened(&sample), loading.probe.implausible())?;
     }
-    let (bar, tally) = (
-        progress.bar("images", images.entries.len()),
-        InputTally::default(),
-    );
+    let (bar, tally) = (progress.bar("images", images.entries.len()), InputTally::default());
     let settings = pixel_settings(&digest, &loading.size);
     let overruled_problem = enhancer.overruled_problem();
     let mut counts = ImageCounts::default();
@@ -216,13 +207,12 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
         let outcome = picture.and_then(|picture| {
             tally.add(&entry.id, &picture.note());
             let origin = EnhancedOrigin::new(&entry.id, &picture, &settings);
-            let place = OutputImage::new(out, &entry.stem, args.force)
-                .with_overruled_problem(overruled_problem.clone());
+            let place =
+                OutputImage::new(out, &entry.stem, args.force).with_overruled_problem(overruled_problem.clone());
             place.write_unless_present(&origin, || {
                 let degraded = picture.decode()?;
-                let enhanced = enhancer
-                    .enhance(&degraded)
-                    .map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))?;
+                let enhanced =
+                    enhancer.enhance(&degraded).map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))?;
                 burnt.extend(burnt_out([&degraded, &enhanced]).map(|share| (&entry.id, share)));
                 Ok(enhanced)
             })
@@ -245,11 +235,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     refusals.log();
     warn_of_burnt_out(&burnt, counts.written, enhancer.name());
     let used = enhancer.usage().note();
-    let sizes = if used.size_counts.whole < used.size_counts.images {
-        used.sizes + "\n"
-    } else {
-        String::new()
-    };
+    let sizes = if used.size_counts.whole < used.size_counts.images { used.sizes + "\n" } else { String::new() };
     Ok(Outcome::wrote(
         out,
         Outcome::complete_if(counts.failed == 0),
@@ -258,11 +244,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
             out.display(),
             counts.written,
             enhancer.name(),
-            if overruled_problem.is_some() && counts.written > 0 {
-                " because of --allow bad-enhancer"
-            } else {
-                ""
-            },
+            if overruled_problem.is_some() && counts.written > 0 { " because of --allow bad-enhancer" } else { "" },
             counts.not_written_text()
         ),
     ))
@@ -277,11 +259,7 @@ fn warn_of_burnt_out(burnt: &[(&FrameId, f64)], made: usize, enhancer: &Enhancer
     tracing::warn!(
         "{enhancer}: {} of {} burnt out, with codes of 254 or 255 where the dark ones have detail: {:.0} % of the pixels (for example {})",
         burnt.len(),
-        if made == 1 {
-            "1 image is".to_owned()
-        } else {
-            format!("{made} images are")
-        },
+        if made == 1 { "1 image is".to_owned() } else { format!("{made} images are") },
         100.0 * mean,
         example.0
     );
@@ -328,7 +306,8 @@ impl EnhancedOrigin {
     }
 }
 
-/// Opens an enhancer, and returns whether it is known which of its outputs is the image. If unknown, the first usable output is opened.
+/// Opens an enhancer, and returns whether it is known which of its outputs is the image. If unknown, the first usable
+/// output is opened.
 fn open_for_examination(args: &ModelArgs) -> Result<(Enhancer, ImageOutput)> {
     let problem = match args.open(args.file()?) {
         Ok(enhancer) => return Ok((enhancer, ImageOutput::Known)),

@@ -31,8 +31,8 @@ pub(super) enum Repeats {
     Untouched(NonZeroU32),
 }
 
-/// Default number of times for untouched images if true answers are unknown. With two replies, the report can separate the effect of light
-/// from the variation of a model's replies.
+/// Default number of times for untouched images if true answers are unknown. With two replies, the report can separate
+/// the effect of light from the variation of a model's replies.
 const UNTOUCHED_REPEATS: NonZeroU32 = NonZeroU32::MIN.saturating_add(1);
 
 impl Repeats {
@@ -54,7 +54,8 @@ impl Repeats {
 }
 
 impl ChoiceOrder {
-    /// Number of times that each order is asked: `--repeats`, or a default that depends on whether true answers are known.
+    /// Number of times that each order is asked: `--repeats`, or a default that depends on whether true answers are
+    /// known.
     pub(super) fn repeats(self, truths: Truths) -> Repeats {
         match (self.repeats, truths) {
             (Some(times), _) => Repeats::Everywhere(times),
@@ -77,8 +78,8 @@ pub(super) struct ShownQuestion {
 
 /// All showings of a question: each rotation of the first order, repeated up to [`Repeats::max`].
 ///
-/// A record stores the choices in the order shown, so that parsed choices need no mapping. Different orders have different keys, because
-/// the key depends on the choices.
+/// A record stores the choices in the order shown, so that parsed choices need no mapping. Different orders have
+/// different keys, because the key depends on the choices.
 pub(super) fn shown_questions(
     question: &Question,
     choice_order: ChoiceOrder,
@@ -91,34 +92,20 @@ pub(super) fn shown_questions(
         // Sorting by a digest of each choice gives a random order that does not depend on other questions.
         order.sort_by_cached_key(|&index| {
             let text = choices.texts()[index].as_bytes();
-            let parts = [
-                b"shuffle",
-                &seed.to_le_bytes()[..],
-                question.id.0.as_bytes(),
-                text,
-            ];
+            let parts = [b"shuffle", &seed.to_le_bytes()[..], question.id.0.as_bytes(), text];
             *Digest::from_parts(parts).as_bytes()
         });
     }
-    let rotations = if choice_order.circular {
-        choices.len()
-    } else {
-        1
-    };
+    let rotations = if choice_order.circular { choices.len() } else { 1 };
     let mut shown = Vec::new();
     for repeat in 0..repeats.max().get() {
         for rotation in 0..rotations {
             let mut order = order.clone();
             order.rotate_left(rotation);
             let texts = order.iter().map(|&index| choices.texts()[index].clone());
-            let truth = order
-                .iter()
-                .position(|&index| Some(index) == choices.truth());
+            let truth = order.iter().position(|&index| Some(index) == choices.truth());
             shown.push(ShownQuestion {
-                question: Question {
-                    choices: Choices::with_truth(texts.collect(), truth)?,
-                    ..question.clone()
-                },
+                question: Question { choices: Choices::with_truth(texts.collect(), truth)?, ..question.clone() },
                 repeat,
                 turn: shown.len() as u32,
             });
@@ -148,11 +135,7 @@ mod tests {
     }
 
     fn shown(id: usize, shuffled: bool, circular: bool, repeats: u32) -> Vec<(String, u32)> {
-        let choice_order = ChoiceOrder {
-            shuffle_options: shuffled,
-            circular,
-            repeats: NonZeroU32::new(repeats),
-        };
+        let choice_order = ChoiceOrder { shuffle_options: shuffled, circular, repeats: NonZeroU32::new(repeats) };
         let repeats = choice_order.repeats(Truths::Known);
         shown_questions(&question(id), choice_order, repeats, 7)
             .unwrap()
@@ -186,34 +169,17 @@ mod tests {
     }
 
     fn times(repeats: Option<u32>, truths: Truths, condition: Option<&str>) -> u32 {
-        let order = ChoiceOrder {
-            shuffle_options: false,
-            circular: false,
-            repeats: repeats.and_then(NonZeroU32::new),
-        };
+        let order = ChoiceOrder { shuffle_options: false, circular: false, repeats: repeats.and_then(NonZeroU32::new) };
         let condition = condition.map(|name| name.parse::<Condition>().unwrap());
         order.repeats(truths).times(condition.as_ref())
     }
 
     #[test]
     fn only_untouched_images_are_asked_twice_without_truths() {
-        for (condition, expected) in [
-            (Some("L0"), 2),
-            (Some("L3-noise"), 1),
-            (Some("L0+lift"), 1),
-            (None, 1),
-        ] {
-            assert_eq!(
-                times(None, Truths::Unknown, condition),
-                expected,
-                "{condition:?}"
-            );
+        for (condition, expected) in [(Some("L0"), 2), (Some("L3-noise"), 1), (Some("L0+lift"), 1), (None, 1)] {
+            assert_eq!(times(None, Truths::Unknown, condition), expected, "{condition:?}");
             assert_eq!(times(None, Truths::Known, condition), 1, "{condition:?}");
-            assert_eq!(
-                times(Some(3), Truths::Unknown, condition),
-                3,
-                "{condition:?}"
-            );
+            assert_eq!(times(Some(3), Truths::Unknown, condition), 3, "{condition:?}");
         }
     }
 
@@ -227,9 +193,6 @@ mod tests {
         }
         assert_eq!(counts.len(), 6);
         // The expected count is 1000; the bounds are four standard deviations.
-        assert!(
-            counts.values().all(|n| (885..=1115).contains(n)),
-            "{counts:?}"
-        );
+        assert!(counts.values().all(|n| (885..=1115).contains(n)), "{counts:?}");
     }
 }

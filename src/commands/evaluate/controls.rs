@@ -20,8 +20,8 @@ pub(super) struct AddedControls {
 }
 
 impl AddedControls {
-    /// The controls to add: none without the observer, else at least the default control. This is other-room or, if all frames are of one
-    /// scene, the image with its tiles in another order.
+    /// The controls to add: none without the observer, else at least the default control. This is other-room or, if all
+    /// frames are of one scene, the image with its tiles in another order.
     ///
     /// # Errors
     /// If a flag names other-room, and all frames are of one scene.
@@ -35,11 +35,7 @@ impl AddedControls {
         if !ask.shows_images_to(&ModelName::Observer(None)) {
             return Ok(Self::default());
         }
-        let default = if has_other_scene {
-            Control::OtherRoom
-        } else {
-            Control::Tiles
-        };
+        let default = if has_other_scene { Control::OtherRoom } else { Control::Tiles };
         let names: Vec<ModelName> = Control::ALL
             .into_iter()
             .filter(|control| {

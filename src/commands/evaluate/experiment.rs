@@ -69,32 +69,21 @@ impl Experiment for ChoiceSetup<'_> {
 
     fn questions(&self) -> Vec<RunQuestion> {
         // In a shard, other-room is also asked questions about frames of other shards, with images of this one.
-        let ids: HashSet<&QuestionId> =
-            self.questions.iter().map(|question| &question.id).collect();
-        let others = self
-            .with_other_rooms
-            .iter()
-            .filter(|question| !ids.contains(&question.id));
+        let ids: HashSet<&QuestionId> = self.questions.iter().map(|question| &question.id).collect();
+        let others = self.with_other_rooms.iter().filter(|question| !ids.contains(&question.id));
         self.questions
             .iter()
             .chain(others)
             .map(|question| RunQuestion {
                 image: self.digests.get(&question.frame).copied(),
                 images: self.dataset.image_series(&question.frame).to_vec(),
-                ..RunQuestion::new(
-                    question,
-                    self.file_places[&question.id],
-                    &self.dataset.scene(&question.frame),
-                )
+                ..RunQuestion::new(question, self.file_places[&question.id], &self.dataset.scene(&question.frame))
             })
             .collect()
     }
 
     fn power(&self) -> Option<PowerForecast> {
-        let models = self
-            .models
-            .iter()
-            .filter(|model| model.view == View::Image && !is_reference(&model.name));
+        let models = self.models.iter().filter(|model| model.view == View::Image && !is_reference(&model.name));
         let asked = run_contents(&self.conditions, models.count());
         power_forecast(&self.dataset, &self.questions, &self.digests, asked)
     }
@@ -102,20 +91,16 @@ impl Experiment for ChoiceSetup<'_> {
     fn identity(&self) -> Identity {
         let order = self.config.order;
         let rules = Rules::built_in().map(|rules| rules.digest());
-        let rules =
-            Some(self.config.rules.digest()).filter(|own| rules.is_ok_and(|rules| rules != *own));
+        let rules = Some(self.config.rules.digest()).filter(|own| rules.is_ok_and(|rules| rules != *own));
         let fields = [
             Some(("--data", json!(self.dataset.name()))),
             Some(("--prompts", json!(self.config.prompts.digest()))),
-            order
-                .shuffle_options
-                .then_some(("--shuffle-options", true.into())),
+            order.shuffle_options.then_some(("--shuffle-options", true.into())),
             order.circular.then_some(("--circular", true.into())),
             rules.map(|rules| ("--rules", json!(rules))),
             self.bank.map(|bank| (ASK, json!(bank))),
             // Left out if unset, so that runs older than the flag can be continued.
-            (self.config.image_place == ImagePlace::BeforeWords)
-                .then_some(("--image-first", true.into())),
+            (self.config.image_place == ImagePlace::BeforeWords).then_some(("--image-first", true.into())),
         ];
         fields
             .into_iter()
@@ -126,11 +111,7 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn notes(&self) -> Vec<(&'static str, Value)> {
-        let bank = self
-            .config
-            .bank
-            .as_ref()
-            .map(|bank| ("questions without answers", json!(bank.description())));
+        let bank = self.config.bank.as_ref().map(|bank| ("questions without answers", json!(bank.description())));
         let reading = match self.dataset.summary() {
             [] => None,
             lines => Some(("reading of the data", json!(lines))),
@@ -141,30 +122,18 @@ impl Experiment for ChoiceSetup<'_> {
             let note = json!({"mean": mean, "frames": frames});
             ("brightness", note)
         });
-        [bank, reading, light, brightness]
-            .into_iter()
-            .flatten()
-            .collect()
+        [bank, reading, light, brightness].into_iter().flatten().collect()
     }
 
     fn columns(&self) -> Columns {
         identity::columns(&self.models, &self.recipe, &self.config.job)
     }
 
-    fn plan(
-        &self,
-        _: usize,
-        _: impl FnOnce() -> Result<Vec<Record>>,
-    ) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+    fn plan(&self, _: usize, _: impl FnOnce() -> Result<Vec<Record>>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
         plan_trials(self)
     }
 
-    fn report(
-        &self,
-        store: &Store<ChoiceDetail>,
-        run: StoredRun<ChoiceDetail>,
-        show: StdoutFormat,
-    ) -> Result<Outcome> {
+    fn report(&self, store: &Store<ChoiceDetail>, run: StoredRun<ChoiceDetail>, show: StdoutFormat) -> Result<Outcome> {
         joined::choice::write(store, run, show)
     }
 }

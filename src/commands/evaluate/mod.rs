@@ -47,11 +47,7 @@ fn estimate(args: EvaluateArgs, progress: &Progress) -> Result<String> {
 ///
 /// # Errors
 /// If a model is built in, an image is too large for the endpoint, or a file cannot be written.
-pub(crate) fn export_batch(
-    args: EvaluateArgs,
-    files: &BatchFileArgs,
-    progress: &Progress,
-) -> Result<Outcome> {
+pub(crate) fn export_batch(args: EvaluateArgs, files: &BatchFileArgs, progress: &Progress) -> Result<Outcome> {
     let config = args.resolve()?;
     let (setup, models) = ChoiceSetup::open(&config, progress)?;
     setup.print_column_mapping(progress);

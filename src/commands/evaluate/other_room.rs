@@ -7,18 +7,17 @@ use crate::types::{FrameId, Question};
 
 /// For each frame, the frame whose image is shown instead.
 ///
-/// It is the next frame of another scene in the order of the run; after the last frame, the order starts again at the first. All frames of
-/// the run are considered, so that shards and resumed runs choose the same.
+/// It is the next frame of another scene in the order of the run; after the last frame, the order starts again at the
+/// first. All frames of the run are considered, so that shards and resumed runs choose the same.
 #[derive(Debug, Default)]
 pub(super) struct OtherRooms(BTreeMap<FrameId, FrameId>);
 
 impl OtherRooms {
-    /// Chooses the other frames; `None` if all frames are of one scene. A frame without a scene (empty) counts as a scene of its own.
+    /// Chooses the other frames; `None` if all frames are of one scene. A frame without a scene (empty) counts as a
+    /// scene of its own.
     pub(super) fn new(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
-        let frames: Vec<&FrameId> = first_question_per_frame(questions)
-            .into_iter()
-            .map(|question| &question.frame)
-            .collect();
+        let frames: Vec<&FrameId> =
+            first_question_per_frame(questions).into_iter().map(|question| &question.frame).collect();
         let scenes: Vec<String> = frames
             .iter()
             .map(|frame| match scene(frame) {
@@ -32,8 +31,8 @@ impl OtherRooms {
         let count = frames.len();
         let mut others = BTreeMap::new();
         let mut next = 0;
-        // Going backwards, `next` is the nearest later frame of another scene. For the last scene this is one of the first frames, which is
-        // known only after one pass over all frames, so the loop makes two.
+        // Going backwards, `next` is the nearest later frame of another scene. For the last scene this is one of the
+        // first frames, which is known only after one pass over all frames, so the loop makes two.
         for place in (0..2 * count).rev().map(|place| place % count) {
             let after = (place + 1) % count;
             if scenes[after] != scenes[place] {
@@ -70,21 +69,8 @@ mod tests {
             })
             .collect();
         // Lower and upper case are frames of one scene; digits have none.
-        let others = OtherRooms::new(&questions, |frame| {
-            frame.0.to_lowercase().replace(char::is_numeric, "")
-        })?;
-        frames
-            .chars()
-            .map(|frame| {
-                Some(
-                    others
-                        .shown_for(&FrameId(frame.to_string()))
-                        .unwrap()
-                        .0
-                        .clone(),
-                )
-            })
-            .collect()
+        let others = OtherRooms::new(&questions, |frame| frame.0.to_lowercase().replace(char::is_numeric, ""))?;
+        frames.chars().map(|frame| Some(others.shown_for(&FrameId(frame.to_string())).unwrap().0.clone())).collect()
     }
 
     #[test]

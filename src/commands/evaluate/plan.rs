@@ -11,9 +11,7 @@ use crate::engine::images::trials::{Item, Prompt, SourcePlan, Stimulus, Trial, T
 use crate::engine::key_facts::KeyFacts;
 use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::error::Result;
-use crate::types::{
-    ChoiceDetail, Condition, Digest, FrameId, Question, Record, TrialOutcome, View,
-};
+use crate::types::{ChoiceDetail, Condition, Digest, FrameId, Question, Record, TrialOutcome, View};
 
 /// A question with its choices in one order.
 #[derive(Debug, Clone)]
@@ -105,10 +103,7 @@ pub(super) fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<Choi
         .into_iter()
         .enumerate()
         .map(|(source, questions)| {
-            let shown = setup
-                .conditions
-                .iter()
-                .filter(|condition| setup.sources[source].can_show(condition));
+            let shown = setup.conditions.iter().filter(|condition| setup.sources[source].can_show(condition));
             let groups = std::iter::once(None)
                 .chain(shown.map(Some))
                 .filter_map(|condition| group(setup, source, condition, &questions).transpose())
@@ -118,7 +113,8 @@ pub(super) fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<Choi
         .collect()
 }
 
-/// A question in each order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of the question.
+/// A question in each order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of
+/// the question.
 fn prompts(
     setup: &ChoiceSetup<'_>,
     question: &Question,
@@ -166,30 +162,23 @@ fn group(
     if models.is_empty() {
         return Ok(None);
     }
-    let image = condition
-        .map(|condition| {
-            setup
-                .recipe
-                .stimulus_digest(&setup.sources[source], condition)
-        })
-        .transpose()?;
+    let image =
+        condition.map(|condition| setup.recipe.stimulus_digest(&setup.sources[source], condition)).transpose()?;
     let own = questions.own.iter().map(|shown| (shown, false));
     let others = questions.others.iter().map(|shown| (shown, true));
     let count = questions.own.len() + questions.others.len();
     let mut trials = Vec::with_capacity(count * models.len());
     let times = setup.config.repeats.times(condition);
-    for (shown, is_of_other) in own
-        .chain(others)
-        .filter(|(shown, _)| shown.item.repeat < times)
-    {
+    for (shown, is_of_other) in own.chain(others).filter(|(shown, _)| shown.item.repeat < times) {
         let prompt = match view {
             View::Image => &shown.image,
             View::Blind => &shown.blind,
         };
         let place = setup.question_places[&shown.item.question.id];
-        for &(index, model) in models.iter().filter(|(_, model)| {
-            model.is_asked(place) && (view == View::Image && is_other_room(model)) == is_of_other
-        }) {
+        for &(index, model) in models
+            .iter()
+            .filter(|(_, model)| model.is_asked(place) && (view == View::Image && is_other_room(model)) == is_of_other)
+        {
             trials.push(Trial {
                 key: key_facts(shown, prompt, model, condition, image).key()?,
                 model: index,
@@ -198,10 +187,7 @@ fn group(
             });
         }
     }
-    Ok(Some(TrialGroup {
-        condition: condition.cloned(),
-        trials,
-    }))
+    Ok(Some(TrialGroup { condition: condition.cloned(), trials }))
 }
 
 fn key_facts<'a>(

@@ -13,7 +13,8 @@ use crate::types::manifests::Identity;
 use crate::types::{AxisLevel, Family, SetLight};
 use darkqa_questions::rules::Rules;
 
-/// The settings of data, questions and light. Models, enhancers and request settings are not included, so that they may be added later.
+/// The settings of data, questions and light. Models, enhancers and request settings are not included, so that they may
+/// be added later.
 pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Identity> {
     let (selection, rule) = (&config.selection, config.rule);
     let data = match &config.place {
@@ -32,8 +33,7 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
         is_own.then(|| ("--rules", json!(rules))),
         selection.limit.map(|limit| ("--limit", json!(limit))),
         (!families.is_empty()).then(|| ("--families", json!(families))),
-        bank.map(|bank| bank.digest().map(|digest| (ASK, json!(digest))))
-            .transpose()?,
+        bank.map(|bank| bank.digest().map(|digest| (ASK, json!(digest)))).transpose()?,
         bank.map(|bank| ("--ask-per-image", json!(bank.questions_per_image()))),
         (rule.colour != usual.colour).then(|| ("--colour", json!(rule.colour.to_string()))),
         (rule.transfer != usual.transfer).then(|| ("--transfer", json!(rule.transfer.to_string()))),
@@ -44,10 +44,7 @@ pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Id
         Some(("--variant", json!(job.light.variants.to_string()))),
         Some(("--seed", json!(job.light.kinds.sensor.seed))),
     ];
-    let fields = fields
-        .into_iter()
-        .flatten()
-        .map(|(field, value)| (field.to_owned(), value));
+    let fields = fields.into_iter().flatten().map(|(field, value)| (field.to_owned(), value));
     Ok(fields.chain(light_settings(config)).collect())
 }
 
@@ -56,16 +53,12 @@ fn light_settings(config: &Evaluation) -> Vec<(String, Value)> {
     let job = &config.job;
     let recipe = Recipe::lossless(&job.light.kinds, &[]);
     let version = identity::images(&recipe).filter(|(field, _)| field == "synthesis");
-    let columns = identity::columns([], &recipe, job)
-        .into_iter()
-        .flat_map(|(column, values)| {
-            values.into_iter().flat_map(move |(name, content)| {
-                let place = format!("{column} {name}");
-                let settings = content.as_object().cloned().unwrap_or_default();
-                settings
-                    .into_iter()
-                    .map(move |(flag, value)| (format!("{flag} of the {place}"), value))
-            })
-        });
+    let columns = identity::columns([], &recipe, job).into_iter().flat_map(|(column, values)| {
+        values.into_iter().flat_map(move |(name, content)| {
+            let place = format!("{column} {name}");
+            let settings = content.as_object().cloned().unwrap_or_default();
+            settings.into_iter().map(move |(flag, value)| (format!("{flag} of the {place}"), value))
+        })
+    });
     version.chain(columns).collect()
 }

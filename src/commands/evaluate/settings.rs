@@ -65,7 +65,8 @@ pub(crate) struct ChoiceArgs {
     /// Folder with custom prompts (choice.txt, blind.txt); default: built in
     #[arg(long, value_name = "DIR", add = Decides::Reply)]
     pub prompts: Option<PathBuf>,
-    /// Also ask every control of the observer (observer:other-room, or observer:tiles with a single scene, is always asked)
+    /// Also ask every control of the observer (observer:other-room, or observer:tiles with a single scene, is always
+    /// asked)
     #[arg(long, add = Decides::Trials)]
     pub observer_controls: bool,
 }
@@ -96,7 +97,8 @@ pub(super) struct Evaluation {
     pub(super) selection: SelectionArgs,
     /// Rule for decoding images.
     pub(super) rule: DecodeRule,
-    /// Questions asked about every image, with the number per image; `None` if the data set has its own questions with answers.
+    /// Questions asked about every image, with the number per image; `None` if the data set has its own questions with
+    /// answers.
     pub(super) bank: Option<QuestionBank>,
     pub(super) order: ChoiceOrder,
     /// Number of times that each order of choices is asked.
@@ -124,14 +126,8 @@ impl EvaluateArgs {
         }
         let prompts = self.choice.prompts.as_deref();
         let place = self.scene.place(self.data.place());
-        let set_light = self
-            .scene
-            .set_light(&place, &self.data.set.root.data_root)?;
-        let experiment = ExperimentSettings {
-            data: place.path().map(Path::to_owned),
-            set_light,
-            ..self.experiment()
-        };
+        let set_light = self.scene.set_light(&place, &self.data.set.root.data_root)?;
+        let experiment = ExperimentSettings { data: place.path().map(Path::to_owned), set_light, ..self.experiment() };
         let bank = QuestionBank::open(&self.bank)?;
         let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
         let max_cost = self.job.money.max_cost;
@@ -151,11 +147,7 @@ impl EvaluateArgs {
         Ok(Evaluation {
             rules: rules(self.selection.rules.as_deref())?,
             observer_controls: self.choice.observer_controls,
-            image_place: if self.choice.image_first {
-                ImagePlace::BeforeWords
-            } else {
-                ImagePlace::AfterWords
-            },
+            image_place: if self.choice.image_first { ImagePlace::BeforeWords } else { ImagePlace::AfterWords },
             place,
             set: self.data.set,
             scene: self.scene,
@@ -193,9 +185,7 @@ impl EvaluateArgs {
 /// If the observer is asked, a model gets no images, or the untouched images are left out.
 fn check_without_truths(job: &JobSettings) -> Result<()> {
     let models = &job.ask.models;
-    if let Some(observer) = models
-        .iter()
-        .find(|model| matches!(model.id, ModelName::Observer(_) | ModelName::RoomNet))
+    if let Some(observer) = models.iter().find(|model| matches!(model.id, ModelName::Observer(_) | ModelName::RoomNet))
     {
         let problem = format_args!(
             "{} cannot be asked with --ask: it answers by the rules that make questions, and none made these; models \
@@ -204,11 +194,7 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
         );
         return Err(Error::usage("--model", problem));
     }
-    let seeing: Vec<&str> = models
-        .iter()
-        .filter(|model| model.view == View::Image)
-        .map(|model| &*model.name)
-        .collect();
+    let seeing: Vec<&str> = models.iter().filter(|model| model.view == View::Image).map(|model| &*model.name).collect();
     if let Some(blind) = models.iter().find(|model| !seeing.contains(&&*model.name)) {
         let problem = format_args!(
             "{} is shown no image, and --ask compares a model with its own answers in the light: name it with --model and leave --blind out; it is \
@@ -218,7 +204,8 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
         return Err(Error::usage("--ask", problem));
     }
     if !job.light.degradations().contains(&None) {
-        let problem = "--ask compares a model with its own answers at L0: add L0 to --levels; what a run has is not asked again";
+        let problem =
+            "--ask compares a model with its own answers at L0: add L0 to --levels; what a run has is not asked again";
         return Err(Error::usage("--levels", problem));
     }
     Ok(())

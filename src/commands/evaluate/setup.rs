@@ -16,9 +16,7 @@ use crate::engine::images::enhancement::evenly_spaced_indices;
 use crate::engine::images::frames::{Source, first_question_per_frame, inspect_all, photographs};
 use crate::engine::images::progress::Progress;
 use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::questions::{
-    QuestionBank, open_data, open_without_generating, select,
-};
+use crate::engine::images::trials::questions::{QuestionBank, open_data, open_without_generating, select};
 use crate::engine::images::trials::{check_enhanced, conditions};
 use crate::engine::models::{self, ModelName, ModelUnderTest};
 use crate::engine::observer::Observer;
@@ -64,18 +62,11 @@ pub(super) struct ChoiceSetup<'a> {
 
 impl<'a> ChoiceSetup<'a> {
     /// Opens the data and the models. Also returns the files of the enhancers, which are read but not yet loaded.
-    pub(super) fn open(
-        config: &'a Evaluation,
-        progress: &Progress,
-    ) -> Result<(Self, Vec<ModelFile>)> {
+    pub(super) fn open(config: &'a Evaluation, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
         // If every model is blind, no image is read and no enhancer is opened.
         let shows_images = job.shows_images();
-        let enhancer_files = if shows_images {
-            job.enhancers()?
-        } else {
-            Vec::new()
-        };
+        let enhancer_files = if shows_images { job.enhancers()? } else { Vec::new() };
         let (dataset, selected) = selected_data(config, progress)?;
         let dataset = Arc::new(dataset);
         let file_places = file_places(config, &dataset, &selected);
@@ -112,33 +103,17 @@ impl<'a> ChoiceSetup<'a> {
         if shows_images {
             recipe = recipe.with_enhanced_images(&job.enhancers.enhanced)?;
         }
-        let conditions = conditions(
-            &job.light,
-            &photographs::names(&sources),
-            job.enhancers.on(),
-            &recipe.enhancer_names(),
-        );
-        let brightness = (job.set_light == SetLight::Dark)
-            .then(|| dark_already::brightness(&*dataset, &sources))
-            .flatten();
-        let probe_sources = if part.is_some() && !enhancer_files.is_empty() {
-            probe_sources(&dataset, &selected)
-        } else {
-            Vec::new()
-        };
+        let conditions =
+            conditions(&job.light, &photographs::names(&sources), job.enhancers.on(), &recipe.enhancer_names());
+        let brightness =
+            (job.set_light == SetLight::Dark).then(|| dark_already::brightness(&*dataset, &sources)).flatten();
+        let probe_sources =
+            if part.is_some() && !enhancer_files.is_empty() { probe_sources(&dataset, &selected) } else { Vec::new() };
         let mut setup = Self {
             config,
             probe_sources,
-            places: sources
-                .iter()
-                .map(|source| source.name.clone())
-                .zip(0..)
-                .collect(),
-            question_places: selected
-                .iter()
-                .map(|question| question.id.clone())
-                .zip(0..)
-                .collect(),
+            places: sources.iter().map(|source| source.name.clone()).zip(0..).collect(),
+            question_places: selected.iter().map(|question| question.id.clone()).zip(0..).collect(),
             file_places,
             digests: digests(&sources),
             sources,
@@ -175,7 +150,8 @@ impl<'a> ChoiceSetup<'a> {
         }
     }
 
-    /// Adds the selected questions that are asked with the image of another frame, if that image belongs to this run or shard.
+    /// Adds the selected questions that are asked with the image of another frame, if that image belongs to this run or
+    /// shard.
     fn add_other_rooms(&mut self, mut questions: Vec<Question>) -> Result<()> {
         questions.retain(|question| {
             let shown = self.other_rooms.shown_for(&question.frame);
@@ -211,29 +187,18 @@ fn probe_sources(dataset: &Dataset, selected: &[Question]) -> Vec<Source> {
 
 /// Warns about the number of questions that `room-net` will guess, because no rule made them.
 fn warn_of_guesses(questions: &[Question], rules: &Rules) {
-    let unknown = questions
-        .iter()
-        .filter(|question| !is_in_rulebook(question, rules))
-        .count();
+    let unknown = questions.iter().filter(|question| !is_in_rulebook(question, rules)).count();
     if unknown > 0 {
-        tracing::warn!(
-            "room-net guesses {unknown} of {} questions, because no rule made them",
-            questions.len()
-        );
+        tracing::warn!("room-net guesses {unknown} of {} questions, because no rule made them", questions.len());
     }
 }
 
 /// Prints that photographs in the dark stay raw, if other images are enhanced.
 fn print_raw_photographs(job: &JobSettings, sources: &[Source], progress: &Progress) {
-    let are_enhanced = job
-        .enhancers
-        .on()
-        .intersection(TreatmentSet::DARK)
-        .is_some();
+    let are_enhanced = job.enhancers.on().intersection(TreatmentSet::DARK).is_some();
     if !job.enhancers.is_empty() && !are_enhanced && !photographs::names(sources).is_empty() {
-        progress.print_on_terminal(
-            "the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too",
-        );
+        progress
+            .print_on_terminal("the photographs in the dark are not enhanced; --llie-on noise,dark enhances them too");
     }
 }
 
@@ -243,12 +208,7 @@ fn print_training(config: &Evaluation, progress: &Progress) {
     if !job.ask.shows_images_to(&ModelName::RoomNet) {
         return;
     }
-    let lift = if job
-        .enhancers
-        .llie
-        .iter()
-        .any(|word| word == Path::new("lift"))
-    {
+    let lift = if job.enhancers.llie.iter().any(|word| word == Path::new("lift")) {
         "; lift was trained on such rooms in the dark"
     } else {
         ""
@@ -266,15 +226,7 @@ fn selected_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, V
     let dataset = match (&config.bank, &config.plan) {
         (Some(bank), _) => bank.open_images(place, set, config.rule, progress)?,
         (None, Some(_)) => open_without_generating(place, scene, set, selection, config.rule)?,
-        (None, None) => open_data(
-            place,
-            scene,
-            set,
-            selection,
-            &config.rules,
-            config.rule,
-            progress,
-        )?,
+        (None, None) => open_data(place, scene, set, selection, &config.rules, config.rule, progress)?,
     };
     let Some(plan) = &config.plan else {
         let questions = select(dataset.questions().to_vec(), selection)?;
@@ -289,34 +241,19 @@ fn selected_data(config: &Evaluation, progress: &Progress) -> Result<(Dataset, V
     Ok((dataset, questions))
 }
 
-/// Position of each question among all questions of the data: from the plan if there is one, otherwise from the data set.
-fn file_places(
-    config: &Evaluation,
-    dataset: &Dataset,
-    selected: &[Question],
-) -> HashMap<QuestionId, usize> {
+/// Position of each question among all questions of the data: from the plan if there is one, otherwise from the data
+/// set.
+fn file_places(config: &Evaluation, dataset: &Dataset, selected: &[Question]) -> HashMap<QuestionId, usize> {
     if let Some(plan) = &config.plan {
-        selected
-            .iter()
-            .map(|question| question.id.clone())
-            .zip(plan.question_places())
-            .collect()
+        selected.iter().map(|question| question.id.clone()).zip(plan.question_places()).collect()
     } else {
-        dataset
-            .questions()
-            .iter()
-            .map(|question| question.id.clone())
-            .zip(0..)
-            .collect()
+        dataset.questions().iter().map(|question| question.id.clone()).zip(0..).collect()
     }
 }
 
 /// Digest of each source, over its file or all its files. Sources without frames are left out.
 fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
-    sources
-        .iter()
-        .filter_map(|source| Some((source.name.clone(), source.digest()?)))
-        .collect()
+    sources.iter().filter_map(|source| Some((source.name.clone(), source.digest()?))).collect()
 }
 
 /// Opens the models without sending any request.
@@ -327,31 +264,18 @@ fn open_models(
     questions: &[Question],
 ) -> Result<Vec<ModelUnderTest>> {
     let ask = &config.job.ask;
-    let guesser = Random {
-        seed: config.job.light.kinds.sensor.seed,
-    };
-    let asks_observer = ask
-        .models
-        .iter()
-        .any(|model| matches!(model.id, ModelName::Observer(_)));
+    let guesser = Random { seed: config.job.light.kinds.sensor.seed };
+    let asks_observer = ask.models.iter().any(|model| matches!(model.id, ModelName::Observer(_)));
     let observer = if asks_observer {
         let rules = config.rules.clone();
-        Some(Observer::open(
-            dataset,
-            &config.place,
-            &config.set.root.data_root,
-            questions,
-            rules,
-        )?)
+        Some(Observer::open(dataset, &config.place, &config.set.root.data_root, questions, rules)?)
     } else {
         None
     };
     let runtime = config.job.loading.runtime.search();
     models::open_all(ask, &controls.names, |name| {
         Ok(match (name, &observer) {
-            (ModelName::Observer(control), Some(observer)) => {
-                Model::Local(observer.model(*control, guesser))
-            }
+            (ModelName::Observer(control), Some(observer)) => Model::Local(observer.model(*control, guesser)),
             (ModelName::RoomNet, _) => {
                 warn_of_guesses(questions, &config.rules);
                 let net = RoomNet::new(runtime.clone(), config.rules.clone())?;

@@ -11,8 +11,5 @@ pub(super) fn unnamed_scenes(dataset: &Dataset, questions: &[Question]) -> Optio
         return None;
     }
     let suggested = SuggestedScenes::new(frames)?;
-    Some(format!(
-        "{}; a \"scene\" in each question (or --map scene=COLUMN) names them",
-        suggested.sentence()
-    ))
+    Some(format!("{}; a \"scene\" in each question (or --map scene=COLUMN) names them", suggested.sentence()))
 }

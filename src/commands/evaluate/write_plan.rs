@@ -21,7 +21,8 @@ use crate::types::text::counted;
 /// If no folder is named, the data cannot be read, or the run has parts of another plan.
 pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcome> {
     let Some(run) = args.job.output.out.clone() else {
-        let problem = "the folder of the run that the plan is for is missing; the evaluation takes the plan from the same --out";
+        let problem =
+            "the folder of the run that the plan is for is missing; the evaluation takes the plan from the same --out";
         return Err(Error::usage("--out", problem));
     };
     args.job.scale.shard = Some("none".to_owned());
@@ -46,13 +47,7 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
                 PlannedFrame::new(place, &source.name, image, &setup.dataset, cost)
             })
             .collect(),
-        models: setup
-            .columns()
-            .remove("model")
-            .into_iter()
-            .flatten()
-            .map(|(name, _)| name)
-            .collect(),
+        models: setup.columns().remove("model").into_iter().flatten().map(|(name, _)| name).collect(),
         command,
         trials: Plan::new(trials).keys.len(),
     };

@@ -11,9 +11,7 @@ use clap::Args;
 use crate::data::{self, DataPlace, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
 use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
 use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::frames::{
-    Source, input_summary, inspect_all, photographs, warn_of_inputs,
-};
+use crate::engine::images::frames::{Source, input_summary, inspect_all, photographs, warn_of_inputs};
 use crate::engine::images::image_pipeline::ImagePipeline;
 use crate::engine::images::image_steps::ImageSteps;
 use crate::engine::images::progress::Progress;
@@ -82,7 +80,8 @@ pub(crate) struct ExportArgs {
 /// If the data cannot be read, a set exists already, or a file cannot be written.
 pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> {
     if args.scene.pairs.is_some() {
-        let problem = "export takes pairs from a folder whose frames.jsonl names the photographs in the dark (\"dark\")";
+        let problem =
+            "export takes pairs from a folder whose frames.jsonl names the photographs in the dark (\"dark\")";
         return Err(Error::usage("--pairs", problem));
     }
     let set = args.scene.set_light(&args.data, &args.set.root.data_root)?;
@@ -127,28 +126,16 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     recipe.check(&sources, &conditions)?;
     let mut sets = open_sets(args, shard, &dataset, &conditions, &questions)?;
     let timings = Timings::default();
-    let steps = ImageSteps {
-        frames: &dataset,
-        recipe: &recipe,
-        limit: None,
-        timings: &timings,
-        stored: None,
-    };
+    let steps = ImageSteps { frames: &dataset, recipe: &recipe, limit: None, timings: &timings, stored: None };
     let enhancers = EnhancerModels::load(files, &args.loading)?.take()?;
     let mut pipeline = ImagePipeline::new(steps, enhancers, args.loading.probe.implausible());
     workers.install(|| pipeline.probe_sources(&sources))?;
-    let frames: BTreeMap<&FrameId, &Source> = sources
-        .iter()
-        .map(|source| (&source.name, source))
-        .collect();
+    let frames: BTreeMap<&FrameId, &Source> = sources.iter().map(|source| (&source.name, source)).collect();
     let bar = progress.bar("images", frames.len() * conditions.len());
     workers.install(|| {
         for (frame, source) in &frames {
-            let frame_questions: Vec<(usize, &Question)> = questions
-                .iter()
-                .enumerate()
-                .filter(|(_, question)| question.frame == **frame)
-                .collect();
+            let frame_questions: Vec<(usize, &Question)> =
+                questions.iter().enumerate().filter(|(_, question)| question.frame == **frame).collect();
             for source_frame in &source.frames {
                 let mut work = FrameWork::for_source(pipeline.steps, source, source_frame);
                 for (condition, set) in conditions.iter().zip(&mut sets) {
@@ -177,35 +164,20 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     for path in &paths {
         let _ = writeln!(output, "{}", path.display());
     }
-    Ok(Outcome {
-        status: Status::Complete,
-        output,
-        written: paths,
-    })
+    Ok(Outcome { status: Status::Complete, output, written: paths })
 }
 
 /// The questions about the frames of a shard.
-fn shard_questions(
-    questions: &[Question],
-    asked: BTreeSet<&FrameId>,
-    shard: Shard,
-) -> Result<Vec<Question>> {
+fn shard_questions(questions: &[Question], asked: BTreeSet<&FrameId>, shard: Shard) -> Result<Vec<Question>> {
     let mut own: Vec<&FrameId> = asked.into_iter().collect();
     keep_shard(&mut own, shard)?;
     let own: BTreeSet<&FrameId> = own.into_iter().collect();
-    Ok(questions
-        .iter()
-        .filter(|question| own.contains(&question.frame))
-        .cloned()
-        .collect())
+    Ok(questions.iter().filter(|question| own.contains(&question.frame)).cloned().collect())
 }
 
 /// Refuses questions that show several images, because the sets have one image per question.
 fn refuse_several_images(dataset: &Dataset, questions: &[Question]) -> Result<()> {
-    match questions
-        .iter()
-        .find(|question| !dataset.image_series(&question.frame).is_empty())
-    {
+    match questions.iter().find(|question| !dataset.image_series(&question.frame).is_empty()) {
         None => Ok(()),
         Some(first) => Err(Error::usage(
             "--multi-image",
@@ -233,11 +205,7 @@ fn open_sets(
     let sets: Vec<ReadySet> = conditions
         .iter()
         .map(|condition| {
-            let place = SetPlace {
-                out: &args.out,
-                data: dataset.name(),
-                shard,
-            };
+            let place = SetPlace { out: &args.out, data: dataset.name(), shard };
             ReadySet::new(args.kind, &place, condition, questions)
         })
         .collect();
@@ -251,7 +219,8 @@ fn open_sets(
     }
 }
 
-/// A unique file name for each frame: its name without folders and extension, followed by a number if it is already used.
+/// A unique file name for each frame: its name without folders and extension, followed by a number if it is already
+/// used.
 fn file_names<'a>(frames: impl Iterator<Item = &'a FrameId>) -> BTreeMap<&'a FrameId, String> {
     let mut used = BTreeSet::new();
     let mut names = BTreeMap::new();
@@ -279,8 +248,7 @@ mod tests {
 
     #[test]
     fn no_two_frames_share_a_file() {
-        let frames =
-            ["a/b.png", "a_b", "A_B.jpg", "../c d.png", "2"].map(|name| FrameId(name.into()));
+        let frames = ["a/b.png", "a_b", "A_B.jpg", "../c d.png", "2"].map(|name| FrameId(name.into()));
         let names: Vec<String> = file_names(frames.iter()).into_values().collect();
         assert_eq!(names, ["_c_d", "2", "A_B-3", "a_b", "a_b-2"]);
     }

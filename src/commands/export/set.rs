@@ -41,16 +41,10 @@ pub(super) struct SetPlace<'a> {
 impl SetPlace<'_> {
     /// The main file of the set of a condition. Its name contains the shard, if there are several.
     fn file(&self, form: SetForm, condition: &Condition) -> PathBuf {
-        let part = if self.shard.is_part() {
-            format!("-{}", self.shard.folder())
-        } else {
-            String::new()
-        };
+        let part = if self.shard.is_part() { format!("-{}", self.shard.folder()) } else { String::new() };
         let folder = self.out.join(condition.to_string());
         match form {
-            SetForm::VlmEvalKit => self
-                .out
-                .join(format!("{}_{condition}{part}.tsv", self.data)),
+            SetForm::VlmEvalKit => self.out.join(format!("{}_{condition}{part}.tsv", self.data)),
             SetForm::ImageFolder => folder.join(format!("metadata{part}.jsonl")),
             SetForm::Llava => folder.join(format!("questions{part}.jsonl")),
         }
@@ -68,22 +62,9 @@ pub(super) struct ReadySet {
 }
 
 impl ReadySet {
-    pub(super) fn new(
-        form: SetForm,
-        place: &SetPlace<'_>,
-        condition: &Condition,
-        questions: &[Question],
-    ) -> Self {
-        let max_choices = questions
-            .iter()
-            .map(|question| question.choices.len())
-            .max();
-        Self {
-            form,
-            path: place.file(form, condition),
-            max_choices: max_choices.unwrap_or(0),
-            writer: None,
-        }
+    pub(super) fn new(form: SetForm, place: &SetPlace<'_>, condition: &Condition, questions: &[Question]) -> Self {
+        let max_choices = questions.iter().map(|question| question.choices.len()).max();
+        Self { form, path: place.file(form, condition), max_choices: max_choices.unwrap_or(0), writer: None }
     }
 
     /// The main file of the set.
@@ -92,12 +73,7 @@ impl ReadySet {
     }
 
     /// Adds an image under a name, with the questions about it.
-    pub(super) fn add(
-        &mut self,
-        name: &str,
-        image: &[u8],
-        questions: &[(usize, &Question)],
-    ) -> Result<()> {
+    pub(super) fn add(&mut self, name: &str, image: &[u8], questions: &[(usize, &Question)]) -> Result<()> {
         let file = format!("images/{name}.png");
         if self.form != SetForm::VlmEvalKit {
             let folder = self.path.parent().unwrap_or(Path::new(""));
@@ -143,36 +119,26 @@ impl ReadySet {
                     SetForm::ImageFolder | SetForm::Llava => csv::QuoteStyle::Never,
                 };
                 let mut builder = csv::WriterBuilder::new();
-                let writer = none.insert(
-                    builder
-                        .delimiter(b'\t')
-                        .quote_style(quotes)
-                        .from_writer(file),
-                );
+                let writer = none.insert(builder.delimiter(b'\t').quote_style(quotes).from_writer(file));
                 if self.form == SetForm::VlmEvalKit {
                     let letters = (0..self.max_choices).map(|i| letter(i).to_string());
                     let header = COLUMNS.iter().map(|&name| name.to_owned()).chain(letters);
-                    writer
-                        .write_record(header)
-                        .map_err(|e| Error::data(path.display(), e))?;
+                    writer.write_record(header).map_err(|e| Error::data(path.display(), e))?;
                 }
                 writer
             }
         };
-        writer
-            .write_record(cells)
-            .map_err(|e| Error::data(path.display(), e))
+        writer.write_record(cells).map_err(|e| Error::data(path.display(), e))
     }
 
-    /// Renames the complete file to its final path, and returns the path; `None` if the shard has no image in this condition.
+    /// Renames the complete file to its final path, and returns the path; `None` if the shard has no image in this
+    /// condition.
     pub(super) fn finish(self) -> Result<Option<PathBuf>> {
         let unfinished = unfinished_path(&self.path);
         let Some(mut writer) = self.writer else {
             return Ok(None);
         };
-        writer
-            .flush()
-            .map_err(|e| Error::file(&unfinished, "write", e))?;
+        writer.flush().map_err(|e| Error::file(&unfinished, "write", e))?;
         drop(writer);
         fs::rename(&unfinished, &self.path).map_err(|e| Error::file(&self.path, "write", e))?;
         Ok(Some(self.path))
@@ -189,8 +155,8 @@ fn unfinished_path(path: &Path) -> PathBuf {
 /// The columns of a table before the choices.
 const COLUMNS: [&str; 6] = ["index", "image", "question", "answer", "category", "id"];
 
-/// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`). A short cell in the column `image` is the index of the row that has the
-/// image.
+/// A row of VLMEvalKit's table (`vlmeval/dataset/image_mcq.py`). A short cell in the column `image` is the index of the
+/// row that has the image.
 fn table_row(index: usize, image: String, question: &Question) -> Vec<String> {
     [
         index.to_string(),
@@ -207,10 +173,7 @@ fn table_row(index: usize, image: String, question: &Question) -> Vec<String> {
 
 /// The letter of the true choice; empty if it is unknown.
 fn true_letter(question: &Question) -> String {
-    question
-        .choices
-        .truth()
-        .map_or_else(String::new, |truth| letter(truth).to_string())
+    question.choices.truth().map_or_else(String::new, |truth| letter(truth).to_string())
 }
 
 /// A line of `metadata.jsonl` for an image folder.
@@ -238,11 +201,5 @@ fn llava_line(file: &str, question: &Question) -> Value {
 
 /// The choices, one line each with its letter.
 fn lettered(choices: &Choices) -> String {
-    choices
-        .texts()
-        .iter()
-        .enumerate()
-        .map(|(i, text)| format!("{}. {text}", letter(i)))
-        .collect::<Vec<_>>()
-        .join("\n")
+    choices.texts().iter().enumerate().map(|(i, text)| format!("{}. {text}", letter(i))).collect::<Vec<_>>().join("\n")
 }

@@ -12,12 +12,9 @@ use crate::files;
 use crate::pictures::{decode_data_url, png};
 use crate::report::charts::chart::figure_chart::FigureChart;
 use crate::report::charts::figures::{
-    FIGURES, FigureSpec, KnownNames, Names, figure_specs, missing_threshold_message, overview,
-    paper_tables,
+    FIGURES, FigureSpec, KnownNames, Names, figure_specs, missing_threshold_message, overview, paper_tables,
 };
-use crate::report::charts::paper::{
-    Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
-};
+use crate::report::charts::paper::{Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex};
 use crate::report::joined::FigureRuns;
 use crate::report::text::table::Table;
 use crate::runs::Outcome;
@@ -91,9 +88,7 @@ pub(crate) enum FigureFormat {
 
 fn label(text: &str) -> std::result::Result<(String, String), String> {
     match text.split_once('=') {
-        Some((old, new)) if !old.is_empty() && !new.trim().is_empty() => {
-            Ok((old.to_owned(), new.trim().to_owned()))
-        }
+        Some((old, new)) if !old.is_empty() && !new.trim().is_empty() => Ok((old.to_owned(), new.trim().to_owned())),
         _ => Err("OLD=NEW expected: a name in the runs, and the one to show".to_owned()),
     }
 }
@@ -102,13 +97,7 @@ fn font_size(text: &str) -> std::result::Result<f64, String> {
     text.parse()
         .ok()
         .filter(|size| FONT_SIZES.contains(size))
-        .ok_or_else(|| {
-            format!(
-                "a size from {} to {} points expected",
-                FONT_SIZES.start(),
-                FONT_SIZES.end()
-            )
-        })
+        .ok_or_else(|| format!("a size from {} to {} points expected", FONT_SIZES.start(), FONT_SIZES.end()))
 }
 
 /// Draws the figures of the runs, from the numbers of their report.
@@ -125,12 +114,7 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
     let runs = FigureRuns::open(&args.runs)?;
     let all = runs.findings();
     let findings = all.shown();
-    let names = Names::new(
-        &args.label,
-        &args.order,
-        args.reference.as_ref(),
-        &KnownNames::from_findings(findings),
-    )?;
+    let names = Names::new(&args.label, &args.order, args.reference.as_ref(), &KnownNames::from_findings(findings))?;
     let mut output = String::new();
     for alert in runs.alerts(&all) {
         let _ = writeln!(output, "note: {}", alert.text);
@@ -141,12 +125,9 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
         if name == PAPER {
             let width = args.width.text();
             let look = Look { width, ..look };
-            let sheet = overview_sheet(
-                &overview(findings, &names),
-                runs.thumbnails(),
-                &look,
-                &|url| decode_data_url(url, MAX_SIDE),
-            )?;
+            let sheet = overview_sheet(&overview(findings, &names), runs.thumbnails(), &look, &|url| {
+                decode_data_url(url, MAX_SIDE)
+            })?;
             files.add_overview(&sheet, &args.format, &look)?;
             continue;
         }
@@ -177,10 +158,7 @@ fn all_names() -> impl Iterator<Item = &'static str> {
 }
 
 fn check_only(only: &[String]) -> Result<()> {
-    match only
-        .iter()
-        .find(|name| all_names().all(|known| known != *name))
-    {
+    match only.iter().find(|name| all_names().all(|known| known != *name)) {
         Some(name) => {
             let all: Vec<&str> = all_names().collect();
             let problem = format!("there is no figure {name:?}; there are {}", all.join(", "));
@@ -211,12 +189,7 @@ struct Files {
 }
 
 impl Files {
-    fn add_drawing(
-        &mut self,
-        drawing: &FigureSpec,
-        formats: &[FigureFormat],
-        look: &Look,
-    ) -> Result<()> {
+    fn add_drawing(&mut self, drawing: &FigureSpec, formats: &[FigureFormat], look: &Look) -> Result<()> {
         let name = drawing.name;
         self.add(name, &sheet(&drawing.chart, look), formats)?;
         if formats.contains(&FigureFormat::Tex) {
@@ -232,12 +205,7 @@ impl Files {
         Ok(())
     }
 
-    fn add_overview(
-        &mut self,
-        overview: &OverviewSheet,
-        formats: &[FigureFormat],
-        look: &Look,
-    ) -> Result<()> {
+    fn add_overview(&mut self, overview: &OverviewSheet, formats: &[FigureFormat], look: &Look) -> Result<()> {
         for (panel, why) in &overview.left_out {
             self.leave_out(&format!("{PAPER}, the panel {panel}"), why);
         }
@@ -250,8 +218,7 @@ impl Files {
             let width = in_tex(look).width / 2.0;
             for (letter, chart) in ('a'..).zip(&overview.charts) {
                 let half = Look { width, ..*look };
-                self.contents
-                    .extend(tex(&format!("{PAPER}-{letter}"), chart, &half));
+                self.contents.extend(tex(&format!("{PAPER}-{letter}"), chart, &half));
             }
         }
         let _ = writeln!(self.captions, "{PAPER}\n{}\n", overview.caption);
@@ -273,9 +240,7 @@ impl Files {
         let (files, long) = tables(all, &in_tex(look), args.columns == Some(2));
         self.contents.extend(files);
         if long > 0 {
-            let why = format!(
-                "{long} of more than 40 rows are in tables-full.tex, for text in one column"
-            );
+            let why = format!("{long} of more than 40 rows are in tables-full.tex, for text in one column");
             self.leave_out("tables.tex", &why);
         }
     }
@@ -284,8 +249,7 @@ impl Files {
     fn add(&mut self, name: &str, sheet: &Sheet, formats: &[FigureFormat]) -> Result<()> {
         sheet.check_characters()?;
         if formats.contains(&FigureFormat::Pdf) {
-            self.contents
-                .push((format!("{name}.pdf"), pdf(sheet, name)?));
+            self.contents.push((format!("{name}.pdf"), pdf(sheet, name)?));
         }
         if formats.contains(&FigureFormat::Svg) {
             let file = (format!("{name}.svg"), svg(sheet, &png)?.into_bytes());

@@ -33,30 +33,10 @@ pub(crate) struct Venue {
 
 /// `\columnwidth` and `\textwidth` of the LaTeX classes and style files of these venues.
 const VENUES: [Venue; 4] = [
-    Venue {
-        name: "ieee",
-        column: 252.0,
-        text: Some(516.0),
-        font_size: 8.0,
-    },
-    Venue {
-        name: "cvpr",
-        column: 237.1,
-        text: Some(496.9),
-        font_size: 8.0,
-    },
-    Venue {
-        name: "acl",
-        column: 219.1,
-        text: Some(455.2),
-        font_size: 8.0,
-    },
-    Venue {
-        name: "neurips",
-        column: 397.5,
-        text: None,
-        font_size: 9.0,
-    },
+    Venue { name: "ieee", column: 252.0, text: Some(516.0), font_size: 8.0 },
+    Venue { name: "cvpr", column: 237.1, text: Some(496.9), font_size: 8.0 },
+    Venue { name: "acl", column: 219.1, text: Some(455.2), font_size: 8.0 },
+    Venue { name: "neurips", column: 397.5, text: None, font_size: 9.0 },
 ];
 
 impl FromStr for Width {
@@ -67,9 +47,7 @@ impl FromStr for Width {
             return Ok(Self::Venue(venue));
         }
         match text.parse::<f64>() {
-            Ok(millimetres) if MILLIMETRES.contains(&millimetres) => {
-                Ok(Self::Custom(millimetres * POINTS))
-            }
+            Ok(millimetres) if MILLIMETRES.contains(&millimetres) => Ok(Self::Custom(millimetres * POINTS)),
             _ => Err(format!(
                 "ieee, cvpr, acl, neurips, or a width from {} to {} in millimetres expected",
                 MILLIMETRES.start(),
@@ -86,13 +64,9 @@ impl Width {
     /// If the width is custom, or the paper has only one column.
     pub(super) fn points(self, columns: Option<u8>) -> Result<f64> {
         let problem = match (self, columns) {
-            (Self::Custom(_), Some(_)) => {
-                "a width in millimetres is that of the figure: leave it out"
-            }
+            (Self::Custom(_), Some(_)) => "a width in millimetres is that of the figure: leave it out",
             (Self::Custom(width), None) => return Ok(width),
-            (Self::Venue(Venue { text: None, .. }), Some(2)) => {
-                "this paper has one column: leave it out"
-            }
+            (Self::Venue(Venue { text: None, .. }), Some(2)) => "this paper has one column: leave it out",
             (Self::Venue(_), Some(2)) => return Ok(self.text()),
             (Self::Venue(venue), _) => return Ok(venue.column / TEX),
         };

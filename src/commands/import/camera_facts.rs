@@ -23,14 +23,9 @@ impl Cameras {
         }
     }
 
-    /// The intrinsics of an image topic at a time: the last ones before it, or else the first. Of several cameras whose names match the topic,
-    /// the first one with intrinsics for this size is used.
-    pub(super) fn intrinsics(
-        &self,
-        topic: &str,
-        time: Nanoseconds,
-        size: (usize, usize),
-    ) -> Option<Intrinsics> {
+    /// The intrinsics of an image topic at a time: the last ones before it, or else the first. Of several cameras whose
+    /// names match the topic, the first one with intrinsics for this size is used.
+    pub(super) fn intrinsics(&self, topic: &str, time: Nanoseconds, size: (usize, usize)) -> Option<Intrinsics> {
         intrinsics_names(topic).into_iter().find_map(|camera| {
             let infos = self.0.get(camera)?;
             let after = infos.partition_point(|(from, _)| *from <= time);
@@ -64,11 +59,7 @@ impl Exposures {
     /// Requests the exposure of a frame.
     pub(super) fn want(&mut self, camera: &str, stamp: Nanoseconds) {
         let key = (camera.to_owned(), stamp);
-        match self
-            .recent
-            .iter()
-            .find(|(name, exposure)| name == camera && exposure.stamp == stamp)
-        {
+        match self.recent.iter().find(|(name, exposure)| name == camera && exposure.stamp == stamp) {
             Some((_, exposure)) => drop(self.found.insert(key, exposure.values.clone())),
             None => drop(self.wanted.insert(key)),
         }

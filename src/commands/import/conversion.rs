@@ -21,14 +21,10 @@ enum RecordingKind {
 /// What `path` is and the commands that make it readable; `None` if it is an MCAP recording or unknown.
 pub(super) fn conversion(path: &Path) -> Option<String> {
     match kind(path)? {
-        RecordingKind::Ros1Bag => Some(format!(
-            "bags of ROS 1 are not read; {}",
-            bag_commands(&[path.to_owned()])
-        )),
-        RecordingKind::SqliteBag => Some(format!(
-            "bags of ROS 2 in SQLite are not read; {}",
-            bag_commands(&sqlite_sources(path))
-        )),
+        RecordingKind::Ros1Bag => Some(format!("bags of ROS 1 are not read; {}", bag_commands(&[path.to_owned()]))),
+        RecordingKind::SqliteBag => {
+            Some(format!("bags of ROS 2 in SQLite are not read; {}", bag_commands(&sqlite_sources(path))))
+        }
         RecordingKind::Compressed => Some(compressed(path)),
         RecordingKind::Mcap => None,
     }
@@ -38,9 +34,7 @@ pub(super) fn conversion(path: &Path) -> Option<String> {
 pub(super) fn not_a_bag(path: &Path) -> String {
     if kind(path) == Some(RecordingKind::Mcap) {
         let name = word(path);
-        return format!(
-            "an MCAP recording; no conversion is needed: darkqa-eval import mcap {name}"
-        );
+        return format!("an MCAP recording; no conversion is needed: darkqa-eval import mcap {name}");
     }
     "neither a bag of ROS 1 (.bag) or ROS 2 (.db3) nor an MCAP recording".to_owned()
 }
@@ -80,10 +74,7 @@ fn sqlite_sources(path: &Path) -> Vec<PathBuf> {
         if files.iter().any(|file| file.ends_with("metadata.yaml")) {
             return vec![path.to_owned()];
         }
-        let mut bags: Vec<PathBuf> = files
-            .into_iter()
-            .filter(|file| has_ending(file, "db3"))
-            .collect();
+        let mut bags: Vec<PathBuf> = files.into_iter().filter(|file| has_ending(file, "db3")).collect();
         bags.sort();
         return bags;
     }
@@ -103,10 +94,7 @@ fn bag_commands(sources: &[PathBuf]) -> String {
     let mut made = Vec::new();
     for source in sources {
         let (old, new) = (word(source), word(&converted(source)));
-        let _ = writeln!(
-            commands,
-            "  rosbags-convert --src {old} --dst {new} --dst-storage mcap"
-        );
+        let _ = writeln!(commands, "  rosbags-convert --src {old} --dst {new} --dst-storage mcap");
         made.push(new);
     }
     let _ = write!(commands, "  darkqa-eval import mcap {}", made.join(" "));
@@ -121,8 +109,7 @@ fn converted(source: &Path) -> PathBuf {
     }
     let name = source.file_stem().unwrap_or_default().to_string_lossy();
     let name = if name.is_empty() { "bag" } else { &name };
-    let names = std::iter::once(format!("{name}-mcap"))
-        .chain((2..).map(|number| format!("{name}-mcap-{number}")));
+    let names = std::iter::once(format!("{name}-mcap")).chain((2..).map(|number| format!("{name}-mcap-{number}")));
     names
         .map(|name| match source.file_name() {
             Some(_) => source.with_file_name(name),
@@ -148,11 +135,7 @@ fn compressed(path: &Path) -> String {
         let (file, new) = (word(file), word(&new));
         let _ = writeln!(words, "  zstd -d {file} -o {new}");
     }
-    let next = if path.is_dir() {
-        path.to_owned()
-    } else {
-        unpacked(path)
-    };
+    let next = if path.is_dir() { path.to_owned() } else { unpacked(path) };
     let _ = write!(words, "  darkqa-eval import mcap {}", word(&next));
     words
 }
@@ -166,14 +149,9 @@ fn unpacked(file: &Path) -> PathBuf {
     }
 }
 
-/// The commands that make a video of the messages of a topic, and import it. `rate` is the number of its messages per second; `None` if it
-/// is unknown. `None` if no program is known that reads such messages.
-pub(super) fn video_commands(
-    files: &[PathBuf],
-    topic: &str,
-    encoding: Encoding,
-    rate: Option<f64>,
-) -> Option<String> {
+/// The commands that make a video of the messages of a topic, and import it. `rate` is the number of its messages per
+/// second; `None` if it is unknown. `None` if no program is known that reads such messages.
+pub(super) fn video_commands(files: &[PathBuf], topic: &str, encoding: Encoding, rate: Option<f64>) -> Option<String> {
     let (package, module) = match encoding {
         Encoding::Cdr => ("mcap-ros2-support", "mcap_ros2"),
         Encoding::Ros1 => ("mcap-ros1-support", "mcap_ros1"),

@@ -10,8 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::data::frame_folder::{self, FrameOutput};
 use crate::data::import::recording::{
-    Channel, ChannelContent, ForeignData, ImageMessage, MessageImage, Nanoseconds, Place,
-    Thumbnail, seconds,
+    Channel, ChannelContent, ForeignData, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
 };
 use crate::engine::images::frames::InputTally;
 use crate::error::{Error, Result};
@@ -22,7 +21,8 @@ use crate::types::text::counted;
 use crate::types::text::excerpt;
 use crate::types::{DepthNote, FrameId, Labels, Pixels, Rgb, Rgb16Image};
 
-/// Maximum size of the frames waiting to be written, in bytes (chosen). Writing needs two to three times as much memory.
+/// Maximum size of the frames waiting to be written, in bytes (chosen). Writing needs two to three times as much
+/// memory.
 const MAX_WAITING_BYTES: usize = 32 << 20;
 
 /// Number of waiting frames per thread (chosen).
@@ -138,8 +138,8 @@ impl<'a> FrameWriter<'a> {
         }
     }
 
-    /// Adds a frame, and first writes the waiting ones if there are many. A frame in a chunk is known to be intact only after the whole chunk
-    /// was read, but is written earlier if the chunk exceeds the memory for waiting frames.
+    /// Adds a frame, and first writes the waiting ones if there are many. A frame in a chunk is known to be intact only
+    /// after the whole chunk was read, but is written earlier if the chunk exceeds the memory for waiting frames.
     pub(super) fn push(&mut self, frame: ChosenFrame, is_intact: bool) {
         let bytes: usize = self.waiting.iter().map(ChosenFrame::bytes).sum();
         let max_waiting = WAITING_PER_THREAD * self.pool.current_num_threads();
@@ -169,9 +169,8 @@ impl<'a> FrameWriter<'a> {
     pub(super) fn write_waiting(&mut self) {
         let waiting = std::mem::take(&mut self.waiting);
         self.intact = 0;
-        let results: Vec<Result<WrittenFrame, String>> = self
-            .pool
-            .install(|| waiting.par_iter().map(|frame| self.write(frame)).collect());
+        let results: Vec<Result<WrittenFrame, String>> =
+            self.pool.install(|| waiting.par_iter().map(|frame| self.write(frame)).collect());
         for (frame, result) in waiting.iter().zip(results) {
             match result {
                 Ok(written) => self.written.push(written),
@@ -199,9 +198,7 @@ impl<'a> FrameWriter<'a> {
 
     fn write(&self, frame: &ChosenFrame) -> Result<WrittenFrame, String> {
         let encoded = match &frame.source {
-            FrameSource::Message { channel, bytes } => {
-                self.encode_message(frame, channel, bytes)?
-            }
+            FrameSource::Message { channel, bytes } => self.encode_message(frame, channel, bytes)?,
             FrameSource::File(bytes) => self.encode_file(frame, bytes.clone(), "unknown")?,
             FrameSource::Image(image) => EncodedFrame {
                 bytes: crate::pictures::png(image).map_err(|e| e.to_string())?,
@@ -215,16 +212,10 @@ impl<'a> FrameWriter<'a> {
             },
         };
         let scene = format!("{}-{:04}", self.drive, frame.place.stretch);
-        let output = FrameOutput {
-            out: self.out,
-            scene: &scene,
-            frame: &frame.name,
-        };
+        let output = FrameOutput { out: self.out, scene: &scene, frame: &frame.name };
         let (width, height) = encoded.size;
         let mut line = output.line(width, height);
-        let path = output
-            .write("rgb", encoded.ending, &encoded.bytes)
-            .map_err(|e| e.to_string())?;
+        let path = output.write("rgb", encoded.ending, &encoded.bytes).map_err(|e| e.to_string())?;
         line.insert("rgb".to_owned(), json!(path));
         line.insert("t".to_owned(), json!(seconds(frame.time)));
         line.insert("topic".to_owned(), json!(frame.topic));
@@ -245,12 +236,7 @@ impl<'a> FrameWriter<'a> {
         })
     }
 
-    fn encode_message(
-        &self,
-        frame: &ChosenFrame,
-        channel: &Channel,
-        bytes: &[u8],
-    ) -> Result<EncodedFrame, String> {
+    fn encode_message(&self, frame: &ChosenFrame, channel: &Channel, bytes: &[u8]) -> Result<EncodedFrame, String> {
         let message = parse(channel, bytes)?;
         match message.image {
             MessageImage::Raw(image) => {
@@ -268,20 +254,14 @@ impl<'a> FrameWriter<'a> {
                     frame_id: message.frame_id,
                 })
             }
-            MessageImage::File { format, bytes } => Ok(EncodedFrame {
-                frame_id: message.frame_id,
-                ..self.encode_file(frame, bytes.into_owned(), &format)?
-            }),
+            MessageImage::File { format, bytes } => {
+                Ok(EncodedFrame { frame_id: message.frame_id, ..self.encode_file(frame, bytes.into_owned(), &format)? })
+            }
         }
     }
 
     /// Checks an image file that is copied unchanged. `format` is its stated format.
-    fn encode_file(
-        &self,
-        frame: &ChosenFrame,
-        bytes: Vec<u8>,
-        format: &str,
-    ) -> Result<EncodedFrame, String> {
+    fn encode_file(&self, frame: &ChosenFrame, bytes: Vec<u8>, format: &str) -> Result<EncodedFrame, String> {
         let file = ImageFile::new(bytes, frame.words(), DecodeRule::default());
         let ending = file.extension();
         if !COPIED.contains(&ending) {
@@ -300,7 +280,8 @@ impl<'a> FrameWriter<'a> {
             Some(DepthNote::Light) => true,
         };
         if self.white != u16::MAX && has_white {
-            let problem = "the file states what its codes mean, so --white does not apply; leave it out, or take the topic alone";
+            let problem =
+                "the file states what its codes mean, so --white does not apply; leave it out, or take the topic alone";
             return Err(problem.to_owned());
         }
         if note.depth == Some(DepthNote::Rgb16Image) {
@@ -312,10 +293,7 @@ impl<'a> FrameWriter<'a> {
             let bytes = if self.white == u16::MAX {
                 file.bytes().to_vec()
             } else {
-                pixels
-                    .with_white(self.white)
-                    .png()
-                    .map_err(|e| e.to_string())?
+                pixels.with_white(self.white).png().map_err(|e| e.to_string())?
             };
             return Ok(EncodedFrame {
                 bytes,
@@ -342,7 +320,8 @@ impl<'a> FrameWriter<'a> {
         })
     }
 
-    /// Writes the waiting frames and the files about all frames, with `info` as `dataset.json`. Returns the number of scenes.
+    /// Writes the waiting frames and the files about all frames, with `info` as `dataset.json`. Returns the number of
+    /// scenes.
     ///
     /// # Errors
     /// If there is no frame, or the files cannot be written.
@@ -354,27 +333,18 @@ impl<'a> FrameWriter<'a> {
         std::mem::take(&mut self.tally).warn();
         self.warn_of_white();
         self.warn_of_lost_colour();
-        self.written.sort_by_cached_key(|written| {
-            ["scene", "frame"].map(|key| written.line[key].as_str().map(str::to_owned))
-        });
+        self.written
+            .sort_by_cached_key(|written| ["scene", "frame"].map(|key| written.line[key].as_str().map(str::to_owned)));
         let lines = self.written.iter().map(|written| &written.line);
         frame_folder::write_folder_files(self.out, &Labels::default(), info, lines)?;
-        let mut scenes: Vec<&Value> = self
-            .written
-            .iter()
-            .map(|written| &written.line["scene"])
-            .collect();
+        let mut scenes: Vec<&Value> = self.written.iter().map(|written| &written.line["scene"]).collect();
         scenes.dedup();
         Ok(scenes.len())
     }
 
     /// Gives the frames of a topic the times of the recorder.
     pub(super) fn use_log_times(&mut self, topic: &str) {
-        for written in self
-            .written
-            .iter_mut()
-            .filter(|written| written.topic == topic)
-        {
+        for written in self.written.iter_mut().filter(|written| written.topic == topic) {
             let time = json!(seconds(written.log_time));
             written.line.insert("t".to_owned(), time);
         }
@@ -394,11 +364,7 @@ impl<'a> FrameWriter<'a> {
     /// Warns of topics with colour images that were compressed as grey.
     fn warn_of_lost_colour(&self) {
         let mut topics: BTreeMap<&str, usize> = BTreeMap::new();
-        for written in self
-            .written
-            .iter()
-            .filter(|written| written.has_lost_colour)
-        {
+        for written in self.written.iter().filter(|written| written.has_lost_colour) {
             *topics.entry(&written.topic).or_default() += 1;
         }
         for (topic, count) in topics {
@@ -413,14 +379,8 @@ impl<'a> FrameWriter<'a> {
 
     /// Warns if 16-bit images seem to use fewer bits, which makes them too dark.
     fn warn_of_white(&self) {
-        let peak = self
-            .written
-            .iter()
-            .filter_map(|written| written.peak_16)
-            .max();
-        if let Some(peak) =
-            peak.filter(|peak| *peak > 0 && *peak < 1 << 14 && self.white == u16::MAX)
-        {
+        let peak = self.written.iter().filter_map(|written| written.peak_16).max();
+        if let Some(peak) = peak.filter(|peak| *peak > 0 && *peak < 1 << 14 && self.white == u16::MAX) {
             let white = (u32::from(peak) + 1).next_power_of_two() - 1;
             tracing::warn!(
                 "the greatest code of the images of 16 bits is {peak}: they are dark, unless their white is less than 65535; for a sensor of {} bits set --white {white}",
@@ -450,15 +410,13 @@ fn problem(error: Error) -> String {
 pub(super) const VIDEO_REMEDY: &str =
     "; `darkqa-eval import mcap` without --out prints the commands that make a video file of it";
 
-/// True if a format states that a colour image was compressed as grey: `compressed_image_transport` writes `yuv422_yuy2; jpeg compressed mono8`
-/// for an image in YUV.
+/// True if a format states that a colour image was compressed as grey: `compressed_image_transport` writes
+/// `yuv422_yuy2; jpeg compressed mono8` for an image in YUV.
 fn has_lost_colour(format: &str) -> bool {
     let (source, target) = format.split_once(';').unwrap_or((format, ""));
     let source = source.trim();
     let is_colour = is_yuv(source)
-        || ["rgb", "bgr", "8UC3", "8UC4", "16UC3", "16UC4"]
-            .iter()
-            .any(|start| source.starts_with(start));
+        || ["rgb", "bgr", "8UC3", "8UC4", "16UC3", "16UC4"].iter().any(|start| source.starts_with(start));
     is_colour && target.contains("mono")
 }
 
@@ -475,9 +433,7 @@ pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<T
                 let pixels = RawPixels::Rgb16Image(deep_image(&file)?);
                 return thumbnail_of_pixels(pixels.with_white(white));
             }
-            file.decode()
-                .map(|image| Thumbnail::new(&image))
-                .map_err(|e| e.to_string())
+            file.decode().map(|image| Thumbnail::new(&image)).map_err(|e| e.to_string())
         }
     }
 }
@@ -486,15 +442,9 @@ fn thumbnail_of_pixels(pixels: RawPixels) -> Result<Thumbnail, String> {
     match pixels {
         RawPixels::Codes8(image) => Ok(Thumbnail::new(&image)),
         RawPixels::Rgb16Image(image) => {
-            let high = image
-                .samples()
-                .iter()
-                .map(|code| (code >> 8) as u8)
-                .collect();
+            let high = image.samples().iter().map(|code| (code >> 8) as u8).collect();
             let image = Rgb::new(image.height(), image.width(), high);
-            image
-                .map(|image| Thumbnail::new(&image))
-                .map_err(|e| e.to_string())
+            image.map(|image| Thumbnail::new(&image)).map_err(|e| e.to_string())
         }
     }
 }
@@ -506,25 +456,11 @@ fn parse<'a>(channel: &Channel, bytes: &'a [u8]) -> Result<ImageMessage<'a>, Str
     }
 }
 
-/// The line about the written frames and scenes. `extent` is that of a scene, such as `30 s`, `seen` the number of frames read.
-pub(super) fn summary(
-    out: &Path,
-    frames: usize,
-    scenes: usize,
-    extent: &str,
-    seen: usize,
-    failed: usize,
-) -> String {
-    let failed = if failed == 0 {
-        String::new()
-    } else {
-        format!(", {failed} failed")
-    };
-    let chosen = if seen == frames {
-        String::new()
-    } else {
-        format!(", chosen from {seen}")
-    };
+/// The line about the written frames and scenes. `extent` is that of a scene, such as `30 s`, `seen` the number of
+/// frames read.
+pub(super) fn summary(out: &Path, frames: usize, scenes: usize, extent: &str, seen: usize, failed: usize) -> String {
+    let failed = if failed == 0 { String::new() } else { format!(", {failed} failed") };
+    let chosen = if seen == frames { String::new() } else { format!(", chosen from {seen}") };
     format!(
         "{}: {} of {} ({extent} each){chosen}{failed}\n",
         out.display(),

@@ -54,8 +54,8 @@ pub(crate) struct LeRobotArgs {
 /// Lists the cameras of a LeRobot data set, or imports frames of them.
 ///
 /// # Errors
-/// If the folder has no LeRobot data set of a supported version, several cameras have images and none is named, or no frame could be
-/// read.
+/// If the folder has no LeRobot data set of a supported version, several cameras have images and none is named, or no
+/// frame could be read.
 pub(crate) fn import(args: &LeRobotArgs, progress: &Progress) -> Result<Outcome> {
     let set = LeRobotSet::open(&args.folder, &args.root.data_root)?;
     let Some(out) = &args.out else {
@@ -80,12 +80,7 @@ pub(crate) fn import(args: &LeRobotArgs, progress: &Progress) -> Result<Outcome>
 }
 
 /// Writes the files about all frames, and returns the result of the import.
-fn finish(
-    mut import: EpisodeImport<'_>,
-    args: &LeRobotArgs,
-    out: &Path,
-    info: &Value,
-) -> Result<Outcome> {
+fn finish(mut import: EpisodeImport<'_>, args: &LeRobotArgs, out: &Path, info: &Value) -> Result<Outcome> {
     let place = args.folder.display().to_string();
     import.problems.warn();
     let scenes = import.writer.finish(&place, info)?;
@@ -98,23 +93,10 @@ fn finish(
         import.camera_names().join(", "),
         args.sampling.description()
     );
-    let tasks: BTreeSet<&str> = import
-        .writer
-        .written
-        .iter()
-        .filter_map(|written| written.line.get("task")?.as_str())
-        .collect();
-    let _ = writeln!(
-        output,
-        "{}; {} frames a second",
-        counted(tasks.len(), "task"),
-        import.set.fps()
-    );
-    Ok(Outcome::wrote(
-        out,
-        Outcome::complete_if(failed == 0 && import.problems.is_empty()),
-        output,
-    ))
+    let tasks: BTreeSet<&str> =
+        import.writer.written.iter().filter_map(|written| written.line.get("task")?.as_str()).collect();
+    let _ = writeln!(output, "{}; {} frames a second", counted(tasks.len(), "task"), import.set.fps());
+    Ok(Outcome::wrote(out, Outcome::complete_if(failed == 0 && import.problems.is_empty()), output))
 }
 
 /// The name of a set: that of its folder, or of its repository in a hub's cache.
@@ -124,31 +106,15 @@ fn set_name(folder: &Path) -> String {
         let name = path.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
     };
-    let repository = folder
-        .ancestors()
-        .nth(2)
-        .map(part)
-        .filter(|name| name.starts_with("datasets--"));
-    let name = repository
-        .as_deref()
-        .and_then(|name| name.rsplit("--").next())
-        .map_or_else(|| part(&folder), str::to_owned);
-    Some(slug(&name))
-        .filter(|name| !name.is_empty())
-        .unwrap_or_else(|| "lerobot".to_owned())
+    let repository = folder.ancestors().nth(2).map(part).filter(|name| name.starts_with("datasets--"));
+    let name =
+        repository.as_deref().and_then(|name| name.rsplit("--").next()).map_or_else(|| part(&folder), str::to_owned);
+    Some(slug(&name)).filter(|name| !name.is_empty()).unwrap_or_else(|| "lerobot".to_owned())
 }
 
 /// The cameras to import: the named ones, or the only one with images.
-fn selected_cameras<'a>(
-    set: &'a LeRobotSet,
-    folder: &Path,
-    named: &[String],
-) -> Result<Vec<&'a Camera>> {
-    let readable: Vec<&Camera> = set
-        .cameras()
-        .iter()
-        .filter(|camera| !camera.is_depth)
-        .collect();
+fn selected_cameras<'a>(set: &'a LeRobotSet, folder: &Path, named: &[String]) -> Result<Vec<&'a Camera>> {
+    let readable: Vec<&Camera> = set.cameras().iter().filter(|camera| !camera.is_depth).collect();
     let names: Vec<&str> = readable.iter().map(|camera| &*camera.name).collect();
     if names.is_empty() {
         return Err(no_cameras(set, folder));
@@ -156,8 +122,7 @@ fn selected_cameras<'a>(
     let names = names.join(", ");
     if named.is_empty() {
         if readable.len() > 1 {
-            let problem =
-                format_args!("several cameras have images; choose one or more of {names}");
+            let problem = format_args!("several cameras have images; choose one or more of {names}");
             return Err(Error::usage("--camera", problem));
         }
         return Ok(readable);
@@ -173,14 +138,10 @@ fn selected_cameras<'a>(
         };
         return Err(Error::usage("--camera", problem));
     }
-    let chosen: Vec<&Camera> = readable
-        .into_iter()
-        .filter(|camera| named.contains(&camera.name))
-        .collect();
+    let chosen: Vec<&Camera> = readable.into_iter().filter(|camera| named.contains(&camera.name)).collect();
     let slugs: BTreeSet<String> = chosen.iter().map(|camera| slug(&camera.name)).collect();
     if slugs.len() < chosen.len() {
-        let problem =
-            "two of the cameras give their frames the same names; import them into two folders";
+        let problem = "two of the cameras give their frames the same names; import them into two folders";
         return Err(Error::usage("--camera", problem));
     }
     Ok(chosen)
@@ -189,10 +150,7 @@ fn selected_cameras<'a>(
 /// The error for a set without a camera that can be read.
 fn no_cameras(set: &LeRobotSet, folder: &Path) -> Error {
     let problem = match set.cameras() {
-        [] => format!(
-            "no camera with images: its {} have numbers alone",
-            counted(set.other_features(), "feature")
-        ),
+        [] => format!("no camera with images: its {} have numbers alone", counted(set.other_features(), "feature")),
         [camera, ..] => format!("no camera with images: {} has depth", camera.name),
     };
     Error::data(folder.display(), problem)
@@ -207,19 +165,13 @@ fn listing(set: &LeRobotSet, folder: &Path) -> Result<Outcome> {
         return Err(no_cameras(set, folder));
     }
     let episodes = set.episodes(&[])?;
-    let rows: u64 = episodes
-        .iter()
-        .fold(0, |rows, episode| rows.saturating_add(episode.length));
+    let rows: u64 = episodes.iter().fold(0, |rows, episode| rows.saturating_add(episode.length));
     let seconds = rows as f64 / set.fps();
     let cells: Vec<[String; 3]> = set
         .cameras()
         .iter()
         .map(|camera| {
-            let form = if camera.is_depth {
-                "not read: depth".to_owned()
-            } else {
-                camera.description.clone()
-            };
+            let form = if camera.is_depth { "not read: depth".to_owned() } else { camera.description.clone() };
             [camera.name.clone(), camera.form.name().to_owned(), form]
         })
         .collect();
@@ -238,21 +190,14 @@ fn listing(set: &LeRobotSet, folder: &Path) -> Result<Outcome> {
             counted(frames, "frame"),
         );
     }
-    let _ = writeln!(
-        lines,
-        "{} without images",
-        counted(set.other_features(), "further feature")
-    );
+    let _ = writeln!(lines, "{} without images", counted(set.other_features(), "further feature"));
     let tasks = set.tasks();
     let _ = writeln!(
         lines,
         "LeRobot {}: {}, {}",
         set.version(),
         counted(episodes.len(), "episode"),
-        counted(
-            tasks.as_ref().map_or(0, std::collections::BTreeMap::len),
-            "task"
-        )
+        counted(tasks.as_ref().map_or(0, std::collections::BTreeMap::len), "task")
     );
     if let Err(e) = &tasks {
         tracing::warn!("{e}");

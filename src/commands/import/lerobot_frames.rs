@@ -11,9 +11,7 @@ use super::mcap_files::slug;
 use crate::data::ParquetColumns;
 use crate::data::import::lerobot::{Camera, DataRow, Episode, FilePlace, ImageForm, LeRobotSet};
 use crate::data::import::recording::video::Video;
-use crate::data::import::recording::{
-    Nanoseconds, Place, Sampler, SamplingArgs, Thumbnail, seconds,
-};
+use crate::data::import::recording::{Nanoseconds, Place, Sampler, SamplingArgs, Thumbnail, seconds};
 use crate::engine::images::progress::{Progress, StepBar};
 use crate::engine::images::workers::pool;
 use crate::error::{Error, Result};
@@ -95,11 +93,8 @@ impl<'a> EpisodeImport<'a> {
         drive: &str,
         threads: Option<NonZeroUsize>,
     ) -> Result<Self> {
-        let videos: Vec<&str> = cameras
-            .iter()
-            .filter(|camera| camera.form == ImageForm::Video)
-            .map(|camera| &*camera.name)
-            .collect();
+        let videos: Vec<&str> =
+            cameras.iter().filter(|camera| camera.form == ImageForm::Video).map(|camera| &*camera.name).collect();
         let mut problems = Problems::default();
         let episodes = set.episodes(&videos)?;
         let tasks = set.tasks().unwrap_or_else(|e| {
@@ -148,11 +143,13 @@ impl<'a> EpisodeImport<'a> {
                 match result {
                     Ok(()) => {}
                     Err(e @ Error::Usage { .. }) => return Err(e),
-                    Err(e) => self.problems.push(format!(
-                        "{e}; {} of {} left out",
-                        counted(rows.len(), "frame"),
-                        camera.name
-                    )),
+                    Err(e) => {
+                        self.problems.push(format!(
+                            "{e}; {} of {} left out",
+                            counted(rows.len(), "frame"),
+                            camera.name
+                        ));
+                    }
                 }
             }
             videos += usize::from(camera.form == ImageForm::Video);
@@ -175,15 +172,9 @@ impl<'a> EpisodeImport<'a> {
                 let is_ended = self.choose_in_episode(position, rows, &mut chosen);
                 ended += usize::from(is_ended);
             }
-            let count: usize = chosen
-                .iter()
-                .flat_map(RowsByFile::values)
-                .map(Vec::len)
-                .sum();
+            let count: usize = chosen.iter().flat_map(RowsByFile::values).map(Vec::len).sum();
             if count > MAX_FRAMES {
-                let problem = format_args!(
-                    "more than {MAX_FRAMES} frames; choose fewer, such as one every 10 seconds"
-                );
+                let problem = format_args!("more than {MAX_FRAMES} frames; choose fewer, such as one every 10 seconds");
                 return Err(Error::usage("--every", problem));
             }
         }
@@ -195,26 +186,15 @@ impl<'a> EpisodeImport<'a> {
     }
 
     /// Reads the rows of a data file, which should have the episodes at these positions.
-    fn rows_by_episode(
-        &mut self,
-        place: FilePlace,
-        positions: &[usize],
-    ) -> Result<Vec<(usize, Vec<DataRow>)>> {
-        let mut slots: Vec<(usize, Vec<DataRow>)> = positions
-            .iter()
-            .map(|position| (*position, Vec::new()))
-            .collect();
-        let by_index: HashMap<u32, usize> = (0..)
-            .zip(positions)
-            .map(|(slot, position)| (self.episodes[*position].index, slot))
-            .collect();
+    fn rows_by_episode(&mut self, place: FilePlace, positions: &[usize]) -> Result<Vec<(usize, Vec<DataRow>)>> {
+        let mut slots: Vec<(usize, Vec<DataRow>)> = positions.iter().map(|position| (*position, Vec::new())).collect();
+        let by_index: HashMap<u32, usize> =
+            (0..).zip(positions).map(|(slot, position)| (self.episodes[*position].index, slot)).collect();
         let mut others = 0;
-        let read = self
-            .set
-            .rows(place, |row| match by_index.get(&row.episode) {
-                Some(slot) => slots[*slot].1.push(row),
-                None => others += 1,
-            });
+        let read = self.set.rows(place, |row| match by_index.get(&row.episode) {
+            Some(slot) => slots[*slot].1.push(row),
+            None => others += 1,
+        });
         match read {
             Ok(unread) if others + unread > 0 => {
                 let path = self.set.data_file(place)?;
@@ -235,12 +215,7 @@ impl<'a> EpisodeImport<'a> {
     }
 
     /// Chooses the rows of an episode for each camera. Returns true if a time of `--at` is after its end.
-    fn choose_in_episode(
-        &mut self,
-        position: usize,
-        mut rows: Vec<DataRow>,
-        chosen: &mut [RowsByFile],
-    ) -> bool {
+    fn choose_in_episode(&mut self, position: usize, mut rows: Vec<DataRow>, chosen: &mut [RowsByFile]) -> bool {
         let episode = &self.episodes[position];
         let mut numbers = HashSet::new();
         rows.retain(|row| numbers.insert(row.frame));
@@ -269,15 +244,12 @@ impl<'a> EpisodeImport<'a> {
                 }
             };
             let Some((place, from)) = part else {
-                self.problems.push(format!(
-                    "episode {}: meta states no video of {}",
-                    episode.index, camera.name
-                ));
+                self.problems.push(format!("episode {}: meta states no video of {}", episode.index, camera.name));
                 continue;
             };
-            let own = rows.iter().filter(|row| {
-                from.is_none_or(|from| has_own_frame(from + row.time, camera.fps, self.set.fps()))
-            });
+            let own = rows
+                .iter()
+                .filter(|row| from.is_none_or(|from| has_own_frame(from + row.time, camera.fps, self.set.fps())));
             let mut sampler = self.sampling.sampler(duration);
             let takes_all = sampler.compares_pixels();
             let of_file = files.entry(place).or_default();
@@ -285,10 +257,7 @@ impl<'a> EpisodeImport<'a> {
                 self.seen += 1;
                 let since = nanoseconds(row.time - start);
                 if takes_all || sampler.is_due(place_of(row, since, episode)) {
-                    of_file.push(ChosenRow {
-                        episode: position as u32,
-                        row: *row,
-                    });
+                    of_file.push(ChosenRow { episode: position as u32, row: *row });
                 }
             }
             is_ended |= !takes_all && !sampler.missed().is_empty();
@@ -304,13 +273,7 @@ impl<'a> EpisodeImport<'a> {
     }
 
     /// Takes images of a camera from a data file. The rows are in the order of the file.
-    fn read_images(
-        &mut self,
-        camera: &Camera,
-        place: FilePlace,
-        rows: &[ChosenRow],
-        bar: &StepBar,
-    ) -> Result<()> {
+    fn read_images(&mut self, camera: &Camera, place: FilePlace, rows: &[ChosenRow], bar: &StepBar) -> Result<()> {
         let table = ParquetColumns::open(&self.set.data_file(place)?)?;
         let mut samplers = Samplers::default();
         for chosen in rows {
@@ -319,8 +282,7 @@ impl<'a> EpisodeImport<'a> {
             match table.image(&camera.name, group as usize, row as usize) {
                 Ok(bytes) => {
                     let thumbnail = || {
-                        let file =
-                            ImageFile::new(bytes.clone(), String::new(), DecodeRule::default());
+                        let file = ImageFile::new(bytes.clone(), String::new(), DecodeRule::default());
                         file.decode().ok().map(|image| Thumbnail::new(&image))
                     };
                     if self.is_wanted(&mut samplers, chosen, thumbnail) {
@@ -333,8 +295,8 @@ impl<'a> EpisodeImport<'a> {
         Ok(())
     }
 
-    /// Takes frames of a camera from a video file. The rows are sorted by their time in the file; `number` counts the cameras with
-    /// videos.
+    /// Takes frames of a camera from a video file. The rows are sorted by their time in the file; `number` counts the
+    /// cameras with videos.
     fn read_video(
         &mut self,
         camera: &Camera,
@@ -345,10 +307,7 @@ impl<'a> EpisodeImport<'a> {
     ) -> Result<()> {
         let path = self.set.video_file(place, &camera.name)?;
         let video = Video::open_mp4(&path)?;
-        let times: Vec<f64> = rows
-            .iter()
-            .map(|row| self.time_in_file(number, row))
-            .collect();
+        let times: Vec<f64> = rows.iter().map(|row| self.time_in_file(number, row)).collect();
         let tolerance = 0.5 / camera.fps.max(self.set.fps());
         let mut frames = video.frames_within(&spans(&times, tolerance))?;
         let mut samplers = Samplers::default();
@@ -402,8 +361,8 @@ impl<'a> EpisodeImport<'a> {
         }
     }
 
-    /// False if pixels decide and the frame has not changed enough. An image that cannot be decoded goes to the writer, which counts
-    /// the problem.
+    /// False if pixels decide and the frame has not changed enough. An image that cannot be decoded goes to the writer,
+    /// which counts the problem.
     fn is_wanted(
         &self,
         samplers: &mut Samplers,
@@ -427,20 +386,13 @@ impl<'a> EpisodeImport<'a> {
     fn push(&mut self, camera: &Camera, chosen: &ChosenRow, source: FrameSource) {
         let episode = &self.episodes[chosen.episode as usize];
         let row = &chosen.row;
-        let prefix = if self.cameras.len() > 1 {
-            slug(&camera.name) + "-"
-        } else {
-            String::new()
-        };
+        let prefix = if self.cameras.len() > 1 { slug(&camera.name) + "-" } else { String::new() };
         let time = nanoseconds(row.time);
-        let mut facts: Map<String, Value> = [
-            ("episode", json!(episode.index)),
-            ("frame_index", json!(row.frame)),
-            ("fps", json!(self.set.fps())),
-        ]
-        .map(|(key, value)| (key.to_owned(), value))
-        .into_iter()
-        .collect();
+        let mut facts: Map<String, Value> =
+            [("episode", json!(episode.index)), ("frame_index", json!(row.frame)), ("fps", json!(self.set.fps()))]
+                .map(|(key, value)| (key.to_owned(), value))
+                .into_iter()
+                .collect();
         if let Some(task) = row.task.and_then(|task| self.tasks.get(&task)) {
             facts.insert("task".to_owned(), json!(task));
         }
@@ -463,19 +415,15 @@ struct Samplers(HashMap<u32, (f64, Sampler)>);
 
 /// Position of a row: each episode is one scene. `since` is the time since its first row.
 fn place_of(row: &DataRow, since: Nanoseconds, episode: &Episode) -> Place {
-    Place {
-        time: nanoseconds(row.time),
-        since,
-        stretch: u64::from(episode.index),
-    }
+    Place { time: nanoseconds(row.time), since, stretch: u64::from(episode.index) }
 }
 
 fn nanoseconds(seconds: f64) -> Nanoseconds {
     (seconds * 1e9).round() as Nanoseconds
 }
 
-/// True if a frame of a slower camera belongs to this row and to no other: the next frame is less than half a row away. `time` is that
-/// of the row in the video, `camera` and `rows` are frames and rows per second.
+/// True if a frame of a slower camera belongs to this row and to no other: the next frame is less than half a row away.
+/// `time` is that of the row in the video, `camera` and `rows` are frames and rows per second.
 fn has_own_frame(time: f64, camera: f64, rows: f64) -> bool {
     if camera >= rows {
         return true;
@@ -486,8 +434,8 @@ fn has_own_frame(time: f64, camera: f64, rows: f64) -> bool {
     (-0.5 - 1e-6..0.5 - 1e-6).contains(&distance)
 }
 
-/// Spans of time with the frames at these times, which are sorted: from half a frame in front to half a frame after. Spans that meet are
-/// joined.
+/// Spans of time with the frames at these times, which are sorted: from half a frame in front to half a frame after.
+/// Spans that meet are joined.
 fn spans(times: &[f64], tolerance: f64) -> Vec<[f64; 2]> {
     let mut spans: Vec<[f64; 2]> = Vec::new();
     for time in times {
@@ -507,9 +455,7 @@ mod tests {
     #[test]
     fn rows_of_a_slower_camera_are_those_with_a_frame() {
         let own = |camera: f64| -> Vec<usize> {
-            (0..12)
-                .filter(|row| has_own_frame(*row as f64 / 10.0, camera, 10.0))
-                .collect()
+            (0..12).filter(|row| has_own_frame(*row as f64 / 10.0, camera, 10.0)).collect()
         };
         assert_eq!(own(10.0).len(), 12);
         assert_eq!(own(30.0).len(), 12);
@@ -522,10 +468,7 @@ mod tests {
 
     #[test]
     fn spans_that_meet_are_joined() {
-        assert_eq!(
-            spans(&[0.0, 0.1, 1.0], 0.05),
-            [[-0.05, 0.1 + 0.05], [1.0 - 0.05, 1.0 + 0.05]]
-        );
+        assert_eq!(spans(&[0.0, 0.1, 1.0], 0.05), [[-0.05, 0.1 + 0.05], [1.0 - 0.05, 1.0 + 0.05]]);
         assert!(spans(&[], 0.05).is_empty());
     }
 }

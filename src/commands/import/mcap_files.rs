@@ -35,14 +35,8 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
             return Err(Error::data(path.display(), problem));
         }
         inside.sort_by_cached_key(|file| {
-            let stem = file
-                .file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned();
-            let name = stem
-                .trim_end_matches(|c: char| c.is_ascii_digit())
-                .to_owned();
+            let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+            let name = stem.trim_end_matches(|c: char| c.is_ascii_digit()).to_owned();
             let number: u64 = stem[name.len()..].parse().unwrap_or(0);
             (name, number, stem)
         });
@@ -53,41 +47,21 @@ pub(super) fn files(paths: &[PathBuf]) -> Result<Vec<PathBuf>> {
 
 /// A topic as part of a file name.
 pub(super) fn slug(topic: &str) -> String {
-    let name: String = topic
-        .chars()
-        .map(|c| {
-            if c.is_alphanumeric() || matches!(c, '-' | '.') {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
+    let name: String =
+        topic.chars().map(|c| if c.is_alphanumeric() || matches!(c, '-' | '.') { c } else { '_' }).collect();
     name.trim_matches(['_', '.']).to_owned()
 }
 
 /// The name of a drive: the stem of its first file, without the number that bags append.
 pub(super) fn drive_name(file: &Path) -> String {
-    let stem = file
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned();
+    let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let name = slug(stem.strip_suffix("_0").unwrap_or(&stem));
-    if name.is_empty() {
-        "drive".to_owned()
-    } else {
-        name
-    }
+    if name.is_empty() { "drive".to_owned() } else { name }
 }
 
 /// Total size of files, in bytes.
 pub(super) fn total_bytes(files: &[PathBuf]) -> u64 {
-    files
-        .iter()
-        .filter_map(|file| file.metadata().ok())
-        .map(|metadata| metadata.len())
-        .sum()
+    files.iter().filter_map(|file| file.metadata().ok()).map(|metadata| metadata.len()).sum()
 }
 
 pub(super) fn open_reader(path: &Path) -> Result<McapReader<File>> {

@@ -2,7 +2,8 @@
 
 use crate::data::import::recording::Nanoseconds;
 
-/// Times of the images of a topic. Some drivers state one time stamp in all messages; the recorder's clock then continues it.
+/// Times of the images of a topic. Some drivers state one time stamp in all messages; the recorder's clock then
+/// continues it.
 #[derive(Debug, Default)]
 pub(super) struct MessageTimes {
     /// Time stamp and log time of the first message.
@@ -15,11 +16,7 @@ pub(super) struct MessageTimes {
 
 impl MessageTimes {
     /// The time of the next message from its time stamp, `None` if it has none, and the time of the recorder.
-    pub(super) fn next(
-        &mut self,
-        stamp: Option<Nanoseconds>,
-        log_time: Nanoseconds,
-    ) -> Nanoseconds {
+    pub(super) fn next(&mut self, stamp: Option<Nanoseconds>, log_time: Nanoseconds) -> Nanoseconds {
         let Some(stamp) = stamp else {
             return log_time;
         };
@@ -56,17 +53,11 @@ mod tests {
     fn constant_stamps_follow_the_recorder() {
         assert_eq!(times(&[7, 7, 7], &[100, 101, 105]), (vec![7, 8, 12], true));
         // Controls: stamps that advance, one message, no stamps, a recorder without a clock.
-        assert_eq!(
-            times(&[7, 9, 11], &[100, 101, 105]),
-            (vec![7, 9, 11], false)
-        );
+        assert_eq!(times(&[7, 9, 11], &[100, 101, 105]), (vec![7, 9, 11], false));
         assert_eq!(times(&[7], &[100]), (vec![7], false));
         assert_eq!(times(&[0, 0], &[100, 101]), (vec![100, 101], false));
         assert_eq!(times(&[7, 7], &[100, 100]), (vec![7, 7], false));
         // A stamp that is repeated once is no constant one.
-        assert_eq!(
-            times(&[7, 7, 9, 7], &[100, 101, 102, 103]),
-            (vec![7, 8, 9, 7], false)
-        );
+        assert_eq!(times(&[7, 7, 9, 7], &[100, 101, 102, 103]), (vec![7, 8, 9, 7], false));
     }
 }

@@ -11,16 +11,14 @@ use clap::Args;
 use serde_json::{Map, Value, json};
 
 use super::camera_facts::{Cameras, Exposures};
-use super::frame_writer::{
-    ChosenFrame, FrameSource, FrameWriter, VIDEO_REMEDY, summary, thumbnail,
-};
+use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, VIDEO_REMEDY, summary, thumbnail};
 use super::mcap_files::{drive_name, files, open_reader, overview, slug, total_bytes};
 use super::message_times::MessageTimes;
 use super::topic_list::{MAX_NAMED, listing, no_images, warn_of_unread};
 use crate::data::import::recording::{
-    CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader,
-    Message, Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview,
-    camera_name, camera_of_info, is_without_image, seconds, stamp,
+    CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader, Message, Nanoseconds,
+    Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_name, camera_of_info,
+    is_without_image, seconds, stamp,
 };
 use crate::engine::images::progress::{Progress, StepBar};
 use crate::engine::images::workers::{ThreadArgs, pool};
@@ -94,17 +92,13 @@ impl WrittenArgs {
 /// Refuses a file, and a folder that has frames already unless `--force` is set.
 pub(super) fn check_output(out: &Path, force: bool) -> Result<()> {
     if out.is_file() {
-        return Err(Error::data(
-            out.display(),
-            "a file; a folder for frames expected",
-        ));
+        return Err(Error::data(out.display(), "a file; a folder for frames expected"));
     }
     let list = out.join("frames.jsonl");
     if force || !list.exists() {
         return Ok(());
     }
-    let problem =
-        "the folder has frames already; --force overwrites them, another --out keeps both";
+    let problem = "the folder has frames already; --force overwrites them, another --out keeps both";
     Err(Error::data(list.display(), problem))
 }
 
@@ -112,27 +106,22 @@ pub(super) fn check_output(out: &Path, force: bool) -> Result<()> {
 pub(super) fn warn_of_missed(sampler: &Sampler, name: &str) {
     let missed = sampler.missed();
     if let Some(first) = missed.first() {
-        tracing::warn!(
-            "{name}: no frame at {first} s or later; {} of --at",
-            counted(missed.len(), "time")
-        );
+        tracing::warn!("{name}: no frame at {first} s or later; {} of --at", counted(missed.len(), "time"));
     }
 }
 
 /// Lists the topics of a recording, or imports frames of them.
 ///
 /// # Errors
-/// If a file is not an MCAP file, no topic has images, several topics have images and none is named, or no frame could be read.
+/// If a file is not an MCAP file, no topic has images, several topics have images and none is named, or no frame could
+/// be read.
 pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
     let files = files(&args.files)?;
     if let Some(out) = &args.out {
         args.written.check(out)?;
     }
-    let needs_overview =
-        args.out.is_none() || args.topic.is_empty() || args.sampling.max_frames.is_some();
-    let overview = needs_overview
-        .then(|| overview(&files, progress))
-        .transpose()?;
+    let needs_overview = args.out.is_none() || args.topic.is_empty() || args.sampling.max_frames.is_some();
+    let overview = needs_overview.then(|| overview(&files, progress)).transpose()?;
     let Some(out) = &args.out else {
         return listing(&files, &overview.unwrap_or_default());
     };
@@ -154,21 +143,14 @@ pub(crate) fn import(args: &McapArgs, progress: &Progress) -> Result<Outcome> {
 }
 
 /// The topics to import: the named ones, or the only one with images.
-fn selected_topics(
-    args: &McapArgs,
-    files: &[PathBuf],
-    overview: Option<&Overview>,
-) -> Result<BTreeSet<String>> {
+fn selected_topics(args: &McapArgs, files: &[PathBuf], overview: Option<&Overview>) -> Result<BTreeSet<String>> {
     let known = overview.map(Overview::image_topics);
     let topics = match (known, overview) {
         (Some(known), Some(overview)) if known.is_empty() => {
             return Err(no_images(files, overview));
         }
         (Some(known), _) if args.topic.is_empty() && known.len() > 1 => {
-            let problem = format_args!(
-                "several topics have images; choose one or more of {}",
-                known.join(", ")
-            );
+            let problem = format_args!("several topics have images; choose one or more of {}", known.join(", "));
             return Err(Error::usage("--topic", problem));
         }
         (Some(known), Some(overview)) if args.topic.is_empty() => {
@@ -179,8 +161,7 @@ fn selected_topics(
     };
     let slugs: BTreeSet<String> = topics.iter().map(|topic: &String| slug(topic)).collect();
     if slugs.len() < topics.len() {
-        let problem =
-            "two of the topics give their frames the same names; import them into two folders";
+        let problem = "two of the topics give their frames the same names; import them into two folders";
         return Err(Error::usage("--topic", problem));
     }
     Ok(topics)
@@ -230,16 +211,11 @@ impl<'a> Import<'a> {
             topics: topics
                 .iter()
                 .map(|topic| {
-                    let duration = overview
-                        .and_then(|overview| overview.topics.get(topic))
-                        .map_or(0.0, TopicOverview::duration);
+                    let duration =
+                        overview.and_then(|overview| overview.topics.get(topic)).map_or(0.0, TopicOverview::duration);
                     let selected = SelectedTopic {
                         sampler: args.sampling.sampler(duration),
-                        prefix: if topics.len() > 1 {
-                            slug(topic) + "-"
-                        } else {
-                            String::new()
-                        },
+                        prefix: if topics.len() > 1 { slug(topic) + "-" } else { String::new() },
                         seen: 0,
                         times: MessageTimes::default(),
                         clock: TopicClock::default(),
@@ -249,12 +225,7 @@ impl<'a> Import<'a> {
                 })
                 .collect(),
             stretches: Stretches::new(args.written.stretch),
-            writer: FrameWriter::new(
-                out,
-                drive.to_owned(),
-                white,
-                pool(args.written.threads.threads)?,
-            ),
+            writer: FrameWriter::new(out, drive.to_owned(), white, pool(args.written.threads.threads)?),
             white,
             cameras: Cameras::default(),
             exposures: Exposures::default(),
@@ -266,13 +237,7 @@ impl<'a> Import<'a> {
     }
 
     /// Imports the frames of one file. Damage is added to `problems`; frames before it are kept.
-    fn read(
-        &mut self,
-        path: &Path,
-        mut reader: McapReader<File>,
-        bar: &StepBar,
-        problems: &mut Vec<String>,
-    ) {
+    fn read(&mut self, path: &Path, mut reader: McapReader<File>, bar: &StepBar, problems: &mut Vec<String>) {
         let place = path.display();
         let mut megabytes = 0;
         let mut last = None;
@@ -295,13 +260,13 @@ impl<'a> Import<'a> {
                 }
                 Event::Cut(problem) => {
                     self.writer.mark_intact();
-                    let last = last
-                        .take()
-                        .map_or("before the first image".to_owned(), |message| {
-                            let since = self.since_start(message.log_time);
-                            format!("after {} at {since:.3} s", message.channel.topic)
-                        });
-                    problems.push(format!("{place}: the recording is cut off {last}: {problem}; frames up to there are kept"));
+                    let last = last.take().map_or("before the first image".to_owned(), |message| {
+                        let since = self.since_start(message.log_time);
+                        format!("after {} at {since:.3} s", message.channel.topic)
+                    });
+                    problems.push(format!(
+                        "{place}: the recording is cut off {last}: {problem}; frames up to there are kept"
+                    ));
                 }
             }
             let position = reader.position() as usize >> 20;
@@ -338,10 +303,7 @@ impl<'a> Import<'a> {
                 ChannelContent::Video(_) => {
                     format!("{}: video, not images{VIDEO_REMEDY}", channel.topic)
                 }
-                _ => format!(
-                    "{}: messages of {} are no images",
-                    channel.topic, channel.schema
-                ),
+                _ => format!("{}: messages of {} are no images", channel.topic, channel.schema),
             };
             self.writer.fail(&channel.topic, &problem);
         }
@@ -350,8 +312,7 @@ impl<'a> Import<'a> {
                 if let Some(bytes) = reader.body()
                     && let Ok(info) = CameraInfo::parse(&channel.schema, *encoding, bytes)
                 {
-                    self.cameras
-                        .add(camera_of_info(&channel.topic), message.log_time, info);
+                    self.cameras.add(camera_of_info(&channel.topic), message.log_time, info);
                 }
             }
             ChannelContent::Exposure(fields) if message.length <= MAX_MESSAGE_BYTES => {
@@ -381,12 +342,7 @@ impl<'a> Import<'a> {
     }
 
     /// Gives the image of a message to the writer, if its topic's sampler selects it.
-    fn process_image(
-        &mut self,
-        reader: &mut McapReader<File>,
-        message: &Message,
-        encoding: Encoding,
-    ) {
+    fn process_image(&mut self, reader: &mut McapReader<File>, message: &Message, encoding: Encoding) {
         let topic = message.channel.topic.clone();
         let schema = &message.channel.schema;
         if message.length > MAX_MESSAGE_BYTES {
@@ -408,20 +364,13 @@ impl<'a> Import<'a> {
             return;
         };
         let sampled = selected.times.next(stated, message.log_time);
-        let place = self
-            .stretches
-            .place(&mut selected.clock, sampled, message.log_time);
-        if let Some(latest) = selected
-            .latest
-            .replace(time)
-            .filter(|latest| time < *latest)
-        {
+        let place = self.stretches.place(&mut selected.clock, sampled, message.log_time);
+        if let Some(latest) = selected.latest.replace(time).filter(|latest| time < *latest) {
             let since = seconds(place.since);
             let back = seconds(latest.saturating_sub(time));
             self.backwards += 1;
-            self.first_backwards.get_or_insert_with(|| {
-                format!("{topic} at {since:.3} s, {back:.3} s before the frame in front of it")
-            });
+            self.first_backwards
+                .get_or_insert_with(|| format!("{topic} at {since:.3} s, {back:.3} s before the frame in front of it"));
         }
         let number = selected.seen;
         selected.seen += 1;
@@ -450,10 +399,7 @@ impl<'a> Import<'a> {
             time,
             log_time: message.log_time,
             facts: Map::new(),
-            source: FrameSource::Message {
-                channel: Arc::clone(&message.channel),
-                bytes,
-            },
+            source: FrameSource::Message { channel: Arc::clone(&message.channel), bytes },
         };
         self.writer.push(frame, !message.is_in_chunk);
     }
@@ -494,13 +440,9 @@ impl<'a> Import<'a> {
         let [mut with_intrinsics, mut with_exposure] = [0; 2];
         for written in &mut self.writer.written {
             let camera = camera_name(&written.topic);
-            let intrinsics =
-                self.cameras
-                    .intrinsics(&written.topic, written.log_time, written.size);
+            let intrinsics = self.cameras.intrinsics(&written.topic, written.log_time, written.size);
             if let Some(intrinsics) = intrinsics.filter(|_| !written.is_turned) {
-                written
-                    .line
-                    .insert("intrinsics".to_owned(), json!(intrinsics));
+                written.line.insert("intrinsics".to_owned(), json!(intrinsics));
                 with_intrinsics += 1;
             }
             if let Some(exposure) = self.exposures.found.get(&(camera.to_owned(), written.time)) {
@@ -547,27 +489,12 @@ impl<'a> Import<'a> {
         let scenes = self.writer.finish(&place, &info)?;
         let failed = self.writer.warn_of_failures();
         if let Some(first) = &self.first_backwards {
-            tracing::warn!(
-                "{place}: time goes back {}, first {first}",
-                counted(self.backwards, "time")
-            );
+            tracing::warn!("{place}: time goes back {}, first {first}", counted(self.backwards, "time"));
         }
         let seen = self.topics.values().map(|selected| selected.seen).sum();
         let frames = self.writer.written.len();
-        let mut output = summary(
-            out,
-            frames,
-            scenes,
-            &format!("{} s", args.written.stretch),
-            seen,
-            failed,
-        );
-        let _ = writeln!(
-            output,
-            "topics: {}; {}",
-            names.join(", "),
-            args.sampling.description()
-        );
+        let mut output = summary(out, frames, scenes, &format!("{} s", args.written.stretch), seen, failed);
+        let _ = writeln!(output, "topics: {}; {}", names.join(", "), args.sampling.description());
         let _ = writeln!(
             output,
             "intrinsics: {with_intrinsics} of {}; exposure: {with_exposure}",
@@ -581,10 +508,6 @@ impl<'a> Import<'a> {
                 counted(self.without_stamp, "message")
             );
         }
-        Ok(Outcome::wrote(
-            out,
-            Outcome::complete_if(failed == 0 && problems.is_empty()),
-            output,
-        ))
+        Ok(Outcome::wrote(out, Outcome::complete_if(failed == 0 && problems.is_empty()), output))
     }
 }

@@ -44,15 +44,8 @@ fn lines(overview: &Overview) -> String {
             others += 1;
             continue;
         }
-        let rate = topic
-            .rate()
-            .map_or(String::new(), |rate| format!("{rate:.1} Hz, "));
-        let TopicOverview {
-            schema,
-            image_format: form,
-            count,
-            ..
-        } = topic;
+        let rate = topic.rate().map_or(String::new(), |rate| format!("{rate:.1} Hz, "));
+        let TopicOverview { schema, image_format: form, count, .. } = topic;
         let (messages, duration) = (counted(*count, "message"), topic.duration());
         let broken = broken(topic);
         let _ = writeln!(
@@ -70,10 +63,7 @@ fn broken(topic: &TopicOverview) -> String {
         0 => String::new(),
         _ if !topic.has_images() => String::new(),
         1 => format!("; the first cannot be read: {}", topic.first_problem),
-        count => format!(
-            "; the first {count} cannot be read: {}",
-            topic.first_problem
-        ),
+        count => format!("; the first {count} cannot be read: {}", topic.first_problem),
     }
 }
 
@@ -109,29 +99,15 @@ fn width(overview: &Overview, text: fn(&str, &TopicOverview) -> usize) -> usize 
 
 /// The error for a recording without images, with its topics and, for video, the commands that make a video file.
 pub(super) fn no_images(files: &[PathBuf], overview: &Overview) -> Error {
-    let unread = overview
-        .topics
-        .iter()
-        .find(|(_, topic)| !topic.image_format.is_empty());
-    let topics: Vec<String> = overview
-        .topics
-        .iter()
-        .map(|(name, topic)| format!("{name} ({})", topic.schema))
-        .collect();
+    let unread = overview.topics.iter().find(|(_, topic)| !topic.image_format.is_empty());
+    let topics: Vec<String> =
+        overview.topics.iter().map(|(name, topic)| format!("{name} ({})", topic.schema)).collect();
     let problem = match (unread, topics.is_empty()) {
         (Some((name, topic)), _) => format!("{name} ({}) is {}", topic.schema, topic.image_format),
-        (None, true) => overview
-            .problems
-            .first()
-            .cloned()
-            .unwrap_or_else(|| "it has no messages".to_owned()),
+        (None, true) => overview.problems.first().cloned().unwrap_or_else(|| "it has no messages".to_owned()),
         (None, false) => format!("its topics are {}", first_names(&topics, MAX_NAMED)),
     };
-    let commands = extraction(files, overview).map_or(String::new(), |(topic, commands)| {
-        format!("\n{topic}: {commands}")
-    });
-    Error::data(
-        files[0].display(),
-        format_args!("no topic with images: {problem}{commands}"),
-    )
+    let commands =
+        extraction(files, overview).map_or(String::new(), |(topic, commands)| format!("\n{topic}: {commands}"));
+    Error::data(files[0].display(), format_args!("no topic with images: {problem}{commands}"))
 }

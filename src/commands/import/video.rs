@@ -56,12 +56,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     let mut sampler = args.sampling.sampler(duration);
     let mut stretches = Stretches::new(args.written.stretch);
     let mut clock = TopicClock::default();
-    let mut writer = FrameWriter::new(
-        out,
-        drive.clone(),
-        u16::MAX,
-        pool(args.written.threads.threads)?,
-    );
+    let mut writer = FrameWriter::new(out, drive.clone(), u16::MAX, pool(args.written.threads.threads)?);
     let bar = progress.bar("seconds", duration as usize);
     let mut frames = video.frames(args.sampling.interval())?;
     let (mut seen, mut last, mut problem) = (0, 0.0_f64, None);
@@ -81,8 +76,8 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         let shown_seconds = last as usize;
         last = last.max(seconds(frame.time));
         bar.advance(last as usize - shown_seconds);
-        let is_chosen = sampler.is_due(place)
-            && (!sampler.compares_pixels() || sampler.has_changed(Thumbnail::new(&frame.image)));
+        let is_chosen =
+            sampler.is_due(place) && (!sampler.compares_pixels() || sampler.has_changed(Thumbnail::new(&frame.image)));
         if is_chosen {
             let frame = ChosenFrame {
                 topic: path.clone(),
@@ -101,9 +96,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     let colours = converted_colours(&frames, &path);
     let problem = match problem {
         Some(problem) => Some(format!("{problem}; frames up to there are kept")),
-        None => frames
-            .damage()
-            .map(|problem| format!("{path}: {problem}; its frames are kept")),
+        None => frames.damage().map(|problem| format!("{path}: {problem}; its frames are kept")),
     };
     let is_whole = problem.is_none();
     let early = early_end(&video, last, args.sampling.interval());
@@ -116,44 +109,22 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
     }
     let scenes = writer.finish(&path, &info)?;
     let failed = writer.warn_of_failures();
-    let mut output = summary(
-        out,
-        writer.written.len(),
-        scenes,
-        &format!("{} s", args.written.stretch),
-        seen,
-        failed,
-    );
-    let _ = writeln!(
-        output,
-        "video: {}; {}",
-        video.stream,
-        args.sampling.description()
-    );
+    let mut output = summary(out, writer.written.len(), scenes, &format!("{} s", args.written.stretch), seen, failed);
+    let _ = writeln!(output, "video: {}; {}", video.stream, args.sampling.description());
     if let Some(colours) = colours {
         let _ = writeln!(output, "colours: {colours}");
     }
-    Ok(Outcome::wrote(
-        out,
-        Outcome::complete_if(failed == 0 && is_whole),
-        output,
-    ))
+    Ok(Outcome::wrote(out, Outcome::complete_if(failed == 0 && is_whole), output))
 }
 
 /// The stream and the duration of a video.
 fn describe(video: &Video) -> Outcome {
-    let duration = video
-        .duration
-        .map_or("unknown duration".to_owned(), |duration| {
-            format!("{duration} s")
-        });
-    Outcome::text(
-        Outcome::complete_if(true),
-        format!("{}; {duration}\n", video.stream),
-    )
+    let duration = video.duration.map_or("unknown duration".to_owned(), |duration| format!("{duration} s"));
+    Outcome::text(Outcome::complete_if(true), format!("{}; {duration}\n", video.stream))
 }
 
-/// The colours of the frames and their conversion; `None` if the codes are taken as sRGB codes. Warns of clipped light in HDR.
+/// The colours of the frames and their conversion; `None` if the codes are taken as sRGB codes. Warns of clipped light
+/// in HDR.
 fn converted_colours(frames: &VideoFrames, path: &str) -> Option<String> {
     let colours = frames.converted_from()?;
     if let Some(share) = frames.clipped_share() {
@@ -165,11 +136,12 @@ fn converted_colours(frames: &VideoFrames, path: &str) -> Option<String> {
     Some(format!("{colours}, converted to sRGB"))
 }
 
-/// Seconds without frames that are normal at the end of a video, where the sound may be longer than the picture; chosen.
+/// Seconds without frames that are normal at the end of a video, where the sound may be longer than the picture;
+/// chosen.
 const MAX_GAP: f64 = 2.0;
 
-/// Warning that the frames of a video end long before its stated duration; `None` if they do not or the duration is unknown. `last` is
-/// the time of the last frame and `interval` the time between frames, both in seconds.
+/// Warning that the frames of a video end long before its stated duration; `None` if they do not or the duration is
+/// unknown. `last` is the time of the last frame and `interval` the time between frames, both in seconds.
 fn early_end(video: &Video, last: f64, interval: f64) -> Option<String> {
     let duration = video.duration?;
     (duration - last > interval + MAX_GAP).then(|| {

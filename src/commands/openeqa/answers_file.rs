@@ -15,9 +15,7 @@ use crate::error::{Error, Result};
 use crate::files::reading;
 use crate::report::text::words::first_names;
 use crate::types::degradations::Kind;
-use crate::types::{
-    Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via,
-};
+use crate::types::{Condition, Degradation, Digest, KindSet, OpenDetail, Record, Step, TrialKey, Via};
 
 /// An entry of a file. Other fields are ignored.
 #[derive(Debug, Deserialize)]
@@ -33,10 +31,12 @@ struct AnswerEntry {
     annotator: Option<Value>,
 }
 
-/// Reads the answers in a file as records, in the order of the file. Warns about answers to questions that are not selected.
+/// Reads the answers in a file as records, in the order of the file. Warns about answers to questions that are not
+/// selected.
 ///
 /// # Errors
-/// If the file cannot be read, a person answered the same question twice in the same condition, or a level exists in several variants.
+/// If the file cannot be read, a person answered the same question twice in the same condition, or a level exists in
+/// several variants.
 pub(super) fn read(
     config: &AnswersFile,
     questions: &[Arc<OpenQuestion>],
@@ -53,11 +53,8 @@ pub(super) fn read(
             ),
         )
     })?;
-    let known: BTreeMap<&str, usize> = questions
-        .iter()
-        .enumerate()
-        .map(|(index, question)| (&*question.id.0, index))
-        .collect();
+    let known: BTreeMap<&str, usize> =
+        questions.iter().enumerate().map(|(index, question)| (&*question.id.0, index)).collect();
     let (mut records, mut unknown) = (Vec::new(), Vec::new());
     let mut seen = BTreeSet::new();
     for entry in &entries {
@@ -66,10 +63,7 @@ pub(super) fn read(
             continue;
         };
         let condition = condition(entry, variants).map_err(|problem| {
-            Error::data(
-                path.display(),
-                format_args!("question {}: {problem}", entry.question_id),
-            )
+            Error::data(path.display(), format_args!("question {}: {problem}", entry.question_id))
         })?;
         let person = entry.annotator.as_ref().map(|name| match name {
             Value::String(name) => name.clone(),
@@ -86,17 +80,10 @@ pub(super) fn read(
         }
         let key = key(&config.name, entry, &condition, person.as_deref());
         let question = &questions[index];
-        let detail = OpenDetail {
-            person,
-            ..detail(question, Step::Answer)
-        };
+        let detail = OpenDetail { person, ..detail(question, Step::Answer) };
         let condition = Some(condition);
         let record = Record::blank(key, question.id.clone(), &config.name, condition, detail);
-        records.push(Record {
-            reply: entry.answer.clone(),
-            via: Via::File,
-            ..record
-        });
+        records.push(Record { reply: entry.answer.clone(), via: Via::File, ..record });
     }
     warn_of_unknown(path, &unknown, entries.len());
     Ok(records)
@@ -121,14 +108,10 @@ fn condition(entry: &AnswerEntry, variants: KindSet) -> std::result::Result<Cond
         (None, Some(level)) => level,
     };
     // Kinds on the axis of the level.
-    let mut degradations: Vec<Degradation> = Kind::ALL
-        .into_iter()
-        .filter_map(|kind| degradation_at(level, kind).ok())
-        .collect();
+    let mut degradations: Vec<Degradation> =
+        Kind::ALL.into_iter().filter_map(|kind| degradation_at(level, kind).ok()).collect();
     if degradations.is_empty() {
-        return Err(degradation_at(level, Kind::Exposure)
-            .err()
-            .unwrap_or_default());
+        return Err(degradation_at(level, Kind::Exposure).err().unwrap_or_default());
     }
     let noise = degradations.iter().find(|how| how.kind() == Kind::Sensor);
     let example = noise.or(degradations.last()).map(ToString::to_string);

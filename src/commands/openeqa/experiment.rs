@@ -29,8 +29,7 @@ use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
 use darkqa_score::choice::llm_match::Protocol;
 
 /// A typical answer, for estimating the length of a judge's prompt.
-const ANSWER: &str =
-    "There is a small round table with two chairs next to the window of the living room.";
+const ANSWER: &str = "There is a small round table with two chairs next to the window of the living room.";
 
 impl Experiment for OpenSetup<'_> {
     type Item = OpenItem;
@@ -44,11 +43,7 @@ impl Experiment for OpenSetup<'_> {
     }
 
     fn data(&self) -> &str {
-        self.config
-            .questions
-            .file_stem()
-            .and_then(std::ffi::OsStr::to_str)
-            .unwrap_or("openeqa")
+        self.config.questions.file_stem().and_then(std::ffi::OsStr::to_str).unwrap_or("openeqa")
     }
 
     fn models(&self, phase: usize) -> &[ModelUnderTest] {
@@ -86,11 +81,7 @@ impl Experiment for OpenSetup<'_> {
     }
 
     fn questions(&self) -> Vec<RunQuestion> {
-        let walks: HashMap<&str, &Source> = self
-            .sources
-            .iter()
-            .map(|source| (&*source.name.0, source))
-            .collect();
+        let walks: HashMap<&str, &Source> = self.sources.iter().map(|source| (&*source.name.0, source)).collect();
         self.questions
             .iter()
             .map(|question| {
@@ -116,23 +107,18 @@ impl Experiment for OpenSetup<'_> {
 
     fn identity(&self) -> Identity {
         let walk = &self.config.walk;
-        [
-            ("--num-frames", json!(walk.frames)),
-            ("--degrade", json!(walk.degraded_at)),
-            ("--sensor", json!(walk.camera)),
-        ]
-        .into_iter()
-        .map(|(field, value)| (field.to_owned(), value))
-        .chain(identity::images(&self.recipe))
-        .collect()
+        [("--num-frames", json!(walk.frames)), ("--degrade", json!(walk.degraded_at)), ("--sensor", json!(walk.camera))]
+            .into_iter()
+            .map(|(field, value)| (field.to_owned(), value))
+            .chain(identity::images(&self.recipe))
+            .collect()
     }
 
     fn columns(&self) -> Columns {
         let mut columns = identity::columns(&self.models, &self.recipe, &self.config.job);
         if let Some(judge) = &self.judge {
             // A model that is its own judge may have other settings as a judge.
-            let content =
-                || BTreeMap::from([(judge.name.to_string(), identity::model_definition(judge))]);
+            let content = || BTreeMap::from([(judge.name.to_string(), identity::model_definition(judge))]);
             columns.insert(JUDGES.to_owned(), content());
             let models = columns.entry("model".to_owned()).or_default();
             for (name, content) in content() {
@@ -179,10 +165,7 @@ impl Experiment for OpenSetup<'_> {
             .flat_map(|group| &group.trials)
             .filter_map(|trial| match &trial.item {
                 OpenItem::Answer(question) => {
-                    let mark = OpenItem::Mark {
-                        question: Arc::clone(question),
-                        answer: ANSWER.into(),
-                    };
+                    let mark = OpenItem::Mark { question: Arc::clone(question), answer: ANSWER.into() };
                     Some(ExpectedRequest {
                         model: 0,
                         text_tokens: text_tokens(&mark_prompt(question, ANSWER)),
@@ -194,12 +177,7 @@ impl Experiment for OpenSetup<'_> {
             .collect()
     }
 
-    fn report(
-        &self,
-        store: &Store<OpenDetail>,
-        run: StoredRun<OpenDetail>,
-        show: StdoutFormat,
-    ) -> Result<Outcome> {
+    fn report(&self, store: &Store<OpenDetail>, run: StoredRun<OpenDetail>, show: StdoutFormat) -> Result<Outcome> {
         open::write(store, run, show)
     }
 }

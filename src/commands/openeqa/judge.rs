@@ -59,10 +59,7 @@ impl Judge {
         let ModelName::Remote(id) = &self.model else {
             return;
         };
-        let own = Parameters {
-            model: id.clone(),
-            ..self.parameters.clone()
-        };
+        let own = Parameters { model: id.clone(), ..self.parameters.clone() };
         if let Some(accepted) = run.accept(JUDGES, id, &own, true) {
             self.parameters = accepted;
         }
@@ -70,7 +67,8 @@ impl Judge {
 }
 
 impl JudgeArgs {
-    /// Resolves the judge and the key of its endpoint; `None` without `--judge`. The key of one endpoint is never sent to another.
+    /// Resolves the judge and the key of its endpoint; `None` without `--judge`. The key of one endpoint is never sent
+    /// to another.
     ///
     /// # Errors
     /// If the judge cannot answer open questions, or its endpoint or key is invalid.
@@ -83,9 +81,8 @@ impl JudgeArgs {
             model.check_spelling().map_err(at_judge)?;
         }
         let mut access = job.access.clone();
-        let own_access = self.judge_base_url.is_some()
-            || self.judge_api_key_env.is_some()
-            || self.judge_api_key_file.is_some();
+        let own_access =
+            self.judge_base_url.is_some() || self.judge_api_key_env.is_some() || self.judge_api_key_file.is_some();
         if own_access {
             let access_args = match self.judge_base_url {
                 Some(url) => access.for_base_url(url),

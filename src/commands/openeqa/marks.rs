@@ -26,18 +26,11 @@ fn mark_key(judge: &ModelUnderTest, prompt: &Prompt) -> Result<TrialKey> {
 }
 
 /// The trials for all marks of a run, grouped by walk. Each distinct answer to a question is marked once.
-pub(super) fn plan_marks(
-    setup: &OpenSetup<'_>,
-    records: &[Record<OpenDetail>],
-) -> Result<Vec<SourcePlan<OpenItem>>> {
+pub(super) fn plan_marks(setup: &OpenSetup<'_>, records: &[Record<OpenDetail>]) -> Result<Vec<SourcePlan<OpenItem>>> {
     let Some(judge) = &setup.judge else {
         return Ok(Vec::new());
     };
-    let ids: Vec<&QuestionId> = setup
-        .questions
-        .iter()
-        .map(|question| &question.id)
-        .collect();
+    let ids: Vec<&QuestionId> = setup.questions.iter().map(|question| &question.id).collect();
     let mut by_walk: Vec<Vec<Trial<OpenItem>>> = Vec::new();
     by_walk.resize_with(setup.sources.len(), Vec::new);
     let mut planned = HashSet::new();
@@ -53,22 +46,13 @@ pub(super) fn plan_marks(
                 key,
                 model: 0,
                 prompt,
-                item: OpenItem::Mark {
-                    question: Arc::clone(question),
-                    answer,
-                },
+                item: OpenItem::Mark { question: Arc::clone(question), answer },
             });
         }
     }
     Ok(by_walk
         .into_iter()
         .enumerate()
-        .map(|(source, trials)| SourcePlan {
-            source,
-            groups: vec![TrialGroup {
-                condition: None,
-                trials,
-            }],
-        })
+        .map(|(source, trials)| SourcePlan { source, groups: vec![TrialGroup { condition: None, trials }] })
         .collect())
 }

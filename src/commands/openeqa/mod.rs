@@ -1,7 +1,7 @@
 //! `openeqa`: asks open questions about walks through houses in low light, and has a judge mark the answers.
 //!
-//! The models are asked for answers first, walk by walk. Then the judge is asked for marks. Both phases use the engine of an evaluation.
-//! Models, levels, human answers and judges may be added to a run later.
+//! The models are asked for answers first, walk by walk. Then the judge is asked for marks. Both phases use the engine
+//! of an evaluation. Models, levels, human answers and judges may be added to a run later.
 
 mod answers_file;
 mod experiment;
@@ -34,9 +34,7 @@ pub(crate) fn openeqa(args: OpenEqaArgs, progress: &Progress) -> Result<Outcome>
     match &config.task {
         OpenTask::Run => Job::new(&setup, files, progress)?.run(),
         OpenTask::Batch(batch) => Job::new(&setup, files, progress)?.export_batch(batch),
-        OpenTask::BatchRun(batch, args) => {
-            Job::new(&setup, files, progress)?.run_batch(batch, args)
-        }
+        OpenTask::BatchRun(batch, args) => Job::new(&setup, files, progress)?.run_batch(batch, args),
         OpenTask::Study(folder) => study::pack(&setup, files, folder, progress),
     }
 }

@@ -29,10 +29,7 @@ pub(super) fn plan_answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenI
             let groups = std::iter::once(None)
                 .chain(setup.conditions.iter().map(Some))
                 .filter_map(|condition| group(setup, source, condition, &questions).transpose());
-            Ok(SourcePlan {
-                source,
-                groups: groups.collect::<Result<_>>()?,
-            })
+            Ok(SourcePlan { source, groups: groups.collect::<Result<_>>()? })
         })
         .collect()
 }
@@ -65,10 +62,7 @@ fn group(
             });
         }
     }
-    Ok(Some(TrialGroup {
-        condition: condition.cloned(),
-        trials,
-    }))
+    Ok(Some(TrialGroup { condition: condition.cloned(), trials }))
 }
 
 /// The prompt of a question, for a model with images or a blind one.
@@ -77,11 +71,7 @@ fn prompt(question: &OpenQuestion, view: View) -> Prompt {
         View::Blind => Prompt::from_text(blind(&question.text).into()),
         View::Image => {
             let (before, behind) = vision(&question.text);
-            Prompt {
-                before: before.into(),
-                after: Some(behind.into()),
-                places: ImagePlaces::Together,
-            }
+            Prompt { before: before.into(), after: Some(behind.into()), places: ImagePlaces::Together }
         }
     }
 }

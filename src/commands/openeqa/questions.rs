@@ -42,18 +42,11 @@ fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
 ///
 /// # Errors
 /// If a split or category is not in the file, or no question is selected.
-pub(super) fn select(
-    all: Vec<OpenQuestion>,
-    selection: &OpenSelectionArgs,
-) -> Result<Vec<OpenQuestion>> {
+pub(super) fn select(all: Vec<OpenQuestion>, selection: &OpenSelectionArgs) -> Result<Vec<OpenQuestion>> {
     let subset = selection.subset.as_deref().map(read_ids).transpose()?;
     if let (Some(subset), Some(path)) = (&subset, &selection.subset) {
         let known: BTreeSet<&str> = all.iter().map(|question| &*question.id.0).collect();
-        let unknown: Vec<&str> = subset
-            .iter()
-            .map(|id| &**id)
-            .filter(|id| !known.contains(id))
-            .collect();
+        let unknown: Vec<&str> = subset.iter().map(|id| &**id).filter(|id| !known.contains(id)).collect();
         if !unknown.is_empty() {
             tracing::warn!(
                 "{}: {} of {} ids are not in the file of questions: {}",
@@ -64,23 +57,16 @@ pub(super) fn select(
             );
         }
     }
-    check_known(
-        "--splits",
-        &selection.splits,
-        all.iter().map(OpenQuestion::split),
-    )?;
+    check_known("--splits", &selection.splits, all.iter().map(OpenQuestion::split))?;
     let categories = all.iter().map(|question| &*question.category);
     check_known("--categories", &selection.categories, categories)?;
-    let allows =
-        |list: &[String], name: &str| list.is_empty() || list.iter().any(|one| one == name);
+    let allows = |list: &[String], name: &str| list.is_empty() || list.iter().any(|one| one == name);
     let questions: Vec<OpenQuestion> = all
         .into_iter()
         .filter(|question| {
             allows(&selection.splits, question.split())
                 && allows(&selection.categories, &question.category)
-                && subset
-                    .as_ref()
-                    .is_none_or(|subset| subset.contains(&question.id.0))
+                && subset.as_ref().is_none_or(|subset| subset.contains(&question.id.0))
         })
         .take(selection.limit.map_or(usize::MAX, usize::from))
         .collect();
@@ -92,11 +78,7 @@ pub(super) fn select(
 }
 
 /// Checks that every selected name occurs in the file.
-fn check_known<'a>(
-    flag: &str,
-    names: &[String],
-    known: impl Iterator<Item = &'a str>,
-) -> Result<()> {
+fn check_known<'a>(flag: &str, names: &[String], known: impl Iterator<Item = &'a str>) -> Result<()> {
     let known: BTreeSet<&str> = known.collect();
     match names.iter().find(|name| !known.contains(&***name)) {
         None => Ok(()),

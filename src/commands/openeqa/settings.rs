@@ -42,14 +42,15 @@ pub(crate) struct OpenEqaArgs {
         help_heading = "OpenEQA",
         default_value = "1234", add = Decides::Reply)]
     pub sampling_seed: SamplingSeed,
-    /// Answers of people or another program, as upstream's files ([{"question_id", "answer"}], with "level" or "condition"
-    /// beside them where it is not L0), to be marked like a model's; repeatable; default: none
+    /// Answers of people or another program, as upstream's files ([{"question_id", "answer"}], with "level" or
+    /// "condition" beside them where it is not L0), to be marked like a model's; repeatable; default: none
     #[arg(long, value_name = "NAME=FILE", help_heading = "OpenEQA", add = Decides::Trials)]
     pub answers: Vec<AnswersFile>,
     /// The flags of the judge.
     #[command(flatten)]
     pub judge: JudgeArgs,
-    /// Write a page on which people answer the questions about the frames into this folder, and ask no model; default: ask models
+    /// Write a page on which people answer the questions about the frames into this folder, and ask no model; default:
+    /// ask models
     #[arg(
         long,
         value_name = "DIR",
@@ -117,8 +118,8 @@ pub(super) enum OpenTask {
 }
 
 impl OpenEqaArgs {
-    /// Adapts the default and help text of a flag shared with an evaluation to this command. The defaults are those of upstream, the levels
-    /// those of the paper's table.
+    /// Adapts the default and help text of a flag shared with an evaluation to this command. The defaults are those of
+    /// upstream, the levels those of the paper's table.
     #[must_use]
     pub(crate) fn own(arg: Arg) -> Arg {
         match arg.get_id().as_str() {
@@ -156,9 +157,7 @@ impl OpenEqaArgs {
             return Err(self.job.no_model_error());
         }
         let models = &self.job.models;
-        models
-            .named()
-            .try_for_each(ModelName::require_open_answers)?;
+        models.named().try_for_each(ModelName::require_open_answers)?;
         let SamplingSeed(seed) = self.sampling_seed;
         let protocol = self.judge.protocol;
         let mut judge = self.judge.resolve(&self.job, seed)?;
@@ -171,12 +170,7 @@ impl OpenEqaArgs {
         if let Some(judge) = &mut judge {
             judge.continue_from(&job.continuation());
         }
-        if let Some(model) = job
-            .ask
-            .models
-            .iter()
-            .find(|model| model.parameters.probabilities)
-        {
+        if let Some(model) = job.ask.models.iter().find(|model| model.parameters.probabilities) {
             let problem = format_args!("{}: open questions have no choices", model.name);
             return Err(Error::usage("probabilities", problem));
         }
@@ -201,10 +195,9 @@ impl FromStr for AnswersFile {
     /// Reads `human=answers.json`.
     fn from_str(text: &str) -> Result<Self, String> {
         match text.split_once('=') {
-            Some((name, path)) if !name.trim().is_empty() && !path.is_empty() => Ok(Self {
-                name: name.trim().to_owned(),
-                path: path.into(),
-            }),
+            Some((name, path)) if !name.trim().is_empty() && !path.is_empty() => {
+                Ok(Self { name: name.trim().to_owned(), path: path.into() })
+            }
             _ => Err("NAME=FILE expected, as human=answers.json".to_owned()),
         }
     }

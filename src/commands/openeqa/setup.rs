@@ -45,21 +45,14 @@ pub(super) struct OpenSetup<'a> {
 }
 
 impl<'a> OpenSetup<'a> {
-    /// Opens the questions, the walks and the models. Also returns the files of the enhancers, which are read but not yet loaded.
+    /// Opens the questions, the walks and the models. Also returns the files of the enhancers, which are read but not
+    /// yet loaded.
     pub(super) fn open(config: &'a OpenEqa, progress: &Progress) -> Result<(Self, Vec<ModelFile>)> {
         let job = &config.job;
         let all = openeqa::read_questions(&config.questions)?;
-        let file_places = all
-            .iter()
-            .map(|question| question.id.clone())
-            .zip(0..)
-            .collect();
+        let file_places = all.iter().map(|question| question.id.clone()).zip(0..).collect();
         let selected = select(all, &config.chosen)?;
-        let question_places = selected
-            .iter()
-            .map(|question| question.id.clone())
-            .zip(0..)
-            .collect();
+        let question_places = selected.iter().map(|question| question.id.clone()).zip(0..).collect();
         let (questions, part) = shard_questions(
             selected,
             job.shard,
@@ -67,24 +60,14 @@ impl<'a> OpenSetup<'a> {
             |_| String::new(),
             |_| 1,
         )?;
-        let models = models::open_all(&job.ask, &[], |name| {
-            models::open(name, None, &Parameters::new(String::new()))
-        })?;
+        let models = models::open_all(&job.ask, &[], |name| models::open(name, None, &Parameters::new(String::new())))?;
         let judge = config.judge.as_ref().map(open_judge).transpose()?;
         // Without models or people that see frames, no frame is read and no enhancer is opened.
         let shows_frames = matches!(config.task, OpenTask::Study(_)) || job.shows_images();
-        let files = if shows_frames {
-            job.enhancers()?
-        } else {
-            Vec::new()
-        };
+        let files = if shows_frames { job.enhancers()? } else { Vec::new() };
         let recipe = Recipe::new(&job.light.kinds, job.format, None, &files);
         let recipe = recipe.for_walks(&config.walk);
-        let recipe = if shows_frames {
-            recipe.with_enhanced_images(&job.enhancers.enhanced)?
-        } else {
-            recipe
-        };
+        let recipe = if shows_frames { recipe.with_enhanced_images(&job.enhancers.enhanced)? } else { recipe };
         let walks = WalkFolder::new(&config.walk, &config.root, config.rule);
         let names = walk_names(&questions);
         let (sources, conditions) = if shows_frames {
@@ -97,13 +80,7 @@ impl<'a> OpenSetup<'a> {
             check_enhanced(&conditions, &job.enhancers)?;
             (sources, conditions)
         } else {
-            (
-                names
-                    .into_iter()
-                    .map(|name| Source::without_frames(FrameId(name)))
-                    .collect(),
-                Vec::new(),
-            )
+            (names.into_iter().map(|name| Source::without_frames(FrameId(name))).collect(), Vec::new())
         };
         recipe.check(&sources, &conditions)?;
         let mut setup = Self {
@@ -126,10 +103,7 @@ impl<'a> OpenSetup<'a> {
 
     /// The index in `sources` of the walk of a question.
     pub(super) fn walk_of(&self, question: &OpenQuestion) -> usize {
-        self.sources
-            .iter()
-            .position(|source| source.name.0 == question.episode)
-            .unwrap_or_default()
+        self.sources.iter().position(|source| source.name.0 == question.episode).unwrap_or_default()
     }
 
     /// Reads the answers in all `--answers` files.
@@ -138,10 +112,7 @@ impl<'a> OpenSetup<'a> {
         let mut all = Vec::new();
         for file in &self.config.answers {
             if !names.insert(&file.name) {
-                let problem = format_args!(
-                    "the name {:?} is used twice among models and answers",
-                    file.name
-                );
+                let problem = format_args!("the name {:?} is used twice among models and answers", file.name);
                 return Err(Error::usage("--answers", problem));
             }
             let variants = self.config.job.light.variants;
@@ -170,10 +141,7 @@ fn walk_names(questions: &[OpenQuestion]) -> Vec<String> {
 
 /// Warns of walks with fewer frames than `--num-frames`, because repeated frames are sent and paid for several times.
 fn warn_of_repeated(sources: &[Source]) {
-    let short: Vec<&Source> = sources
-        .iter()
-        .filter(|source| source.order.len() > source.frames.len())
-        .collect();
+    let short: Vec<&Source> = sources.iter().filter(|source| source.order.len() > source.frames.len()).collect();
     let most = short.iter().map(|source| source.frames.len()).max();
     if let (Some(first), Some(most)) = (short.first(), most) {
         tracing::warn!(
@@ -198,21 +166,16 @@ fn warn_of_repeated(sources: &[Source]) {
 /// # Errors
 /// If no walk can be shown.
 fn warn_of_unseen(sources: &[Source], questions: &[OpenQuestion]) -> Result<()> {
-    let missing: BTreeMap<&str, &str> = sources
-        .iter()
-        .filter_map(|source| Some((&*source.name.0, source.problem.as_deref()?)))
-        .collect();
+    let missing: BTreeMap<&str, &str> =
+        sources.iter().filter_map(|source| Some((&*source.name.0, source.problem.as_deref()?))).collect();
     let Some(problem) = missing.values().next() else {
         return Ok(());
     };
     if missing.len() == sources.len() {
-        let problem =
-            format!("no walk can be shown: {problem}; DIR/EPISODE_HISTORY/*-rgb.png expected");
+        let problem = format!("no walk can be shown: {problem}; DIR/EPISODE_HISTORY/*-rgb.png expected");
         return Err(Error::usage("--frames", problem));
     }
-    let unanswered = questions
-        .iter()
-        .filter(|question| missing.contains_key(&*question.episode));
+    let unanswered = questions.iter().filter(|question| missing.contains_key(&*question.episode));
     let walks: Vec<&str> = missing.keys().copied().collect();
     tracing::warn!(
         "{} of {} walks cannot be shown ({}); unanswered questions: {}; the first problem: {problem}",

@@ -23,7 +23,8 @@ use crate::types::text::counted;
 use crate::types::{Condition, Digest};
 use darkqa_enhance::ModelFile;
 
-/// Writes the page and its images. Each image has the same bytes as in a request to a model. The page contains no true answers.
+/// Writes the page and its images. Each image has the same bytes as in a request to a model. The page contains no true
+/// answers.
 ///
 /// # Errors
 /// If a frame cannot be computed or a file cannot be written.
@@ -62,16 +63,10 @@ pub(super) fn pack(
                 names.push(name);
             }
             written += names.len();
-            shots.push(StudyImage {
-                condition: condition.to_string(),
-                images: names,
-            });
+            shots.push(StudyImage { condition: condition.to_string(), images: names });
         }
         walks += 1;
-        let questions = setup
-            .questions
-            .iter()
-            .filter(|question| question.episode == walk.name.0);
+        let questions = setup.questions.iter().filter(|question| question.episode == walk.name.0);
         asked.extend(questions.map(|question| StudyQuestion {
             id: question.id.0.clone(),
             frame: number,
@@ -103,10 +98,6 @@ pub(super) fn pack(
 /// The file name of an image, which does not reveal the level.
 fn image_name(walk: &str, condition: &Condition, place: usize, payload: &Payload) -> String {
     let digest = Digest::from_parts([walk.as_bytes(), condition.to_string().as_bytes()]);
-    let ending = if payload.facts().format == "png" {
-        "png"
-    } else {
-        "jpg"
-    };
+    let ending = if payload.facts().format == "png" { "png" } else { "jpg" };
     format!("images/{}-{place:03}.{ending}", &digest.to_string()[..16])
 }

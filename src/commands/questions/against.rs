@@ -30,10 +30,7 @@ pub(super) fn compare(
         Ok(found)
     };
     let [own, others] = [looks(sets[0])?, looks(sets[1])?];
-    Ok(AppearanceComparison::new([
-        (sets[0].name(), &own),
-        (sets[1].name(), &others),
-    ]))
+    Ok(AppearanceComparison::new([(sets[0].name(), &own), (sets[1].name(), &others)]))
 }
 
 /// The look of each frame.

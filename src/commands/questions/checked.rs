@@ -1,4 +1,5 @@
-//! Check of questions by people: writes the page ([`write_review`]), and reads the verdicts that it saves ([`read_verdicts`]).
+//! Check of questions by people: writes the page ([`write_review`]), and reads the verdicts that it saves
+//! ([`read_verdicts`]).
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -74,8 +75,8 @@ enum Decision {
     Reject,
 }
 
-/// Reads the verdicts in files. If a person has several lines about a question, the last one counts. A question is rejected if any person
-/// rejects it.
+/// Reads the verdicts in files. If a person has several lines about a question, the last one counts. A question is
+/// rejected if any person rejects it.
 ///
 /// # Errors
 /// If a line is not a verdict; names the file and the line.
@@ -107,10 +108,7 @@ pub(super) fn write_review(
     questions: &[GeneratedQuestion],
 ) -> Result<()> {
     // The parent of a bare file name is empty, which means the working directory.
-    let folder = path
-        .parent()
-        .filter(|parent| !parent.as_os_str().is_empty())
-        .unwrap_or(Path::new("."));
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // Relative links depend on the canonical path of the folder, so it must exist before they are made.
     fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
     let items = questions.iter().filter_map(|generated| {
@@ -125,11 +123,7 @@ pub(super) fn write_review(
 /// The relative link from a folder to a file.
 fn link(from: &Path, to: &Path) -> String {
     let (from, to) = (absolute(from), absolute(to));
-    let common = from
-        .components()
-        .zip(to.components())
-        .take_while(|(a, b)| a == b)
-        .count();
+    let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
     let up = from.components().skip(common).map(|_| "..".to_owned());
     let down = to.components().skip(common).filter_map(|part| match part {
         Component::Normal(name) => Some(escaped(&name.to_string_lossy())),
@@ -166,23 +160,15 @@ mod tests {
     fn the_last_verdict_counts() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("v.jsonl");
-        let lines = [
-            ("a", "reject"),
-            ("b", "reject"),
-            ("a", "accept"),
-            ("c", "accept"),
-        ]
-        .map(|(id, verdict)| format!(r#"{{"id":"{id}","verdict":"{verdict}","frame":"x"}}"#));
+        let lines = [("a", "reject"), ("b", "reject"), ("a", "accept"), ("c", "accept")]
+            .map(|(id, verdict)| format!(r#"{{"id":"{id}","verdict":"{verdict}","frame":"x"}}"#));
         fs::write(&path, lines.join("\n\n")).unwrap();
         let found = read_verdicts(std::slice::from_ref(&path)).unwrap();
         assert_eq!(found.rejected, [QuestionId("b".into())].into());
         assert!(found.checks.is_empty());
         fs::write(&path, "\n{\"id\":\"a\",\"verdict\":\"perhaps\"}\n").unwrap();
         let error = read_verdicts(&[path]).map(|_| ()).unwrap_err().to_string();
-        assert!(
-            error.contains("v.jsonl, line 2: unknown variant `perhaps`"),
-            "{error}"
-        );
+        assert!(error.contains("v.jsonl, line 2: unknown variant `perhaps`"), "{error}");
     }
 
     fn line(person: &str, id: &str, verdict: &str, found: &str) -> String {
@@ -200,18 +186,11 @@ mod tests {
         let ben = line("ben", "a", "accept", "right") + &line("ben", "b", "accept", "right");
         fs::write(folder.path().join("anna.jsonl"), anna).unwrap();
         fs::write(folder.path().join("ben.jsonl"), ben).unwrap();
-        let found = read_verdicts(&[
-            folder.path().join("anna.jsonl"),
-            folder.path().join("ben.jsonl"),
-        ])
-        .unwrap();
+        let found = read_verdicts(&[folder.path().join("anna.jsonl"), folder.path().join("ben.jsonl")]).unwrap();
         assert_eq!(found.rejected, [QuestionId("a".into())].into());
         assert_eq!(found.checks.len(), 4);
         let check = &found.checks[&("anna".to_owned(), QuestionId("a".into()))];
-        assert_eq!(
-            (&*check.scene, check.finding),
-            ("scene-1", CheckFinding::Wrong)
-        );
+        assert_eq!((&*check.scene, check.finding), ("scene-1", CheckFinding::Wrong));
     }
 
     #[test]
@@ -221,13 +200,7 @@ mod tests {
         fs::create_dir_all(root.join("data/a b")).unwrap();
         fs::create_dir_all(root.join("out")).unwrap();
         fs::write(root.join("data/a b/#1.png"), "").unwrap();
-        assert_eq!(
-            link(&root.join("out"), &root.join("data/a b/#1.png")),
-            "../data/a%20b/%231.png"
-        );
-        assert_eq!(
-            link(&root.join("data"), &root.join("data/a b/#1.png")),
-            "a%20b/%231.png"
-        );
+        assert_eq!(link(&root.join("out"), &root.join("data/a b/#1.png")), "../data/a%20b/%231.png");
+        assert_eq!(link(&root.join("data"), &root.join("data/a b/#1.png")), "a%20b/%231.png");
     }
 }

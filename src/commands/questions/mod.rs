@@ -74,16 +74,16 @@ pub(crate) struct QuestionsArgs {
     /// Write the statistics of frames, questions and answers: JSON, CSV and a figure; default: not written
     #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
     pub stats: Option<PathBuf>,
-    /// Compare how the frames look (light, edges, segments, depth, colours) with those of another folder, with or without maps;
-    /// default: not compared
+    /// Compare how the frames look (light, edges, segments, depth, colours) with those of another folder, with or
+    /// without maps; default: not compared
     #[arg(long, value_name = "DIR", help_heading = "Checking", add = Decides::Nothing)]
     pub against: Option<PathBuf>,
-    /// Write a page on which a person answers each question before the rule's answer is shown, and which saves what was found;
-    /// default: not written
+    /// Write a page on which a person answers each question before the rule's answer is shown, and which saves what was
+    /// found; default: not written
     #[arg(long, value_name = "FILE.html", help_heading = "Checking", add = Decides::Nothing)]
     pub review: Option<PathBuf>,
-    /// Leave out what a person has rejected on such a page, and show the shares found wrong and ambiguous; with the files of two
-    /// people also Cohen's κ; repeatable; default: nothing
+    /// Leave out what a person has rejected on such a page, and show the shares found wrong and ambiguous; with the
+    /// files of two people also Cohen's κ; repeatable; default: nothing
     #[arg(long, value_name = "FILE", help_heading = "Checking", add = Decides::Trials)]
     pub verdicts: Vec<PathBuf>,
     /// Print the statistics as JSON instead of a table
@@ -92,9 +92,9 @@ pub(crate) struct QuestionsArgs {
     /// The reading of frames.
     #[command(flatten)]
     pub folders: FolderArgs,
-    /// Only measure this part of the frames, as 2/4, or auto/4 for the task of this process in a Slurm array or the pod of an indexed
-    /// Kubernetes job. Questions are balanced over all frames: the same command without --shard makes them from what all parts measured;
-    /// default: all frames
+    /// Only measure this part of the frames, as 2/4, or auto/4 for the task of this process in a Slurm array or the pod
+    /// of an indexed Kubernetes job. Questions are balanced over all frames: the same command without --shard makes
+    /// them from what all parts measured; default: all frames
     #[arg(long, value_name = "I/N|auto/N|auto", help_heading = "Scale", add = Decides::Trials)]
     pub shard: Option<String>,
     /// The number of threads.
@@ -106,17 +106,13 @@ pub(crate) struct QuestionsArgs {
 fn file(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     let valid = path.file_stem().is_some() && !path.is_dir();
-    valid
-        .then_some(path)
-        .ok_or_else(|| "a file expected, as questions.jsonl".to_owned())
+    valid.then_some(path).ok_or_else(|| "a file expected, as questions.jsonl".to_owned())
 }
 
 /// The family of questions in a text; only families that are made by rule.
 fn family(name: &str) -> Result<Family, String> {
     match Family::from(name.trim()) {
-        Family::Other(_) => {
-            Err("one of room_type, affordance, presence, color, closest expected".to_owned())
-        }
+        Family::Other(_) => Err("one of room_type, affordance, presence, color, closest expected".to_owned()),
         family => Ok(family),
     }
 }
@@ -129,10 +125,8 @@ fn folder(args: &QuestionsArgs) -> Result<&Path> {
     match &*args.data {
         [folder] => Ok(folder),
         folders => {
-            let sources: String = folders
-                .iter()
-                .map(|folder| format!(" --src {}", shell_word(&folder.display().to_string())))
-                .collect();
+            let sources: String =
+                folders.iter().map(|folder| format!(" --src {}", shell_word(&folder.display().to_string()))).collect();
             let problem = format_args!(
                 "one folder expected, which a run takes with its questions; darkqa-eval import folder{sources} --out JOINED makes one of {}",
                 folders.len()
@@ -152,11 +146,7 @@ struct QuestionSettings<'a> {
 impl<'a> QuestionSettings<'a> {
     fn read(args: &'a QuestionsArgs) -> Result<Self> {
         let palette = read_table(args.colors.as_deref(), Palette::parse)?;
-        Ok(Self {
-            args,
-            rules: rules(args.rules.as_deref())?,
-            palette: palette.map_or_else(Palette::built_in, Ok)?,
-        })
+        Ok(Self { args, rules: rules(args.rules.as_deref())?, palette: palette.map_or_else(Palette::built_in, Ok)? })
     }
 
     /// The families to make; all families of the paper if no flag names any.
@@ -169,11 +159,7 @@ impl<'a> QuestionSettings<'a> {
     }
 
     /// The comparison with the set of `--against`; `None` without the flag.
-    fn comparison(
-        &self,
-        dataset: &Dataset,
-        progress: &Progress,
-    ) -> Result<Option<AppearanceComparison>> {
+    fn comparison(&self, dataset: &Dataset, progress: &Progress) -> Result<Option<AppearanceComparison>> {
         let args = self.args;
         let Some(folder) = &args.against else {
             return Ok(None);
@@ -190,9 +176,7 @@ fn read_table<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Op
         return Ok(None);
     };
     let text = reading::settings(path)?;
-    parse(&text)
-        .map(Some)
-        .map_err(|e| e.at(path.display().to_string()))
+    parse(&text).map(Some).map_err(|e| e.at(path.display().to_string()))
 }
 
 /// Makes the questions and writes them. If a frame fails, the error is logged and counted, and the others continue.
@@ -230,10 +214,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
             candidates.push(candidate_line(frame, result));
         }
     })?;
-    write(
-        &args.out,
-        &lines(generated.asked.iter().map(WrittenQuestion::new))?,
-    )?;
+    write(&args.out, &lines(generated.asked.iter().map(WrittenQuestion::new))?)?;
     if let Some(path) = &args.candidates {
         write(path, &lines(candidates)?)?;
     }
@@ -251,9 +232,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
     if args.json {
         return Ok(Outcome::text(status, json));
     }
-    let looks = comparison
-        .as_ref()
-        .map_or_else(String::new, AppearanceComparison::table);
+    let looks = comparison.as_ref().map_or_else(String::new, AppearanceComparison::table);
     let table = report::questions::table(&summary);
     let checks = report::questions::checks::text(&verdicts.checks);
     let output = format!("{table}{looks}{checks}{}\n", args.out.display());
@@ -287,7 +266,8 @@ fn warn(generated: &Generated, settings: &QuestionSettings<'_>) {
     }
 }
 
-/// The outcome of a command with `--shard`, which measures frames but makes no questions, because these are balanced over all frames.
+/// The outcome of a command with `--shard`, which measures frames but makes no questions, because these are balanced
+/// over all frames.
 fn shard_outcome(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usize) -> Outcome {
     let path = statistics_path(&args.out, shard);
     let status = Outcome::complete_if(failed == 0);
@@ -299,7 +279,8 @@ fn shard_outcome(args: &QuestionsArgs, shard: Shard, frames: usize, failed: usiz
     Outcome::wrote(path, status, output)
 }
 
-/// The statistics of the frames of a shard, and the number of failed frames. Frames in the cache are not measured again.
+/// The statistics of the frames of a shard, and the number of failed frames. Frames in the cache are not measured
+/// again.
 fn measure_frames(
     settings: &QuestionSettings<'_>,
     dataset: &Dataset,
@@ -336,10 +317,7 @@ fn measure_frames(
     let failed = results.iter().filter(|result| result.is_none()).count();
     let frames: Vec<FrameStatistics> = results.into_iter().flatten().collect();
     if frames.is_empty() {
-        return Err(Error::data(
-            dataset.name(),
-            "no frame in this folder could be measured",
-        ));
+        return Err(Error::data(dataset.name(), "no frame in this folder could be measured"));
     }
     cache.finish(&frames)?;
     Ok((frames, failed))
@@ -348,16 +326,8 @@ fn measure_frames(
 /// Digest of everything except the frame that determines the statistics.
 fn context_digest(settings: &QuestionSettings<'_>, labels: &Labels) -> Digest {
     let version = statistics::VERSION.to_le_bytes();
-    let parts = [
-        settings.rules.measure_digest(),
-        settings.palette.digest(),
-        labels.digest(),
-    ];
-    Digest::from_parts(
-        [&version[..]]
-            .into_iter()
-            .chain(parts.iter().map(|part| &part.as_bytes()[..])),
-    )
+    let parts = [settings.rules.measure_digest(), settings.palette.digest(), labels.digest()];
+    Digest::from_parts([&version[..]].into_iter().chain(parts.iter().map(|part| &part.as_bytes()[..])))
 }
 
 /// The inputs and the cache for measuring frames.
@@ -377,11 +347,7 @@ impl Measuring<'_> {
         let files = self.dataset.files(name)?;
         self.tally.add(name, &files.note());
         let content = files.digest()?;
-        let key = Digest::from_parts([
-            &self.context.as_bytes()[..],
-            content.as_bytes(),
-            name.0.as_bytes(),
-        ]);
+        let key = Digest::from_parts([&self.context.as_bytes()[..], content.as_bytes(), name.0.as_bytes()]);
         let found = if let Some(found) = self.cache.get(key) {
             found
         } else {
@@ -393,9 +359,7 @@ impl Measuring<'_> {
         };
         let unknown = unknown_labels(&found);
         if self.settings.args.strict && !unknown.is_empty() {
-            let problem = format_args!(
-                "its semantic map has the numbers {unknown:?}, which are not in classes.json"
-            );
+            let problem = format_args!("its semantic map has the numbers {unknown:?}, which are not in classes.json");
             return Err(Error::data(format_args!("frame {:?}", name.0), problem));
         }
         Ok(found)

@@ -1,7 +1,7 @@
 //! Cache of frame statistics in a file next to the questions: [`StatisticsCache`].
 //!
-//! The file has one line per frame. Each line is added as soon as its frame is measured, so that an interrupted command can continue. At the
-//! end the file is rewritten in the order of the frames.
+//! The file has one line per frame. Each line is added as soon as its frame is measured, so that an interrupted command
+//! can continue. At the end the file is rewritten in the order of the frames.
 
 use std::collections::HashMap;
 use std::fs::{self, File, OpenOptions};
@@ -23,8 +23,8 @@ pub(super) struct StatisticsCache {
 }
 
 impl StatisticsCache {
-    /// Reads the file, if it exists, and the files of shards. Broken lines, such as the last one of an interrupted command, are ignored:
-    /// their frames are measured again.
+    /// Reads the file, if it exists, and the files of shards. Broken lines, such as the last one of an interrupted
+    /// command, are ignored: their frames are measured again.
     pub(super) fn open(path: &Path, shard_files: &[PathBuf]) -> Result<Self> {
         let mut known = HashMap::new();
         for file in shard_files {
@@ -34,21 +34,13 @@ impl StatisticsCache {
         if let Some(folder) = path.parent() {
             fs::create_dir_all(folder).map_err(|e| Error::file(folder, "make", e))?;
         }
-        let mut file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(path)
-            .map_err(|e| Error::file(path, "write", e))?;
+        let mut file =
+            OpenOptions::new().create(true).append(true).open(path).map_err(|e| Error::file(path, "write", e))?;
         if end == FileEnd::Broken {
             // The next line must not continue a half-written one.
-            file.write_all(b"\n")
-                .map_err(|e| Error::file(path, "write", e))?;
+            file.write_all(b"\n").map_err(|e| Error::file(path, "write", e))?;
         }
-        Ok(Self {
-            path: path.to_owned(),
-            known,
-            file: Mutex::new(file),
-        })
+        Ok(Self { path: path.to_owned(), known, file: Mutex::new(file) })
     }
 
     /// The statistics with a key.
@@ -60,8 +52,7 @@ impl StatisticsCache {
     pub(super) fn add(&self, statistics: &FrameStatistics) -> Result<()> {
         let line = line(statistics)?;
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
-        file.write_all(&line)
-            .map_err(|e| Error::file(&self.path, "write", e))
+        file.write_all(&line).map_err(|e| Error::file(&self.path, "write", e))
     }
 
     /// Rewrites the file with exactly these frames, in this order.

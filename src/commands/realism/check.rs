@@ -34,13 +34,9 @@ struct PairLight {
     scene: SceneMatch,
 }
 
-/// Loads the images of a pair: in normal light at full bit depth, because it will be darkened, and in low light at 8 bits. The notes of
-/// the image files are added to `tally`.
-pub(super) fn load(
-    args: &RealismArgs,
-    pair: &Pair,
-    tally: Option<&InputTally>,
-) -> Result<(Pixels, Rgb)> {
+/// Loads the images of a pair: in normal light at full bit depth, because it will be darkened, and in low light at 8
+/// bits. The notes of the image files are added to `tally`.
+pub(super) fn load(args: &RealismArgs, pair: &Pair, tally: Option<&InputTally>) -> Result<(Pixels, Rgb)> {
     let open = |path: &Path| {
         let file = ImageFile::open(path, args.decode.rule())?;
         if let Some(tally) = tally {
@@ -65,9 +61,7 @@ pub(super) fn check<'a>(
     workers: &PairWorkers<'_>,
 ) -> Result<(Vec<CheckedPair<'a>>, LeftOut)> {
     let tally = InputTally::default();
-    let lights = workers.map("pairs checked", pairs, |_, pair| {
-        measure_light(args, pair, &tally)
-    });
+    let lights = workers.map("pairs checked", pairs, |_, pair| measure_light(args, pair, &tally));
     tally.warn();
     refuse_swapped_folders(args, place, &lights)?;
     if let Some(ev) = args.ev.filter(|ev| ev.abs() < SMALL_DROP) {
@@ -97,11 +91,7 @@ pub(super) fn check<'a>(
             }
             Ok(light) => {
                 light.warn(args, name);
-                checked.push(CheckedPair {
-                    pair,
-                    drop: light.drop,
-                    scene: light.scene,
-                });
+                checked.push(CheckedPair { pair, drop: light.drop, scene: light.scene });
                 continue;
             }
         };
@@ -118,11 +108,7 @@ fn measure_light(args: &RealismArgs, pair: &Pair, tally: &InputTally) -> Result<
         Some(drop) => (drop, estimated.ok()),
         None => estimated.map(|drop| (drop, Some(drop)))?,
     };
-    Ok(PairLight {
-        drop,
-        estimated,
-        scene: SceneMatch::new(&normal, &low, f64::from(drop)),
-    })
+    Ok(PairLight { drop, estimated, scene: SceneMatch::new(&normal, &low, f64::from(drop)) })
 }
 
 impl PairLight {
@@ -149,27 +135,13 @@ impl PairLight {
 }
 
 /// Returns an error if most pairs are swapped.
-fn refuse_swapped_folders(
-    args: &RealismArgs,
-    place: &Path,
-    lights: &[Result<PairLight>],
-) -> Result<()> {
-    let known: Vec<&PairLight> = lights
-        .iter()
-        .flatten()
-        .filter(|light| light.estimated.is_some())
-        .collect();
-    let swapped: Vec<&&PairLight> = known
-        .iter()
-        .filter(|light| light.is_swapped(args))
-        .collect();
+fn refuse_swapped_folders(args: &RealismArgs, place: &Path, lights: &[Result<PairLight>]) -> Result<()> {
+    let known: Vec<&PairLight> = lights.iter().flatten().filter(|light| light.estimated.is_some()).collect();
+    let swapped: Vec<&&PairLight> = known.iter().filter(|light| light.is_swapped(args)).collect();
     if 2 * swapped.len() <= known.len() {
         return Ok(());
     }
-    let how = if swapped
-        .iter()
-        .any(|light| light.estimated.is_some_and(|drop| drop < 0.0))
-    {
+    let how = if swapped.iter().any(|light| light.estimated.is_some_and(|drop| drop < 0.0)) {
         "brighter than"
     } else {
         "as bright as"

@@ -23,7 +23,8 @@ pub(super) struct PairWork {
     pub compared: PairComparison,
     /// Residuals of the real image, then of the images with noise.
     pub residuals: Vec<Residuals>,
-    /// The real image, the image with the exposure drop alone, then the images with noise; `None` if no crops are shown.
+    /// The real image, the image with the exposure drop alone, then the images with noise; `None` if no crops are
+    /// shown.
     pub images: Option<Vec<Rgb>>,
 }
 
@@ -35,9 +36,8 @@ pub(super) fn compare(
     fits: &[ProfileFit],
     workers: &PairWorkers<'_>,
 ) -> (Vec<PairWork>, Vec<String>) {
-    let compared = workers.map("pairs", pairs, |index, checked| {
-        compare_pair(args, sensor, checked, fits, index < MAX_CROPS)
-    });
+    let compared =
+        workers.map("pairs", pairs, |index, checked| compare_pair(args, sensor, checked, fits, index < MAX_CROPS));
     let (mut works, mut failed) = (Vec::new(), Vec::new());
     for (work, checked) in compared.into_iter().zip(pairs) {
         match work {
@@ -52,25 +52,15 @@ pub(super) fn compare(
 }
 
 /// The noise methods for a pair: each noise profile with the given camera, and with the fitted one.
-fn methods(
-    sensor: &SensorSettings,
-    fits: &[ProfileFit],
-    pair: &str,
-) -> Result<Vec<(NoiseMethod, Synthesis)>> {
+fn methods(sensor: &SensorSettings, fits: &[ProfileFit], pair: &str) -> Result<Vec<(NoiseMethod, Synthesis)>> {
     let mut methods = Vec::new();
     for (profile, synthesis) in sensor.readings.iter() {
-        let method = |camera| NoiseMethod {
-            profile: profile.clone(),
-            camera,
-        };
+        let method = |camera| NoiseMethod { profile: profile.clone(), camera };
         methods.push((method(CameraOrigin::Given), synthesis.clone()));
         let fit = fits.iter().find(|fit| fit.profile == *profile);
         if let Some((fit, (gains, origin))) = fit.and_then(|fit| Some((fit, fit.for_pair(pair)?))) {
             let camera = fitted_camera(&synthesis.camera, fit, gains.range)?;
-            let fitted = Synthesis {
-                camera,
-                ..synthesis.clone()
-            };
+            let fitted = Synthesis { camera, ..synthesis.clone() };
             methods.push((method(origin), fitted));
         }
     }
@@ -95,12 +85,7 @@ fn compare_pair(
             psnr: psnr(&real, image)?,
             ssim: ssim(&real, image)?,
             kl: divergence(&real_residuals, &residuals, args.kl_bins, args.kl_empty),
-            kl_other: divergence(
-                &real_residuals,
-                &residuals,
-                args.kl_bins,
-                args.kl_empty.other(),
-            ),
+            kl_other: divergence(&real_residuals, &residuals, args.kl_bins, args.kl_empty.other()),
         };
         Ok((comparison, residuals))
     };
@@ -111,16 +96,11 @@ fn compare_pair(
         let render = |terms: &[Term]| {
             let (amplify, tone) = (synthesis.amplify, synthesis.tone);
             let headroom = synthesis.headroom_ev(drop);
-            Negative::with_state(&normal, &key, &state, amplify, tone, terms, headroom)
-                .develop_by(drop)
+            Negative::with_state(&normal, &key, &state, amplify, tone, terms, headroom).develop_by(drop)
         };
         let (noisy, clean) = (render(&Term::ALL), render(&[]));
         let (image, noise_residuals) = compare_image(&noisy)?;
-        noise.push(NoiseComparison {
-            method,
-            image,
-            clean_psnr: psnr(&real, &clean)?,
-        });
+        noise.push(NoiseComparison { method, image, clean_psnr: psnr(&real, &clean)? });
         residuals.push(noise_residuals);
         images.push(noisy);
     }

@@ -1,5 +1,5 @@
-//! The output files of `realism`: numbers of each pair, summary and figures ([`write_files`]), fitted gains and camera files
-//! ([`write_fits`]).
+//! The output files of `realism`: numbers of each pair, summary and figures ([`write_files`]), fitted gains and camera
+//! files ([`write_fits`]).
 
 use std::fs;
 use std::path::Path;
@@ -23,14 +23,8 @@ pub(super) fn write_files(out: &Path, works: &[PairWork], summary: &RealismSumma
     write(&out.join("pairs.csv"), &report::pairs(&compared)?)?;
     write(&out.join("summary.json"), summary.json().as_bytes())?;
     let pooled = pool_residuals(works);
-    write(
-        &out.join("residuals_by_code.csv"),
-        &report::by_code(&pooled)?,
-    )?;
-    write(
-        &out.join("residuals.svg"),
-        report::figure(&pooled)?.as_bytes(),
-    )?;
+    write(&out.join("residuals_by_code.csv"), &report::by_code(&pooled)?)?;
+    write(&out.join("residuals.svg"), report::figure(&pooled)?.as_bytes())?;
     let crops = works.iter().filter_map(|work| {
         let images = work.images.as_deref()?;
         Some((&work.compared, images))
@@ -58,8 +52,8 @@ fn sum_residuals(works: &[PairWork], index: usize) -> Residuals {
     sum
 }
 
-/// Writes the fitted gains of each pair, and a camera file for each noise profile with fitted pairs: `fitted.toml` if there is one noise
-/// profile, else `fitted-PROFILE.toml`.
+/// Writes the fitted gains of each pair, and a camera file for each noise profile with fitted pairs: `fitted.toml` if
+/// there is one noise profile, else `fitted-PROFILE.toml`.
 pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ProfileFit]) -> Result<()> {
     if fits.is_empty() {
         return Ok(());
@@ -75,16 +69,8 @@ pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ProfileFit
         if let Some((synthesis, gains)) = synthesis.zip(fit.pooled.as_ref()) {
             write(&path, camera_file(synthesis, fit, gains)?.as_bytes())?;
         } else {
-            let earlier = if path.exists() {
-                "; the file that is there is from an earlier run"
-            } else {
-                ""
-            };
-            tracing::warn!(
-                "{}: not written, because no pair is fitted under {}{earlier}",
-                path.display(),
-                fit.profile
-            );
+            let earlier = if path.exists() { "; the file that is there is from an earlier run" } else { "" };
+            tracing::warn!("{}: not written, because no pair is fitted under {}{earlier}", path.display(), fit.profile);
         }
     }
     Ok(())
@@ -94,26 +80,18 @@ pub(super) fn write_fits(out: &Path, sensor: &SensorSettings, fits: &[ProfileFit
 fn camera_file(synthesis: &Synthesis, fit: &ProfileFit, gains: &PooledGain) -> Result<String> {
     let fitted = fitted_camera(&synthesis.camera, fit, gains.range)?;
     let mut calibration = fitted.calibration().clone();
-    let base = std::mem::replace(
-        &mut calibration.name,
-        format!("{}-fitted", synthesis.camera.calibration().name),
-    );
+    let base = std::mem::replace(&mut calibration.name, format!("{}-fitted", synthesis.camera.calibration().name));
     let mut comments = vec![
         format!(
             "The sensor {base} with its gain K fitted to the noise of real images under the noise profile {}, {}.",
             fit.profile,
             report::AS_SAVED
         ),
-        format!(
-            "gain: the 10 % to 90 % range of K over the pairs that were fitted, {} in number.",
-            gains.n
-        ),
+        format!("gain: the 10 % to 90 % range of K over the pairs that were fitted, {} in number.", gains.n),
     ];
     if let Some(ratio) = fit.ratio {
         calibration.ratio = [ratio; 2];
-        comments.push(format!(
-            "ratio: {ratio}, which the fit took, because images show only the product r · K."
-        ));
+        comments.push(format!("ratio: {ratio}, which the fit took, because images show only the product r · K."));
     }
     calibration.to_toml(&comments)
 }

@@ -5,12 +5,8 @@ use super::settings::RealismArgs;
 use super::workers::PairWorkers;
 use crate::error::Result;
 use crate::types::{FrameId, Pixels, ProfileName, Rgb};
-use darkqa_light::{
-    CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis,
-};
-use darkqa_score::photographs::realism::gain::{
-    GAINS, GainFit, LADDER_STEPS, PairFit, ProfileFit, ladder,
-};
+use darkqa_light::{CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorSettings, Synthesis};
+use darkqa_score::photographs::realism::gain::{GAINS, GainFit, LADDER_STEPS, PairFit, ProfileFit, ladder};
 use darkqa_score::photographs::realism::smooth::SmoothBlocks;
 
 /// The fits to all pairs, one for each noise profile. Pairs that cannot be read are left out.
@@ -23,11 +19,8 @@ pub(super) fn fit(
     pairs: &[CheckedPair<'_>],
     workers: &PairWorkers<'_>,
 ) -> Result<Vec<ProfileFit>> {
-    let profiles: Vec<ProfileLadder> = sensor
-        .readings
-        .iter()
-        .map(|(name, synthesis)| ProfileLadder::new(name, synthesis))
-        .collect::<Result<_>>()?;
+    let profiles: Vec<ProfileLadder> =
+        sensor.readings.iter().map(|(name, synthesis)| ProfileLadder::new(name, synthesis)).collect::<Result<_>>()?;
     let fits = workers.map("pairs fitted", pairs, |_, checked| {
         // A file that can no longer be read fails in the comparison, where it is logged and counted.
         let (normal, low) = load(args, checked.pair, None).ok()?;
@@ -41,10 +34,7 @@ pub(super) fn fit(
                 .iter()
                 .zip(&fits)
                 .filter_map(|(checked, fits)| {
-                    Some(PairFit {
-                        pair: checked.pair.name.clone(),
-                        fit: *fits.as_ref()?.get(index)?,
-                    })
+                    Some(PairFit { pair: checked.pair.name.clone(), fit: *fits.as_ref()?.get(index)? })
                 })
                 .collect();
             ProfileFit::new(profile.name.clone(), profile.ratio(), pair_fits)
@@ -63,18 +53,12 @@ impl ProfileLadder {
         let mut camera = synthesis.camera.clone();
         camera.set_sampling(Sampling::Fixed);
         camera.set_gain_range(GAINS)?;
-        let given = Synthesis {
-            camera,
-            ..synthesis.clone()
-        };
+        let given = Synthesis { camera, ..synthesis.clone() };
         let mut at_gains = ladder().map(|_| given.clone());
         for (synthesis, gain) in at_gains.iter_mut().zip(ladder()) {
             synthesis.camera.pin_gain(gain)?;
         }
-        Ok(Self {
-            name: name.clone(),
-            ladder: at_gains,
-        })
+        Ok(Self { name: name.clone(), ladder: at_gains })
     }
 
     /// The light ratio r; `None` if it depends on the exposure drop.
@@ -124,11 +108,7 @@ fn fit_pair(
 ///
 /// # Errors
 /// If the camera does not take the range or the ratio.
-pub(super) fn fitted_camera(
-    camera: &CameraModel,
-    fit: &ProfileFit,
-    range: [f64; 2],
-) -> Result<CameraModel> {
+pub(super) fn fitted_camera(camera: &CameraModel, fit: &ProfileFit, range: [f64; 2]) -> Result<CameraModel> {
     let mut fitted = camera.clone();
     fitted.set_gain_range(range)?;
     if let Some(ratio) = fit.ratio {

@@ -1,9 +1,9 @@
-//! `realism`: compares the synthesis with real pairs of images in normal and low light, as the paper does on LLRGBD-real (DarkQA, Table I),
-//! and fits the sensor's gain to them (`--fit`).
+//! `realism`: compares the synthesis with real pairs of images in normal and low light, as the paper does on
+//! LLRGBD-real (DarkQA, Table I), and fits the sensor's gain to them (`--fit`).
 //!
-//! The image in normal light is made as dark as its partner, by exposure drop alone and with sensor noise. Both results are compared with
-//! the real image. A residual is the difference from the clean image after the exposure drop. The residuals of the exposure drop alone
-//! are 0, so its divergence depends only on the treatment of empty bins.
+//! The image in normal light is made as dark as its partner, by exposure drop alone and with sensor noise. Both results
+//! are compared with the real image. A residual is the difference from the clean image after the exposure drop. The
+//! residuals of the exposure drop alone are 0, so its divergence depends only on the treatment of empty bins.
 
 mod check;
 mod compare;
@@ -34,10 +34,7 @@ use darkqa_score::photographs::realism::gain::ProfileFit;
 /// If there is no pair, none can be compared, most are swapped, or a file cannot be written.
 pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome> {
     let (found, place) = match (&args.pairs, &args.normal, &args.low) {
-        (None, Some(normal), Some(low)) => (
-            Pairs::from_folders(normal, low, &args.root.data_root)?,
-            low.as_path(),
-        ),
+        (None, Some(normal), Some(low)) => (Pairs::from_folders(normal, low, &args.root.data_root)?, low.as_path()),
         (folder, ..) => {
             let folder = folder.as_deref().unwrap_or(Path::new("."));
             let other = "--normal DIR and --low DIR name any two folders, instead of PAIRS";
@@ -48,16 +45,9 @@ pub(crate) fn realism(args: &RealismArgs, progress: &Progress) -> Result<Outcome
     for path in &found.unmatched {
         tracing::warn!("{}: no partner in the other light", path.display());
     }
-    let workers = PairWorkers {
-        pool: pool(args.threads.threads)?,
-        progress,
-    };
+    let workers = PairWorkers { pool: pool(args.threads.threads)?, progress };
     let (checked, mut left_out) = check::check(args, &found.pairs, place, &workers)?;
-    let fits = if args.fit {
-        fit::fit(args, &sensor, &checked, &workers)?
-    } else {
-        Vec::new()
-    };
+    let fits = if args.fit { fit::fit(args, &sensor, &checked, &workers)? } else { Vec::new() };
     let (works, failed) = compare::compare(args, &sensor, &checked, &fits, &workers);
     left_out.failed.extend(failed);
     left_out.failed.sort();
@@ -90,9 +80,6 @@ fn summary(
         return Err(Error::data("pairs", "no pair could be compared"));
     }
     let compared: Vec<&PairComparison> = works.iter().map(|work| &work.compared).collect();
-    let rules = ResidualRules {
-        bins: args.kl_bins,
-        empty: args.kl_empty,
-    };
+    let rules = ResidualRules { bins: args.kl_bins, empty: args.kl_empty };
     RealismSummary::new(rules, source, &compared, fits)
 }

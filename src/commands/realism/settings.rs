@@ -37,10 +37,11 @@ pub(crate) struct RealismArgs {
     pub ev: Option<f32>,
     /// Fit the sensor's gain K to the noise of each pair, in each noise profile, and compare the fitted camera too
     ///
-    /// The gain is the one whose noise has the spread of the low-light image in blocks that are smooth in normal light, as saved: a
-    /// smaller K than the sensor's means that noise was averaged away. paper and eld take the middle of the camera's r, or --noise ratio,
-    /// because images show the product rK alone. With 3 fitted pairs or more, each pair is judged by the gains of the others. --out
-    /// also gets a camera file for --noise camera: fitted.toml, or fitted-READING.toml for each of several readings.
+    /// The gain is the one whose noise has the spread of the low-light image in blocks that are smooth in normal light,
+    /// as saved: a smaller K than the sensor's means that noise was averaged away. paper and eld take the middle of the
+    /// camera's r, or --noise ratio, because images show the product rK alone. With 3 fitted pairs or more, each pair
+    /// is judged by the gains of the others. --out also gets a camera file for --noise camera: fitted.toml, or
+    /// fitted-READING.toml for each of several readings.
     #[arg(long, conflicts_with = "gain", add = Decides::Pixels)]
     pub fit: bool,
     /// The bins of the residuals' divergence

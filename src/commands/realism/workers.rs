@@ -12,7 +12,8 @@ pub(super) struct PairWorkers<'a> {
 }
 
 impl PairWorkers<'_> {
-    /// Applies `work` to each item and its index, and returns the results in order. `what` is the name of the items in the progress bar.
+    /// Applies `work` to each item and its index, and returns the results in order. `what` is the name of the items in
+    /// the progress bar.
     pub(super) fn map<I: Sync, T: Send>(
         &self,
         what: &'static str,

@@ -20,8 +20,9 @@ const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
 
 /// Checks the headers of a request to this port.
 ///
-/// A web page in a browser may send requests to loopback. If its domain resolves to this machine (DNS rebinding), `Host` has that domain;
-/// otherwise `Origin` has the site of the page. Without a CORS preflight, a page cannot send JSON.
+/// A web page in a browser may send requests to loopback. If its domain resolves to this machine (DNS rebinding),
+/// `Host` has that domain; otherwise `Origin` has the site of the page. Without a CORS preflight, a page cannot send
+/// JSON.
 ///
 /// # Errors
 /// 421 for another host, 403 for a page of another site, 415 for a body that is not JSON.
@@ -46,10 +47,7 @@ pub(super) fn admit(request: &Request<Incoming>, port: u16) -> Result<(), Reques
     let kind = kind.split(';').next().unwrap_or_default().trim();
     if request.method() == Method::POST && !kind.eq_ignore_ascii_case("application/json") {
         let message = "the header Content-Type: application/json is missing";
-        return Err(RequestFault::new(
-            StatusCode::UNSUPPORTED_MEDIA_TYPE,
-            message,
-        ));
+        return Err(RequestFault::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, message));
     }
     Ok(())
 }
@@ -71,10 +69,7 @@ pub(super) async fn body(
     tokio::time::timeout(BODY_TIMEOUT, read_all(body))
         .await
         .map_err(|_| {
-            let message = format!(
-                "the body did not arrive within {} s",
-                BODY_TIMEOUT.as_secs()
-            );
+            let message = format!("the body did not arrive within {} s", BODY_TIMEOUT.as_secs());
             RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
         })?
         .ok_or_else(too_large)
@@ -82,10 +77,7 @@ pub(super) async fn body(
 }
 
 fn too_large() -> RequestFault {
-    let message = format!(
-        "the body is incomplete, or has more than {} MiB",
-        MAX_BODY >> 20
-    );
+    let message = format!("the body is incomplete, or has more than {} MiB", MAX_BODY >> 20);
     RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
 }
 
@@ -113,9 +105,7 @@ fn header_text(headers: &HeaderMap, name: header::HeaderName) -> Option<String> 
 
 /// True if a host with a port is this server.
 fn is_here(host: &str, port: u16) -> bool {
-    LOOPBACK
-        .iter()
-        .any(|name| host.eq_ignore_ascii_case(&format!("{name}:{port}")))
+    LOOPBACK.iter().any(|name| host.eq_ignore_ascii_case(&format!("{name}:{port}")))
 }
 
 /// True if an origin is a page from this machine, on any port.
@@ -133,11 +123,7 @@ mod tests {
 
     #[test]
     fn only_pages_of_this_machine_are_local() {
-        for origin in [
-            "http://localhost:3000",
-            "http://127.0.0.1",
-            "http://[::1]:8",
-        ] {
+        for origin in ["http://localhost:3000", "http://127.0.0.1", "http://[::1]:8"] {
             assert!(is_local_page(origin), "{origin}");
         }
         for origin in [

@@ -56,9 +56,7 @@ impl Completion {
 
     fn events(&self) -> String {
         let delta = json!({"role": "assistant", "content": self.text});
-        self.chunk(&delta, &Value::Null)
-            + &self.chunk(&json!({}), &json!("stop"))
-            + "data: [DONE]\n\n"
+        self.chunk(&delta, &Value::Null) + &self.chunk(&json!({}), &json!("stop")) + "data: [DONE]\n\n"
     }
 
     fn chunk(&self, delta: &Value, finish: &Value) -> String {
@@ -89,31 +87,18 @@ pub(super) struct RequestFault {
 
 impl RequestFault {
     pub(super) fn new(status: StatusCode, message: impl Into<String>) -> Self {
-        Self {
-            status,
-            message: message.into(),
-            parameter: None,
-            code: None,
-        }
+        Self { status, message: message.into(), parameter: None, code: None }
     }
 
     /// Adds the name of the invalid parameter and an error code.
     pub(super) fn at(self, parameter: &'static str, code: &'static str) -> Self {
-        Self {
-            parameter: Some(parameter),
-            code: Some(code),
-            ..self
-        }
+        Self { parameter: Some(parameter), code: Some(code), ..self }
     }
 }
 
 impl From<RequestFault> for Response<String> {
     fn from(fault: RequestFault) -> Self {
-        let kind = if fault.status.is_server_error() {
-            "server_error"
-        } else {
-            "invalid_request_error"
-        };
+        let kind = if fault.status.is_server_error() { "server_error" } else { "invalid_request_error" };
         let error = json!({
             "message": fault.message,
             "type": kind,
@@ -126,9 +111,7 @@ impl From<RequestFault> for Response<String> {
 
 /// The response that lists the models.
 pub(super) fn models<'a>(names: impl Iterator<Item = &'a str>) -> Response<String> {
-    let models = names.map(
-        |name| json!({"id": name, "object": "model", "created": 0, "owned_by": "darkqa-eval"}),
-    );
+    let models = names.map(|name| json!({"id": name, "object": "model", "created": 0, "owned_by": "darkqa-eval"}));
     let list = json!({"object": "list", "data": models.collect::<Vec<_>>()});
     response(StatusCode::OK, JSON, list.to_string())
 }

@@ -23,15 +23,9 @@ const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(10);
 const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
 
 /// Answers requests until `end`, then finishes the open ones.
-pub(super) async fn answer_until<S>(
-    listener: TcpListener,
-    service: S,
-    end: impl Future<Output = ()>,
-) where
-    S: HttpService<Incoming, ResBody = String, Error = Infallible, Future: Send>
-        + Clone
-        + Send
-        + 'static,
+pub(super) async fn answer_until<S>(listener: TcpListener, service: S, end: impl Future<Output = ()>)
+where
+    S: HttpService<Incoming, ResBody = String, Error = Infallible, Future: Send> + Clone + Send + 'static,
 {
     let free = Arc::new(Semaphore::new(MAX_CONNECTIONS));
     let open = GracefulShutdown::new();

@@ -1,8 +1,8 @@
 //! Matching of an image to the frame of a data set that it shows: [`FrameMatcher`].
 //!
-//! The linear light of the image is averaged over a coarse grid, which removes most of the sensor noise. The cell values are then
-//! correlated with those of every frame. The correlation does not depend on the brightness of the image, so a frame is recognised at
-//! every level at which some of it is visible.
+//! The linear light of the image is averaged over a coarse grid, which removes most of the sensor noise. The cell
+//! values are then correlated with those of every frame. The correlation does not depend on the brightness of the
+//! image, so a frame is recognised at every level at which some of it is visible.
 
 use std::sync::LazyLock;
 
@@ -23,11 +23,7 @@ const MIN_CORRELATION: f64 = 0.5;
 static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
     std::array::from_fn(|code| {
         let value = code as f64 / 255.0;
-        let linear = if value <= 0.04045 {
-            value / 12.92
-        } else {
-            libm::pow((value + 0.055) / 1.055, 2.4)
-        };
+        let linear = if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) };
         (linear * 65_535.0 + 0.5) as u64
     })
 });
@@ -81,26 +77,13 @@ fn cell_values(image: &Rgb) -> Vec<f64> {
     for (i, pixel) in pixels.iter().enumerate() {
         let (x, y) = (i % width * GRID[0] / width, i / width * GRID[1] / height);
         let (light, count) = &mut cells[y * GRID[0] + x];
-        *light += pixel
-            .iter()
-            .map(|code| LINEAR[usize::from(*code)])
-            .sum::<u64>();
+        *light += pixel.iter().map(|code| LINEAR[usize::from(*code)]).sum::<u64>();
         *count += 1;
     }
     // The square root keeps a bright window from dominating the rest.
-    let lights: Vec<f64> = cells
-        .iter()
-        .map(|(light, count)| (*light as f64 / (*count).max(1) as f64).sqrt())
-        .collect();
+    let lights: Vec<f64> = cells.iter().map(|(light, count)| (*light as f64 / (*count).max(1) as f64).sqrt()).collect();
     let mean = lights.iter().sum::<f64>() / lights.len() as f64;
-    let norm = lights
-        .iter()
-        .map(|light| (light - mean) * (light - mean))
-        .sum::<f64>()
-        .sqrt();
+    let norm = lights.iter().map(|light| (light - mean) * (light - mean)).sum::<f64>().sqrt();
     let norm = if norm > 0.0 { norm } else { 1.0 };
-    lights
-        .into_iter()
-        .map(|light| (light - mean) / norm)
-        .collect()
+    lights.into_iter().map(|light| (light - mean) / norm).collect()
 }

@@ -25,12 +25,7 @@ pub(super) struct MemoryBound {
 impl MemoryBound {
     /// A bound of `whole` units of `unit` each.
     pub(super) fn new(whole: usize, unit: usize, name: String) -> Self {
-        Self {
-            free: Arc::new(Semaphore::new(whole)),
-            unit,
-            whole,
-            name,
-        }
+        Self { free: Arc::new(Semaphore::new(whole)), unit, whole, name }
     }
 
     /// Takes a share until the returned permit is dropped.
@@ -43,10 +38,8 @@ impl MemoryBound {
         if let Ok(Ok(permit)) = tokio::time::timeout(MAX_WAIT, free).await {
             return Ok(permit);
         }
-        let message = format!(
-            "the requests in flight together have {}: send fewer or smaller ones at a time",
-            self.name
-        );
+        let message =
+            format!("the requests in flight together have {}: send fewer or smaller ones at a time", self.name);
         Err(RequestFault::new(StatusCode::SERVICE_UNAVAILABLE, message))
     }
 }

@@ -1,8 +1,10 @@
-//! `serve`: serves the built-in models at an OpenAI-compatible endpoint on loopback, for testing clients and for CI without keys.
+//! `serve`: serves the built-in models at an OpenAI-compatible endpoint on loopback, for testing clients and for CI
+//! without keys.
 //!
-//! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter; `GET /v1/models` lists
-//! the models. The observer must know which frame an image shows, and finds it by the image alone ([`frame_matcher`]). Only programs on
-//! this machine are answered, not web pages of other sites ([`admission`]). Any key is accepted, and nothing is charged or stored.
+//! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter;
+//! `GET /v1/models` lists the models. The observer must know which frame an image shows, and finds it by the image
+//! alone ([`frame_matcher`]). Only programs on this machine are answered, not web pages of other sites ([`admission`]).
+//! Any key is accepted, and nothing is charged or stored.
 
 mod admission;
 mod completion;
@@ -44,7 +46,8 @@ use memory::MemoryBound;
 use parsed_question::ParsedQuestion;
 use request::{MAX_PIXELS, ServedQuestion};
 
-/// Maximum number of bytes of all bodies in flight (chosen). A body takes up to three times its size until it is decoded.
+/// Maximum number of bytes of all bodies in flight (chosen). A body takes up to three times its size until it is
+/// decoded.
 const MAX_BODIES: usize = 2 * MAX_BODY;
 /// Maximum number of requests answered in parallel; further ones wait (chosen).
 const MAX_PARALLEL: usize = 16;
@@ -73,7 +76,8 @@ pub(crate) struct ServeArgs {
 /// The state that all requests share.
 struct ServerState {
     frame_matcher: FrameMatcher,
-    /// The models, by their names at this endpoint. The names differ from `observer` and `random`, which run without an endpoint.
+    /// The models, by their names at this endpoint. The names differ from `observer` and `random`, which run without an
+    /// endpoint.
     models: [(&'static str, Model); 2],
     /// Permits for answering requests.
     permits: Semaphore,
@@ -92,46 +96,25 @@ struct ServerState {
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
     // Bind first, so that a used port is reported before any frame is drawn.
     let listener = bind(args.port)?;
-    let dataset = Arc::new(Dataset::open_without_questions(
-        &args.data,
-        &args.root.data_root,
-    )?);
+    let dataset = Arc::new(Dataset::open_without_questions(&args.data, &args.root.data_root)?);
     let prior = Random { seed: args.seed };
-    let observer = Observer::open(
-        &dataset,
-        &args.data,
-        &args.root.data_root,
-        &[],
-        Rules::built_in()?,
-    )
-    .map_err(|e| e.usage_at("--data"))?;
-    let models = [
-        ("darkqa-observer", Model::Local(observer.model(None, prior))),
-        ("darkqa-random", Model::Random(prior)),
-    ];
+    let observer = Observer::open(&dataset, &args.data, &args.root.data_root, &[], Rules::built_in()?)
+        .map_err(|e| e.usage_at("--data"))?;
+    let models =
+        [("darkqa-observer", Model::Local(observer.model(None, prior))), ("darkqa-random", Model::Random(prior))];
     let state = Arc::new(ServerState {
         frame_matcher: FrameMatcher::new(&dataset, progress)?,
         models,
         permits: Semaphore::new(MAX_PARALLEL),
-        bodies: MemoryBound::new(
-            MAX_BODIES >> 10,
-            1 << 10,
-            format!("bodies of more than {} MiB", MAX_BODIES >> 20),
-        ),
+        bodies: MemoryBound::new(MAX_BODIES >> 10, 1 << 10, format!("bodies of more than {} MiB", MAX_BODIES >> 20)),
         pixels: MemoryBound::new(
             MAX_PIXELS / 1000,
             1000,
-            format!(
-                "images of more than {} million pixels",
-                MAX_PIXELS / 1_000_000
-            ),
+            format!("images of more than {} million pixels", MAX_PIXELS / 1_000_000),
         ),
         has_seen_unknown: AtomicBool::new(false),
     });
-    let runtime = runtime::Builder::new_multi_thread()
-        .enable_all()
-        .build()
-        .map_err(|e| Error::usage("serve", e))?;
+    let runtime = runtime::Builder::new_multi_thread().enable_all().build().map_err(|e| Error::usage("serve", e))?;
     runtime.block_on(listen(listener, state, progress))?;
     Ok(Outcome::text(Status::Complete, String::new()))
 }
@@ -139,27 +122,17 @@ pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
 /// A non-blocking listener at a loopback port.
 fn bind(port: u16) -> Result<TcpListener> {
     let address = SocketAddr::from((Ipv4Addr::LOCALHOST, port));
-    TcpListener::bind(address)
-        .and_then(|listener| listener.set_nonblocking(true).map(|()| listener))
-        .map_err(|e| {
-            let problem = format!(
-                "cannot listen at {address}: {e}; --port N takes another port, 0 any free one"
-            );
-            Error::usage("--port", problem)
-        })
+    TcpListener::bind(address).and_then(|listener| listener.set_nonblocking(true).map(|()| listener)).map_err(|e| {
+        let problem = format!("cannot listen at {address}: {e}; --port N takes another port, 0 any free one");
+        Error::usage("--port", problem)
+    })
 }
 
 async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progress) -> Result<()> {
-    let listener =
-        tokio::net::TcpListener::from_std(listener).map_err(|e| Error::usage("--port", e))?;
-    let address = listener
-        .local_addr()
-        .map_err(|e| Error::usage("--port", e))?;
+    let listener = tokio::net::TcpListener::from_std(listener).map_err(|e| Error::usage("--port", e))?;
+    let address = listener.local_addr().map_err(|e| Error::usage("--port", e))?;
     let names: Vec<&str> = state.names().collect();
-    progress.note(&format!(
-        "models: {}; no key is needed; Ctrl-C ends it",
-        names.join(", ")
-    ));
+    progress.note(&format!("models: {}; no key is needed; Ctrl-C ends it", names.join(", ")));
     // A client may wait for the address on standard output. Ignore a closed output.
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "http://{address}/v1").and_then(|()| out.flush());
@@ -180,11 +153,7 @@ async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progr
 }
 
 /// Answers a request, if it is admitted.
-async fn respond(
-    state: &ServerState,
-    request: Request<Incoming>,
-    port: u16,
-) -> Result<Response<String>, RequestFault> {
+async fn respond(state: &ServerState, request: Request<Incoming>, port: u16) -> Result<Response<String>, RequestFault> {
     admit(&request, port)?;
     match (request.method(), request.uri().path()) {
         (&Method::GET | &Method::HEAD, MODELS) => Ok(completion::models(state.names())),
@@ -215,20 +184,12 @@ impl ServerState {
         let model = self.models.iter().find(|(name, _)| *name == request.model);
         let (_, model) = model.ok_or_else(|| {
             let names: Vec<&str> = self.names().collect();
-            let message = format!(
-                "the model {:?} is not one of {}",
-                request.model,
-                names.join(", ")
-            );
+            let message = format!("the model {:?} is not one of {}", request.model, names.join(", "));
             RequestFault::new(StatusCode::NOT_FOUND, message).at("model", "model_not_found")
         })?;
         let parsed = ParsedQuestion::parse(&request.text)?;
-        let frame = request
-            .image
-            .as_ref()
-            .and_then(|image| self.frame_matcher.best_match(&image.rgb));
-        if request.image.is_some() && frame.is_none() && !self.has_seen_unknown.swap(true, Relaxed)
-        {
+        let frame = request.image.as_ref().and_then(|image| self.frame_matcher.best_match(&image.rgb));
+        if request.image.is_some() && frame.is_none() && !self.has_seen_unknown.swap(true, Relaxed) {
             tracing::warn!(
                 "an image shows none of the {} frames of --data: about such images the observer guesses, too",
                 self.frame_matcher.len()
@@ -262,10 +223,6 @@ impl ServerState {
             .ask(call)
             .await
             .map_err(|e| RequestFault::new(StatusCode::INTERNAL_SERVER_ERROR, e.failure.message))?;
-        Ok(Completion {
-            model: request.model,
-            text: reply.text,
-            form: request.form,
-        })
+        Ok(Completion { model: request.model, text: reply.text, form: request.form })
     }
 }

@@ -16,23 +16,18 @@ pub(super) struct ParsedQuestion {
 }
 
 /// A line with a choice: `A. yes`, `(B) no`, `C: perhaps`.
-static CHOICE: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new(r"^\s*[(\[]?([A-Z])[)\].:]+\s*(\S.*?)\s*$").ok());
+static CHOICE: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(r"^\s*[(\[]?([A-Z])[)\].:]+\s*(\S.*?)\s*$").ok());
 
 impl ParsedQuestion {
-    /// Parses the last question of a text. The choices are lines with consecutive letters. The question is the last line before them that
-    /// ends with a question mark, or else the line directly before them.
+    /// Parses the last question of a text. The choices are lines with consecutive letters. The question is the last
+    /// line before them that ends with a question mark, or else the line directly before them.
     ///
     /// # Errors
     /// 400 if the text has fewer than two choices.
     pub(super) fn parse(text: &str) -> Result<Self, RequestFault> {
         let lines: Vec<&str> = text.lines().collect();
-        let parsed: Vec<Option<(char, &str)>> =
-            lines.iter().map(|line| parse_choice(line)).collect();
-        let first = parsed
-            .iter()
-            .rposition(|line| matches!(line, Some(('A', _))))
-            .ok_or_else(no_choices)?;
+        let parsed: Vec<Option<(char, &str)>> = lines.iter().map(|line| parse_choice(line)).collect();
+        let first = parsed.iter().rposition(|line| matches!(line, Some(('A', _)))).ok_or_else(no_choices)?;
         let mut choices = Vec::new();
         for (own_letter, text) in parsed[first..].iter().flatten() {
             if *own_letter == letter(choices.len()) {
@@ -42,21 +37,10 @@ impl ParsedQuestion {
         if choices.len() < 2 {
             return Err(no_choices());
         }
-        let mut before = lines[..first]
-            .iter()
-            .rev()
-            .map(|line| line.trim())
-            .filter(|line| !line.is_empty());
-        let question = before
-            .clone()
-            .find(|line| line.ends_with('?'))
-            .or_else(|| before.next())
-            .unwrap_or_default();
+        let mut before = lines[..first].iter().rev().map(|line| line.trim()).filter(|line| !line.is_empty());
+        let question = before.clone().find(|line| line.ends_with('?')).or_else(|| before.next()).unwrap_or_default();
         let question = question.strip_prefix("Question:").unwrap_or(question);
-        Ok(Self {
-            question: question.trim().to_owned(),
-            choices,
-        })
+        Ok(Self { question: question.trim().to_owned(), choices })
     }
 }
 

@@ -14,7 +14,8 @@ use crate::pictures::{DecodeRule, ImageFile};
 use crate::pictures::{Payload, PayloadFormat};
 use crate::types::Rgb;
 
-/// Maximum number of pixels of an image, and of all images in flight (chosen). Decoded and encoded again, a pixel takes 10 to 20 bytes.
+/// Maximum number of pixels of an image, and of all images in flight (chosen). Decoded and encoded again, a pixel takes
+/// 10 to 20 bytes.
 pub(super) const MAX_PIXELS: usize = 32_000_000;
 
 /// The used fields of a request. Other fields are ignored.
@@ -74,10 +75,7 @@ impl ServedQuestion {
         let parsed = serde_json::from_slice::<ChatBody>(&bytes);
         drop(bytes);
         let body = parsed.map_err(|e| {
-            RequestFault::new(
-                StatusCode::BAD_REQUEST,
-                format!("the request is not a valid chat completion: {e}"),
-            )
+            RequestFault::new(StatusCode::BAD_REQUEST, format!("the request is not a valid chat completion: {e}"))
         })?;
         let (mut text, mut image, mut max_images) = (String::new(), None, 0);
         let mut append = |words: &str| {
@@ -89,10 +87,7 @@ impl ServedQuestion {
                 None => {}
                 Some(Content::Text(words)) => append(&words),
                 Some(Content::Parts(parts)) => {
-                    let images = parts
-                        .iter()
-                        .filter(|part| matches!(part, Part::ImageUrl { .. }))
-                        .count();
+                    let images = parts.iter().filter(|part| matches!(part, Part::ImageUrl { .. })).count();
                     max_images = max_images.max(images);
                     for part in parts {
                         match part {
@@ -104,10 +99,8 @@ impl ServedQuestion {
             }
         }
         if max_images > 1 {
-            let message =
-                format!("a message shows {max_images} images, and these models look at one");
-            return Err(RequestFault::new(StatusCode::BAD_REQUEST, message)
-                .at("image_url", "invalid_image_url"));
+            let message = format!("a message shows {max_images} images, and these models look at one");
+            return Err(RequestFault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url"));
         }
         let image = match image {
             Some(url) => Some(ServedImage::decode(url, pixels).await?),
@@ -117,11 +110,7 @@ impl ServedQuestion {
             model: body.model,
             text,
             image,
-            form: if body.stream == Some(true) {
-                ReplyForm::Stream
-            } else {
-                ReplyForm::Whole
-            },
+            form: if body.stream == Some(true) { ReplyForm::Stream } else { ReplyForm::Whole },
         })
     }
 }
@@ -158,50 +147,30 @@ impl ServedImage {
     async fn decode(url: String, pixels: &MemoryBound) -> Result<Self, RequestFault> {
         let file = file_in_data_url(&url)?;
         drop(url);
-        let (width, height) = file
-            .stored_size()
-            .map_err(|e| invalid_image(e.to_string()))?;
+        let (width, height) = file.stored_size().map_err(|e| invalid_image(e.to_string()))?;
         let count = width as usize * height as usize;
         if count > MAX_PIXELS {
             let message = format!(
                 "the image has {width} × {height} pixels; at most {} million are decoded",
                 MAX_PIXELS / 1_000_000
             );
-            return Err(RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
-                .at("image_url", "invalid_image_url"));
+            return Err(RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message).at("image_url", "invalid_image_url"));
         }
         let share = pixels.take(count).await?;
         let rgb = file.decode().map_err(|e| invalid_image(e.to_string()))?;
         drop(file);
-        let payload =
-            Payload::encode(&rgb, PayloadFormat::Png).map_err(|e| invalid_image(e.to_string()))?;
-        Ok(Self {
-            rgb,
-            payload: Arc::new(payload),
-            _share: share,
-        })
+        let payload = Payload::encode(&rgb, PayloadFormat::Png).map_err(|e| invalid_image(e.to_string()))?;
+        Ok(Self { rgb, payload: Arc::new(payload), _share: share })
     }
 }
 
 /// The image file in a data URL.
 fn file_in_data_url(url: &str) -> Result<ImageFile, RequestFault> {
-    let (_, data) = url
-        .strip_prefix("data:image/")
-        .and_then(|rest| rest.split_once(";base64,"))
-        .ok_or_else(|| {
-            invalid_image(
-                "only data URLs are accepted: data:image/png;base64,… or data:image/jpeg;base64,…"
-                    .to_owned(),
-            )
-        })?;
-    let bytes = STANDARD
-        .decode(data)
-        .map_err(|e| invalid_image(format!("the image is not base64: {e}")))?;
-    Ok(ImageFile::new(
-        bytes,
-        "image_url".to_owned(),
-        DecodeRule::default(),
-    ))
+    let (_, data) = url.strip_prefix("data:image/").and_then(|rest| rest.split_once(";base64,")).ok_or_else(|| {
+        invalid_image("only data URLs are accepted: data:image/png;base64,… or data:image/jpeg;base64,…".to_owned())
+    })?;
+    let bytes = STANDARD.decode(data).map_err(|e| invalid_image(format!("the image is not base64: {e}")))?;
+    Ok(ImageFile::new(bytes, "image_url".to_owned(), DecodeRule::default()))
 }
 
 fn invalid_image(message: String) -> RequestFault {
@@ -214,11 +183,7 @@ mod tests {
 
     #[test]
     fn values_are_counted_outside_of_strings() {
-        for (json, count) in [
-            (r#"{"a": [1, 2], "b": {}}"#, 5),
-            (r#"{"a": "[,\",{"}"#, 1),
-            (r#""a""#, 0),
-        ] {
+        for (json, count) in [(r#"{"a": [1, 2], "b": {}}"#, 5), (r#"{"a": "[,\",{"}"#, 1), (r#""a""#, 0)] {
             assert_eq!(value_count(json.as_bytes()), count, "{json}");
         }
     }

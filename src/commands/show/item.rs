@@ -72,11 +72,7 @@ pub(super) fn choice_text(record: &Record, stored_question: Option<&RunQuestion>
         let _ = writeln!(text, "{}", stored_question.text);
     }
     for (index, choice) in record.detail.choices.iter().enumerate() {
-        let truth = if Some(index) == record.detail.truth {
-            "  (true)"
-        } else {
-            ""
-        };
+        let truth = if Some(index) == record.detail.truth { "  (true)" } else { "" };
         let _ = writeln!(text, "  {}. {choice}{truth}", letter(index));
     }
     text
@@ -107,10 +103,7 @@ fn open_answer(record: &Record<OpenDetail>) -> ShownAnswer {
         model: record.model.clone(),
         condition: record.condition.clone(),
         outcome: match (&record.failure, &record.detail.judged) {
-            (Some(failure), _) => format!(
-                "failed ({})",
-                outcome_words::failure_reason(failure.kind, failure.status)
-            ),
+            (Some(failure), _) => format!("failed ({})", outcome_words::failure_reason(failure.kind, failure.status)),
             (None, Some(_)) => "marked".to_owned(),
             (None, None) => "answered".to_owned(),
         },

@@ -22,8 +22,8 @@ pub(crate) struct ShowArgs {
     /// Where the images go; default: shown in the folder of the run
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
-    /// Draw one picture instead, .png or .jpg: the image over the levels, raw above each enhancer, whether each model's reply was
-    /// right, and the curves of the run below; default: none
+    /// Draw one picture instead, .png or .jpg: the image over the levels, raw above each enhancer, whether each model's
+    /// reply was right, and the curves of the run below; default: none
     #[arg(long, value_name = "FILE", conflicts_with_all = ["condition", "out"], add = Decides::Nothing)]
     pub sheet: Option<PathBuf>,
     /// Where the data and enhancers are now.

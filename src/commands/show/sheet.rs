@@ -24,8 +24,8 @@ use darkqa_score::model_in_condition::is_control;
 /// Draws and writes the picture. The outcome lists the conditions left out, and the images that differ from those sent.
 ///
 /// # Errors
-/// If the folder has no run of questions with choices, the run has no degraded images, it did not ask the item with images, or an image
-/// cannot be rebuilt.
+/// If the folder has no run of questions with choices, the run has no degraded images, it did not ask the item with
+/// images, or an image cannot be rebuilt.
 pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     let format = format(path)?;
     let item = SheetItem::read(args)?;
@@ -43,9 +43,7 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
                 .transpose()
         });
         let name = name.clone();
-        cells
-            .collect::<Result<_>>()
-            .map(|cells| StoryRow { name, cells })
+        cells.collect::<Result<_>>().map(|cells| StoryRow { name, cells })
     });
     let picture = story(&Story {
         rows: drawn.collect::<Result<_>>()?,
@@ -55,12 +53,8 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
         note: item.curves.note.clone(),
     });
     write(path, Payload::encode(&picture, format)?.file())?;
-    let left_out = item
-        .asked_conditions()
-        .filter(|condition| !images.contains_key(condition));
-    let changed = images
-        .iter()
-        .filter(|(condition, image)| item.is_changed(condition, image));
+    let left_out = item.asked_conditions().filter(|condition| !images.contains_key(condition));
+    let changed = images.iter().filter(|(condition, image)| item.is_changed(condition, image));
     let changed = condition_names(changed.map(|(condition, _)| condition));
     let drawn = format!("{}: the item over the levels\n", path.display());
     let left_out = condition_names(left_out).map(|names| format!("not drawn: {names}\n"));
@@ -72,19 +66,13 @@ pub(super) fn sheet(args: &ShowArgs, path: &Path) -> Result<Outcome> {
     Ok(Outcome::wrote(
         path,
         changed.map_or(Status::Complete, |_| Status::Incomplete),
-        [Some(drawn), left_out, note]
-            .into_iter()
-            .flatten()
-            .collect(),
+        [Some(drawn), left_out, note].into_iter().flatten().collect(),
     ))
 }
 
 /// The image of a cell; several images are placed side by side.
 fn cell_image(images: &[Arc<Payload>]) -> Result<Rgb> {
-    let mut images: Vec<Rgb> = images
-        .iter()
-        .map(|image| image.decode())
-        .collect::<Result<_>>()?;
+    let mut images: Vec<Rgb> = images.iter().map(|image| image.decode()).collect::<Result<_>>()?;
     match images.pop() {
         Some(only) if images.is_empty() => Ok(only),
         last => montage(&images.into_iter().chain(last).collect::<Vec<Rgb>>()),
@@ -115,8 +103,7 @@ struct SheetItem {
 impl SheetItem {
     fn read(args: &ShowArgs) -> Result<Self> {
         let run = open_choice_run(&args.run, "--sheet draws questions with choices")?;
-        let run =
-            run.with_truths("--sheet draws accuracy; leave it out to see the images and replies")?;
+        let run = run.with_truths("--sheet draws accuracy; leave it out to see the images and replies")?;
         let name = args.question_id();
         let mut records = run.records_of(name)?;
         records.retain(|record| record.condition.is_some() && !is_control(&record.model));
@@ -135,16 +122,12 @@ impl SheetItem {
         let question = lines.next().unwrap_or_default().to_owned();
         let choices: Vec<&str> = lines.map(str::trim).collect();
         let manifest = run.manifest.clone();
-        let curves = story_curves(run)?
-            .ok_or_else(|| run_error(args, "no model was shown a degraded image".to_owned()))?;
-        let conditions = records
-            .iter()
-            .filter_map(|record| record.condition.as_ref());
+        let curves =
+            story_curves(run)?.ok_or_else(|| run_error(args, "no model was shown a degraded image".to_owned()))?;
+        let conditions = records.iter().filter_map(|record| record.condition.as_ref());
         // The picture shows only the axis of the curves.
         let axis = curves.variant.kind.map(Kind::axis);
-        let levels = conditions
-            .map(Condition::level)
-            .filter(|level| *level == AxisLevel::L0 || level.axis() == axis);
+        let levels = conditions.map(Condition::level).filter(|level| *level == AxisLevel::L0 || level.axis() == axis);
         Ok(Self {
             levels: levels.collect(),
             question: vec![question, choices.join("   ").replace("  (true)", " (true)")],
@@ -156,9 +139,7 @@ impl SheetItem {
 
     /// The conditions in which the item was asked.
     fn asked_conditions(&self) -> impl Iterator<Item = &Condition> {
-        self.records
-            .iter()
-            .filter_map(|record| record.condition.as_ref())
+        self.records.iter().filter_map(|record| record.condition.as_ref())
     }
 
     /// The rows of the picture: raw images, and images by each enhancer with which the item was asked.
@@ -177,31 +158,16 @@ impl SheetItem {
             (name, conditions.collect())
         };
         let raw = row(self.curves.light.clone(), None);
-        let enhanced = self
-            .curves
-            .enhancers
-            .iter()
-            .map(|name| row(format!("+ {name}"), Some(name)));
+        let enhanced = self.curves.enhancers.iter().map(|name| row(format!("+ {name}"), Some(name)));
         std::iter::once(raw)
-            .chain(
-                enhanced.filter(|(_, conditions): &(String, Vec<Option<_>>)| {
-                    conditions.iter().any(Option::is_some)
-                }),
-            )
+            .chain(enhanced.filter(|(_, conditions): &(String, Vec<Option<_>>)| conditions.iter().any(Option::is_some)))
             .collect()
     }
 
     /// Rebuilds the images of all conditions in the rows.
-    fn images(
-        &self,
-        args: &ShowArgs,
-        rows: &SheetRows,
-    ) -> Result<BTreeMap<Condition, Vec<Arc<Payload>>>> {
-        let conditions: Vec<Condition> = rows
-            .iter()
-            .flat_map(|(_, conditions)| conditions.iter().flatten())
-            .cloned()
-            .collect();
+    fn images(&self, args: &ShowArgs, rows: &SheetRows) -> Result<BTreeMap<Condition, Vec<Arc<Payload>>>> {
+        let conditions: Vec<Condition> =
+            rows.iter().flat_map(|(_, conditions)| conditions.iter().flatten()).cloned().collect();
         let rebuild = args.rebuild.clone();
         let mut rebuilder = ImageRebuilder::open(rebuild, &self.manifest, &args.run, &conditions)?;
         let images = rebuilder.images(&self.records[0].detail.frame, &conditions)?;
@@ -211,13 +177,10 @@ impl SheetItem {
     /// True if the rebuilt images differ from those sent.
     fn is_changed(&self, condition: &Condition, images: &[Arc<Payload>]) -> bool {
         let now = Payload::joint_digest(images);
-        self.records
-            .iter()
-            .filter(|record| record.condition.as_ref() == Some(condition))
-            .any(|record| {
-                let sent = record.detail.file_digest();
-                sent.is_some() && sent != now
-            })
+        self.records.iter().filter(|record| record.condition.as_ref() == Some(condition)).any(|record| {
+            let sent = record.detail.file_digest();
+            sent.is_some() && sent != now
+        })
     }
 
     /// The mark of each model in a condition, from its first reply.
@@ -231,9 +194,7 @@ impl SheetItem {
             let mark = match record.detail.outcome {
                 TrialOutcome::Right => StoryMark::Right,
                 TrialOutcome::Wrong => StoryMark::Wrong,
-                TrialOutcome::Answered | TrialOutcome::Unparsed | TrialOutcome::Failed => {
-                    StoryMark::None
-                }
+                TrialOutcome::Answered | TrialOutcome::Unparsed | TrialOutcome::Failed => StoryMark::None,
             };
             marks.push((record.model.clone(), mark));
         }
@@ -242,10 +203,7 @@ impl SheetItem {
 }
 
 fn run_error(args: &ShowArgs, problem: String) -> Error {
-    Error::Run {
-        path: args.run.clone(),
-        problem,
-    }
+    Error::Run { path: args.run.clone(), problem }
 }
 
 /// The format for a file extension: PNG, or JPEG at a quality that keeps text sharp (chosen).
@@ -255,10 +213,7 @@ fn format(path: &Path) -> Result<PayloadFormat> {
         "png" => "png".parse(),
         "jpg" | "jpeg" => "jpeg:90".parse(),
         _ => {
-            let problem = format_args!(
-                "{}: a name that ends in .png or .jpg expected",
-                path.display()
-            );
+            let problem = format_args!("{}: a name that ends in .png or .jpg expected", path.display());
             return Err(Error::usage("--sheet", problem));
         }
     };

@@ -16,9 +16,7 @@ use crate::runs::Outcome;
 use crate::runs::stored::StoredRun;
 use crate::types::manifests::Status;
 use crate::types::text::{counted, plural};
-use crate::types::{
-    ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials,
-};
+use crate::types::{ChoiceDetail, Condition, Decides, Digest, FrameId, QuestionId, RunQuestion, Trials};
 
 /// The flags of `study pack`.
 #[derive(Debug, Args)]
@@ -45,27 +43,17 @@ pub(crate) struct PackArgs {
 /// # Errors
 /// If the run has no questions about images, its data or enhancers are missing, or an image differs from the one sent.
 pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
-    let StoredRun {
-        manifest,
-        trials,
-        questions,
-        ..
-    } = StoredRun::open_choices(&args.run, "openeqa --study DIR makes their page")?
-        .with_truths("what people answer is scored by them")?;
+    let StoredRun { manifest, trials, questions, .. } =
+        StoredRun::open_choices(&args.run, "openeqa --study DIR makes their page")?
+            .with_truths("what people answer is scored by them")?;
     let conditions = conditions(&trials, &args.condition)?;
     if questions.is_empty() || conditions.is_empty() {
-        return Err(run_error(
-            &args.run,
-            "this run has no questions about images".to_owned(),
-        ));
+        return Err(run_error(&args.run, "this run has no questions about images".to_owned()));
     }
     let first_orders = first_orders(&trials);
     let mut frames = BTreeMap::<FrameId, Vec<RunQuestion>>::new();
     for question in choose_questions(questions, args.items.map_or(usize::MAX, usize::from)) {
-        frames
-            .entry(question.frame.clone())
-            .or_default()
-            .push(question);
+        frames.entry(question.frame.clone()).or_default().push(question);
     }
     let sent = sent_digests(&trials);
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &args.run, &conditions)?;
@@ -96,24 +84,16 @@ pub(crate) fn pack(args: PackArgs, progress: &Progress) -> Result<Outcome> {
                 write(&args.out.join(&name), image.file())?;
                 Ok(name)
             });
-            shots.push(StudyImage {
-                condition: condition.to_string(),
-                images: names.collect::<Result<_>>()?,
-            });
+            shots.push(StudyImage { condition: condition.to_string(), images: names.collect::<Result<_>>()? });
             images += payloads.len();
             bar.inc();
         }
-        asked.extend(questions.into_iter().map(|question| {
-            StudyQuestion {
-                frame: number,
-                choices: first_orders
-                    .get(&question.id)
-                    .cloned()
-                    .unwrap_or(question.choices),
-                id: question.id.0,
-                text: question.text,
-                shots: shots.clone(),
-            }
+        asked.extend(questions.into_iter().map(|question| StudyQuestion {
+            frame: number,
+            choices: first_orders.get(&question.id).cloned().unwrap_or(question.choices),
+            id: question.id.0,
+            text: question.text,
+            shots: shots.clone(),
         }));
     }
     drop(bar);
@@ -140,12 +120,8 @@ fn run_error(run: &Path, problem: String) -> Error {
 
 /// The conditions of the run with images, limited to the `wanted` ones if there are any.
 fn conditions(trials: &Trials<ChoiceDetail>, wanted: &[Condition]) -> Result<Vec<Condition>> {
-    let asked: BTreeSet<Condition> = trials
-        .asked()
-        .into_iter()
-        .flatten()
-        .filter_map(|(_, condition)| condition.cloned())
-        .collect();
+    let asked: BTreeSet<Condition> =
+        trials.asked().into_iter().flatten().filter_map(|(_, condition)| condition.cloned()).collect();
     if let Some(missing) = wanted.iter().find(|condition| !asked.contains(condition)) {
         let problem = format_args!("nothing was asked at {missing} in this run");
         return Err(Error::usage("--condition", problem));
@@ -160,17 +136,14 @@ fn conditions(trials: &Trials<ChoiceDetail>, wanted: &[Condition]) -> Result<Vec
 fn first_orders(trials: &Trials<ChoiceDetail>) -> BTreeMap<QuestionId, Vec<String>> {
     let mut orders = BTreeMap::new();
     for trial in trials.iter() {
-        orders
-            .entry(trial.question().clone())
-            .or_insert_with(|| trial.choices().to_vec());
+        orders.entry(trial.question().clone()).or_insert_with(|| trial.choices().to_vec());
     }
     orders
 }
 
 /// Chooses the `count` questions whose ids have the lowest digests.
 fn choose_questions(mut questions: Vec<RunQuestion>, count: usize) -> Vec<RunQuestion> {
-    questions
-        .sort_by_cached_key(|question| *Digest::from_bytes(question.id.0.as_bytes()).as_bytes());
+    questions.sort_by_cached_key(|question| *Digest::from_bytes(question.id.0.as_bytes()).as_bytes());
     questions.truncate(count);
     questions
 }

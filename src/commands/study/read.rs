@@ -20,8 +20,8 @@ use crate::store::now;
 use crate::store::{AddressChange, Store, read_questions};
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
-    ChoiceDetail, Condition, Decides, Digest, ParsedAnswer, QuestionId, Record, Reply,
-    StoredDetail as _, TrialKey, TrialRef, Trials, UnreadReason,
+    ChoiceDetail, Condition, Decides, Digest, ParsedAnswer, QuestionId, Record, Reply, StoredDetail as _, TrialKey,
+    TrialRef, Trials, UnreadReason,
 };
 use darkqa_score::answers::record::{Detail, answered};
 
@@ -77,15 +77,14 @@ struct PlacedAnswer<'a> {
     answer: AnswerLine,
 }
 
-/// Imports answers. Importing a file again changes nothing, and further files add to the run. A later answer of a person to the same
-/// question in the same condition replaces the earlier one.
+/// Imports answers. Importing a file again changes nothing, and further files add to the run. A later answer of a
+/// person to the same question in the same condition replaces the earlier one.
 ///
 /// # Errors
 /// If the folder has no run, a line is not an answer, or no answer is to an item of the run.
 pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let instead = "openeqa --answers NAME=FILE reads what people answered";
-    let asked_run = StoredRun::open_choices(&args.run, instead)?
-        .with_truths("what people answer is scored by them")?;
+    let asked_run = StoredRun::open_choices(&args.run, instead)?.with_truths("what people answer is scored by them")?;
     let asked = trials_by_item(&asked_run.trials);
     let mut counts = AnswerCounts::default();
     let mut lines = Vec::new();
@@ -107,8 +106,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
         })
         .collect();
     if known.is_empty() {
-        let problem =
-            "no answer in the files is to a question and condition of this run".to_owned();
+        let problem = "no answer in the files is to a question and condition of this run".to_owned();
         let path = args.run.clone();
         return Err(Error::Run { path, problem });
     }
@@ -130,8 +128,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     warn_of_no_choice(&counts.no_choice);
     let mut run = StoredRun::reread(&args.out, people_manifest)?;
     let failed = run.trials.iter().map(TrialRef::failed);
-    run.manifest
-        .set_counts(Counts::new(run.trials.len(), failed));
+    run.manifest.set_counts(Counts::new(run.trials.len(), failed));
     let mut outcome = choice::write(&store, run, args.show.format())?;
     record_table::update(&args.out, args.show.record_table())?;
     if !args.show.format().is_json() {
@@ -141,14 +138,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
 }
 
 fn read_answers(path: &Path) -> Result<Vec<PlacedAnswer<'_>>> {
-    Ok(reading::json_lines(path)?
-        .into_iter()
-        .map(|(line, answer)| PlacedAnswer {
-            file: path,
-            line,
-            answer,
-        })
-        .collect())
+    Ok(reading::json_lines(path)?.into_iter().map(|(line, answer)| PlacedAnswer { file: path, line, answer }).collect())
 }
 
 /// Describes an answer that is not a choice of its question; `None` if it is one, or if the person could not tell.
@@ -157,9 +147,8 @@ fn no_choice_problem(line: &PlacedAnswer<'_>, record: &Record) -> Option<String>
     let found = line.answer.answer.as_deref().unwrap_or_default();
     let choices = record.detail.choices.join(", ");
     let (file, number, question) = (line.file.display(), line.line, &record.question);
-    (why != UnreadReason::CannotTell).then(|| {
-        format!("{file}, line {number}: {found:?} is not a choice of {question}: {choices}")
-    })
+    (why != UnreadReason::CannotTell)
+        .then(|| format!("{file}, line {number}: {found:?} is not a choice of {question}: {choices}"))
 }
 
 /// Warns about answers that are not a choice. Like those of a model, they count as wrong.
@@ -183,15 +172,11 @@ fn warn_of_no_choice(answers: &[String]) {
 
 /// The text of a string or a number.
 fn value_text(value: &Value) -> String {
-    value
-        .as_str()
-        .map_or_else(|| value.to_string(), str::to_owned)
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
 /// The first trial with an image of each question and condition.
-fn trials_by_item(
-    trials: &Trials<ChoiceDetail>,
-) -> HashMap<(&QuestionId, &Condition), TrialRef<'_>> {
+fn trials_by_item(trials: &Trials<ChoiceDetail>) -> HashMap<(&QuestionId, &Condition), TrialRef<'_>> {
     let mut asked = HashMap::new();
     for trial in trials.iter() {
         if let Some(condition) = trial.condition() {
@@ -203,10 +188,7 @@ fn trials_by_item(
 
 /// The manifest of the run of human answers. Its images are those of the run that the questions came from.
 fn people_manifest(run: &RunManifest, args: &ReadArgs) -> RunManifest {
-    let identity = [
-        ("--model", json!([args.name])),
-        ("people asked about", json!(run.identity)),
-    ];
+    let identity = [("--model", json!([args.name])), ("people asked about", json!(run.identity))];
     RunManifest {
         schema: ChoiceDetail::SCHEMA.to_owned(),
         status: Status::Started,
@@ -214,9 +196,7 @@ fn people_manifest(run: &RunManifest, args: &ReadArgs) -> RunManifest {
         created: now(),
         updated: now(),
         platform: BTreeMap::new(),
-        identity: identity
-            .map(|(name, value)| (name.to_owned(), value))
-            .into(),
+        identity: identity.map(|(name, value)| (name.to_owned(), value)).into(),
         columns: BTreeMap::new(),
         models: Vec::new(),
         enhancers: BTreeMap::new(),
@@ -230,8 +210,8 @@ fn people_manifest(run: &RunManifest, args: &ReadArgs) -> RunManifest {
     }
 }
 
-/// The stored human answers. The first person to answer an item gets repeat 0, the next repeat 1, so that people and models are compared
-/// by item.
+/// The stored human answers. The first person to answer an item gets repeat 0, the next repeat 1, so that people and
+/// models are compared by item.
 struct People {
     answers: HashMap<TrialKey, Record>,
     /// The next free repeat of each item.
@@ -240,10 +220,7 @@ struct People {
 
 impl People {
     fn new(stored: Vec<Record>) -> Self {
-        let mut people = Self {
-            answers: HashMap::new(),
-            next: HashMap::new(),
-        };
+        let mut people = Self { answers: HashMap::new(), next: HashMap::new() };
         for record in stored {
             let item = (record.question.clone(), record.condition.clone());
             let next = people.next.entry(item).or_default();
@@ -256,38 +233,20 @@ impl People {
     /// The record of an answer.
     fn record(&mut self, asked: &Record, line: &AnswerLine, name: &str) -> Result<Record> {
         let person = value_text(&line.person);
-        let place = asked
-            .condition
-            .as_ref()
-            .map(ToString::to_string)
-            .unwrap_or_default();
+        let place = asked.condition.as_ref().map(ToString::to_string).unwrap_or_default();
         let head = ["darkqa.person/1", name, &person, &asked.question.0, &place];
         let key: TrialKey = Digest::from_parts(head.map(str::as_bytes)).into();
-        let next = self
-            .next
-            .entry((asked.question.clone(), asked.condition.clone()))
-            .or_default();
+        let next = self.next.entry((asked.question.clone(), asked.condition.clone())).or_default();
         let stored = self.answers.get(&key);
         let repeat = stored.map_or(*next, |stored| stored.detail.repeat);
         *next = (*next).max(repeat + 1);
-        let detail = ChoiceDetail {
-            repeat,
-            observed: None,
-            options: None,
-            ..asked.detail.clone()
-        };
+        let detail = ChoiceDetail { repeat, observed: None, options: None, ..asked.detail.clone() };
         let (question, condition) = (asked.question.clone(), asked.condition.clone());
         let blank = Record::blank(key, question, name, condition, detail);
-        let reply = Reply {
-            served_model: Some(person),
-            ..Reply::local(line.answer.clone().unwrap_or_default())
-        };
+        let reply = Reply { served_model: Some(person), ..Reply::local(line.answer.clone().unwrap_or_default()) };
         let mut answered = answered(blank, reply)?;
         if line.answer.is_none() {
-            let cannot_tell = Some(ParsedAnswer {
-                chosen: None,
-                why: Some(UnreadReason::CannotTell),
-            });
+            let cannot_tell = Some(ParsedAnswer { chosen: None, why: Some(UnreadReason::CannotTell) });
             (answered.detail.strict, answered.detail.lenient) = (cannot_tell, cannot_tell);
         }
         answered.latency_ms = None;
@@ -308,10 +267,7 @@ fn summary(counts: &AnswerCounts) -> String {
     let mut text = format!("answers imported: {}\n", counts.answers);
     if let Some(first) = counts.unknown.first() {
         let count = counts.unknown.len();
-        let _ = writeln!(
-            text,
-            "items in the files that the run did not ask: {count}, as {first}"
-        );
+        let _ = writeln!(text, "items in the files that the run did not ask: {count}, as {first}");
     }
     text
 }

@@ -34,10 +34,7 @@ pub(super) fn check(folder: &Path) -> Result<Outcome> {
         .filter(|file| is_image(file))
         .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
         .collect();
-    for file in files
-        .iter()
-        .filter(|file| file.extension().is_some_and(|end| end == "json"))
-    {
+    for file in files.iter().filter(|file| file.extension().is_some_and(|end| end == "json")) {
         match read_output(file) {
             Ok(Some(output)) => {
                 unknown.remove(&output.file);
@@ -106,10 +103,7 @@ fn read_output(file: &Path) -> Result<Option<OutputFile>> {
         ));
     };
     if Path::new(&output.file).components().count() != 1 {
-        return Err(Error::data(
-            file.display(),
-            "names an image outside of its folder",
-        ));
+        return Err(Error::data(file.display(), "names an image outside of its folder"));
     }
     Ok(Some(output))
 }

@@ -1,4 +1,5 @@
-//! `synthesize`: writes low-light versions of images, identical to those that an evaluation of the same folder would send.
+//! `synthesize`: writes low-light versions of images, identical to those that an evaluation of the same folder would
+//! send.
 
 mod check;
 mod sheet;
@@ -128,23 +129,17 @@ pub(crate) fn synthesize(command: &SynthesizeCommand, progress: &Progress) -> Re
 
 /// Writes the images or figures of all inputs.
 ///
-/// If one frame fails, the error is logged and counted, and the others continue. The reason of images that are refused is logged once.
+/// If one frame fails, the error is logged and counted, and the others continue. The reason of images that are refused
+/// is logged once.
 ///
 /// # Errors
 /// If an input is missing, two frames have the same name, or the folder cannot be written to.
 fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let out = &args.out;
-    let making = ImageMaking {
-        args,
-        light: LightSettings::resolve(&args.light, SetLight::Lit)?,
-        refusals: Refusals::default(),
-    };
+    let making =
+        ImageMaking { args, light: LightSettings::resolve(&args.light, SetLight::Lit)?, refusals: Refusals::default() };
     making.light.refuse_matches("synthesize knows none")?;
-    let mut frames = Inputs::open(
-        &args.inputs,
-        &args.folders.root.data_root,
-        args.folders.decode.rule(),
-    )?;
+    let mut frames = Inputs::open(&args.inputs, &args.folders.root.data_root, args.folders.decode.rule())?;
     keep_shard(&mut frames.entries, args.part.resolve()?)?;
     let workers = pool(args.threads.threads)?;
     fs::create_dir_all(out).map_err(|e| Error::file(out, "make", e))?;
@@ -152,20 +147,16 @@ fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let bar = progress.bar("images", frames.entries.len() * files.len());
     let counts: Vec<ImageCounts> = workers.install(|| {
         let entries = frames.entries.par_iter();
-        entries
-            .map(|entry| write_files(&making, &frames, entry, &files, &bar, &tally))
-            .collect()
+        entries.map(|entry| write_files(&making, &frames, entry, &files, &bar, &tally)).collect()
     });
     drop(bar);
     tally.warn();
     making.refusals.log();
-    let total = counts
-        .iter()
-        .fold(ImageCounts::default(), |sum, counts| ImageCounts {
-            written: sum.written + counts.written,
-            unchanged: sum.unchanged + counts.unchanged,
-            failed: sum.failed + counts.failed,
-        });
+    let total = counts.iter().fold(ImageCounts::default(), |sum, counts| ImageCounts {
+        written: sum.written + counts.written,
+        unchanged: sum.unchanged + counts.unchanged,
+        failed: sum.failed + counts.failed,
+    });
     Ok(outcome(total, out, frames.entries.len()))
 }
 
@@ -196,12 +187,7 @@ fn output_files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
     if let Some(sheet) = making.args.sheet {
         return vec![FrameFile::Sheet(sheet)];
     }
-    making
-        .light
-        .degradations()
-        .into_iter()
-        .map(FrameFile::Image)
-        .collect()
+    making.light.degradations().into_iter().map(FrameFile::Image).collect()
 }
 
 /// Writes all files of one frame.
@@ -217,18 +203,8 @@ fn write_files(
     let frames = OneFrame { frames, entry };
     let recipe = Recipe::lossless(&making.light.kinds, &[]);
     let timings = Timings::default();
-    let steps = ImageSteps {
-        frames: &frames,
-        recipe: &recipe,
-        limit: None,
-        timings: &timings,
-        stored: None,
-    };
-    let mut work = SynthesisWork {
-        making,
-        entry,
-        frame: FrameWork::for_frame(steps, entry.id.clone()),
-    };
+    let steps = ImageSteps { frames: &frames, recipe: &recipe, limit: None, timings: &timings, stored: None };
+    let mut work = SynthesisWork { making, entry, frame: FrameWork::for_frame(steps, entry.id.clone()) };
     match work.frame.note() {
         Ok(note) => tally.add(&entry.id, &note),
         Err(e) => {
@@ -293,15 +269,8 @@ impl SynthesisWork<'_> {
         let name = format!("{}_{condition}", self.entry.stem);
         let applied = how.map(|how| self.frame.apply(how)).transpose()?;
         let picture = self.frame.picture()?;
-        let recipe = ImageRecipe::new(
-            &self.entry.id,
-            picture.digest(),
-            picture.note(),
-            how,
-            applied.as_ref(),
-            &key,
-            seed,
-        );
+        let recipe =
+            ImageRecipe::new(&self.entry.id, picture.digest(), picture.note(), how, applied.as_ref(), &key, seed);
         let place = OutputImage::new(&self.making.args.out, &name, self.making.args.force);
         place.write_unless_present(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
     }
@@ -323,10 +292,7 @@ fn replay(args: &ReplayArgs) -> Result<Outcome> {
     let file = &args.file;
     let sidecar = Sidecar::<ImageRecipe>::read(file)?;
     let [entry] = &frames.entries[..] else {
-        let problem = format_args!(
-            "one image expected, which FILE was made from; got {}",
-            frames.entries.len()
-        );
+        let problem = format_args!("one image expected, which FILE was made from; got {}", frames.entries.len());
         return Err(Error::usage("INPUT", problem));
     };
     let picture = frames.picture(entry)?;
@@ -338,8 +304,7 @@ fn replay(args: &ReplayArgs) -> Result<Outcome> {
     fs::create_dir_all(&args.out).map_err(|e| Error::file(&args.out, "make", e))?;
     let place = OutputImage::new(&args.out, &name, args.force);
     let mut counts = ImageCounts::default();
-    if let Some(refusal) = counts.add(place.write_unless_present(&sidecar.recipe, || Ok(degraded))?)
-    {
+    if let Some(refusal) = counts.add(place.write_unless_present(&sidecar.recipe, || Ok(degraded))?) {
         return Err(refusal.into_error());
     }
     Ok(outcome(counts, &args.out, 1))

@@ -1,5 +1,5 @@
-//! The figures of `synthesize --sheet` ([`Sheet`]) and the facts that determine them ([`SheetRecipe`]). They are drawn by
-//! [`crate::report::charts::sheet`].
+//! The figures of `synthesize --sheet` ([`Sheet`]) and the facts that determine them ([`SheetRecipe`]). They are drawn
+//! by [`crate::report::charts::sheet`].
 
 use std::fmt;
 
@@ -61,12 +61,7 @@ impl ImageOrigin for SheetRecipe {
 }
 
 impl SheetRecipe {
-    pub(super) fn new(
-        kind: Sheet,
-        frame: &FrameId,
-        picture: &Picture,
-        light: &LightSettings,
-    ) -> Result<Self> {
+    pub(super) fn new(kind: Sheet, frame: &FrameId, picture: &Picture, light: &LightSettings) -> Result<Self> {
         if kind == Sheet::Noise {
             light.kinds.sensor.readings.only()?;
         }
@@ -93,7 +88,8 @@ impl Sheet {
     }
 }
 
-/// The footer of a figure: camera and seed, gain and light ratio in each noise profile, and the flags of further variants.
+/// The footer of a figure: camera and seed, gain and light ratio in each noise profile, and the flags of further
+/// variants.
 fn footer(light: &LightSettings, frame: &FrameId, degradations: &[Degradation]) -> String {
     let mut facts = Vec::new();
     if has_kind(degradations, Kind::has_noise) {
@@ -131,9 +127,7 @@ fn camera_and_seed(light: &LightSettings) -> String {
         .readings
         .iter()
         .next()
-        .map_or_else(String::new, |(_, synthesis)| {
-            synthesis.camera.name().to_owned()
-        });
+        .map_or_else(String::new, |(_, synthesis)| synthesis.camera.name().to_owned());
     format!("{camera}, seed {}", light.kinds.sensor.seed)
 }
 
@@ -143,11 +137,8 @@ fn gain_and_ratio(synthesis: &Synthesis, key: &NoiseKey) -> String {
         return "K and r drawn for each level".to_owned();
     }
     let state = synthesis.state(key, Severity::L5);
-    let ratio = if synthesis.coupling == Coupling::Photon {
-        "r 2^EV".to_owned()
-    } else {
-        format!("r {:.0}", state.ratio)
-    };
+    let ratio =
+        if synthesis.coupling == Coupling::Photon { "r 2^EV".to_owned() } else { format!("r {:.0}", state.ratio) };
     format!("K {:.2}, {ratio}", state.system_gain)
 }
 
@@ -168,10 +159,7 @@ fn draw_levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> 
         let Some((_, first)) = by_variant.first() else {
             continue;
         };
-        let levels = first
-            .iter()
-            .map(|how| AxisLevel::from(Some(*how)))
-            .collect();
+        let levels = first.iter().map(|how| AxisLevel::from(Some(*how))).collect();
         let rows = by_variant
             .into_iter()
             .map(|(variant, all)| {
@@ -194,12 +182,10 @@ fn draw_levels(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> 
     Ok(sheet::levels(frame.clean()?, &blocks, &footer))
 }
 
-/// Draws the noise terms of a frame at the darkest requested level. The level matters if each level has its own negative.
+/// Draws the noise terms of a frame at the darkest requested level. The level matters if each level has its own
+/// negative.
 fn draw_terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
-    let mut levels = light
-        .levels
-        .iter()
-        .filter(|level| level.axis() == Some(Axis::LIGHT));
+    let mut levels = light.levels.iter().filter(|level| level.axis() == Some(Axis::LIGHT));
     let level = levels.next_back().and_then(|level| level.severity());
     let level = level.unwrap_or(Severity::L5);
     let sensor = &light.kinds.sensor;
@@ -229,13 +215,8 @@ fn draw_terms(frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         signals.push(signal(name.to_owned(), with_terms(&[term]) - &clean));
     }
     signals.push(signal("noisy RAW".to_owned(), with_terms(&Term::ALL)));
-    let footer = format!(
-        "{}; {}: K {:.2}, r {:.0}",
-        camera_and_seed(light),
-        synthesis.name(),
-        state.system_gain,
-        state.ratio
-    );
+    let footer =
+        format!("{}; {}: K {:.2}, r {:.0}", camera_and_seed(light), synthesis.name(), state.system_gain, state.ratio);
     Ok(sheet::noise(&signals, &footer))
 }
 
@@ -245,7 +226,5 @@ fn signal(name: String, adu: ndarray::Array2<f32>) -> Signal {
 
 /// The samples of a RAW image in ADU.
 fn adu(raw: &Bayer, range: f32) -> Array2<f32> {
-    Array2::from_shape_fn((raw.height(), raw.width()), |(row, column)| {
-        raw.sample(row, column) * range
-    })
+    Array2::from_shape_fn((raw.height(), raw.width()), |(row, column)| raw.sample(row, column) * range)
 }

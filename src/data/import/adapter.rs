@@ -21,8 +21,8 @@ pub(crate) struct MapArgs {
     /// classes.json; default: that of the kind of data set
     #[arg(long, value_name = "NAME|FILE", add = Decides::Pixels)]
     pub labels: Option<String>,
-    /// The metres in one unit of depth: 0.001 for millimetres, 0.0002 for 1/5000 m, 10 if habitat-lab scaled 10 m to 0..1; default:
-    /// that of the kind of data set, 1 for floats in .npy and HDF5
+    /// The metres in one unit of depth: 0.001 for millimetres, 0.0002 for 1/5000 m, 10 if habitat-lab scaled 10 m to
+    /// 0..1; default: that of the kind of data set, 1 for floats in .npy and HDF5
     #[arg(long, value_name = "METRES", value_parser = positive, add = Decides::Pixels)]
     pub depth_scale: Option<f64>,
     /// What depth is measured along; default: planar
@@ -64,16 +64,7 @@ pub(crate) struct ListedFrame {
 impl ListedFrame {
     /// A frame without time, camera and room type.
     pub(super) fn new(scene: &str, frame: String, rgb: PathBuf, index: usize) -> Self {
-        Self {
-            scene: scene.to_owned(),
-            frame,
-            time: None,
-            pose: None,
-            intrinsics: None,
-            room: None,
-            rgb,
-            index,
-        }
+        Self { scene: scene.to_owned(), frame, time: None, pose: None, intrinsics: None, room: None, rgb, index }
     }
 }
 
@@ -123,11 +114,7 @@ pub(super) struct SizedCamera {
 impl Listing {
     /// An empty listing with the labels of mpcat40, for adapters that map names to these classes.
     pub(super) fn with_mpcat40(args: &MapArgs) -> Self {
-        Self {
-            labels: labels::space("mpcat40").unwrap_or_default(),
-            hfov: args.hfov,
-            ..Self::default()
-        }
+        Self { labels: labels::space("mpcat40").unwrap_or_default(), hfov: args.hfov, ..Self::default() }
     }
 }
 
@@ -136,24 +123,24 @@ pub(crate) trait Adapter: fmt::Debug + Sync {
     /// Contents of the data set without its maps.
     fn listing(&self) -> &Listing;
 
-    /// Intrinsics of a frame's camera, in pixels of its image: from the frame, else from `--hfov`, else of the default camera.
+    /// Intrinsics of a frame's camera, in pixels of its image: from the frame, else from `--hfov`, else of the default
+    /// camera.
     fn camera(&self, frame: &ListedFrame, rgb: &Rgb) -> Option<Intrinsics> {
         let (width, height) = (rgb.width(), rgb.height());
         let Listing { hfov, sensor, .. } = self.listing();
         let from_flag = hfov.map(|hfov| pinhole(width, height, hfov));
-        let default = sensor
-            .as_ref()
-            .filter(|sensor| sensor.size == (width, height))
-            .map(|sensor| sensor.camera);
+        let default = sensor.as_ref().filter(|sensor| sensor.size == (width, height)).map(|sensor| sensor.camera);
         frame.intrinsics.or(from_flag).or(default)
     }
 
-    /// Name of the folder with the depth map of a frame, for data sets with several depth maps per frame; `None` for others.
+    /// Name of the folder with the depth map of a frame, for data sets with several depth maps per frame; `None` for
+    /// others.
     fn depth_folder(&self, _frame: &ListedFrame) -> Option<&'static str> {
         None
     }
 
-    /// True if depth is taken as metres, because nothing states its unit: neither a publisher's page nor `--depth-scale`.
+    /// True if depth is taken as metres, because nothing states its unit: neither a publisher's page nor
+    /// `--depth-scale`.
     fn assumes_metres(&self) -> bool {
         false
     }
@@ -181,27 +168,18 @@ pub(super) fn labels(args: &MapArgs) -> Result<Option<Labels>> {
         return labels::read(path).map(Some);
     }
     let known = labels::names().join(", ");
-    let problem =
-        format_args!("{name:?} is neither a file nor one of the built-in label spaces: {known}");
+    let problem = format_args!("{name:?} is neither a file nor one of the built-in label spaces: {known}");
     Err(Error::usage("--labels", problem))
 }
 
 /// Number of each canonical class.
 pub(super) fn class_numbers(labels: &Labels) -> BTreeMap<String, u16> {
-    labels
-        .labels
-        .iter()
-        .map(|(id, label)| (label.canonical.clone(), *id))
-        .collect()
+    labels.labels.iter().map(|(id, label)| (label.canonical.clone(), *id)).collect()
 }
 
-/// Pinhole camera with a horizontal field of view in degrees, square pixels and the principal point in the middle of the image.
+/// Pinhole camera with a horizontal field of view in degrees, square pixels and the principal point in the middle of
+/// the image.
 fn pinhole(width: usize, height: usize, hfov: f64) -> Intrinsics {
     let focal = width as f64 / 2.0 / libm::tan(hfov.to_radians() / 2.0);
-    Intrinsics {
-        fx: focal,
-        fy: focal,
-        cx: (width as f64 - 1.0) / 2.0,
-        cy: (height as f64 - 1.0) / 2.0,
-    }
+    Intrinsics { fx: focal, fy: focal, cx: (width as f64 - 1.0) / 2.0, cy: (height as f64 - 1.0) / 2.0 }
 }

@@ -7,8 +7,8 @@ use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing};
 use crate::error::{Error, Result};
 use crate::types::{Intrinsics, Rgb};
 
-/// Data sets of several folders. If two of them have a scene of the same name, the number of the folder, from 1, is put before it:
-/// `2-kitchen`.
+/// Data sets of several folders. If two of them have a scene of the same name, the number of the folder, from 1, is put
+/// before it: `2-kitchen`.
 #[derive(Debug)]
 pub(super) struct Combined {
     parts: Vec<Box<dyn Adapter>>,
@@ -25,12 +25,7 @@ impl Combined {
     pub(super) fn new(folders: &[PathBuf], parts: Vec<Box<dyn Adapter>>) -> Result<Self> {
         let mut scene_counts: BTreeMap<&String, usize> = BTreeMap::new();
         for part in &parts {
-            let scenes: BTreeSet<&String> = part
-                .listing()
-                .frames
-                .iter()
-                .map(|frame| &frame.scene)
-                .collect();
+            let scenes: BTreeSet<&String> = part.listing().frames.iter().map(|frame| &frame.scene).collect();
             for scene in scenes {
                 *scene_counts.entry(scene).or_default() += 1;
             }
@@ -53,15 +48,9 @@ impl Combined {
                 combined.renders.clone_from(&own.renders);
             }
             let differing = [
-                (
-                    "class numbers (classes.json, --labels)",
-                    combined.labels == own.labels,
-                ),
+                ("class numbers (classes.json, --labels)", combined.labels == own.labels),
                 ("kinds of depth", combined.depth_kind == own.depth_kind),
-                (
-                    "kinds of segments",
-                    combined.segmentation == own.segmentation,
-                ),
+                ("kinds of segments", combined.segmentation == own.segmentation),
             ];
             if let Some((what, _)) = differing.into_iter().find(|(_, is_same)| !is_same) {
                 let problem = format_args!(
@@ -84,22 +73,14 @@ impl Combined {
                 part_frames.push((number, index));
             }
             for (scene, names) in &own.names {
-                combined
-                    .names
-                    .insert(unique_name(number, scene), names.clone());
+                combined.names.insert(unique_name(number, scene), names.clone());
             }
             for (word, count) in &own.unlisted {
                 *combined.unlisted.entry(word.clone()).or_default() += count;
             }
         }
-        combined
-            .frames
-            .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
-        Ok(Self {
-            parts,
-            listing: combined,
-            part_frames,
-        })
+        combined.frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
+        Ok(Self { parts, listing: combined, part_frames })
     }
 
     /// Data set of a frame, and the frame in its listing.
@@ -130,10 +111,7 @@ impl Adapter for Combined {
     }
 
     fn other_files(&self) -> Vec<PathBuf> {
-        self.parts
-            .iter()
-            .flat_map(|part| part.other_files())
-            .collect()
+        self.parts.iter().flat_map(|part| part.other_files()).collect()
     }
 
     fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

@@ -46,10 +46,7 @@ pub(super) fn files(folder: &Path, endings: &[&str]) -> Result<BTreeMap<String, 
 
 /// First of these subfolders that exists.
 pub(super) fn first_folder(folder: &Path, names: &[&str]) -> Option<PathBuf> {
-    names
-        .iter()
-        .map(|name| folder.join(name))
-        .find(|path| path.is_dir())
+    names.iter().map(|name| folder.join(name)).find(|path| path.is_dir())
 }
 
 /// Decodes an image of ids, ignoring its EXIF orientation.
@@ -60,10 +57,7 @@ pub(super) fn read_id_image(path: &Path) -> Result<Rgb> {
 
 /// Last part of a path, as text.
 pub(super) fn file_name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// Reads the numbers of a PNG file, which must have one of these sample formats.
@@ -78,7 +72,8 @@ fn decode_png(bytes: &[u8], forms: &[SampleForm]) -> Result<Array2<u16>, String>
     Array2::from_shape_vec(size, png.samples(|sample| sample)?).map_err(|e| e.to_string())
 }
 
-/// Reads a segment map from a 16-bit grey PNG file, or a `.npy` or HDF5 file of integers. Negative numbers become 0, no segment.
+/// Reads a segment map from a 16-bit grey PNG file, or a `.npy` or HDF5 file of integers. Negative numbers become 0, no
+/// segment.
 pub(super) fn read_segments(path: &Path) -> Result<Array2<u32>> {
     if is_png(path) {
         return Ok(read_png(path, &[SampleForm::Grey16])?.mapv(u32::from));
@@ -86,8 +81,8 @@ pub(super) fn read_segments(path: &Path) -> Result<Array2<u32>> {
     read_integers(path, "segment")
 }
 
-/// Reads a class map from a PNG file (8-bit grey, 16-bit grey or palette), or a `.npy` or HDF5 file of integers. Negative numbers
-/// become 0.
+/// Reads a class map from a PNG file (8-bit grey, 16-bit grey or palette), or a `.npy` or HDF5 file of integers.
+/// Negative numbers become 0.
 pub(super) fn read_classes(path: &Path) -> Result<Array2<u16>> {
     if is_png(path) {
         let forms = [SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette];
@@ -105,8 +100,7 @@ fn is_hdf5(path: &Path) -> bool {
 }
 
 fn has_extension(path: &Path, extension: &str) -> bool {
-    path.extension()
-        .is_some_and(|own| own.eq_ignore_ascii_case(extension))
+    path.extension().is_some_and(|own| own.eq_ignore_ascii_case(extension))
 }
 
 /// Name of the array in HDF5 files of maps, as in Hypersim.
@@ -127,31 +121,25 @@ fn convert_ids<T: TryFrom<i128>>(array: Npy<'_>, noun: &str) -> Result<Array2<T>
     let size = array.size;
     let ids = array
         .integers()?
-        .map(|id| {
-            T::try_from(id.max(0))
-                .map_err(|_| format!("{id} is too large for the number of a {noun}"))
-        })
+        .map(|id| T::try_from(id.max(0)).map_err(|_| format!("{id} is too large for the number of a {noun}")))
         .collect::<Result<Vec<T>, String>>()?;
     Array2::from_shape_vec(size, ids).map_err(|e| e.to_string())
 }
 
-/// Reads the depth in millimetres, in the size of the file. `scale` is metres per unit: required for PNG, 1 by default for other files.
+/// Reads the depth in millimetres, in the size of the file. `scale` is metres per unit: required for PNG, 1 by default
+/// for other files.
 pub(super) fn read_depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>> {
     let wrong = |problem: String| Error::data(path.display(), problem);
     if is_hdf5(path) {
         let bytes = bytes(path)?;
-        return Hdf5Array::parse(&bytes, ARRAY)
-            .and_then(|array| decode_depth(array.numbers()?, scale))
-            .map_err(wrong);
+        return Hdf5Array::parse(&bytes, ARRAY).and_then(|array| decode_depth(array.numbers()?, scale)).map_err(wrong);
     }
     if !is_png(path) {
         let bytes = bytes(path)?;
-        return Npy::parse(&bytes)
-            .and_then(|array| decode_depth(array, scale))
-            .map_err(wrong);
+        return Npy::parse(&bytes).and_then(|array| decode_depth(array, scale)).map_err(wrong);
     }
-    let file = DepthFile::new(path.to_owned(), scale)
-        .map_err(|problem| wrong(problem + " (--depth-scale METRES sets it)"))?;
+    let file =
+        DepthFile::new(path.to_owned(), scale).map_err(|problem| wrong(problem + " (--depth-scale METRES sets it)"))?;
     let bytes = bytes(path)?;
     file.decode_any_size(&bytes).map_err(wrong)
 }
@@ -160,10 +148,7 @@ pub(super) fn read_depth(path: &Path, scale: Option<f64>) -> Result<Array2<u32>>
 fn decode_depth(array: Npy<'_>, scale: Option<f64>) -> Result<Array2<u32>, String> {
     let size = array.size;
     let depths: Result<Vec<u32>, String> = match scale {
-        Some(scale) => array
-            .numbers()
-            .map(|units| millimetres(units, scale * 1_000.0))
-            .collect(),
+        Some(scale) => array.numbers().map(|units| millimetres(units, scale * 1_000.0)).collect(),
         None => array
             .floats()
             .map_err(|problem| problem + ", or the metres per unit: --depth-scale METRES")?
@@ -177,11 +162,7 @@ fn decode_depth(array: Npy<'_>, scale: Option<f64>) -> Result<Array2<u32>, Strin
 ///
 /// # Errors
 /// If the file cannot be read or does not have the size of the image.
-pub(super) fn read_frame_depth(
-    path: Option<&Path>,
-    scale: Option<f64>,
-    rgb: &Rgb,
-) -> Result<Option<Array2<u32>>> {
+pub(super) fn read_frame_depth(path: Option<&Path>, scale: Option<f64>, rgb: &Rgb) -> Result<Option<Array2<u32>>> {
     let Some(path) = path else {
         return Ok(None);
     };
@@ -215,6 +196,5 @@ pub(super) fn read_numbers(path: &Path) -> Result<Vec<f64>> {
 
 /// Paths of the depth map and the other map of each frame. The depth map may be missing.
 pub(super) fn map_paths(maps: &[(Option<PathBuf>, PathBuf)]) -> impl Iterator<Item = &PathBuf> {
-    maps.iter()
-        .flat_map(|(depth, other)| depth.iter().chain([other]))
+    maps.iter().flat_map(|(depth, other)| depth.iter().chain([other]))
 }

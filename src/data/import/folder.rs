@@ -1,6 +1,7 @@
 //! Folders of images and maps with the same file names.
 //!
-//! The folders are `rgb`, `depth`, `sem` and `over` (or the names of other tools), in the folder itself or in one folder per scene.
+//! The folders are `rgb`, `depth`, `sem` and `over` (or the names of other tools), in the folder itself or in one
+//! folder per scene.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -16,24 +17,8 @@ use crate::types::{Labels, Rgb};
 /// Names of the folders of images, depth, classes and segments.
 const RGB: [&str; 6] = ["rgb", "image", "images", "color", "img", "RGB"];
 const DEPTH: [&str; 3] = ["depth", "depths", "Depth"];
-const CLASSES: [&str; 8] = [
-    "sem",
-    "semantic",
-    "semantics",
-    "label",
-    "labels",
-    "semantic_class",
-    "mask",
-    "masks",
-];
-const SEGMENTS: [&str; 6] = [
-    "over",
-    "instance",
-    "instances",
-    "semantic_instance",
-    "segment",
-    "segments",
-];
+const CLASSES: [&str; 8] = ["sem", "semantic", "semantics", "label", "labels", "semantic_class", "mask", "masks"];
+const SEGMENTS: [&str; 6] = ["over", "instance", "instances", "semantic_instance", "segment", "segments"];
 
 /// Data set in folders of images and maps.
 #[derive(Debug)]
@@ -73,12 +58,7 @@ impl Folder {
         Ok(Self { labels_file, ..set })
     }
 
-    pub(super) fn with_labels(
-        folder: &Path,
-        args: &MapArgs,
-        labels: Labels,
-        offset: NumberOffset,
-    ) -> Result<Self> {
+    pub(super) fn with_labels(folder: &Path, args: &MapArgs, labels: Labels, offset: NumberOffset) -> Result<Self> {
         let mut set = Self {
             listing: Listing {
                 labels,
@@ -102,17 +82,13 @@ impl Folder {
                 }
             }
         }
-        ImagePaths::from_paths(std::mem::take(&mut set.image_folder_files))
-            .warn_of_unsupported(folder);
+        ImagePaths::from_paths(std::mem::take(&mut set.image_folder_files)).warn_of_unsupported(folder);
         Ok(set)
     }
 
     fn add_scene(&mut self, folder: &Path) -> Result<()> {
         let scene = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-        let scene = scene.file_name().map_or_else(
-            || "scene".into(),
-            |name| name.to_string_lossy().into_owned(),
-        );
+        let scene = scene.file_name().map_or_else(|| "scene".into(), |name| name.to_string_lossy().into_owned());
         let images = files_in_first(folder, &RGB, &IMAGES)?;
         if let Some(folder) = first_folder(folder, &RGB) {
             self.image_folder_files.extend(entries(&folder)?);
@@ -130,26 +106,16 @@ impl Folder {
             let listed = ListedFrame::new(&scene, frame, rgb, index);
             self.listing.frames.push(listed);
         }
-        let unmatched = depths
-            .into_values()
-            .chain(classes.into_values())
-            .chain(segments.into_values());
+        let unmatched = depths.into_values().chain(classes.into_values()).chain(segments.into_values());
         if let Some(map) = unmatched.min() {
-            return Err(Error::data(
-                map.display(),
-                "no image has the name of this map",
-            ));
+            return Err(Error::data(map.display(), "no image has the name of this map"));
         }
         Ok(())
     }
 }
 
 /// Files in the first of these subfolders that exists, by stem.
-fn files_in_first(
-    folder: &Path,
-    names: &[&str],
-    endings: &[&str],
-) -> Result<BTreeMap<String, PathBuf>> {
+fn files_in_first(folder: &Path, names: &[&str], endings: &[&str]) -> Result<BTreeMap<String, PathBuf>> {
     match first_folder(folder, names) {
         Some(folder) => files(&folder, endings),
         None => Ok(BTreeMap::new()),
@@ -166,10 +132,7 @@ impl Adapter for Folder {
     }
 
     fn other_files(&self) -> Vec<PathBuf> {
-        MapFiles::paths(&self.maps)
-            .chain(&self.labels_file)
-            .cloned()
-            .collect()
+        MapFiles::paths(&self.maps).chain(&self.labels_file).cloned().collect()
     }
 
     fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {

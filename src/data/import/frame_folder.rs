@@ -32,18 +32,11 @@ impl FrameFolder {
     pub(super) fn open(folder: &Path, further: &[PathBuf]) -> Result<Self> {
         let dataset = Dataset::from_frames(folder, further)?;
         let Some(labels) = dataset.labels().cloned() else {
-            return Err(Error::data(
-                folder.display(),
-                "no classes.json in this folder",
-            ));
+            return Err(Error::data(folder.display(), "no classes.json in this folder"));
         };
         let lines = json_lines::<FrameLine>(&folder.join("frames.jsonl"))?;
         let depth_kind = lines.iter().find_map(|(_, line)| line.depth_kind);
-        let mut listing = Listing {
-            labels,
-            depth_kind: depth_kind.unwrap_or_default(),
-            ..Listing::default()
-        };
+        let mut listing = Listing { labels, depth_kind: depth_kind.unwrap_or_default(), ..Listing::default() };
         for (index, (_, line)) in lines.into_iter().enumerate() {
             let id = FrameId(format!("{}/{}", line.scene, line.frame));
             let Some(ImageSource::File(file)) = dataset.sources.get(&id) else {
@@ -53,10 +46,7 @@ impl FrameFolder {
             if facts.segmentation == Segmentation::Parts {
                 listing.segmentation = Segmentation::Parts;
             }
-            listing
-                .names
-                .entry(line.scene.clone())
-                .or_insert_with(|| facts.names.as_ref().clone());
+            listing.names.entry(line.scene.clone()).or_insert_with(|| facts.names.as_ref().clone());
             listing.frames.push(ListedFrame {
                 rgb: file.rgb.clone(),
                 scene: line.scene,
@@ -68,14 +58,8 @@ impl FrameFolder {
                 index,
             });
         }
-        listing
-            .frames
-            .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
-        Ok(Self {
-            folder: folder.to_owned(),
-            dataset,
-            listing,
-        })
+        listing.frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
+        Ok(Self { folder: folder.to_owned(), dataset, listing })
     }
 }
 
@@ -85,13 +69,9 @@ impl Adapter for FrameFolder {
     }
 
     fn other_files(&self) -> Vec<PathBuf> {
-        let folder_files =
-            ["frames.jsonl", "classes.json", "dataset.json"].map(|name| self.folder.join(name));
-        let segment_names = self
-            .listing
-            .names
-            .keys()
-            .map(|scene| self.folder.join("scenes").join(scene).join("segments.json"));
+        let folder_files = ["frames.jsonl", "classes.json", "dataset.json"].map(|name| self.folder.join(name));
+        let segment_names =
+            self.listing.names.keys().map(|scene| self.folder.join("scenes").join(scene).join("segments.json"));
         let maps = self
             .dataset
             .sources
@@ -101,27 +81,12 @@ impl Adapter for FrameFolder {
                 _ => None,
             })
             .flatten();
-        folder_files
-            .into_iter()
-            .chain(segment_names)
-            .chain(maps)
-            .collect()
+        folder_files.into_iter().chain(segment_names).chain(maps).collect()
     }
 
     fn read_maps(&self, frame: &ListedFrame, _rgb: &Rgb) -> Result<FrameMaps> {
-        let Frame {
-            depth,
-            semantic,
-            segments,
-            ..
-        } = self
-            .dataset
-            .frame(&FrameId(format!("{}/{}", frame.scene, frame.frame)))?;
-        Ok(FrameMaps {
-            depth,
-            semantic,
-            segments,
-            room: None,
-        })
+        let Frame { depth, semantic, segments, .. } =
+            self.dataset.frame(&FrameId(format!("{}/{}", frame.scene, frame.frame)))?;
+        Ok(FrameMaps { depth, semantic, segments, room: None })
     }
 }

@@ -15,9 +15,7 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, class_numbers};
-use super::files::{
-    IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_segments,
-};
+use super::files::{IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_segments};
 use super::{hm3d, mp3d, renders, replica};
 use crate::error::{Error, Result};
 use crate::files::reading::{json_lines, text};
@@ -45,8 +43,8 @@ pub(super) struct Habitat {
 struct SceneInfo {
     /// Room type of each region.
     rooms: BTreeMap<i64, &'static str>,
-    /// Difference of segment numbers from instance numbers. It is 1 if an instance has the number 0, because segment 0 means no segment;
-    /// else 0.
+    /// Difference of segment numbers from instance numbers. It is 1 if an instance has the number 0, because segment 0
+    /// means no segment; else 0.
     offset: u32,
 }
 
@@ -64,10 +62,7 @@ struct TrajectoryStep {
 
 impl Habitat {
     pub(super) fn open(folder: &Path, args: &MapArgs) -> Result<Self> {
-        let listing = Listing {
-            depth_kind: args.depth_kind.unwrap_or_default(),
-            ..Listing::with_mpcat40(args)
-        };
+        let listing = Listing { depth_kind: args.depth_kind.unwrap_or_default(), ..Listing::with_mpcat40(args) };
         let mut set = Self {
             class_numbers: class_numbers(&listing.labels),
             listing,
@@ -109,8 +104,7 @@ impl Habitat {
                 index: self.maps.len(),
                 frame: frame.clone(),
             });
-            self.maps
-                .push((depths.get(&frame).cloned(), semantic.clone()));
+            self.maps.push((depths.get(&frame).cloned(), semantic.clone()));
         }
         if let Some(frame) = steps.keys().next() {
             tracing::warn!(
@@ -149,16 +143,10 @@ impl Habitat {
             (names, BTreeMap::new())
         };
         if names.is_empty() {
-            return Err(Error::data(
-                path.display(),
-                "no instance is named in this file",
-            ));
+            return Err(Error::data(path.display(), "no instance is named in this file"));
         }
         let offset = u32::from(names.contains_key(&0));
-        let names = names
-            .into_iter()
-            .filter_map(|(id, name)| Some((id.checked_add(offset)?, name)))
-            .collect();
+        let names = names.into_iter().filter_map(|(id, name)| Some((id.checked_add(offset)?, name))).collect();
         Ok((SceneInfo { rooms, offset }, names))
     }
 }
@@ -191,10 +179,7 @@ impl Adapter for Habitat {
     }
 
     fn other_files(&self) -> Vec<PathBuf> {
-        map_paths(&self.maps)
-            .chain(&self.scene_files)
-            .cloned()
-            .collect()
+        map_paths(&self.maps).chain(&self.scene_files).cloned().collect()
     }
 
     fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
@@ -211,10 +196,7 @@ impl Adapter for Habitat {
             if last_id != Some(id) {
                 let name = id.checked_add(scene.offset).and_then(|id| names.get(&id));
                 last_id = Some(id);
-                class = name
-                    .and_then(|name| self.class_numbers.get(&name.canonical))
-                    .copied()
-                    .unwrap_or(0);
+                class = name.and_then(|name| self.class_numbers.get(&name.canonical)).copied().unwrap_or(0);
                 region = name.and_then(|name| name.region);
             }
             if class != 0 {
@@ -231,10 +213,7 @@ impl Adapter for Habitat {
             Some(id) if names.contains_key(&id) => id,
             _ => 0,
         });
-        let (region, pixels) = region_pixels
-            .into_iter()
-            .max_by_key(|(_, count)| *count)
-            .unwrap_or((None, 0));
+        let (region, pixels) = region_pixels.into_iter().max_by_key(|(_, count)| *count).unwrap_or((None, 0));
         let room = region
             .and_then(|region| scene.rooms.get(&region))
             .filter(|_| pixels * 100 >= named_pixels * MIN_REGION_PERCENT);

@@ -1,7 +1,8 @@
 //! Segment names of an HM3D-Sem scene, from `<scene>.semantic.txt`.
 //!
-//! The format follows habitat-sim (`src/esp/scene/HM3DSemanticScene.cpp`): the first line is `HM3D Semantic Annotations`, then one
-//! line per segment, `id,colour,"name",region`. A name is all text between the quotes and may contain commas.
+//! The format follows habitat-sim (`src/esp/scene/HM3DSemanticScene.cpp`): the first line is `HM3D Semantic
+//! Annotations`, then one line per segment, `id,colour,"name",region`. A name is all text between the quotes and may
+//! contain commas.
 
 use std::collections::BTreeMap;
 
@@ -10,8 +11,8 @@ use crate::types::SegmentName;
 
 const HEAD: &str = "HM3D Semantic Annotations";
 
-/// Parses the names of segments, by number. Segments with an empty or unknown name are left out. Names without a known class are counted
-/// in `unlisted`.
+/// Parses the names of segments, by number. Segments with an empty or unknown name are left out. Names without a known
+/// class are counted in `unlisted`.
 ///
 /// # Errors
 /// If a line is invalid: its number, and the problem.
@@ -43,19 +44,12 @@ pub(super) fn parse(
             .trim()
             .parse()
             .map_err(|_| wrong("a whole number expected as id"))?;
-        let region: i64 = region
-            .trim_start_matches(',')
-            .trim()
-            .parse()
-            .map_err(|_| wrong("a whole number expected as region"))?;
+        let region: i64 =
+            region.trim_start_matches(',').trim().parse().map_err(|_| wrong("a whole number expected as region"))?;
         let Some(canonical) = class_of(name, name, 1, unlisted) else {
             continue;
         };
-        let segment = SegmentName {
-            name: name.to_owned(),
-            canonical: canonical.to_owned(),
-            region: Some(region),
-        };
+        let segment = SegmentName { name: name.to_owned(), canonical: canonical.to_owned(), region: Some(region) };
         if names.insert(id, segment).is_some() {
             return Err((number, format!("the segment {id} is defined twice")));
         }
@@ -73,16 +67,10 @@ mod tests {
         let mut unlisted = BTreeMap::new();
         let names = parse(text, &mut unlisted).unwrap();
         assert_eq!(names.keys().copied().collect::<Vec<_>>(), [1, 2, 5]);
-        assert_eq!(
-            (names[&1].canonical.as_str(), names[&1].region),
-            ("chest_of_drawers", Some(0))
-        );
+        assert_eq!((names[&1].canonical.as_str(), names[&1].region), ("chest_of_drawers", Some(0)));
         assert_eq!(names[&2].name, "books, magazines");
         assert_eq!(names[&5].canonical, "misc");
-        assert_eq!(
-            unlisted.into_keys().collect::<Vec<_>>(),
-            ["books, magazines", "flux capacitor"]
-        );
+        assert_eq!(unlisted.into_keys().collect::<Vec<_>>(), ["books, magazines", "flux capacitor"]);
     }
 
     #[test]
@@ -90,24 +78,13 @@ mod tests {
         for (text, line, message) in [
             ("", 1, "HM3D Semantic"),
             ("id,colour\n", 1, "HM3D Semantic"),
-            (
-                "HM3D Semantic Annotations\n1,FF,name,0\n",
-                2,
-                "between quotes",
-            ),
+            ("HM3D Semantic Annotations\n1,FF,name,0\n", 2, "between quotes"),
             ("HM3D Semantic Annotations\nx,FF,\"bed\",0\n", 2, "as id"),
             ("HM3D Semantic Annotations\n1,FF,\"bed\"\n", 2, "as region"),
-            (
-                "HM3D Semantic Annotations\n1,FF,\"bed\",0\n1,FE,\"bed\",0\n",
-                3,
-                "segment 1 is defined twice",
-            ),
+            ("HM3D Semantic Annotations\n1,FF,\"bed\",0\n1,FE,\"bed\",0\n", 3, "segment 1 is defined twice"),
         ] {
             let (found, problem) = parse(text, &mut BTreeMap::new()).unwrap_err();
-            assert!(
-                found == line && problem.contains(message),
-                "{found}: {problem}"
-            );
+            assert!(found == line && problem.contains(message), "{found}: {problem}");
         }
     }
 }

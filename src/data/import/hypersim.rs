@@ -1,8 +1,8 @@
-//! Hypersim as it is distributed: `<scene>/images/scene_cam_<nn>_final_preview/frame.<nnnn>.tonemap.jpg` and maps in HDF5,
-//! `<scene>/images/scene_cam_<nn>_geometry_hdf5/frame.<nnnn>.{depth_meters,semantic,semantic_instance}.hdf5`.
+//! Hypersim as it is distributed: `<scene>/images/scene_cam_<nn>_final_preview/frame.<nnnn>.tonemap.jpg` and maps in
+//! HDF5, `<scene>/images/scene_cam_<nn>_geometry_hdf5/frame.<nnnn>.{depth_meters,semantic,semantic_instance}.hdf5`.
 //!
-//! Depth is the distance along the ray. Classes are numbered as in NYU40, with −1 for none (README of apple/ml-hypersim). The cameras of
-//! a scene show the same rooms, so their frames belong to one scene.
+//! Depth is the distance along the ray. Classes are numbered as in NYU40, with −1 for none (README of
+//! apple/ml-hypersim). The cameras of a scene show the same rooms, so their frames belong to one scene.
 
 use std::path::{Path, PathBuf};
 
@@ -27,10 +27,7 @@ pub(super) struct Hypersim {
 
 impl Hypersim {
     pub(super) fn open(folder: &Path, args: &MapArgs) -> Result<Self> {
-        let args = &MapArgs {
-            labels: args.labels.clone().or(Some("nyu40".to_owned())),
-            ..args.clone()
-        };
+        let args = &MapArgs { labels: args.labels.clone().or(Some("nyu40".to_owned())), ..args.clone() };
         let mut set = Self {
             listing: Listing {
                 labels: labels(args)?.unwrap_or_default(),
@@ -57,10 +54,7 @@ impl Hypersim {
         let images = folder.join("images");
         for preview in folders(&images)? {
             let name = file_name(&preview);
-            let Some(camera) = name
-                .strip_prefix("scene_")
-                .and_then(|name| name.strip_suffix("_final_preview"))
-            else {
+            let Some(camera) = name.strip_prefix("scene_").and_then(|name| name.strip_suffix("_final_preview")) else {
                 continue;
             };
             let geometry = images.join(format!("scene_{camera}_geometry_hdf5"));

@@ -49,16 +49,12 @@ pub(crate) enum KeyFrames {
 
 /// Chooses the key frames of each scene. Frames are sorted by time if they have one, else by name.
 ///
-/// With an interval, the k-th key frame is the first frame at k · seconds or later; no frame is chosen twice. With a count N,
-/// the key frames of n frames are those at k · (n − 1) / (N − 1), rounded half to even.
+/// With an interval, the k-th key frame is the first frame at k · seconds or later; no frame is chosen twice. With a
+/// count N, the key frames of n frames are those at k · (n − 1) / (N − 1), rounded half to even.
 ///
 /// # Errors
 /// If an interval is given and a frame has no time.
-pub(crate) fn choose(
-    frames: &[ListedFrame],
-    selection: KeyFrames,
-    fps: Option<f64>,
-) -> Result<Vec<ListedFrame>> {
+pub(crate) fn choose(frames: &[ListedFrame], selection: KeyFrames, fps: Option<f64>) -> Result<Vec<ListedFrame>> {
     let mut chosen = Vec::new();
     for scene in frames.chunk_by(|a, b| a.scene == b.scene) {
         let mut timed: Vec<ListedFrame> = scene.to_vec();
@@ -67,11 +63,7 @@ pub(crate) fn choose(
                 frame.time = Some(number as f64 / fps);
             }
         }
-        timed.sort_by(|a, b| {
-            a.time
-                .partial_cmp(&b.time)
-                .unwrap_or(std::cmp::Ordering::Equal)
-        });
+        timed.sort_by(|a, b| a.time.partial_cmp(&b.time).unwrap_or(std::cmp::Ordering::Equal));
         match selection {
             KeyFrames::All => {}
             KeyFrames::Count(count) => timed = evenly_spaced(timed, count),
@@ -94,10 +86,7 @@ fn evenly_spaced(frames: Vec<ListedFrame>, count: usize) -> Vec<ListedFrame> {
         .collect();
     indices.dedup();
     let mut frames: Vec<Option<ListedFrame>> = frames.into_iter().map(Some).collect();
-    indices
-        .into_iter()
-        .filter_map(|index| frames.get_mut(index)?.take())
-        .collect()
+    indices.into_iter().filter_map(|index| frames.get_mut(index)?.take()).collect()
 }
 
 /// Chooses the first frame of each interval.
@@ -150,19 +139,13 @@ mod tests {
     #[test]
     fn one_frame_is_chosen_per_interval() {
         let times = [100.0, 100.5, 101.9, 102.0, 102.1, 107.0, 107.5, 108.0];
-        let frames: Vec<ListedFrame> = (0..)
-            .zip(times)
-            .map(|(i, time)| frame("a", i, Some(time)))
-            .collect();
+        let frames: Vec<ListedFrame> = (0..).zip(times).map(|(i, time)| frame("a", i, Some(time))).collect();
         let chosen = choose(&frames, KeyFrames::Seconds(2.0), None).unwrap();
         // The frames at 0, 2 and 7 s (the first after 4 s and after 6 s), and at 8 s.
         assert_eq!(names(&chosen), ["000", "003", "005", "007"]);
         let mut reversed = frames.clone();
         reversed.reverse();
-        assert_eq!(
-            choose(&reversed, KeyFrames::Seconds(2.0), None).unwrap(),
-            chosen
-        );
+        assert_eq!(choose(&reversed, KeyFrames::Seconds(2.0), None).unwrap(), chosen);
         assert_eq!(choose(&frames, KeyFrames::All, None).unwrap().len(), 8);
     }
 
@@ -171,13 +154,8 @@ mod tests {
         let frames: Vec<ListedFrame> = (0..61).map(|i| frame("a", i, None)).collect();
         let chosen = choose(&frames, KeyFrames::Seconds(2.0), Some(10.0)).unwrap();
         assert_eq!(names(&chosen), ["000", "020", "040", "060"]);
-        let error = choose(&frames, KeyFrames::Seconds(2.0), None)
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.starts_with("--every: the frame a/000 has no time"),
-            "{error}"
-        );
+        let error = choose(&frames, KeyFrames::Seconds(2.0), None).unwrap_err().to_string();
+        assert!(error.starts_with("--every: the frame a/000 has no time"), "{error}");
     }
 
     #[test]
@@ -186,9 +164,6 @@ mod tests {
         frames.extend((0..2).map(|i| frame("b", i, None)));
         let chosen = choose(&frames, KeyFrames::Count(4), None).unwrap();
         assert_eq!(names(&chosen), ["000", "003", "006", "009", "000", "001"]);
-        assert_eq!(
-            names(&choose(&frames, KeyFrames::Count(1), None).unwrap()),
-            ["000", "000"]
-        );
+        assert_eq!(names(&choose(&frames, KeyFrames::Count(1), None).unwrap()), ["000", "000"]);
     }
 }

@@ -18,9 +18,7 @@ pub(super) struct MapFiles {
 impl MapFiles {
     /// Paths of all maps of several frames.
     pub(super) fn paths(all: &[Self]) -> impl Iterator<Item = &PathBuf> {
-        all.iter()
-            .flat_map(|maps| [&maps.depth, &maps.classes, &maps.segments])
-            .flatten()
+        all.iter().flat_map(|maps| [&maps.depth, &maps.classes, &maps.segments]).flatten()
     }
 
     /// Reads the maps. `depth_scale` is metres per unit of depth, as for [`read_frame_depth`].
@@ -28,10 +26,8 @@ impl MapFiles {
     /// # Errors
     /// If a file cannot be read or does not have the size of the image.
     pub(super) fn read(&self, depth_scale: Option<f64>, rgb: &Rgb) -> Result<FrameMaps> {
-        let mut maps = FrameMaps {
-            depth: read_frame_depth(self.depth.as_deref(), depth_scale, rgb)?,
-            ..FrameMaps::default()
-        };
+        let mut maps =
+            FrameMaps { depth: read_frame_depth(self.depth.as_deref(), depth_scale, rgb)?, ..FrameMaps::default() };
         if let Some(path) = &self.classes {
             let classes = read_classes(path)?;
             check_same_size(path, &classes, rgb)?;

@@ -1,8 +1,9 @@
 //! Import of other data sets to a folder of frames.
 //!
-//! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. All adapters use the same units:
-//! depth in millimetres, class numbers of a label space, segment numbers from 1. `src/docs/importing.md` shows the layouts.
-//! Recordings of robots have no maps and no adapter: [`recording`] and [`lerobot`] read them.
+//! An [`Adapter`] lists the frames of one kind of data set and reads their maps one frame at a time. All adapters use
+//! the same units: depth in millimetres, class numbers of a label space, segment numbers from 1.
+//! `src/docs/importing.md` shows the layouts. Recordings of robots have no maps and no adapter: [`recording`] and
+//! [`lerobot`] read them.
 
 mod adapter;
 mod combined;
@@ -57,8 +58,8 @@ pub(crate) enum DataSetKind {
 
 flag_words!(DataSetKind);
 
-/// Opens data sets of one kind in several folders as one data set. Paths in a list of frames may also lead into the folders in
-/// `further`.
+/// Opens data sets of one kind in several folders as one data set. Paths in a list of frames may also lead into the
+/// folders in `further`.
 ///
 /// # Errors
 /// As [`open`], or if the data sets cannot be combined.
@@ -75,9 +76,7 @@ pub(crate) fn open_all(
     if parts.len() > 1 {
         return Ok(Box::new(combined::Combined::new(folders, parts)?));
     }
-    parts
-        .pop()
-        .ok_or_else(|| Error::usage("--src", "a folder of a data set expected"))
+    parts.pop().ok_or_else(|| Error::usage("--src", "a folder of a data set expected"))
 }
 
 /// Files in the folders of a data set that are not read.
@@ -85,13 +84,8 @@ pub(crate) fn open_all(
 /// # Errors
 /// If a folder cannot be read.
 pub(crate) fn unread_files(folders: &[PathBuf], adapter: &dyn Adapter) -> Result<UnreadFiles> {
-    let read: BTreeSet<PathBuf> = adapter
-        .listing()
-        .frames
-        .iter()
-        .map(|frame| frame.rgb.clone())
-        .chain(adapter.other_files())
-        .collect();
+    let read: BTreeSet<PathBuf> =
+        adapter.listing().frames.iter().map(|frame| frame.rgb.clone()).chain(adapter.other_files()).collect();
     let mut unread = UnreadFiles::default();
     for folder in folders {
         unread.merge(UnreadFiles::in_folder(folder, &read)?);
@@ -102,19 +96,11 @@ pub(crate) fn unread_files(folders: &[PathBuf], adapter: &dyn Adapter) -> Result
 /// Opens a data set.
 ///
 /// # Errors
-/// If a file or folder is missing or has another layout, a link leads out of the folder, or a required flag is missing; the error names
-/// it.
-fn open(
-    kind: DataSetKind,
-    folder: &Path,
-    args: &MapArgs,
-    further: &[PathBuf],
-) -> Result<Box<dyn Adapter>> {
+/// If a file or folder is missing or has another layout, a link leads out of the folder, or a required flag is missing;
+/// the error names it.
+fn open(kind: DataSetKind, folder: &Path, args: &MapArgs, further: &[PathBuf]) -> Result<Box<dyn Adapter>> {
     if !folder.is_dir() {
-        return Err(Error::usage(
-            "--src",
-            format_args!("{}: no such folder", folder.display()),
-        ));
+        return Err(Error::usage("--src", format_args!("{}: no such folder", folder.display())));
     }
     Root::new(folder, further)?.refuse_links_out()?;
     let adapter: Box<dyn Adapter> = match kind {
@@ -151,13 +137,8 @@ mod tests {
         let missing: Vec<String> = DataSetKind::value_variants()
             .iter()
             .map(ToString::to_string)
-            .filter(|kind| {
-                !page.contains(&format!("\n## {kind}: ")) || !tests.contains(&format!("\"{kind}\""))
-            })
+            .filter(|kind| !page.contains(&format!("\n## {kind}: ")) || !tests.contains(&format!("\"{kind}\"")))
             .collect();
-        assert!(
-            missing.is_empty(),
-            "src/docs/importing.md or tests/program/data/import.rs lacks {missing:?}"
-        );
+        assert!(missing.is_empty(), "src/docs/importing.md or tests/program/data/import.rs lacks {missing:?}");
     }
 }

@@ -11,8 +11,8 @@ use crate::files::reading::text;
 /// Value of `schema` in `scenes.json`.
 const SCHEMA: &str = "darkqa.renders/1";
 
-/// Reads `scenes.json`, without scenes that are not in `present`, the scenes of the folder. `None` if the file does not exist, or, with
-/// a warning, if it is from another tool.
+/// Reads `scenes.json`, without scenes that are not in `present`, the scenes of the folder. `None` if the file does not
+/// exist, or, with a warning, if it is from another tool.
 ///
 /// # Errors
 /// If the file is not JSON, or is from an unknown version of the script.
@@ -21,8 +21,7 @@ pub(super) fn read(folder: &Path, present: &BTreeSet<&String>) -> Result<Option<
     if !path.is_file() {
         return Ok(None);
     }
-    let mut record: Value =
-        serde_json::from_str(&text(&path)?).map_err(|e| Error::data(path.display(), e))?;
+    let mut record: Value = serde_json::from_str(&text(&path)?).map_err(|e| Error::data(path.display(), e))?;
     match record["schema"].as_str() {
         Some(SCHEMA) => {}
         Some(other) if other.starts_with("darkqa.renders/") => {
@@ -30,10 +29,7 @@ pub(super) fn read(folder: &Path, present: &BTreeSet<&String>) -> Result<Option<
             return Err(Error::data(path.display(), problem));
         }
         _ => {
-            tracing::warn!(
-                "{}: not the record of hm3d_frames.py, so it is ignored",
-                path.display()
-            );
+            tracing::warn!("{}: not the record of hm3d_frames.py, so it is ignored", path.display());
             return Ok(None);
         }
     }
@@ -68,10 +64,7 @@ mod tests {
 
     #[test]
     fn record_is_limited_to_present_scenes() {
-        assert!(matches!(
-            read(Path::new("/nowhere"), &BTreeSet::new()),
-            Ok(None)
-        ));
+        assert!(matches!(read(Path::new("/nowhere"), &BTreeSet::new()), Ok(None)));
         let record = r#"{"schema": "darkqa.renders/1", "mode": "cover", "scenes": [{"scene": "a"}, {"scene": "b"}]}"#;
         let found = read_text(record).unwrap().unwrap();
         assert_eq!(found["mode"], "cover");

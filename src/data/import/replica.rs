@@ -19,11 +19,9 @@ struct ReplicaObject {
     class_name: String,
 }
 
-/// Parses the names of segments, by number. Segments without a name are left out. Names without a known class are counted in `unlisted`.
-pub(super) fn parse(
-    text: &str,
-    unlisted: &mut BTreeMap<String, usize>,
-) -> Result<BTreeMap<u32, SegmentName>, String> {
+/// Parses the names of segments, by number. Segments without a name are left out. Names without a known class are
+/// counted in `unlisted`.
+pub(super) fn parse(text: &str, unlisted: &mut BTreeMap<String, usize>) -> Result<BTreeMap<u32, SegmentName>, String> {
     let info: SemanticInfo = serde_json::from_str(text).map_err(|e| e.to_string())?;
     let mut names = BTreeMap::new();
     for ReplicaObject { id, class_name } in info.objects {
@@ -34,11 +32,7 @@ pub(super) fn parse(
         let Some(canonical) = class_of(&words, &class_name, 1, unlisted) else {
             continue;
         };
-        let name = SegmentName {
-            name: words,
-            canonical: canonical.to_owned(),
-            region: None,
-        };
+        let name = SegmentName { name: words, canonical: canonical.to_owned(), region: None };
         names.insert(id, name);
     }
     Ok(names)
@@ -53,16 +47,9 @@ mod tests {
         let text = r#"{"classes":[{"id":1,"name":"bed"}],"objects":[{"id":0,"class_id":1,"class_name":"bed"},{"id":2,"class_name":"coffee-table"},{"id":-1,"class_name":"bed"},{"id":3,"class_name":"gizmo"},{"id":4,"class_name":""}]}"#;
         let mut unlisted = BTreeMap::new();
         let names = parse(text, &mut unlisted).unwrap();
-        let classes: Vec<(u32, &str)> = names
-            .iter()
-            .map(|(id, name)| (*id, name.canonical.as_str()))
-            .collect();
+        let classes: Vec<(u32, &str)> = names.iter().map(|(id, name)| (*id, name.canonical.as_str())).collect();
         assert_eq!(classes, [(0, "bed"), (2, "table"), (3, "misc")]);
         assert_eq!(unlisted, [("gizmo".to_owned(), 1)].into());
-        assert!(
-            parse("{}", &mut unlisted)
-                .unwrap_err()
-                .contains("missing field `objects`")
-        );
+        assert!(parse("{}", &mut unlisted).unwrap_err().contains("missing field `objects`"));
     }
 }

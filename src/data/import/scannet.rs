@@ -1,9 +1,10 @@
 //! Extracted frames of ScanNet: one folder per scene.
 //!
-//! A scene has `<scene>/color/<n>.jpg`, `depth/<n>.png` (millimetres), `pose/<n>.txt` and one of two kinds of label maps:
-//! `label-filt` and `instance-filt` (ScanNet's numbers, with `scannetv2-labels.combined.tsv` in the folder of the scenes) or, as in
-//! frames_25k, `label` (NYU40) and `instance` (label · 1000 + number). Depth maps are smaller than images and are resampled
-//! with both cameras; labels are never scaled. A frame whose pose is unknown (`-inf`) is left out.
+//! A scene has `<scene>/color/<n>.jpg`, `depth/<n>.png` (millimetres), `pose/<n>.txt` and one of two kinds of label
+//! maps: `label-filt` and `instance-filt` (ScanNet's numbers, with `scannetv2-labels.combined.tsv` in the folder of the
+//! scenes) or, as in frames_25k, `label` (NYU40) and `instance` (label · 1000 + number). Depth maps are smaller than
+//! images and are resampled with both cameras; labels are never scaled. A frame whose pose is unknown (`-inf`) is left
+//! out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -12,9 +13,7 @@ use ndarray::{Array2, ShapeError};
 use serde::Deserialize;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs};
-use super::files::{
-    IMAGES, check_same_size, file_name, files, folders, read_depth, read_numbers, read_png,
-};
+use super::files::{IMAGES, check_same_size, file_name, files, folders, read_depth, read_numbers, read_png};
 use crate::error::{Error, Result};
 use crate::files::reading::{bytes, json, text};
 use crate::labels::names::{UNKNOWN, class_override};
@@ -65,10 +64,7 @@ impl Scannet {
             depth_scale: args.depth_scale.unwrap_or(DEPTH_SCALE),
             scene_files: Vec::new(),
         };
-        let scenes: Vec<PathBuf> = folders(folder)?
-            .into_iter()
-            .filter(|scene| scene.join("color").is_dir())
-            .collect();
+        let scenes: Vec<PathBuf> = folders(folder)?.into_iter().filter(|scene| scene.join("color").is_dir()).collect();
         let numbering = if scenes.iter().any(|scene| scene.join("label-filt").is_dir()) {
             Numbering::Scannet
         } else {
@@ -98,10 +94,8 @@ impl Scannet {
         let depth_camera = depth_file.as_deref().map(read_intrinsics).transpose()?;
         let room_file = folder.join(format!("{name}.txt"));
         let room = read_room_type(&room_file)?;
-        self.scene_files
-            .extend(color_file.into_iter().chain(depth_file));
-        self.scene_files
-            .extend([room_file, folder.join(format!("{name}.aggregation.json"))]);
+        self.scene_files.extend(color_file.into_iter().chain(depth_file));
+        self.scene_files.extend([room_file, folder.join(format!("{name}.aggregation.json"))]);
         let (label_folder, instance_folder) = match numbering {
             Numbering::Scannet => ("label-filt", "instance-filt"),
             Numbering::Nyu40 => ("label", "instance"),
@@ -112,14 +106,8 @@ impl Scannet {
         let poses = files(&folder.join("pose"), &[".txt"])?;
         self.scene_files.extend(poses.values().cloned());
         for (frame, rgb) in files(&folder.join("color"), &IMAGES)? {
-            let pose = poses
-                .get(&frame)
-                .map(|path| read_numbers(path))
-                .transpose()?;
-            if pose
-                .as_ref()
-                .is_some_and(|pose| pose.iter().any(|number| !number.is_finite()))
-            {
+            let pose = poses.get(&frame).map(|path| read_numbers(path)).transpose()?;
+            if pose.as_ref().is_some_and(|pose| pose.iter().any(|number| !number.is_finite())) {
                 continue;
             }
             let Some(label) = labels.get(&frame) else {
@@ -176,25 +164,15 @@ fn check_overflow(folder: &Path, scene: &str) -> Result<()> {
 /// Reads the table of ScanNet's label numbers.
 fn read_label_table(path: &Path) -> Result<Labels> {
     let bytes = bytes(path)?;
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(b'\t')
-        .flexible(true)
-        .from_reader(&*bytes);
-    let header = reader
-        .headers()
-        .map_err(|e| Error::data(path.display(), e))?
-        .clone();
+    let mut reader = csv::ReaderBuilder::new().delimiter(b'\t').flexible(true).from_reader(&*bytes);
+    let header = reader.headers().map_err(|e| Error::data(path.display(), e))?.clone();
     let [id, raw, class] = [
         column_index(path, &header, "id")?,
         column_index(path, &header, "raw_category")?,
         column_index(path, &header, "mpcat40")?,
     ];
     let known = canonical();
-    let mut labels = Labels {
-        space: "scannet".into(),
-        void: [0].into(),
-        ..Labels::default()
-    };
+    let mut labels = Labels { space: "scannet".into(), void: [0].into(), ..Labels::default() };
     for row in reader.records() {
         let row = row.map_err(|e| Error::data(path.display(), e))?;
         let Ok(id) = cell(&row, id).parse::<u16>() else {
@@ -205,23 +183,12 @@ fn read_label_table(path: &Path) -> Result<Labels> {
             labels.void.insert(id);
             continue;
         }
-        let class = if known.contains(class) {
-            class
-        } else {
-            UNKNOWN
-        };
-        let label = Label {
-            name: cell(&row, raw).to_owned(),
-            canonical: class.to_owned(),
-        };
+        let class = if known.contains(class) { class } else { UNKNOWN };
+        let label = Label { name: cell(&row, raw).to_owned(), canonical: class.to_owned() };
         labels.labels.insert(id, label);
     }
     // Annotators used free text, so every class of the table is expressible.
-    labels.expressible = labels
-        .labels
-        .values()
-        .map(|label| label.canonical.clone())
-        .collect::<BTreeSet<String>>();
+    labels.expressible = labels.labels.values().map(|label| label.canonical.clone()).collect::<BTreeSet<String>>();
     Ok(labels)
 }
 
@@ -238,13 +205,10 @@ fn cell(row: &csv::StringRecord, column: usize) -> &str {
 
 /// File with the intrinsics of the `color` or `depth` camera, if it exists.
 fn intrinsics_file(folder: &Path, camera: &str) -> Option<PathBuf> {
-    [
-        format!("intrinsic/intrinsic_{camera}.txt"),
-        format!("intrinsics_{camera}.txt"),
-    ]
-    .into_iter()
-    .map(|name| folder.join(name))
-    .find(|path| path.exists())
+    [format!("intrinsic/intrinsic_{camera}.txt"), format!("intrinsics_{camera}.txt")]
+        .into_iter()
+        .map(|name| folder.join(name))
+        .find(|path| path.exists())
 }
 
 /// Reads the intrinsics in a file with a 4 × 4 matrix.
@@ -268,27 +232,17 @@ fn read_room_type(path: &Path) -> Result<Option<String>> {
         .lines()
         .filter_map(|line| line.split_once('='))
         .find(|(key, _)| key.trim() == "sceneType")
-        .map(|(_, room)| {
-            room.split('/')
-                .next()
-                .unwrap_or_default()
-                .trim()
-                .to_lowercase()
-        }))
+        .map(|(_, room)| room.split('/').next().unwrap_or_default().trim().to_lowercase()))
 }
 
-/// Resamples depth to the pixels of an image: the nearest pixel through both cameras, or by relative position if a camera is unknown.
+/// Resamples depth to the pixels of an image: the nearest pixel through both cameras, or by relative position if a
+/// camera is unknown.
 fn resample(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) -> Array2<u32> {
     let (height, width) = depth.dim();
-    let scale = [
-        width as f64 / rgb.width() as f64,
-        height as f64 / rgb.height() as f64,
-    ];
+    let scale = [width as f64 / rgb.width() as f64, height as f64 / rgb.height() as f64];
     let along = |i: usize, axis: usize| -> f64 {
         match &cameras {
-            Some([color, depth]) if axis == 0 => {
-                (i as f64 - color.cx) / color.fx * depth.fx + depth.cx
-            }
+            Some([color, depth]) if axis == 0 => (i as f64 - color.cx) / color.fx * depth.fx + depth.cx,
             Some([color, depth]) => (i as f64 - color.cy) / color.fy * depth.fy + depth.cy,
             None => (i as f64 + 0.5) * scale[axis] - 0.5,
         }
@@ -299,26 +253,15 @@ fn resample(depth: &Array2<u32>, rgb: &Rgb, cameras: Option<[Intrinsics; 2]>) ->
         let (row, column) = (rows[y], columns[x]);
         // Also false for NaN.
         let is_inside = row >= 0.0 && column >= 0.0;
-        depth
-            .get((row as usize, column as usize))
-            .copied()
-            .filter(|_| is_inside)
-            .unwrap_or(0)
+        depth.get((row as usize, column as usize)).copied().filter(|_| is_inside).unwrap_or(0)
     })
 }
 
-/// Numbers the segments: each pair of label and instance gets a number, so that objects with different labels stay separate even if the
-/// 8 bits of their instance numbers overflowed.
-fn number_segments(
-    labels: &Array2<u16>,
-    instances: &Array2<u16>,
-) -> Result<Array2<u32>, ShapeError> {
-    let distinct: BTreeSet<(u16, u16)> = labels
-        .iter()
-        .copied()
-        .zip(instances.iter().copied())
-        .filter(|(_, instance)| *instance != 0)
-        .collect();
+/// Numbers the segments: each pair of label and instance gets a number, so that objects with different labels stay
+/// separate even if the 8 bits of their instance numbers overflowed.
+fn number_segments(labels: &Array2<u16>, instances: &Array2<u16>) -> Result<Array2<u32>, ShapeError> {
+    let distinct: BTreeSet<(u16, u16)> =
+        labels.iter().copied().zip(instances.iter().copied()).filter(|(_, instance)| *instance != 0).collect();
     let numbers: BTreeMap<(u16, u16), u32> = distinct.into_iter().zip(1..).collect();
     let ids = labels
         .iter()
@@ -337,12 +280,7 @@ impl Adapter for Scannet {
     fn other_files(&self) -> Vec<PathBuf> {
         self.maps
             .iter()
-            .flat_map(|maps| {
-                maps.depth
-                    .iter()
-                    .chain([&maps.labels])
-                    .chain(&maps.instances)
-            })
+            .flat_map(|maps| maps.depth.iter().chain([&maps.labels]).chain(&maps.instances))
             .chain(&self.scene_files)
             .cloned()
             .collect()
@@ -356,8 +294,7 @@ impl Adapter for Scannet {
             Some(path) => {
                 let instances = read_png(path, &[SampleForm::Grey8, SampleForm::Grey16])?;
                 check_same_size(path, &instances, rgb)?;
-                let ids = number_segments(&labels, &instances)
-                    .map_err(|e| Error::data(path.display(), e))?;
+                let ids = number_segments(&labels, &instances).map_err(|e| Error::data(path.display(), e))?;
                 Some(ids)
             }
             None => None,
@@ -366,24 +303,12 @@ impl Adapter for Scannet {
             Some(path) => {
                 let depth = read_depth(path, Some(self.depth_scale))?;
                 let has_image_size = depth.dim() == (rgb.height(), rgb.width());
-                let cameras = frame
-                    .intrinsics
-                    .zip(maps.depth_camera)
-                    .map(|(color, depth)| [color, depth]);
-                Some(if has_image_size {
-                    depth
-                } else {
-                    resample(&depth, rgb, cameras)
-                })
+                let cameras = frame.intrinsics.zip(maps.depth_camera).map(|(color, depth)| [color, depth]);
+                Some(if has_image_size { depth } else { resample(&depth, rgb, cameras) })
             }
             None => None,
         };
-        Ok(FrameMaps {
-            depth,
-            semantic: Some(labels),
-            segments,
-            room: None,
-        })
+        Ok(FrameMaps { depth, semantic: Some(labels), segments, room: None })
     }
 }
 
@@ -392,12 +317,7 @@ mod tests {
     use super::*;
 
     fn camera(fx: f64, cx: f64) -> Intrinsics {
-        Intrinsics {
-            fx,
-            fy: 1.0,
-            cx,
-            cy: 0.0,
-        }
+        Intrinsics { fx, fy: 1.0, cx, cy: 0.0 }
     }
 
     #[test]
@@ -408,17 +328,9 @@ mod tests {
         assert_eq!(found.into_raw_vec_and_offset().0, [7, 7, 9, 9, 7, 7, 9, 9]);
         // A colour camera with half the field of view sees the middle of the depth map.
         let deep = Array2::from_shape_vec((1, 5), vec![1, 2, 3, 4, 5]).unwrap();
-        let found = resample(
-            &deep,
-            &Rgb::black(1, 3),
-            Some([camera(2.0, 1.0), camera(2.0, 2.0)]),
-        );
+        let found = resample(&deep, &Rgb::black(1, 3), Some([camera(2.0, 1.0), camera(2.0, 2.0)]));
         assert_eq!(found.into_raw_vec_and_offset().0, [2, 3, 4]);
-        let found = resample(
-            &deep,
-            &Rgb::black(1, 3),
-            Some([camera(1.0, 1.0), camera(3.0, 2.0)]),
-        );
+        let found = resample(&deep, &Rgb::black(1, 3), Some([camera(1.0, 1.0), camera(3.0, 2.0)]));
         assert_eq!(found.into_raw_vec_and_offset().0, [0, 3, 0]);
     }
 
@@ -426,12 +338,7 @@ mod tests {
     fn focal_lengths_must_be_positive() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("intrinsic_color.txt");
-        for (fx, is_read) in [
-            ("577.87", true),
-            ("0", false),
-            ("-1", false),
-            ("nan", false),
-        ] {
+        for (fx, is_read) in [("577.87", true), ("0", false), ("-1", false), ("nan", false)] {
             let matrix = format!("{fx} 0 319.5 0\n0 577.87 239.5 0\n0 0 1 0\n0 0 0 1\n");
             std::fs::write(&path, matrix).unwrap();
             assert_eq!(read_intrinsics(&path).is_ok(), is_read, "{fx}");

@@ -1,8 +1,9 @@
-//! SUN RGB-D as it is distributed: `<sensor>/…/<frame>/image/*.jpg`, `depth_bfx/*.png` or `depth/*.png`, `intrinsics.txt`,
-//! `scene.txt` and `annotation2Dfinal/index.json`.
+//! SUN RGB-D as it is distributed: `<sensor>/…/<frame>/image/*.jpg`, `depth_bfx/*.png` or `depth/*.png`,
+//! `intrinsics.txt`, `scene.txt` and `annotation2Dfinal/index.json`.
 //!
-//! Depth is in millimetres, rotated left by three bits (`read3dPoints.m` of its toolbox), and clamped at 8 m. Classes and segments come
-//! from the polygons that annotators drew around objects; each object is a segment. If polygons overlap, the smaller one is in front.
+//! Depth is in millimetres, rotated left by three bits (`read3dPoints.m` of its toolbox), and clamped at 8 m. Classes
+//! and segments come from the polygons that annotators drew around objects; each object is a segment. If polygons
+//! overlap, the smaller one is in front.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -21,8 +22,8 @@ use crate::labels::names::class_of;
 use crate::pictures::raw_png::SampleForm;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
-/// Depth folders, in order of preference. `depth_bfx` is `depth` with its holes filled, which the toolbox reads (`depthpath` of its
-/// `SUNRGBDMeta`).
+/// Depth folders, in order of preference. `depth_bfx` is `depth` with its holes filled, which the toolbox reads
+/// (`depthpath` of its `SUNRGBDMeta`).
 const DEPTHS: [&str; 2] = ["depth_bfx", "depth"];
 
 /// Maximum depth in millimetres; the toolbox clamps at the same value.
@@ -73,17 +74,11 @@ struct SunRgbdObject {
 
 impl SunRgbd {
     pub(super) fn open(folder: &Path) -> Result<Self> {
-        let mut set = Self {
-            listing: Listing::default(),
-            files: Vec::new(),
-            numbers: BTreeMap::new(),
-            frame_files: Vec::new(),
-        };
+        let mut set =
+            Self { listing: Listing::default(), files: Vec::new(), numbers: BTreeMap::new(), frame_files: Vec::new() };
         set.find_frames(folder, &[])?;
         set.number_names()?;
-        set.listing
-            .frames
-            .sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
+        set.listing.frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
         Ok(set)
     }
 
@@ -102,10 +97,7 @@ impl SunRgbd {
 
     fn add_frame(&mut self, folder: &Path, parents: &[String], annotation: PathBuf) -> Result<()> {
         let Some(rgb) = files(&folder.join("image"), &IMAGES)?.into_values().next() else {
-            return Err(Error::data(
-                folder.join("image").display(),
-                "no image in this folder",
-            ));
+            return Err(Error::data(folder.join("image").display(), "no image in this folder"));
         };
         let mut depth = None;
         for name in DEPTHS {
@@ -124,17 +116,12 @@ impl SunRgbd {
         let room_file = folder.join("scene.txt");
         let room = room_file.exists().then(|| text(&room_file)).transpose()?;
         self.frame_files.extend([camera, room_file]);
-        let (frame, scene) = parents.split_last().map_or_else(
-            || ("frame".to_owned(), String::new()),
-            |(frame, scene)| (frame.clone(), scene.join("-")),
-        );
+        let (frame, scene) = parents
+            .split_last()
+            .map_or_else(|| ("frame".to_owned(), String::new()), |(frame, scene)| (frame.clone(), scene.join("-")));
         self.files.push(SunRgbdFiles { depth, annotation });
         self.listing.frames.push(ListedFrame {
-            scene: if scene.is_empty() {
-                "sunrgbd".to_owned()
-            } else {
-                scene
-            },
+            scene: if scene.is_empty() { "sunrgbd".to_owned() } else { scene },
             frame,
             time: None,
             pose: None,
@@ -146,33 +133,21 @@ impl SunRgbd {
         Ok(())
     }
 
-    /// Numbers all object names of the data set alphabetically, so that the numbers do not depend on the order of files.
+    /// Numbers all object names of the data set alphabetically, so that the numbers do not depend on the order of
+    /// files.
     fn number_names(&mut self) -> Result<()> {
         let mut counts = BTreeMap::new();
         for files in &self.files {
-            for object in json::<Index>(&files.annotation)?
-                .objects
-                .into_iter()
-                .flatten()
-            {
-                *counts
-                    .entry(normalize_name(&object.name))
-                    .or_insert(0_usize) += 1;
+            for object in json::<Index>(&files.annotation)?.objects.into_iter().flatten() {
+                *counts.entry(normalize_name(&object.name)).or_insert(0_usize) += 1;
             }
         }
-        let mut labels = Labels {
-            space: "sunrgbd".into(),
-            void: [0].into(),
-            ..Labels::default()
-        };
+        let mut labels = Labels { space: "sunrgbd".into(), void: [0].into(), ..Labels::default() };
         for (number, (name, count)) in (1..=u16::MAX).zip(counts) {
             let Some(class) = class_of(&name, &name, count, &mut self.listing.unlisted) else {
                 continue;
             };
-            let label = Label {
-                name: name.clone(),
-                canonical: class.to_owned(),
-            };
+            let label = Label { name: name.clone(), canonical: class.to_owned() };
             labels.labels.insert(number, label);
             self.numbers.insert(name, number);
         }
@@ -183,21 +158,17 @@ impl SunRgbd {
     }
 }
 
-/// Name of an object in lower case, without the suffix that annotators added to distinguish objects: `chair:1`, `chair 2`.
+/// Name of an object in lower case, without the suffix that annotators added to distinguish objects: `chair:1`, `chair
+/// 2`.
 fn normalize_name(name: &str) -> String {
     let name = name.split(':').next().unwrap_or_default().trim();
-    name.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '_')
-        .trim()
-        .to_lowercase()
+    name.trim_end_matches(|letter: char| letter.is_ascii_digit() || letter == '_').trim().to_lowercase()
 }
 
 /// Numbers in a JSON array, or a single number, because the files contain both.
 fn number_list(value: &Value) -> Vec<f64> {
     match value {
-        Value::Array(list) => list
-            .iter()
-            .map(|number| number.as_f64().unwrap_or(f64::NAN))
-            .collect(),
+        Value::Array(list) => list.iter().map(|number| number.as_f64().unwrap_or(f64::NAN)).collect(),
         single => single.as_f64().into_iter().collect(),
     }
 }
@@ -215,13 +186,7 @@ impl Adapter for SunRgbd {
     fn other_files(&self) -> Vec<PathBuf> {
         self.files
             .iter()
-            .flat_map(|files| {
-                files
-                    .depth
-                    .iter()
-                    .map(|(_, path)| path)
-                    .chain([&files.annotation])
-            })
+            .flat_map(|files| files.depth.iter().map(|(_, path)| path).chain([&files.annotation]))
             .chain(&self.frame_files)
             .cloned()
             .collect()
@@ -238,28 +203,14 @@ impl Adapter for SunRgbd {
             None => None,
         };
         let index: Index = json(&files.annotation)?;
-        let shapes = index
-            .frames
-            .into_iter()
-            .next()
-            .map_or_else(Vec::new, |view| view.polygon);
+        let shapes = index.frames.into_iter().next().map_or_else(Vec::new, |view| view.polygon);
         let polygons: Vec<Polygon<(u16, u32)>> = shapes
             .into_iter()
             .filter_map(|shape| {
                 let name = &index.objects.get(shape.object)?.as_ref()?.name;
-                let number = self
-                    .numbers
-                    .get(&normalize_name(name))
-                    .copied()
-                    .unwrap_or(0);
-                let corners = number_list(&shape.x)
-                    .into_iter()
-                    .zip(number_list(&shape.y))
-                    .collect();
-                Some(Polygon {
-                    corners,
-                    value: (number, shape.object as u32 + 1),
-                })
+                let number = self.numbers.get(&normalize_name(name)).copied().unwrap_or(0);
+                let corners = number_list(&shape.x).into_iter().zip(number_list(&shape.y)).collect();
+                Some(Polygon { corners, value: (number, shape.object as u32 + 1) })
             })
             .collect();
         let map: Array2<(u16, u32)> = draw(&polygons, [rgb.width(), rgb.height()]);

@@ -9,9 +9,7 @@ use std::path::{Path, PathBuf};
 use ndarray::Array2;
 
 use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, class_numbers};
-use super::files::{
-    IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_id_image,
-};
+use super::files::{IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_id_image};
 use crate::error::{Error, Result};
 use crate::files::reading::json;
 use crate::labels::names;
@@ -63,8 +61,7 @@ impl Thor {
                 let problem = format_args!("no instances of the frame {frame:?}");
                 return Err(Error::data(folder.join("instance").display(), problem));
             };
-            self.maps
-                .push((depths.get(&frame).cloned(), instance.clone()));
+            self.maps.push((depths.get(&frame).cloned(), instance.clone()));
             self.listing.frames.push(ListedFrame {
                 room: room_type(&name).map(str::to_owned),
                 ..ListedFrame::new(&name, frame, rgb, self.maps.len() - 1)
@@ -89,14 +86,10 @@ impl SceneColors {
         let file: BTreeMap<String, String> = json(path)?;
         let mut objects: BTreeMap<&str, Vec<[u8; 3]>> = BTreeMap::new();
         for (key, object) in &file {
-            let parts: Vec<u8> = key
-                .split(|letter: char| !letter.is_ascii_digit())
-                .filter_map(|part| part.parse().ok())
-                .collect();
+            let parts: Vec<u8> =
+                key.split(|letter: char| !letter.is_ascii_digit()).filter_map(|part| part.parse().ok()).collect();
             let color = parts.try_into().map_err(|_| {
-                let problem = format_args!(
-                    "{key:?} is not a colour; three numbers expected, as in \"(12, 34, 56)\""
-                );
+                let problem = format_args!("{key:?} is not a colour; three numbers expected, as in \"(12, 34, 56)\"");
                 Error::data(path.display(), problem)
             })?;
             objects.entry(object).or_default().push(color);
@@ -105,11 +98,7 @@ impl SceneColors {
         for (id, (object, object_colors)) in (1..).zip(objects) {
             let kind = object.split('|').next().unwrap_or_default();
             let (name, class) = names::thor(kind);
-            let name = SegmentName {
-                name,
-                canonical: class.to_owned(),
-                region: None,
-            };
+            let name = SegmentName { name, canonical: class.to_owned(), region: None };
             names.insert(id, name);
             colors.extend(object_colors.into_iter().map(|color| (color, id)));
         }
@@ -119,11 +108,7 @@ impl SceneColors {
 
 /// Room type of an iTHOR scene, by the number in its name.
 fn room_type(scene: &str) -> Option<&'static str> {
-    let digits: String = scene
-        .strip_prefix("FloorPlan")?
-        .chars()
-        .take_while(char::is_ascii_digit)
-        .collect();
+    let digits: String = scene.strip_prefix("FloorPlan")?.chars().take_while(char::is_ascii_digit).collect();
     match digits.parse::<u32>().ok()? {
         1..=30 => Some("kitchen"),
         201..=230 => Some("living room"),
@@ -143,10 +128,7 @@ impl Adapter for Thor {
     }
 
     fn other_files(&self) -> Vec<PathBuf> {
-        map_paths(&self.maps)
-            .chain(&self.color_files)
-            .cloned()
-            .collect()
+        map_paths(&self.maps).chain(&self.color_files).cloned().collect()
     }
 
     fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
@@ -154,16 +136,12 @@ impl Adapter for Thor {
         let segment_by_color = &self.colors[&frame.scene];
         let colors = read_id_image(instance)?;
         let (pixels, _) = colors.samples().as_chunks::<3>();
-        let ids: Vec<u32> = pixels
-            .iter()
-            .map(|color| segment_by_color.get(color).copied().unwrap_or(0))
-            .collect();
+        let ids: Vec<u32> = pixels.iter().map(|color| segment_by_color.get(color).copied().unwrap_or(0)).collect();
         let segments = Array2::from_shape_vec((colors.height(), colors.width()), ids)
             .map_err(|e| Error::data(instance.display(), e))?;
         check_same_size(instance, &segments, rgb)?;
         if segments.iter().all(|id| *id == 0) {
-            let problem =
-                "no pixel has a colour of colors.json; use the file of the same scene and run";
+            let problem = "no pixel has a colour of colors.json; use the file of the same scene and run";
             return Err(Error::data(instance.display(), problem));
         }
         let numbers: BTreeMap<u32, u16> = self.listing.names[&frame.scene]

@@ -52,25 +52,15 @@ impl UnreadFiles {
             Some(ending) => format!("*.{}", ending.to_string_lossy()),
             None => text(path.file_name()),
         };
-        let kind = if folder.is_empty() {
-            name
-        } else {
-            format!("{folder}/{name}")
-        };
-        let files = self.0.entry(kind).or_insert_with(|| FilesOfKind {
-            count: 0,
-            first: path.display().to_string(),
-        });
+        let kind = if folder.is_empty() { name } else { format!("{folder}/{name}") };
+        let files = self.0.entry(kind).or_insert_with(|| FilesOfKind { count: 0, first: path.display().to_string() });
         files.count += 1;
     }
 
     /// Adds the files of another folder.
     pub(super) fn merge(&mut self, other: Self) {
         for (kind, files) in other.0 {
-            self.0
-                .entry(kind)
-                .and_modify(|known| known.count += files.count)
-                .or_insert(files);
+            self.0.entry(kind).and_modify(|known| known.count += files.count).or_insert(files);
         }
     }
 
@@ -89,11 +79,7 @@ impl UnreadFiles {
                 count => format!("{count} {kind}"),
             })
             .collect();
-        let more: usize = kinds
-            .iter()
-            .skip(MAX_NAMED_KINDS)
-            .map(|(_, files)| files.count)
-            .sum();
+        let more: usize = kinds.iter().skip(MAX_NAMED_KINDS).map(|(_, files)| files.count).sum();
         if more > 0 {
             named.push(format!("{more} more"));
         }
@@ -121,13 +107,8 @@ mod tests {
     #[test]
     fn unread_files_are_counted_by_kind() {
         let folder = tempfile::tempdir().unwrap();
-        let read: BTreeSet<PathBuf> = ["s0/rgb/0.png", "s0/rgb/1.png"]
-            .map(|name| write(folder.path(), name))
-            .into();
-        assert_eq!(
-            UnreadFiles::in_folder(folder.path(), &read).unwrap().line(),
-            ""
-        );
+        let read: BTreeSet<PathBuf> = ["s0/rgb/0.png", "s0/rgb/1.png"].map(|name| write(folder.path(), name)).into();
+        assert_eq!(UnreadFiles::in_folder(folder.path(), &read).unwrap().line(), "");
         for name in ["s0/sem/0.tif", "s1/sem/1.tif", "s0/note", "README.md"] {
             write(folder.path(), name);
         }

@@ -45,26 +45,17 @@ fn temporary_file(name: &str, bytes: &[u8]) -> (tempfile::TempDir, PathBuf) {
 
 fn depth(name: &str, bytes: &[u8], scale: Option<f64>, size: Size) -> Result<Array2<u32>> {
     let (_folder, path) = temporary_file(name, bytes);
-    let maps = MapPaths {
-        depth: Some(DepthFile::new(path, scale).unwrap()),
-        ..MapPaths::default()
-    };
+    let maps = MapPaths { depth: Some(DepthFile::new(path, scale).unwrap()), ..MapPaths::default() };
     maps.read()?.depth(size).map(Option::unwrap)
 }
 
 fn semantic(path: &Path, size: Size) -> Result<Array2<u16>> {
-    let maps = MapPaths {
-        semantic: Some(path.to_owned()),
-        ..MapPaths::default()
-    };
+    let maps = MapPaths { semantic: Some(path.to_owned()), ..MapPaths::default() };
     maps.read()?.semantic(size).map(Option::unwrap)
 }
 
 fn segments(path: &Path, size: Size) -> Result<Array2<u32>> {
-    let maps = MapPaths {
-        segments: Some(path.to_owned()),
-        ..MapPaths::default()
-    };
+    let maps = MapPaths { segments: Some(path.to_owned()), ..MapPaths::default() };
     maps.read()?.segments(size).map(Option::unwrap)
 }
 
@@ -73,31 +64,12 @@ fn depth_is_rounded_half_to_even() {
     let png = deep([2, 3], &[0, 1, 3, 5, 7, 65_535]);
     let read = depth("d.png", &png, Some(0.0005), (2, 3)).unwrap();
     assert_eq!(read, array![[0, 0, 2], [2, 4, 32_768]]);
-    let metres = [
-        0.0005,
-        0.0015,
-        0.0025,
-        1.2344,
-        1000.0,
-        0.0,
-        -0.0,
-        -3.0,
-        f64::NAN,
-        f64::INFINITY,
-        f64::NEG_INFINITY,
-        5e-324,
-    ];
+    let metres =
+        [0.0005, 0.0015, 0.0025, 1.2344, 1000.0, 0.0, -0.0, -3.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 5e-324];
     let npy = npy_file("<f8", "(3, 4)", &metres.map(f64::to_le_bytes).concat());
     let read = depth("d.NPY", &npy, None, (3, 4)).unwrap();
-    assert_eq!(
-        read,
-        array![[0, 2, 2, 1234], [1_000_000, 0, 0, 0], [0, 0, 0, 0]]
-    );
-    let npy = npy_file(
-        "<f4",
-        "(1, 2)",
-        &[2.5_f32, f32::NAN].map(f32::to_le_bytes).concat(),
-    );
+    assert_eq!(read, array![[0, 2, 2, 1234], [1_000_000, 0, 0, 0], [0, 0, 0, 0]]);
+    let npy = npy_file("<f4", "(1, 2)", &[2.5_f32, f32::NAN].map(f32::to_le_bytes).concat());
     let read = depth("d.npy", &npy, Some(1.0), (1, 2)).unwrap();
     assert_eq!(read, array![[2500, 0]]);
 }
@@ -156,13 +128,9 @@ fn segment_maps_are_read_in_every_format() {
     let (_folder, path) = temporary_file("o.npy", &npy_file("<i8", "(2, 1)", &ids));
     assert_eq!(segments(&path, (2, 1)).unwrap(), array![[0], [u32::MAX]]);
     for id in [-1_i64, 4_294_967_296] {
-        let (_folder, path) =
-            temporary_file("o.npy", &npy_file("<i8", "(1, 1)", &id.to_le_bytes()));
+        let (_folder, path) = temporary_file("o.npy", &npy_file("<i8", "(1, 1)", &id.to_le_bytes()));
         let error = segments(&path, (1, 1)).unwrap_err().to_string();
-        assert!(
-            error.contains(&format!("o.npy: {id} is not the id")),
-            "{error}"
-        );
+        assert!(error.contains(&format!("o.npy: {id} is not the id")), "{error}");
     }
 }
 

@@ -39,8 +39,7 @@ impl FolderInfo {
         }
         let path = archive.path().join(Self::FILE);
         let text = archive.read_text(Self::FILE)?;
-        let info: serde_json::Value =
-            serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+        let info: serde_json::Value = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
         Self::read(&path, &info)
     }
 
@@ -49,10 +48,7 @@ impl FolderInfo {
             .map(str::parse::<ColumnMap>)
             .transpose()
             .map_err(|problem| Error::data(path.display(), format_args!("map: {problem}")))?;
-        Ok(Self {
-            name: text_field(info, "name").unwrap_or_default().to_owned(),
-            map,
-        })
+        Ok(Self { name: text_field(info, "name").unwrap_or_default().to_owned(), map })
     }
 }
 

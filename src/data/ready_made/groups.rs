@@ -27,13 +27,9 @@ enum NamePart {
     Literal(String),
     /// Text of a cell.
     Cell(Column),
-    /// Index of a run of `length` consecutive numbers in a column, counted from `first`: `{Index:2 from 1}` groups 1 with 2, and 3
-    /// with 4.
-    Run {
-        column: Column,
-        length: u64,
-        first: u64,
-    },
+    /// Index of a run of `length` consecutive numbers in a column, counted from `first`: `{Index:2 from 1}` groups 1
+    /// with 2, and 3 with 4.
+    Run { column: Column, length: u64, first: u64 },
 }
 
 /// Columns for the name and the size of groups in files of this program.
@@ -76,11 +72,7 @@ impl NamePart {
                 Cell::File(facts) => Some(facts.digest.to_string()[..12].to_owned()),
                 _ => column.text(row).map(|text| text.trim().to_owned()),
             },
-            Self::Run {
-                column,
-                length,
-                first,
-            } => {
+            Self::Run { column, length, first } => {
                 let number: u64 = column.text(row)?.trim().parse().ok()?;
                 Some((number.checked_sub(*first)? / length).to_string())
             }
@@ -93,9 +85,7 @@ fn parse_template(table: &Table, template: &str) -> Result<Vec<NamePart>, String
     let mut parts = Vec::new();
     let mut rest = template;
     while let Some((literal, after)) = rest.split_once('{') {
-        let (field, after) = after
-            .split_once('}')
-            .ok_or_else(|| format!("group={template}: '}}' is missing"))?;
+        let (field, after) = after.split_once('}').ok_or_else(|| format!("group={template}: '}}' is missing"))?;
         if !literal.is_empty() {
             parts.push(NamePart::Literal(literal.to_owned()));
         }
@@ -108,7 +98,8 @@ fn parse_template(table: &Table, template: &str) -> Result<Vec<NamePart>, String
     Ok(parts)
 }
 
-/// Parses a field in braces: a column, or a column with the length of a run of numbers. A column with the whole name takes precedence.
+/// Parses a field in braces: a column, or a column with the length of a run of numbers. A column with the whole name
+/// takes precedence.
 fn parse_field(table: &Table, field: &str) -> Result<NamePart, String> {
     let Some((name, run)) = split_run(field).filter(|_| table.find(field).is_none()) else {
         return find_column(table, field).map(NamePart::Cell);
@@ -119,11 +110,7 @@ fn parse_field(table: &Table, field: &str) -> Result<NamePart, String> {
     if length == 0 {
         return Err(run_problem(field));
     }
-    Ok(NamePart::Run {
-        column: find_column(table, name)?,
-        length,
-        first,
-    })
+    Ok(NamePart::Run { column: find_column(table, name)?, length, first })
 }
 
 fn run_problem(field: &str) -> String {
@@ -159,17 +146,10 @@ pub(super) struct Groups {
 }
 
 impl Groups {
-    /// Groups the rows. Rows that cannot be asked count as members, so that incomplete groups are detected. Rotated copies of a question
-    /// do not count.
-    pub(super) fn new(
-        table: &Table,
-        rule: &GroupRule,
-        is_rotation: impl Fn(usize) -> bool,
-    ) -> Self {
-        let mut groups = Self {
-            rule: rule.text.clone(),
-            ..Self::default()
-        };
+    /// Groups the rows. Rows that cannot be asked count as members, so that incomplete groups are detected. Rotated
+    /// copies of a question do not count.
+    pub(super) fn new(table: &Table, rule: &GroupRule, is_rotation: impl Fn(usize) -> bool) -> Self {
+        let mut groups = Self { rule: rule.text.clone(), ..Self::default() };
         for (index, row) in table.rows.iter().enumerate() {
             let name = rule.name(row).filter(|name| !name.is_empty());
             if let Some(name) = &name
@@ -220,29 +200,14 @@ impl Groups {
             _ => String::new(),
         };
         let single = groups.keys().filter(|group| group.size == 1).count();
-        let across_images = groups
-            .values()
-            .filter(|members| count_frames(members) > 1)
-            .count();
-        let incomplete = groups
-            .iter()
-            .filter(|(group, members)| members.len() < group.size)
-            .count();
-        let ungrouped = questions
-            .iter()
-            .filter(|question| question.group.is_none())
-            .count();
+        let across_images = groups.values().filter(|members| count_frames(members) > 1).count();
+        let incomplete = groups.iter().filter(|(group, members)| members.len() < group.size).count();
+        let ungrouped = questions.iter().filter(|question| question.group.is_none()).count();
         let facts: String = [
             (if sizes.len() > 1 { single } else { 0 }, "of one question"),
             (across_images, "about several images"),
-            (
-                incomplete,
-                "with questions that are left out, never complete",
-            ),
-            (
-                self.sizes.len().saturating_sub(groups.len()),
-                "more of which every question is left out",
-            ),
+            (incomplete, "with questions that are left out, never complete"),
+            (self.sizes.len().saturating_sub(groups.len()), "more of which every question is left out"),
         ]
         .into_iter()
         .filter(|(number, _)| *number > 0)
@@ -250,23 +215,13 @@ impl Groups {
         .collect();
         let without = match ungrouped {
             0 => String::new(),
-            number => format!(
-                "; {} without a group",
-                count(number, "question", "questions")
-            ),
+            number => format!("; {} without a group", count(number, "question", "questions")),
         };
-        Some(format!(
-            "group = {}: {number}{of}{facts}{without}",
-            self.rule
-        ))
+        Some(format!("group = {}: {number}{of}{facts}{without}", self.rule))
     }
 }
 
 /// Number of different frames that questions are about.
 fn count_frames(questions: &[&Question]) -> usize {
-    questions
-        .iter()
-        .map(|question| &question.frame)
-        .collect::<BTreeSet<_>>()
-        .len()
+    questions.iter().map(|question| &question.frame).collect::<BTreeSet<_>>().len()
 }

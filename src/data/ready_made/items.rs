@@ -32,12 +32,7 @@ impl Item {
     /// The item as an open question. Options that were found in the question stay in its text.
     pub(super) fn without_options(self) -> Self {
         let text = self.whole.unwrap_or(self.text);
-        Self {
-            text,
-            whole: None,
-            options: None,
-            ..self
-        }
+        Self { text, whole: None, options: None, ..self }
     }
 }
 
@@ -61,7 +56,8 @@ impl InstructionCutter<'_> {
     }
 }
 
-/// Converts the rows to questions. Counts rows without a usable question in `omissions` and the instructions cut in `cut`.
+/// Converts the rows to questions. Counts rows without a usable question in `omissions` and the instructions cut in
+/// `cut`.
 ///
 /// # Errors
 /// If two columns have different options. The message contains the row and the two flags to choose from.
@@ -78,20 +74,11 @@ pub(super) fn items(
     for (index, image_count) in rows_with_images(table, roles, form, args, omissions) {
         let row = &table.rows[index];
         match question_parts(row, roles, ImageMarks::new(image_count), &mut cutter) {
-            Ok(QuestionParts {
-                text,
-                whole,
-                options,
-            }) => items.push(Item {
-                row: index,
-                text,
-                whole,
-                options: options.map(|options| interner.intern(options)),
-            }),
+            Ok(QuestionParts { text, whole, options }) => {
+                items.push(Item { row: index, text, whole, options: options.map(|options| interner.intern(options)) });
+            }
             Err(PartsError::Row(problem)) => {
-                omissions.add(OmissionReason::Bad, || {
-                    format!("{}: {problem}", table.place_in_set(index))
-                });
+                omissions.add(OmissionReason::Bad, || format!("{}: {problem}", table.place_in_set(index)));
             }
             Err(PartsError::Set(problem)) => {
                 return Err(format!("{}: {problem}", table.place_in_set(index)));
@@ -101,7 +88,8 @@ pub(super) fn items(
     Ok(items)
 }
 
-/// The rows with an image, or with several that may be sent, and the number of images of each. Counts the other rows in `omissions`.
+/// The rows with an image, or with several that may be sent, and the number of images of each. Counts the other rows in
+/// `omissions`.
 pub(super) fn rows_with_images(
     table: &Table,
     roles: &Roles,
@@ -158,9 +146,7 @@ fn question_parts(
                 .map_err(PartsError::Row)?;
             (cutter.cut(&text), None, Some(options))
         }
-        Options::None if roles.in_question == OptionsInQuestion::None => {
-            (cutter.cut(&text), None, None)
-        }
+        Options::None if roles.in_question == OptionsInQuestion::None => (cutter.cut(&text), None, None),
         Options::None => {
             let text = cutter.cut(&text);
             match find_in_question(&text) {
@@ -185,26 +171,13 @@ fn question_parts(
         let problem = "nothing but options in the question";
         return Err(PartsError::Row(problem.to_owned()));
     }
-    let (text, whole) = (
-        prepend_hint(&hint, text),
-        whole.map(|text| prepend_hint(&hint, text)),
-    );
-    let is_too_long = options
-        .iter()
-        .flat_map(|options| &*options.texts)
-        .chain([&text])
-        .any(|text| text.len() > MAX_TEXT_BYTES);
+    let (text, whole) = (prepend_hint(&hint, text), whole.map(|text| prepend_hint(&hint, text)));
+    let is_too_long =
+        options.iter().flat_map(|options| &*options.texts).chain([&text]).any(|text| text.len() > MAX_TEXT_BYTES);
     if is_too_long {
-        return Err(PartsError::Row(format!(
-            "a text of more than {} KB",
-            MAX_TEXT_BYTES >> 10
-        )));
+        return Err(PartsError::Row(format!("a text of more than {} KB", MAX_TEXT_BYTES >> 10)));
     }
-    Ok(QuestionParts {
-        text,
-        whole,
-        options,
-    })
+    Ok(QuestionParts { text, whole, options })
 }
 
 fn prepend_hint(hint: &str, text: String) -> String {
@@ -218,11 +191,7 @@ fn prepend_hint(hint: &str, text: String) -> String {
 ///
 /// # Errors
 /// If the row has no question, the question is too long, or its image marks cannot be read.
-fn hint_and_question(
-    row: &Row,
-    roles: &Roles,
-    marks: &mut ImageMarks,
-) -> Result<[String; 2], String> {
+fn hint_and_question(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2], String> {
     let text = match &roles.question {
         QuestionSource::Image => QuestionSource::IN_IMAGE_TEXT.to_owned(),
         QuestionSource::Column(column) => {
@@ -248,18 +217,11 @@ fn no_question_text(column: &Column, row: &Row) -> String {
     if cell.is_absent() {
         return format!("the question is empty (column {name:?})");
     }
-    let conversation_hint =
-        ConversationPaths::from_cell(&column.name, cell).map_or_else(String::new, |paths| {
-            format!(
-                "; {} reads its text",
-                map_flag(Role::Question, &paths.question, None)
-            )
-        });
+    let conversation_hint = ConversationPaths::from_cell(&column.name, cell).map_or_else(String::new, |paths| {
+        format!("; {} reads its text", map_flag(Role::Question, &paths.question, None))
+    });
     let kind = cell.parsed().map_or(cell.kind(), |parsed| parsed.kind());
-    format!(
-        "the column {name:?} of the question holds a {kind}, not a text: {}{conversation_hint}",
-        cell.excerpt(60)
-    )
+    format!("the column {name:?} of the question holds a {kind}, not a text: {}{conversation_hint}", cell.excerpt(60))
 }
 
 /// The answer in a cell, as text. A list with one item is that item.

@@ -1,10 +1,11 @@
 //! Reader of published sets of multiple-choice questions about images.
 //!
-//! 1. Find and open the files (`container/`): TSV, CSV, JSON, JSON lines and Parquet; a single file, shards, or a folder with or
-//!    without the dataset card of a hub.
+//! 1. Find and open the files (`container/`): TSV, CSV, JSON, JSON lines and Parquet; a single file, shards, or a
+//!    folder with or without the dataset card of a hub.
 //! 2. Assign roles to the columns, by their names or by `--map` (`columns/`).
 //! 3. Find the images (`pictures/`), text and options (`items.rs`, `choices/`) of each row (`cells/`).
-//! 4. Choose one format for the answers of all rows (`choices/`). If two formats fit and disagree, stop instead of guessing.
+//! 4. Choose one format for the answers of all rows (`choices/`). If two formats fit and disagree, stop instead of
+//!    guessing.
 //! 5. Stop at rows that cannot become questions, unless the user leaves them out (`omissions/`).
 //! 6. Assign ids and frames to the questions (`pictures/`), and print the inferred mapping (`summary.rs`).
 //!
@@ -56,7 +57,8 @@ use omissions::{OmissionReason, Omissions, omit_contradictions};
 use pictures::{Frames, Ids, ImageForm, Scenes};
 use summary::Summary;
 
-/// Opens a set: a file, a pattern of files, a folder, or several files. `stem` is its name unless `dataset.json` has one.
+/// Opens a set: a file, a pattern of files, a folder, or several files. `stem` is its name unless `dataset.json` has
+/// one.
 ///
 /// # Errors
 /// If the set cannot be read without guessing. The error shows the columns, the inferred mapping, and a flag to fix it.
@@ -64,14 +66,7 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
     let place = places.first().map_or(Path::new(""), PathBuf::as_path);
     let preset = args.preset.as_deref().and_then(preset::find);
     let args = &preset.map_or_else(|| args.clone(), |preset| preset.complete(args));
-    let FoundFiles {
-        files,
-        folder,
-        further,
-        archive,
-        mut notes,
-        joined,
-    } = container::find_files(places, args)?;
+    let FoundFiles { files, folder, further, archive, mut notes, joined } = container::find_files(places, args)?;
     let mut allowed_roots = args.root.data_root.clone();
     allowed_roots.extend(further);
     let root = Root::new(&folder, &allowed_roots)?;
@@ -91,50 +86,28 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         None => preset::recognition_hint(&table.columns),
     };
     let (group, missing_group) = preset.map_or((None, None), |preset| preset.group(&table));
-    let frame =
-        frame_map(&table).filter(|_| is_native_format(&table) && table.find("image").is_none());
+    let frame = frame_map(&table).filter(|_| is_native_format(&table) && table.find("image").is_none());
     let map = ColumnMap::merge(frame.iter().chain(&group).chain(&info.map).chain(&args.map));
-    let (roles, set) =
-        parse_rows(&table, &map, args, preset, ImageForm::Files).map_err(|problem| {
-            let hint = hint
-                .as_ref()
-                .map_or_else(String::new, |hint| format!("\n {hint}"));
-            Error::data(place.display(), format_args!("{problem}{hint}"))
-        })?;
+    let (roles, set) = parse_rows(&table, &map, args, preset, ImageForm::Files).map_err(|problem| {
+        let hint = hint.as_ref().map_or_else(String::new, |hint| format!("\n {hint}"));
+        Error::data(place.display(), format_args!("{problem}{hint}"))
+    })?;
     table.clear_columns(&roles.columns_to_clear());
     let name = match &*info.name {
         "" => stem.to_owned(),
         name => name.to_owned(),
     };
-    let frames = Frames::new(
-        &table,
-        &root,
-        archive.as_ref(),
-        &files,
-        &roles,
-        ImageForm::Files,
-        args.multi_image,
-    );
+    let frames = Frames::new(&table, &root, archive.as_ref(), &files, &roles, ImageForm::Files, args.multi_image);
     notes.extend_from_slice(&table.notes);
     notes.extend(preset.map(preset::Preset::source));
     notes.extend(missing_group.filter(|_| map.entry(Role::Group).is_none()));
-    let context = SetContext {
-        place,
-        name: &name,
-        table: &table,
-        roles: &roles,
-        args,
-    };
+    let context = SetContext { place, name: &name, table: &table, roles: &roles, args };
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
     let contents = assemble(&context, set, frames, scenes, notes, hint)?;
     Ok(ReadySet {
         rows: contents.rows,
         summary: contents.summary,
-        format: if is_native_format(&table) {
-            SetFormat::Native
-        } else {
-            SetFormat::Foreign
-        },
+        format: if is_native_format(&table) { SetFormat::Native } else { SetFormat::Foreign },
         title: info.name,
         name,
         sources: contents.sources,
@@ -158,11 +131,7 @@ fn read_files(files: &[Arc<SetFile>], joined: Joined, args: &SetArgs) -> Result<
         if joined == Joined::OneTable
             && let Some(name) = first.symmetric_difference(&columns).next()
         {
-            let holder = if columns.contains(name) {
-                file
-            } else {
-                &files[0]
-            };
+            let holder = if columns.contains(name) { file } else { &files[0] };
             let problem = format!(
                 "not the columns of {}: {name:?} is in {} alone; files that are joined have the same columns, in any order",
                 files[0].label.path.display(),
@@ -239,30 +208,13 @@ pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<File
     let map = ColumnMap::merge(frame.iter().chain(&info.map).chain(&args.map));
     let (roles, set) = parse_rows(&table, &map, args, None, ImageForm::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
-    let frames = Frames::new(
-        &table,
-        &root,
-        None,
-        &[],
-        &roles,
-        ImageForm::Frames,
-        args.multi_image,
-    );
+    let frames = Frames::new(&table, &root, None, &[], &roles, ImageForm::Frames, args.multi_image);
     let name = file.display().to_string();
-    let context = SetContext {
-        place: file,
-        name: &name,
-        table: &table,
-        roles: &roles,
-        args,
-    };
+    let context = SetContext { place: file, name: &name, table: &table, roles: &roles, args };
     let notes = table.notes.clone();
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
     // Letters and numbers in place of texts are a guess, which the summary reports.
-    let are_texts = set
-        .answer_columns
-        .iter()
-        .all(|column| column.ends_with("(text)"));
+    let are_texts = set.answer_columns.iter().all(|column| column.ends_with("(text)"));
     let contents = assemble(&context, set, frames, scenes, notes, None)?;
     let mut summary = contents.summary;
     let format = if is_native_format(&table) && info.map.is_none() {
@@ -271,13 +223,7 @@ pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<File
     } else {
         SetFormat::Foreign
     };
-    Ok(FileQuestions {
-        questions: contents.questions,
-        scenes: contents.scenes,
-        summary,
-        format,
-        rows: contents.rows,
-    })
+    Ok(FileQuestions { questions: contents.questions, scenes: contents.scenes, summary, format, rows: contents.rows })
 }
 
 /// Questions of a set, the sources of their frames, and the summary of the set.
@@ -313,14 +259,8 @@ fn assemble(
     omit_unusable_images(context, &mut set, &frames)?;
     let mut ids = frames.ids(&set.questions).map_err(with_skip_hint)?;
     if !ids.contradictions().is_empty() {
-        omit_contradictions(
-            context.table,
-            context.args,
-            &mut set.questions,
-            &mut set.omissions,
-            ids.contradictions(),
-        )
-        .map_err(|problem| Error::data(context.place.display(), problem))?;
+        omit_contradictions(context.table, context.args, &mut set.questions, &mut set.omissions, ids.contradictions())
+            .map_err(|problem| Error::data(context.place.display(), problem))?;
         ids = frames.ids(&set.questions).map_err(with_skip_hint)?;
     }
     let id_columns = &context.roles.ids;
@@ -334,15 +274,7 @@ fn assemble(
         );
     }
     let families = FamilySource::choose(context.table, &context.roles.families, &set.questions);
-    let questions = build_questions(
-        context,
-        &families,
-        &set.groups,
-        set.questions,
-        &ids,
-        &mut frames,
-        &mut scenes,
-    )?;
+    let questions = build_questions(context, &families, &set.groups, set.questions, &ids, &mut frames, &mut scenes)?;
     let (sources, series) = frames.take_sources();
     notes.extend(scenes.note());
     notes.extend(ids.note());
@@ -363,37 +295,19 @@ fn assemble(
         notes,
     }
     .lines();
-    let rows = RowCounts {
-        all: context.table.rows.len(),
-        bad: set.omissions.bad().map_or(0, |(count, _)| count),
-    };
-    Ok(SetContents {
-        rows,
-        questions,
-        sources,
-        series,
-        scenes: scenes.take(),
-        summary,
-    })
+    let rows = RowCounts { all: context.table.rows.len(), bad: set.omissions.bad().map_or(0, |(count, _)| count) };
+    Ok(SetContents { rows, questions, sources, series, scenes: scenes.take(), summary })
 }
 
 /// With `--skip bad`, leaves out rows whose image is missing or is not an image.
 ///
 /// Without the flag, reading such an image is an error. Rows whose image cannot be decoded are left out later
 /// ([`Dataset::without_unusable`](crate::data::Dataset::without_unusable)).
-fn omit_unusable_images(
-    context: &SetContext<'_>,
-    set: &mut ParsedSet,
-    frames: &Frames<'_>,
-) -> Result<()> {
+fn omit_unusable_images(context: &SetContext<'_>, set: &mut ParsedSet, frames: &Frames<'_>) -> Result<()> {
     if context.args.bad.is_none() {
         return Ok(());
     }
-    let ParsedSet {
-        questions,
-        omissions,
-        ..
-    } = set;
+    let ParsedSet { questions, omissions, .. } = set;
     questions.retain(|question| match frames.problem(question.row) {
         None => true,
         Some(problem) => {
@@ -438,38 +352,23 @@ fn parse_rows(
     let roles = Roles::new(table, map)?;
     let rule = GroupRule::from_map(table, map)?;
     let (mut omissions, mut cut_instructions) = (Omissions::default(), InstructionCounts::new());
-    let mut items = items(
-        table,
-        &roles,
-        form,
-        args,
-        &mut omissions,
-        &mut cut_instructions,
-    )?;
+    let mut items = items(table, &roles, form, args, &mut omissions, &mut cut_instructions)?;
     let is_rotation = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
     for item in items.extract_if(.., |item| is_rotation(item.row)) {
         omissions.add(OmissionReason::Rotation, || table.place(item.row));
     }
     if items.is_empty() {
-        omissions
-            .check(table.rows.len(), args)
-            .map_err(|problem| with_image_hint(table, &roles, problem))?;
+        omissions.check(table.rows.len(), args).map_err(|problem| with_image_hint(table, &roles, problem))?;
         return Err("no row is left to ask".to_owned());
     }
-    let format = map
-        .entry(Role::Answer)
-        .map_or(&CellFormat::Inferred, |entry| &entry.format);
+    let format = map.entry(Role::Answer).map_or(&CellFormat::Inferred, |entry| &entry.format);
     let truths = find_truths(table, &roles, format, items, &mut omissions)?;
-    omissions
-        .check(table.rows.len(), args)
-        .map_err(|problem| with_image_hint(table, &roles, problem))?;
+    omissions.check(table.rows.len(), args).map_err(|problem| with_image_hint(table, &roles, problem))?;
     if truths.questions.is_empty() {
         return Err("no row is left to ask".to_owned());
     }
     let set = ParsedSet {
-        groups: rule.map_or_else(Groups::default, |rule| {
-            Groups::new(table, &rule, is_rotation)
-        }),
+        groups: rule.map_or_else(Groups::default, |rule| Groups::new(table, &rule, is_rotation)),
         questions: truths.questions,
         answer_columns: truths.columns,
         cut_instructions,
@@ -479,35 +378,20 @@ fn parse_rows(
 }
 
 /// Finds the images of the rows. Each row with an image has a question that is not asked.
-fn parse_images(
-    table: &Table,
-    map: &ColumnMap,
-    args: &SetArgs,
-    form: ImageForm,
-) -> Result<(Roles, ParsedSet), String> {
+fn parse_images(table: &Table, map: &ColumnMap, args: &SetArgs, form: ImageForm) -> Result<(Roles, ParsedSet), String> {
     let mut roles = Roles::with_question(table, map, QuestionSource::Image)?;
-    let is_named = map.entry(Role::Image).is_some()
-        || table
-            .rows
-            .iter()
-            .any(|row| !pictures::images(row, &roles).is_empty());
+    let is_named =
+        map.entry(Role::Image).is_some() || table.rows.iter().any(|row| !pictures::images(row, &roles).is_empty());
     if let Some(column) = columns::embedded_images(table).filter(|_| !is_named) {
         roles.images = ImageColumns::First(vec![column]);
     }
     let mut omissions = Omissions::default();
     let rows = rows_with_images(table, &roles, form, args, &mut omissions);
-    omissions
-        .check(table.rows.len(), args)
-        .map_err(|problem| with_image_hint(table, &roles, problem))?;
-    let choices = Choices::without_truth(vec!["yes".to_owned(), "no".to_owned()])
-        .map_err(|e| e.to_string())?;
+    omissions.check(table.rows.len(), args).map_err(|problem| with_image_hint(table, &roles, problem))?;
+    let choices = Choices::without_truth(vec!["yes".to_owned(), "no".to_owned()]).map_err(|e| e.to_string())?;
     let questions = rows
         .into_iter()
-        .map(|(row, _)| ParsedQuestion {
-            row,
-            text: row.to_string(),
-            choices: choices.clone(),
-        })
+        .map(|(row, _)| ParsedQuestion { row, text: row.to_string(), choices: choices.clone() })
         .collect();
     let set = ParsedSet {
         questions,
@@ -521,19 +405,13 @@ fn parse_images(
 
 /// Adds the columns and an example of `--map image=…` to a problem, if no row has an image.
 fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
-    let has_images = table
-        .rows
-        .iter()
-        .any(|row| !pictures::images(row, roles).is_empty());
+    let has_images = table.rows.iter().any(|row| !pictures::images(row, roles).is_empty());
     if has_images {
         return problem;
     }
     let named_image = table.columns.iter().enumerate().find(|(index, name)| {
         name.to_lowercase().contains("image")
-            && table
-                .rows
-                .iter()
-                .all(|row| matches!(row.cell(*index), Cell::Text(_) | Cell::Number(_)))
+            && table.rows.iter().all(|row| matches!(row.cell(*index), Cell::Text(_) | Cell::Number(_)))
     });
     let key = named_image
         .map(|(_, name)| name.as_str())
@@ -551,10 +429,9 @@ fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
 fn with_skip_hint(error: Error) -> Error {
     const FLAG: &str = "--skip bad";
     match error {
-        Error::Data { place, problem } if !problem.contains(FLAG) => Error::data(
-            place,
-            format_args!("{problem}; {FLAG} leaves such rows out"),
-        ),
+        Error::Data { place, problem } if !problem.contains(FLAG) => {
+            Error::data(place, format_args!("{problem}; {FLAG} leaves such rows out"))
+        }
         other => other,
     }
 }

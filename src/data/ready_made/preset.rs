@@ -50,8 +50,7 @@ struct Rotations {
 }
 
 /// Presets by name. A test checks that the file can be parsed.
-static PRESETS: LazyLock<BTreeMap<String, Preset>> =
-    LazyLock::new(|| toml::from_str(SETS).unwrap_or_default());
+static PRESETS: LazyLock<BTreeMap<String, Preset>> = LazyLock::new(|| toml::from_str(SETS).unwrap_or_default());
 
 /// True if a preset has this name.
 pub(crate) fn is_known(name: &str) -> bool {
@@ -75,10 +74,7 @@ pub(super) fn recognition_hint(columns: &[String]) -> Option<String> {
         let names = &preset.recognise;
         !names.is_empty() && names.iter().all(|name| columns.contains(name))
     })?;
-    Some(format!(
-        "it looks like {}: --data {name}:FILE reads it by its rules",
-        preset.title
-    ))
+    Some(format!("it looks like {}: --data {name}:FILE reads it by its rules", preset.title))
 }
 
 impl Preset {
@@ -111,11 +107,7 @@ impl Preset {
         let map: Option<ColumnMap> = self
             .group
             .iter()
-            .find(|template| {
-                template_columns(template)
-                    .iter()
-                    .all(|name| table.find(name).is_some())
-            })
+            .find(|template| template_columns(template).iter().all(|name| table.find(name).is_some()))
             .and_then(|template| format!("group={template}").parse().ok());
         let is_missing = map.is_none() && !self.group.is_empty();
         let note = is_missing.then(|| {
@@ -150,35 +142,16 @@ mod tests {
         let presets: BTreeMap<String, Preset> = toml::from_str(SETS).unwrap();
         assert!(presets.len() >= 7);
         for (name, preset) in &presets {
-            assert!(
-                !preset.title.is_empty() && !preset.cite.is_empty(),
-                "{name}"
-            );
-            assert!(
-                preset
-                    .map
-                    .as_ref()
-                    .is_none_or(|map| map.parse::<ColumnMap>().is_ok()),
-                "{name}"
-            );
-            assert!(
-                preset
-                    .recognise
-                    .iter()
-                    .all(|column| normalize(column) == *column),
-                "{name}"
-            );
+            assert!(!preset.title.is_empty() && !preset.cite.is_empty(), "{name}");
+            assert!(preset.map.as_ref().is_none_or(|map| map.parse::<ColumnMap>().is_ok()), "{name}");
+            assert!(preset.recognise.iter().all(|column| normalize(column) == *column), "{name}");
         }
     }
 
     #[test]
     fn set_is_recognized_by_its_columns() {
         let columns = ["Index", "Question", "Options", "Correct Answer"].map(str::to_owned);
-        assert!(
-            recognition_hint(&columns)
-                .unwrap()
-                .contains("--data mmvp:FILE")
-        );
+        assert!(recognition_hint(&columns).unwrap().contains("--data mmvp:FILE"));
         assert_eq!(recognition_hint(&columns[..3]), None);
         assert!(is_known("mmvp") && !is_known("mmbnech"));
         assert!(names().contains(&"mmbench"));
@@ -187,10 +160,7 @@ mod tests {
     #[test]
     fn user_flags_take_precedence() {
         let preset = find("mmvp").unwrap();
-        let args = SetArgs {
-            map: vec!["image=other/{Index}.png".parse().unwrap()],
-            ..SetArgs::default()
-        };
+        let args = SetArgs { map: vec!["image=other/{Index}.png".parse().unwrap()], ..SetArgs::default() };
         let both = preset.complete(&args);
         let joined = ColumnMap::merge(&both.map);
         assert_eq!(joined.entries[0].columns, ["other/{Index}.png"]);

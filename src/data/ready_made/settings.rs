@@ -11,8 +11,8 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Ready-made sets")]
 pub struct SetArgs {
-    /// Columns of a ready-made set, as question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1; default: by
-    /// their names
+    /// Columns of a ready-made set, as
+    /// question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1; default: by their names
     #[arg(long, value_name = "ROLE=COLUMN,…", add = Decides::Reply)]
     pub map: Vec<ColumnMap>,
     /// The well-known set that `--data NAME:FILE` names.
@@ -45,7 +45,8 @@ pub struct SetArgs {
     /// Leave out rows with several true options; default: stop
     #[arg(long, value_name = "skip", add = Decides::Trials)]
     pub several: Option<LeaveOut>,
-    /// Leave out broken rows, and images that are missing or cannot be read, up to this share of all: 5 % for the key alone; default: stop
+    /// Leave out broken rows, and images that are missing or cannot be read, up to this share of all: 5 % for the key
+    /// alone; default: stop
     #[arg(long, value_name = "PERCENT", add = Decides::Trials)]
     pub bad: Option<SkipBad>,
     /// Further folders of the data.
@@ -61,7 +62,8 @@ pub struct SetArgs {
 pub enum SeveralImages {
     /// Leave them out and print their number
     Skip,
-    /// Send all images of a row in one request, in order and in the same condition; <image 2> in a text places the second
+    /// Send all images of a row in one request, in order and in the same condition; <image 2> in a text places the
+    /// second
     Send,
 }
 

@@ -42,11 +42,7 @@ const MANY_FAMILIES: usize = 60;
 impl Summary<'_> {
     /// The facts, one per line.
     pub(super) fn lines(&self) -> Vec<String> {
-        let families: BTreeSet<&str> = self
-            .questions
-            .iter()
-            .map(|question| question.family.name())
-            .collect();
+        let families: BTreeSet<&str> = self.questions.iter().map(|question| question.family.name()).collect();
         let mut lines = vec![
             format!(
                 "{}: {} on {} in {} ({})",
@@ -65,11 +61,7 @@ impl Summary<'_> {
                 (OmissionReason::Bad, Some((_, first))) => format!("; the first: {first}"),
                 _ => String::new(),
             };
-            lines.push(format!(
-                "{LEFT_OUT}{number} of {} rows ({}){first}",
-                self.table.rows.len(),
-                reason.name()
-            ));
+            lines.push(format!("{LEFT_OUT}{number} of {} rows ({}){first}", self.table.rows.len(), reason.name()));
         }
         for (ending, number) in self.cut_instructions {
             lines.push(format!("cut from the question: {ending:?} {number} times"));
@@ -89,27 +81,16 @@ impl Summary<'_> {
         if !self.sources.is_empty() {
             return self.sources.len();
         }
-        let frames: BTreeSet<_> = self
-            .questions
-            .iter()
-            .map(|question| &question.frame)
-            .collect();
+        let frames: BTreeSet<_> = self.questions.iter().map(|question| &question.frame).collect();
         frames.len()
     }
 
     /// Number of questions with several images, and of their images; `None` if all questions have one image.
     fn multi_image_questions(&self) -> Option<String> {
-        let counts: Vec<usize> = self
-            .questions
-            .iter()
-            .filter_map(|question| Some(self.series.get(&question.frame)?.len()))
-            .collect();
+        let counts: Vec<usize> =
+            self.questions.iter().filter_map(|question| Some(self.series.get(&question.frame)?.len())).collect();
         let (least, most) = (counts.iter().min()?, counts.iter().max()?);
-        let each = if least == most {
-            most.to_string()
-        } else {
-            format!("{least} to {most}")
-        };
+        let each = if least == most { most.to_string() } else { format!("{least} to {most}") };
         let questions = match counts.len() {
             1 => "1 question shows".to_owned(),
             number => format!("{number} questions show"),
@@ -123,10 +104,7 @@ impl Summary<'_> {
     fn columns(&self) -> String {
         let roles = self.roles;
         let image = match &roles.images {
-            ImageColumns::First(columns) => columns
-                .first()
-                .map_or("none", |column| &column.name)
-                .to_owned(),
+            ImageColumns::First(columns) => columns.first().map_or("none", |column| &column.name).to_owned(),
             ImageColumns::All(columns) => {
                 let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
                 names.join(", ")
@@ -136,18 +114,11 @@ impl Summary<'_> {
         let mut parts = vec![
             match roles.question.column() {
                 Some(column) => format!("question = {}", column.name),
-                None => format!(
-                    "question = in the image (asked as {:?})",
-                    QuestionSource::IN_IMAGE_TEXT
-                ),
+                None => format!("question = in the image (asked as {:?})", QuestionSource::IN_IMAGE_TEXT),
             },
             format!("image = {image} ({})", self.formats()),
         ];
-        let cells: Vec<&str> = roles
-            .option_cells
-            .iter()
-            .map(|column| column.name.as_str())
-            .collect();
+        let cells: Vec<&str> = roles.option_cells.iter().map(|column| column.name.as_str()).collect();
         match (&*cells, &*roles.option_lists) {
             ([], []) => {}
             ([], [column, ..]) => parts.push(format!("options = {}", column.name)),
@@ -174,11 +145,7 @@ impl Summary<'_> {
             };
             *counts.entry(format).or_default() += 1;
         }
-        counts
-            .iter()
-            .map(|(format, count)| format!("{format} {count}"))
-            .collect::<Vec<String>>()
-            .join(", ")
+        counts.iter().map(|(format, count)| format!("{format} {count}")).collect::<Vec<String>>().join(", ")
     }
 }
 

@@ -1,7 +1,8 @@
 //! Intersection of rays with triangles: [`Bvh`], a tree of boxes (bounding volume hierarchy).
 //!
-//! A node has four boxes, which are tested at once (Wald, Benthin and Boulos, 2008). The tree is a binary tree without every second level.
-//! Boxes are visited in the order of that binary tree, because the order decides between equally near triangles.
+//! A node has four boxes, which are tested at once (Wald, Benthin and Boulos, 2008). The tree is a binary tree without
+//! every second level. Boxes are visited in the order of that binary tree, because the order decides between equally
+//! near triangles.
 
 use std::ops::Range;
 
@@ -26,15 +27,8 @@ impl Ray {
 
     pub(super) fn new(origin: Vec3, direction: Vec3) -> Self {
         // No component is 0, so that 0 × ∞ cannot occur: its result differs between machines.
-        let inverse = direction
-            .to_array()
-            .map(|value| 1.0 / if value.abs() < 1e-9 { 1e-9 } else { value });
-        Self {
-            origin,
-            direction,
-            spread: LIGHT_SPREAD,
-            inverse: Vec3::from(inverse),
-        }
+        let inverse = direction.to_array().map(|value| 1.0 / if value.abs() < 1e-9 { 1e-9 } else { value });
+        Self { origin, direction, spread: LIGHT_SPREAD, inverse: Vec3::from(inverse) }
     }
 }
 
@@ -70,7 +64,8 @@ struct Node {
     /// Highest coordinates of the boxes, by axis.
     high: [Vec4; 3],
     children: [Child; BOXES],
-    /// Axes of the three splits: between the first two and the last two boxes, within the first two, and within the last two.
+    /// Axes of the three splits: between the first two and the last two boxes, within the first two, and within the
+    /// last two.
     axes: [u8; 3],
 }
 
@@ -114,22 +109,14 @@ impl Bvh {
             .map(|(face, ([a, b, c], passes_light))| {
                 let (low, high) = (a.min(b).min(c), a.max(b).max(c));
                 BuildItem {
-                    triangle: Triangle {
-                        corner: a,
-                        edges: [b - a, c - a],
-                        face: face as u32,
-                        passes_light,
-                    },
+                    triangle: Triangle { corner: a, edges: [b - a, c - a], face: face as u32, passes_light },
                     low,
                     high,
                     center: (low + high) * 0.5,
                 }
             })
             .collect();
-        let mut tree = Self {
-            nodes: Vec::with_capacity(items.len()),
-            triangles: Vec::with_capacity(items.len()),
-        };
+        let mut tree = Self { nodes: Vec::with_capacity(items.len()), triangles: Vec::with_capacity(items.len()) };
         tree.build(&mut items);
         tree
     }
@@ -140,10 +127,7 @@ impl Bvh {
         self.nodes.push(Node::EMPTY);
         let mut axes = [0; 3];
         for (half, items) in split_in_two(items, &mut axes[0]).into_iter().enumerate() {
-            for (part, items) in split_in_two(items, &mut axes[half + 1])
-                .into_iter()
-                .enumerate()
-            {
+            for (part, items) in split_in_two(items, &mut axes[half + 1]).into_iter().enumerate() {
                 if !items.is_empty() {
                     let (low, high) = bounds(items);
                     let child = self.child(items);
@@ -162,12 +146,8 @@ impl Bvh {
             return Child { index, count: 0 };
         }
         let index = self.triangles.len() as u32;
-        self.triangles
-            .extend(items.iter().map(|item| item.triangle));
-        Child {
-            index,
-            count: items.len() as u32,
-        }
+        self.triangles.extend(items.iter().map(|item| item.triangle));
+        Child { index, count: items.len() as u32 }
     }
 
     /// Returns the first triangle that a ray hits within a distance.
@@ -187,11 +167,7 @@ impl Bvh {
                 for triangle in &self.triangles[child.triangles()] {
                     if let Some((hit_distance, weights)) = triangle.intersect(ray, distance) {
                         distance = hit_distance;
-                        found = Some(Hit {
-                            distance,
-                            face: triangle.face as usize,
-                            weights,
-                        });
+                        found = Some(Hit { distance, face: triangle.face as usize, weights });
                     }
                 }
                 continue;
@@ -228,9 +204,10 @@ impl Bvh {
                 if let Some(index) = child.node() {
                     stack[count] = index;
                     count += 1;
-                } else if self.triangles[child.triangles()].iter().any(|triangle| {
-                    !triangle.passes_light && triangle.intersect(ray, max_distance).is_some()
-                }) {
+                } else if self.triangles[child.triangles()]
+                    .iter()
+                    .any(|triangle| !triangle.passes_light && triangle.intersect(ray, max_distance).is_some())
+                {
                     return true;
                 }
             }
@@ -246,12 +223,7 @@ impl Bvh {
         // A node comes after its parent.
         let mut depths = vec![1; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate() {
-            for child in node
-                .children
-                .iter()
-                .filter_map(|child| child.node())
-                .filter(|child| *child > index)
-            {
+            for child in node.children.iter().filter_map(|child| child.node()).filter(|child| *child > index) {
                 depths[child] = depths[index] + 1;
             }
         }
@@ -295,7 +267,8 @@ impl BoxTester {
         }
     }
 
-    /// Returns the distances to the boxes, and a bit for each box that the ray hits within a distance (Kay and Kajiya, SIGGRAPH 1986).
+    /// Returns the distances to the boxes, and a bit for each box that the ray hits within a distance (Kay and Kajiya,
+    /// SIGGRAPH 1986).
     fn test(&self, node: &Node, distance: f32) -> ([f32; BOXES], u32) {
         let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(distance));
         for axis in 0..3 {
@@ -309,27 +282,17 @@ impl BoxTester {
 
     /// Returns the boxes of a node from the farthest to the nearest, by the axes of its splits.
     fn far_to_near(&self, node: &Node) -> [usize; BOXES] {
-        let [both, first, last] = node
-            .axes
-            .map(|axis| usize::from(self.backwards >> axis & 1));
+        let [both, first, last] = node.axes.map(|axis| usize::from(self.backwards >> axis & 1));
         let [first, last] = [[1 - first, first], [3 - last, 2 + last]];
-        let [[a, b], [c, d]] = if both == 0 {
-            [last, first]
-        } else {
-            [first, last]
-        };
+        let [[a, b], [c, d]] = if both == 0 { [last, first] } else { [first, last] };
         [a, b, c, d]
     }
 }
 
 impl Node {
     /// A node of four boxes that no ray hits.
-    const EMPTY: Self = Self {
-        low: [Vec4::MAX; 3],
-        high: [Vec4::MAX; 3],
-        children: [Child::ROOT; BOXES],
-        axes: [0; 3],
-    };
+    const EMPTY: Self =
+        Self { low: [Vec4::MAX; 3], high: [Vec4::MAX; 3], children: [Child::ROOT; BOXES], axes: [0; 3] };
 
     /// Sets one of the boxes.
     fn set(&mut self, slot: usize, [low, high]: [Vec3; 2], child: Child) {
@@ -342,7 +305,8 @@ impl Node {
 }
 
 impl Triangle {
-    /// Returns the distance and barycentric weights at which a ray hits the triangle, from either side (Möller and Trumbore, 1997).
+    /// Returns the distance and barycentric weights at which a ray hits the triangle, from either side (Möller and
+    /// Trumbore, 1997).
     fn intersect(&self, ray: &Ray, max_distance: f32) -> Option<(f32, [f32; 2])> {
         let [first, second] = self.edges;
         let p = ray.direction.cross(second);
@@ -367,10 +331,9 @@ impl Triangle {
 }
 
 fn bounds(items: &[BuildItem]) -> (Vec3, Vec3) {
-    items.iter().fold(
-        (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)),
-        |(low, high), item| (low.min(item.low), high.max(item.high)),
-    )
+    items.iter().fold((Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)), |(low, high), item| {
+        (low.min(item.low), high.max(item.high))
+    })
 }
 
 /// Splits items into two parts and sets the axis of the split. All are in the first part if they fit into a leaf.
@@ -398,18 +361,10 @@ struct Bin {
 }
 
 impl Bin {
-    const EMPTY: Self = Self {
-        low: Vec3::MAX,
-        high: Vec3::MIN,
-        count: 0,
-    };
+    const EMPTY: Self = Self { low: Vec3::MAX, high: Vec3::MIN, count: 0 };
 
     fn merge(self, other: Self) -> Self {
-        Self {
-            low: self.low.min(other.low),
-            high: self.high.max(other.high),
-            count: self.count + other.count,
-        }
+        Self { low: self.low.min(other.low), high: self.high.max(other.high), count: self.count + other.count }
     }
 
     /// Expected cost of testing a ray against all items, up to a factor.
@@ -418,13 +373,12 @@ impl Bin {
     }
 }
 
-/// Partitions items at the split with the lowest cost for rays (binned surface area heuristic; Wald, 2007). Returns the axis and the number
-/// of items in the first part.
+/// Partitions items at the split with the lowest cost for rays (binned surface area heuristic; Wald, 2007). Returns the
+/// axis and the number of items in the first part.
 fn partition_by_cost(items: &mut [BuildItem]) -> (usize, usize) {
-    let (low, high) = items.iter().fold(
-        (Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)),
-        |(low, high), item| (low.min(item.center), high.max(item.center)),
-    );
+    let (low, high) = items.iter().fold((Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)), |(low, high), item| {
+        (low.min(item.center), high.max(item.center))
+    });
     let size = high - low;
     let bin = |item: &BuildItem, axis: usize| {
         let share = (item.center[axis] - low[axis]) / size[axis];
@@ -435,11 +389,7 @@ fn partition_by_cost(items: &mut [BuildItem]) -> (usize, usize) {
         let mut bins = [Bin::EMPTY; BINS];
         for item in items.iter() {
             let bin = &mut bins[bin(item, axis)];
-            *bin = bin.merge(Bin {
-                low: item.low,
-                high: item.high,
-                count: 1,
-            });
+            *bin = bin.merge(Bin { low: item.low, high: item.high, count: 1 });
         }
         // Bin i of `right` merges the bins from i on.
         let mut right = bins;
@@ -450,10 +400,7 @@ fn partition_by_cost(items: &mut [BuildItem]) -> (usize, usize) {
         for index in 1..BINS {
             left = left.merge(bins[index - 1]);
             let cost = left.cost() + right[index].cost();
-            if left.count > 0
-                && right[index].count > 0
-                && best.is_none_or(|(lowest, ..)| cost < lowest)
-            {
+            if left.count > 0 && right[index].count > 0 && best.is_none_or(|(lowest, ..)| cost < lowest) {
                 best = Some((cost, axis, index));
             }
         }
@@ -463,8 +410,7 @@ fn partition_by_cost(items: &mut [BuildItem]) -> (usize, usize) {
         return (0, items.len() / 2);
     };
     // The order within each part is kept, so that the tree depends only on the scene.
-    let (mut first, second): (Vec<_>, Vec<_>) =
-        items.iter().partition(|item| bin(item, axis) < index);
+    let (mut first, second): (Vec<_>, Vec<_>) = items.iter().partition(|item| bin(item, axis) < index);
     let count = first.len();
     first.extend(second);
     items.copy_from_slice(&first);
@@ -481,13 +427,7 @@ mod tests {
     #[test]
     fn tree_agrees_with_exhaustive_search() {
         let mut rng = SeededRng::new(3, &["bvh"]);
-        let mut point = |size: f32| {
-            vec3(
-                rng.between(-size, size),
-                rng.between(-size, size),
-                rng.between(-size, size),
-            )
-        };
+        let mut point = |size: f32| vec3(rng.between(-size, size), rng.between(-size, size), rng.between(-size, size));
         let faces: Vec<[Vec3; 3]> = (0..400)
             .map(|_| {
                 let corner = point(4.0);
@@ -513,11 +453,7 @@ mod tests {
 
     #[test]
     fn identical_faces_that_pass_light_are_hit_but_cast_no_shadow() {
-        let wall = [
-            vec3(-1.0, -1.0, 1.0),
-            vec3(3.0, -1.0, 1.0),
-            vec3(-1.0, 3.0, 1.0),
-        ];
+        let wall = [vec3(-1.0, -1.0, 1.0), vec3(3.0, -1.0, 1.0), vec3(-1.0, 3.0, 1.0)];
         let tree = Bvh::new((0..300).map(|_| (wall, true)));
         let ray = Ray::new(Vec3::ZERO, Vec3::Z);
         assert!(!tree.is_occluded(&ray, 9.0) && tree.closest_hit(&ray, 9.0).is_some());

@@ -30,24 +30,15 @@ pub(super) fn focal(size: [usize; 2]) -> f32 {
 }
 
 impl Camera {
-    /// Creates a camera that is rotated about y by `angle` and tilted downwards by `tilt`, both in radians; `size` is in pixels.
+    /// Creates a camera that is rotated about y by `angle` and tilted downwards by `tilt`, both in radians; `size` is
+    /// in pixels.
     pub(super) fn new(position: Vec3, angle: f32, tilt: f32, size: [usize; 2]) -> Self {
-        Self {
-            position,
-            yaw: cos_sin(angle),
-            pitch: cos_sin(-tilt),
-            size,
-            focal: focal(size),
-        }
+        Self { position, yaw: cos_sin(angle), pitch: cos_sin(-tilt), size, focal: focal(size) }
     }
 
     /// Returns the camera with another image size.
     pub(super) fn with_size(&self, size: [usize; 2]) -> Self {
-        Self {
-            size,
-            focal: focal(size),
-            ..*self
-        }
+        Self { size, focal: focal(size), ..*self }
     }
 
     fn principal_point(&self) -> [f32; 2] {
@@ -57,12 +48,7 @@ impl Camera {
     pub(super) fn intrinsics(&self) -> Intrinsics {
         let [cx, cy] = self.principal_point().map(f64::from);
         let focal = f64::from(self.focal);
-        Intrinsics {
-            fx: focal,
-            fy: focal,
-            cx,
-            cy,
-        }
+        Intrinsics { fx: focal, fy: focal, cx, cy }
     }
 
     /// The optical axis: the direction in which the camera looks.
@@ -73,11 +59,7 @@ impl Camera {
     /// Rotates a direction from camera to room coordinates.
     fn to_room(self, v: Vec3) -> Vec3 {
         let (pitch, yaw) = (self.pitch, self.yaw);
-        let v = vec3(
-            v.x,
-            v.y * pitch.x - v.z * pitch.y,
-            v.y * pitch.y + v.z * pitch.x,
-        );
+        let v = vec3(v.x, v.y * pitch.x - v.z * pitch.y, v.y * pitch.y + v.z * pitch.x);
         vec3(v.x * yaw.x + v.z * yaw.y, v.y, v.z * yaw.x - v.x * yaw.y)
     }
 
@@ -100,8 +82,6 @@ impl Camera {
     pub(super) fn pose(&self) -> [f32; 16] {
         let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z].map(|v| self.to_room(v));
         let at = self.position;
-        [
-            x.x, y.x, z.x, at.x, x.y, y.y, z.y, at.y, x.z, y.z, z.z, at.z, 0.0, 0.0, 0.0, 1.0,
-        ]
+        [x.x, y.x, z.x, at.x, x.y, y.y, z.y, at.y, x.z, y.z, z.z, at.z, 0.0, 0.0, 0.0, 1.0]
     }
 }

@@ -8,8 +8,8 @@ use super::plan::{FloorArea, FloorPlan};
 use super::scene::{Piece, Pose};
 use super::shell::WALLS;
 
-/// Furniture that carries clutter: its word, the place name of its clutter in the parts table, the height of the surface in metres (0
-/// for the top of the furniture), and the share of the depth, from the back, that remains empty.
+/// Furniture that carries clutter: its word, the place name of its clutter in the parts table, the height of the
+/// surface in metres (0 for the top of the furniture), and the share of the depth, from the back, that remains empty.
 const SURFACES: [(&str, &str, f32, f32); 15] = [
     ("desk", "desk", 0.0, 0.0),
     ("coffee table", "living", 0.0, 0.0),
@@ -28,7 +28,8 @@ const SURFACES: [(&str, &str, f32, f32); 15] = [
     ("sofa", "sofa", 0.46, 0.3),
 ];
 
-/// Number of things per square metre of a surface (chosen), before scaling by the mess of the room. Three placements are tried for each.
+/// Number of things per square metre of a surface (chosen), before scaling by the mess of the room. Three placements
+/// are tried for each.
 const DENSITY: f32 = 9.0;
 /// Minimum gap between adjacent things, in metres.
 const GAP: f32 = 0.006;
@@ -60,17 +61,15 @@ impl FloorPlan {
         }
     }
 
-    /// Adds clutter to the surface of a thing. `place` is a place name in the parts table, `height` the height of the surface in metres (0
-    /// for the top), `from` the empty share of its depth.
+    /// Adds clutter to the surface of a thing. `place` is a place name in the parts table, `height` the height of the
+    /// surface in metres (0 for the top), `from` the empty share of its depth.
     fn add_on_top(&mut self, thing: usize, place: &str, [height, from]: [f32; 2], mess: f32) {
         let pose = self.scene.things[thing].pose;
         let (mut low, high) = self
             .faces(thing)
             .flat_map(|face| face.corners)
             .map(|corner| pose.to_piece(corner.position))
-            .fold((Vec3::MAX, Vec3::MIN), |(low, high), corner| {
-                (low.min(corner), high.max(corner))
-            });
+            .fold((Vec3::MAX, Vec3::MIN), |(low, high), corner| (low.min(corner), high.max(corner)));
         // Things on high furniture are invisible from below.
         let top = if height > 0.0 { height } else { high.y };
         if top > 1.7 {
@@ -92,10 +91,7 @@ impl FloorPlan {
             let angle = pose.angle + self.rng.between(-0.5, 0.5);
             let foot = Pose::new(pose.to_room(vec3(x, top + 0.001, z)), angle);
             let corners = lower_corners(&piece).map(|corner| foot.to_room(corner));
-            if corners
-                .iter()
-                .all(|corner| self.is_on_surface(thing, *corner))
-            {
+            if corners.iter().all(|corner| self.is_on_surface(thing, *corner)) {
                 self.add_if_free(piece, foot, Some(thing));
             }
         }
@@ -105,10 +101,7 @@ impl FloorPlan {
     fn is_on_surface(&self, thing: usize, point: Vec3) -> bool {
         self.faces(thing).any(|face| {
             let corners = face.corners.map(|corner| corner.position);
-            if !corners
-                .into_iter()
-                .all(|corner| (point.y - corner.y).abs() < 0.012)
-            {
+            if !corners.into_iter().all(|corner| (point.y - corner.y).abs() < 0.012) {
                 return false;
             }
             let [a, b, c] = corners.map(|corner| vec2(corner.x - point.x, corner.z - point.z));
@@ -128,8 +121,8 @@ impl FloorPlan {
             .map(|(face, _)| face)
     }
 
-    /// Adds a piece and returns true, unless it would leave the room or overlap a thing other than `below`. Things lower than 2 cm, such as
-    /// rugs, do not block it.
+    /// Adds a piece and returns true, unless it would leave the room or overlap a thing other than `below`. Things
+    /// lower than 2 cm, such as rugs, do not block it.
     fn add_if_free(&mut self, piece: Piece, pose: Pose, below: Option<usize>) -> bool {
         let bounding_box = piece
             .mesh
@@ -137,9 +130,7 @@ impl FloorPlan {
             .iter()
             .flat_map(|face| face.corners)
             .map(|corner| pose.to_room(corner.position))
-            .fold([Vec3::MAX, Vec3::MIN], |[low, high], corner| {
-                [low.min(corner), high.max(corner)]
-            });
+            .fold([Vec3::MAX, Vec3::MIN], |[low, high], corner| [low.min(corner), high.max(corner)]);
         let is_blocked = self.boxes.iter().enumerate().any(|(thing, other)| {
             let is_flat = other[1].y - other[0].y < 0.02;
             Some(thing) != below && !is_flat && boxes_overlap(&bounding_box, other)
@@ -169,9 +160,7 @@ impl FloorPlan {
             let angle = pose.angle + self.rng.between(-0.6, 0.6);
             let [low, high] = [foot - 0.16, foot + 0.16];
             let floor_area = FloorArea([low.x.max(0.01), low.z.max(0.01), high.x, high.z]);
-            if self.is_free(&floor_area)
-                && self.add_if_free(piece.clone(), Pose::new(foot, angle), None)
-            {
+            if self.is_free(&floor_area) && self.add_if_free(piece.clone(), Pose::new(foot, angle), None) {
                 self.reserve_floor(&Pose::new(foot, 0.0), vec3(0.36, 0.0, 0.36), -0.18);
                 return;
             }
@@ -182,11 +171,5 @@ impl FloorPlan {
 /// Lower corners of the bounding box of a piece, projected to height 0.
 fn lower_corners(piece: &Piece) -> [Vec3; 4] {
     let [low, high] = bounds(&piece.mesh.faces);
-    [
-        (low.x, low.z),
-        (high.x, low.z),
-        (high.x, high.z),
-        (low.x, high.z),
-    ]
-    .map(|(x, z)| vec3(x, 0.0, z))
+    [(low.x, low.z), (high.x, low.z), (high.x, high.z), (low.x, high.z)].map(|(x, z)| vec3(x, 0.0, z))
 }

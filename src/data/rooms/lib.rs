@@ -1,9 +1,10 @@
 //! The built-in rooms: images of furnished rooms with exact ground truth, generated from a seed.
 //!
-//! Each scene is one room of one of six kinds. Rules and random draws furnish the room with parametric pieces (`furniture`); windows
-//! and lamps light it. Each scene has two frames: one from the eye height of a person and one from the camera height of a small robot.
-//! Frames are ray traced, so image, depth, classes and segments agree in every pixel. Seed, frame index and image size determine a
-//! frame: its bytes are the same on every machine and for any number of threads. No model was trained on these rooms.
+//! Each scene is one room of one of six kinds. Rules and random draws furnish the room with parametric pieces
+//! (`furniture`); windows and lamps light it. Each scene has two frames: one from the eye height of a person and one
+//! from the camera height of a small robot. Frames are ray traced, so image, depth, classes and segments agree in every
+//! pixel. Seed, frame index and image size determine a frame: its bytes are the same on every machine and for any
+//! number of threads. No model was trained on these rooms.
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -56,8 +57,8 @@ pub const VERSION: u32 = 2;
 /// Name of the label space of the semantic maps.
 const LABEL_SPACE: &str = "mpcat40";
 
-/// Maximum size of the frame cache, in bytes. The 48 frames of the default data set fit in, so each is drawn only once for its
-/// questions and its image.
+/// Maximum size of the frame cache, in bytes. The 48 frames of the default data set fit in, so each is drawn only once
+/// for its questions and its image.
 const CACHE_BYTES: usize = 104 << 20;
 
 /// Number of frames of a size, in pixels, that fit in the cache; at least one.
@@ -98,8 +99,8 @@ pub struct ThingTruth {
     pub class: &'static str,
     /// Name of the main colour; empty if people would not agree on one.
     pub color: &'static str,
-    /// Distance from the camera to the nearest point of the thing in the field of view, even if that point is hidden, in metres. It is
-    /// accurate to a few centimetres. `f32::MAX` if no point is in the field of view.
+    /// Distance from the camera to the nearest point of the thing in the field of view, even if that point is hidden,
+    /// in metres. It is accurate to a few centimetres. `f32::MAX` if no point is in the field of view.
     pub distance: f32,
 }
 
@@ -114,11 +115,7 @@ impl Rooms {
     pub fn all(self) -> impl Iterator<Item = (FrameId, Room)> {
         let cache = Arc::new(Recent::new(cached_frames(self.size, self.light)));
         (0..self.frames).map(move |index| {
-            let room = Room {
-                rooms: self,
-                index,
-                cache: Arc::clone(&cache),
-            };
+            let room = Room { rooms: self, index, cache: Arc::clone(&cache) };
             (room.id(), room)
         })
     }
@@ -136,11 +133,7 @@ impl Room {
     }
 
     fn camera_height(&self) -> CameraHeight {
-        if self.index.is_multiple_of(2) {
-            CameraHeight::Eye
-        } else {
-            CameraHeight::Robot
-        }
+        if self.index.is_multiple_of(2) { CameraHeight::Eye } else { CameraHeight::Robot }
     }
 
     /// Name of the scene, such as `living-room-0003`.
@@ -166,14 +159,7 @@ impl Room {
         let [width, height] = self.rooms.size.map(|side| (side as u64).to_le_bytes());
         let (version, seed) = (VERSION.to_le_bytes(), self.rooms.seed.to_le_bytes());
         let id = self.id().0;
-        let parts: [&[u8]; 6] = [
-            b"darkqa.room/2",
-            &version,
-            &seed,
-            &width,
-            &height,
-            id.as_bytes(),
-        ];
+        let parts: [&[u8]; 6] = [b"darkqa.room/2", &version, &seed, &width, &height, id.as_bytes()];
         let light: Option<&[u8]> = match self.rooms.light {
             RoomLight::Display => None,
             RoomLight::Linear => Some(b"linear light"),
@@ -195,8 +181,7 @@ impl Room {
 
     fn plan(&self) -> FloorPlan {
         let scene = self.scene();
-        self.kind()
-            .furnish(SeededRng::new(self.rooms.seed, &[&scene, "furniture"]))
+        self.kind().furnish(SeededRng::new(self.rooms.seed, &[&scene, "furniture"]))
     }
 
     fn camera(&self, plan: &FloorPlan, tree: &Bvh) -> Camera {
@@ -275,9 +260,7 @@ impl Room {
 
     /// The drawn frame, from the cache if possible.
     fn drawn(&self) -> Arc<RenderedFrame> {
-        let Ok(drawn) = self
-            .cache
-            .get(&self.index, || Ok::<_, Infallible>(Arc::new(self.draw())));
+        let Ok(drawn) = self.cache.get(&self.index, || Ok::<_, Infallible>(Arc::new(self.draw())));
         drawn
     }
 
@@ -299,18 +282,13 @@ impl Room {
             },
             depth: view.depth,
             things: view.things,
-            classes: std::iter::once(0)
-                .chain(kinds.iter().map(|kind| class_number(kind.class)))
-                .collect(),
-            names: Arc::new(
-                (1..)
-                    .zip(kinds.iter().map(ThingKind::segment_name))
-                    .collect(),
-            ),
+            classes: std::iter::once(0).chain(kinds.iter().map(|kind| class_number(kind.class))).collect(),
+            names: Arc::new((1..).zip(kinds.iter().map(ThingKind::segment_name)).collect()),
         }
     }
 
-    /// Camera pose in metres: the row-major matrix from camera coordinates (x right, y up, z backwards) to room coordinates.
+    /// Camera pose in metres: the row-major matrix from camera coordinates (x right, y up, z backwards) to room
+    /// coordinates.
     #[must_use]
     pub fn pose(&self) -> [f32; 16] {
         self.drawn().camera.pose()
@@ -321,10 +299,7 @@ impl Room {
 fn class_number(class: &str) -> u16 {
     static NUMBERS: LazyLock<BTreeMap<String, u16>> = LazyLock::new(|| {
         let labels = labels().labels;
-        labels
-            .into_iter()
-            .map(|(number, label)| (label.canonical, number))
-            .collect()
+        labels.into_iter().map(|(number, label)| (label.canonical, number)).collect()
     });
     NUMBERS.get(class).copied().unwrap_or(0)
 }
@@ -336,12 +311,7 @@ mod tests {
 
     #[test]
     fn words_have_the_classes_of_other_data_sets() {
-        let rooms = Rooms {
-            frames: 120,
-            seed: 1,
-            size: [64, 48],
-            light: RoomLight::Display,
-        };
+        let rooms = Rooms { frames: 120, seed: 1, size: [64, 48], light: RoomLight::Display };
         let mut kinds = BTreeMap::new();
         for (_, room) in rooms.all().step_by(2) {
             for thing in room.plan().scene.things {
@@ -355,10 +325,7 @@ mod tests {
                 Meaning::Class(known) => assert_eq!(class, known, "{word}"),
                 // A word that no data set uses may have any class, but this list must name it.
                 Meaning::Nothing | Meaning::Unlisted => {
-                    assert!(
-                        ["desk lamp", "bowl of fruit", "mug", "wall", "tv"].contains(&word),
-                        "{word}"
-                    );
+                    assert!(["desk lamp", "bowl of fruit", "mug", "wall", "tv"].contains(&word), "{word}");
                 }
             }
         }
@@ -366,56 +333,30 @@ mod tests {
 
     #[test]
     fn room_trees_stay_below_maximum_depth() {
-        let rooms = Rooms {
-            frames: 120,
-            ..Rooms::default()
-        };
-        let deepest = rooms
-            .all()
-            .step_by(2)
-            .map(|(_, room)| room.plan().scene.tree().depth())
-            .max()
-            .unwrap();
+        let rooms = Rooms { frames: 120, ..Rooms::default() };
+        let deepest = rooms.all().step_by(2).map(|(_, room)| room.plan().scene.tree().depth()).max().unwrap();
         assert!((5..Bvh::MAX_DEPTH - 4).contains(&deepest), "{deepest}");
     }
 
     #[test]
     fn default_rooms_fit_in_the_cache() {
-        let rooms = Rooms {
-            frames: 2,
-            seed: 1,
-            size: [64, 48],
-            light: RoomLight::Display,
-        };
+        let rooms = Rooms { frames: 2, seed: 1, size: [64, 48], light: RoomLight::Display };
         let all: Vec<Room> = rooms.all().map(|(_, room)| room).collect();
         assert!(Arc::ptr_eq(&all[0].drawn(), &all[0].drawn()));
         let defaults = Rooms::default();
         assert!(cached_frames(defaults.size, defaults.light) >= defaults.frames);
         let sizes = [[640, 480], [3000, 2000], [4000, 4000]];
-        assert_eq!(
-            sizes.map(|size| cached_frames(size, RoomLight::Display)),
-            [50, 2, 1]
-        );
+        assert_eq!(sizes.map(|size| cached_frames(size, RoomLight::Display)), [50, 2, 1]);
         assert_eq!(cached_frames([640, 480], RoomLight::Linear), 18);
     }
 
     #[test]
     fn drawing_order_does_not_change_frames() {
         for light in [RoomLight::Display, RoomLight::Linear] {
-            let rooms = Rooms {
-                frames: 40,
-                seed: 7,
-                size: [64, 48],
-                light,
-            };
+            let rooms = Rooms { frames: 40, seed: 7, size: [64, 48], light };
             // Both frames of scene 17, drawn first, and drawn after the frames of scenes 15 and 16.
             let [alone, in_a_row] = [(34, 2), (30, 6)].map(|(first, count)| {
-                let rooms: Vec<Room> = rooms
-                    .all()
-                    .map(|(_, room)| room)
-                    .skip(first)
-                    .take(count)
-                    .collect();
+                let rooms: Vec<Room> = rooms.all().map(|(_, room)| room).skip(first).take(count).collect();
                 rooms
                     .iter()
                     .map(|room| {

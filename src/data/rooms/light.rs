@@ -1,8 +1,9 @@
 //! Light that reaches a point: [`Lighting`].
 //!
-//! Direct light comes from lamps and windows; each is sampled with a shadow ray. Indirect light comes from other surfaces: rays over the
-//! half-space (cosine-weighted) return the colour of the surface that they hit, lit by one light each, plus a constant ambient light. So
-//! the first bounce is sampled and later bounces are averaged. This gives soft shadows, dark corners and colour bleeding, but no caustics.
+//! Direct light comes from lamps and windows; each is sampled with a shadow ray. Indirect light comes from other
+//! surfaces: rays over the half-space (cosine-weighted) return the colour of the surface that they hit, lit by one
+//! light each, plus a constant ambient light. So the first bounce is sampled and later bounces are averaged. This gives
+//! soft shadows, dark corners and colour bleeding, but no caustics.
 
 use glam::{Vec3, vec3};
 
@@ -54,13 +55,8 @@ impl LightSample {
 impl Lighting<'_> {
     /// Direct and indirect light at a point: from lamps and windows, and by reflection from other things.
     pub(super) fn incoming(&self, point: &SurfacePoint, sample: LightSample) -> [Vec3; 2] {
-        let indirect: Vec3 = (0..INDIRECT_RAYS)
-            .map(|i| self.indirect(point, sample, i))
-            .sum();
-        [
-            self.direct(point.position, point.normal, sample),
-            indirect / INDIRECT_RAYS as f32,
-        ]
+        let indirect: Vec3 = (0..INDIRECT_RAYS).map(|i| self.indirect(point, sample, i)).sum();
+        [self.direct(point.position, point.normal, sample), indirect / INDIRECT_RAYS as f32]
     }
 
     /// Direct light of lamps and windows at a position.
@@ -78,11 +74,7 @@ impl Lighting<'_> {
         let [u, v] = sample.uniform_pair(12 + ray_index);
         let around = cos_sin(std::f32::consts::TAU * u);
         let (out, up) = (v.sqrt(), (1.0 - v).max(0.0).sqrt());
-        let aside = if point.normal.x.abs() > 0.7 {
-            Vec3::Y
-        } else {
-            Vec3::X
-        };
+        let aside = if point.normal.x.abs() > 0.7 { Vec3::Y } else { Vec3::X };
         let across = point.normal.cross(aside).normalize();
         let over = point.normal.cross(across);
         let direction = across * (around.x * out) + over * (around.y * out) + point.normal * up;
@@ -97,48 +89,25 @@ impl Lighting<'_> {
         let count = self.scene.lights.len().max(1);
         let chosen = (sample.stratum + ray_index) % count;
         let direct = self.scene.lights.get(chosen).map_or(Vec3::ZERO, |light| {
-            self.light_from(
-                light,
-                hit.position,
-                hit.normal,
-                sample.uniform_pair(24 + ray_index),
-            ) * count as f32
+            self.light_from(light, hit.position, hit.normal, sample.uniform_pair(24 + ray_index)) * count as f32
         });
         // Without a limit, a ray that hits a point close to a lamp would cause a bright dot.
         hit.color * (direct + self.ambient).min(self.ambient * MAX_INDIRECT)
     }
 
     /// Light that one lamp or window sends to a position.
-    fn light_from(
-        &self,
-        light: &LightSource,
-        position: Vec3,
-        normal: Vec3,
-        [u, v]: [f32; 2],
-    ) -> Vec3 {
+    fn light_from(&self, light: &LightSource, position: Vec3, normal: Vec3, [u, v]: [f32; 2]) -> Vec3 {
         let start = position + normal * OFFSET;
         let (target, strength) = match *light {
-            LightSource::Panel {
-                corner,
-                edges: [a, b],
-                normal: facing,
-                radiance,
-            } => {
+            LightSource::Panel { corner, edges: [a, b], normal: facing, radiance } => {
                 let target = corner + a * u + b * v;
                 let offset = target - start;
                 let square = offset.length_squared().max(0.01);
                 let shines = (-facing.dot(offset)).max(0.0) / square.sqrt();
                 let area = a.cross(b).length();
-                (
-                    target,
-                    radiance * (shines * area / (std::f32::consts::PI * square)),
-                )
+                (target, radiance * (shines * area / (std::f32::consts::PI * square)))
             }
-            LightSource::Bulb {
-                middle,
-                radius,
-                radiance,
-            } => {
+            LightSource::Bulb { middle, radius, radiance } => {
                 let to = (middle - start).normalize_or_zero();
                 let aside = if to.x.abs() > 0.7 { Vec3::Y } else { Vec3::X };
                 let across = to.cross(aside).normalize_or_zero();
@@ -156,10 +125,7 @@ impl Lighting<'_> {
         if slant <= 0.0 || strength == Vec3::ZERO {
             return Vec3::ZERO;
         }
-        if self
-            .tree
-            .is_occluded(&Ray::new(start, direction), distance - 2.0 * OFFSET)
-        {
+        if self.tree.is_occluded(&Ray::new(start, direction), distance - 2.0 * OFFSET) {
             Vec3::ZERO
         } else {
             strength * slant

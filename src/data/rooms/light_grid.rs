@@ -34,18 +34,14 @@ impl<'a> LightGrid<'a> {
         radiances: Vec<Option<Vec3>>,
     ) -> Self {
         let size = image_size.map(|side| side.div_ceil(2));
-        let points: Vec<Option<SurfacePoint>> = (0..size[0] * size[1])
-            .map(|i| points[(i / size[0]) * 2 * image_size[0] + (i % size[0]) * 2])
-            .collect();
+        let points: Vec<Option<SurfacePoint>> =
+            (0..size[0] * size[1]).map(|i| points[(i / size[0]) * 2 * image_size[0] + (i % size[0]) * 2]).collect();
         let incoming: Vec<[Vec3; 2]> = points
             .par_iter()
             .enumerate()
             .map(|(i, point)| {
                 let [x, y] = [i % size[0], i / size[0]];
-                let sample = LightSample {
-                    stratum: (x % STRATA) + (y % STRATA) * STRATA,
-                    pixel: [x as i32, y as i32],
-                };
+                let sample = LightSample { stratum: (x % STRATA) + (y % STRATA) * STRATA, pixel: [x as i32, y as i32] };
                 point
                     .as_ref()
                     .filter(|point| point.glow == Vec3::ZERO)
@@ -66,12 +62,8 @@ impl<'a> LightGrid<'a> {
             }
         }
         let [direct, indirect] = &light.incoming;
-        let mut lit: Vec<f32> = direct
-            .iter()
-            .zip(indirect)
-            .map(|(a, b)| luminance(*a + *b))
-            .filter(|light| *light > 0.0)
-            .collect();
+        let mut lit: Vec<f32> =
+            direct.iter().zip(indirect).map(|(a, b)| luminance(*a + *b)).filter(|light| *light > 0.0).collect();
         let rank = (lit.len() as f32 * TYPICAL_QUANTILE) as usize;
         if rank < lit.len() {
             light.typical = *lit.select_nth_unstable_by(rank, f32::total_cmp).1;
@@ -79,7 +71,8 @@ impl<'a> LightGrid<'a> {
         light
     }
 
-    /// Runs one smoothing pass: the mean of neighbours in the same plane, `step` apart (à-trous filter, Dammertz et al., HPG 2010).
+    /// Runs one smoothing pass: the mean of neighbours in the same plane, `step` apart (à-trous filter, Dammertz et
+    /// al., HPG 2010).
     fn smooth(&self, incoming: &[Vec3], step: i32) -> Vec<Vec3> {
         let [width, height] = self.size;
         (0..width * height)
@@ -116,14 +109,11 @@ impl<'a> LightGrid<'a> {
         let (left, top) = (u.floor(), v.floor());
         let (mut sum, mut weights) = (Vec3::ZERO, 0.0);
         for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            let [i, j] = [
-                (left as usize + dx).min(width - 1),
-                (top as usize + dy).min(height - 1),
-            ];
+            let [i, j] = [(left as usize + dx).min(width - 1), (top as usize + dy).min(height - 1)];
             let index = j * width + i;
             if let Some(other) = &self.points[index] {
-                let near = (1.0 - (u - (left + dx as f32)).abs()).max(0.0)
-                    * (1.0 - (v - (top + dy as f32)).abs()).max(0.0);
+                let near =
+                    (1.0 - (u - (left + dx as f32)).abs()).max(0.0) * (1.0 - (v - (top + dy as f32)).abs()).max(0.0);
                 let weight = (near + 0.01) * similarity(point, other);
                 sum += (self.incoming[0][index] + self.incoming[1][index]) * weight;
                 weights += weight;
@@ -134,10 +124,7 @@ impl<'a> LightGrid<'a> {
         }
         (0..STRATA * STRATA)
             .map(|stratum| {
-                let sample = LightSample {
-                    stratum,
-                    pixel: [(x * 8.0) as i32, (y * 8.0) as i32],
-                };
+                let sample = LightSample { stratum, pixel: [(x * 8.0) as i32, (y * 8.0) as i32] };
                 let [direct, indirect] = self.lighting.incoming(point, sample);
                 direct + indirect
             })
@@ -145,13 +132,9 @@ impl<'a> LightGrid<'a> {
             / (STRATA * STRATA) as f32
     }
 
-    /// Light that a surface point sends to a camera; `image_position` is the position of the point in the image, in pixels.
-    pub(super) fn shade(
-        &self,
-        point: &SurfacePoint,
-        camera: Vec3,
-        image_position: [f32; 2],
-    ) -> Vec3 {
+    /// Light that a surface point sends to a camera; `image_position` is the position of the point in the image, in
+    /// pixels.
+    pub(super) fn shade(&self, point: &SurfacePoint, camera: Vec3, image_position: [f32; 2]) -> Vec3 {
         if point.glow != Vec3::ZERO {
             return self.glow(point);
         }
@@ -165,19 +148,14 @@ impl<'a> LightGrid<'a> {
         // Schlick's approximation of the Fresnel equations for a refractive index of 1.5.
         let rest = 1.0 - slant;
         let share = 0.04 + 0.96 * rest * rest * rest * rest * rest;
-        let ray = Ray::new(
-            point.position + point.normal * 1e-3,
-            reflect(direction, point.normal),
-        );
+        let ray = Ray::new(point.position + point.normal * 1e-3, reflect(direction, point.normal));
         let reflected = SurfacePoint::first_hit(self.lighting.scene, self.lighting.tree, &ray)
-            .map_or(Vec3::ZERO, |seen| {
-                seen.color * self.lighting.ambient * 1.6 + self.glow(&seen)
-            });
+            .map_or(Vec3::ZERO, |seen| seen.color * self.lighting.ambient * 1.6 + self.glow(&seen));
         matte * (1.0 - 0.5 * share) + reflected * (0.5 * share)
     }
 
-    /// Light of a point that glows. In display codes, the brightness of a lamp is relative to that of the room, so that it never looks
-    /// grey. In linear light, it is the radiance that lights the room.
+    /// Light of a point that glows. In display codes, the brightness of a lamp is relative to that of the room, so that
+    /// it never looks grey. In linear light, it is the radiance that lights the room.
     fn glow(&self, point: &SurfacePoint) -> Vec3 {
         let radiance = self.radiances.get(point.thing).copied().flatten();
         match radiance.filter(|_| point.glow != Vec3::ZERO) {

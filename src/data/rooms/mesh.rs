@@ -1,7 +1,7 @@
 //! Triangle meshes ([`Mesh`]) and the solids that furniture is made of.
 //!
-//! Lengths are in metres and angles in radians. x points to the right, y up and z to the front. The bottom of a piece is at y = 0, its back
-//! at z = 0 and its middle at x = 0.
+//! Lengths are in metres and angles in radians. x points to the right, y up and z to the front. The bottom of a piece
+//! is at y = 0, its back at z = 0 and its middle at x = 0.
 
 use std::f32::consts::{PI, TAU};
 
@@ -30,9 +30,7 @@ impl Face {
         let longest = (b - a).length().max((c - a).length()).max((c - b).length());
         let count = (longest / spacing).ceil().max(1.0) as usize;
         (0..=count).flat_map(move |i| {
-            (0..=count - i).map(move |j| {
-                a + (b - a) * (i as f32 / count as f32) + (c - a) * (j as f32 / count as f32)
-            })
+            (0..=count - i).map(move |j| a + (b - a) * (i as f32 / count as f32) + (c - a) * (j as f32 / count as f32))
         })
     }
 }
@@ -114,16 +112,11 @@ impl Mesh {
     pub(super) fn grid(&mut self, rows: &[Vec<Vec3>], surface: &Surface) {
         let surface = self.surface_index(surface);
         let (height, width) = (rows.len(), rows.first().map_or(0, Vec::len));
-        let is_closed = rows
-            .iter()
-            .all(|row| row[0].distance_squared(row[width - 1]) < 1e-10);
+        let is_closed = rows.iter().all(|row| row[0].distance_squared(row[width - 1]) < 1e-10);
         let corners: Vec<Vec<Corner>> = (0..height)
             .map(|y| {
                 (0..width)
-                    .map(|x| Corner {
-                        position: rows[y][x],
-                        normal: grid_normal(rows, [y, x], is_closed),
-                    })
+                    .map(|x| Corner { position: rows[y][x], normal: grid_normal(rows, [y, x], is_closed) })
                     .collect()
             })
             .collect();
@@ -154,22 +147,11 @@ impl Mesh {
 
     /// Adds a box centered at x = 0, given by half of its width and its bounds in y and z.
     pub(super) fn board(&mut self, half_width: f32, y: [f32; 2], z: [f32; 2], surface: &Surface) {
-        self.block(
-            vec3(-half_width, y[0], z[0]),
-            vec3(half_width, y[1], z[1]),
-            surface,
-        );
+        self.block(vec3(-half_width, y[0], z[0]), vec3(half_width, y[1], z[1]), surface);
     }
 
     /// Adds a [board](Self::board) with rounded edges.
-    pub(super) fn cushion(
-        &mut self,
-        half_width: f32,
-        y: [f32; 2],
-        z: [f32; 2],
-        radius: f32,
-        surface: &Surface,
-    ) {
+    pub(super) fn cushion(&mut self, half_width: f32, y: [f32; 2], z: [f32; 2], radius: f32, surface: &Surface) {
         let (low, high) = (vec3(-half_width, y[0], z[0]), vec3(half_width, y[1], z[1]));
         self.rounded_box(low, high, radius, surface);
     }
@@ -195,15 +177,9 @@ impl Mesh {
         let mut rows = Vec::new();
         for (row, end) in (0..=ROWS).flat_map(|row| {
             let twice = row == ROWS / 2;
-            [Some((row, 1.0)), twice.then_some((row, -1.0))]
-                .into_iter()
-                .flatten()
+            [Some((row, 1.0)), twice.then_some((row, -1.0))].into_iter().flatten()
         }) {
-            let height = if row == ROWS / 2 {
-                end
-            } else {
-                sign(ROWS as f32 / 2.0 - row as f32)
-            };
+            let height = if row == ROWS / 2 { end } else { sign(ROWS as f32 / 2.0 - row as f32) };
             let mut line: Vec<Vec3> = (0..SIDES)
                 .rev()
                 .map(|side: usize| {
@@ -228,42 +204,23 @@ impl Mesh {
         let surface = self.surface_index(surface);
         let middle = ring.iter().sum::<Vec3>() / ring.len() as f32;
         for pair in ring.windows(2) {
-            self.triangle(
-                [middle, pair[0], pair[1]].map(|position| Corner { position, normal }),
-                surface,
-            );
+            self.triangle([middle, pair[0], pair[1]].map(|position| Corner { position, normal }), surface);
         }
     }
 
-    /// Adds a solid of revolution about y with sharp edges, stretched along z by the factor `depth`. `profile` lists (radius, height above
-    /// `foot`) pairs from the bottom to the top.
-    pub(super) fn lathe(
-        &mut self,
-        foot: Vec3,
-        profile: &[(f32, f32)],
-        depth: f32,
-        surface: &Surface,
-    ) {
+    /// Adds a solid of revolution about y with sharp edges, stretched along z by the factor `depth`. `profile` lists
+    /// (radius, height above `foot`) pairs from the bottom to the top.
+    pub(super) fn lathe(&mut self, foot: Vec3, profile: &[(f32, f32)], depth: f32, surface: &Surface) {
         // Each section between two radii gets its own normals, so that the edges are sharp.
         for pair in profile.windows(2) {
-            let rings =
-                [pair[0], pair[1]].map(|(radius, height)| ring(foot, radius, height, depth));
+            let rings = [pair[0], pair[1]].map(|(radius, height)| ring(foot, radius, height, depth));
             self.grid(&rings, surface);
         }
     }
 
     /// Adds a [solid of revolution](Self::lathe) without sharp edges.
-    pub(super) fn smooth_lathe(
-        &mut self,
-        foot: Vec3,
-        profile: &[(f32, f32)],
-        depth: f32,
-        surface: &Surface,
-    ) {
-        let rings: Vec<_> = profile
-            .iter()
-            .map(|(radius, height)| ring(foot, *radius, *height, depth))
-            .collect();
+    pub(super) fn smooth_lathe(&mut self, foot: Vec3, profile: &[(f32, f32)], depth: f32, surface: &Surface) {
+        let rings: Vec<_> = profile.iter().map(|(radius, height)| ring(foot, *radius, *height, depth)).collect();
         self.grid(&rings, surface);
     }
 
@@ -278,15 +235,14 @@ impl Mesh {
         let aside = if axis.y.abs() > 0.9 { Vec3::X } else { Vec3::Y };
         let across = axis.cross(aside).normalize_or_zero();
         let over = axis.cross(across);
-        let [low, high]: [Vec<Vec3>; 2] =
-            [(from, radii[0]), (to, radii[1])].map(|(middle, radius)| {
-                (0..=SIDES)
-                    .map(|side: usize| {
-                        let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
-                        middle + (across * around.x + over * around.y) * radius
-                    })
-                    .collect()
-            });
+        let [low, high]: [Vec<Vec3>; 2] = [(from, radii[0]), (to, radii[1])].map(|(middle, radius)| {
+            (0..=SIDES)
+                .map(|side: usize| {
+                    let around = cos_sin(TAU * (side % SIDES) as f32 / SIDES as f32);
+                    middle + (across * around.x + over * around.y) * radius
+                })
+                .collect()
+        });
         self.grid(&[low.clone(), high.clone()], surface);
         self.cap(&low, -axis, surface);
         self.cap(&high, axis, surface);
@@ -309,44 +265,31 @@ impl Mesh {
         self.grid(&rows, surface);
     }
 
-    /// Adds a pillow, thick in its middle and thin at its seam. `size` is the width, height and thickness of the upright pillow; `lean` is
-    /// the angle by which its top is tilted backwards.
+    /// Adds a pillow, thick in its middle and thin at its seam. `size` is the width, height and thickness of the
+    /// upright pillow; `lean` is the angle by which its top is tilted backwards.
     pub(super) fn pillow(&mut self, middle: Vec3, size: Vec3, lean: f32, surface: &Surface) {
         const CELLS: usize = 10;
         let tilt = cos_sin(lean);
         for side in [1.0_f32, -1.0] {
             let point = |row: usize, column: usize| {
-                let [across, down] =
-                    [column, row].map(|cell| 2.0 * cell as f32 / CELLS as f32 - 1.0);
+                let [across, down] = [column, row].map(|cell| 2.0 * cell as f32 / CELLS as f32 - 1.0);
                 let (u, v) = (across * side, -down);
                 let (u4, v4) = (u * u * u * u, v * v * v * v);
                 let swell = ((1.0 - u4) * (1.0 - v4)).max(0.0).sqrt();
                 // The corners reach a little farther out than the middle of the edges.
                 let pinch = vec2(1.0 - 0.06 * (1.0 - v * v), 1.0 - 0.06 * (1.0 - u * u));
                 let flat = vec3(u * pinch.x, v * pinch.y, side * swell) * size / 2.0;
-                let turned = vec3(
-                    flat.x,
-                    flat.y * tilt.x + flat.z * tilt.y,
-                    flat.z * tilt.x - flat.y * tilt.y,
-                );
+                let turned = vec3(flat.x, flat.y * tilt.x + flat.z * tilt.y, flat.z * tilt.x - flat.y * tilt.y);
                 middle + turned
             };
-            let rows: Vec<Vec<Vec3>> = (0..=CELLS)
-                .map(|row| (0..=CELLS).map(|column| point(row, column)).collect())
-                .collect();
+            let rows: Vec<Vec<Vec3>> =
+                (0..=CELLS).map(|row| (0..=CELLS).map(|column| point(row, column)).collect()).collect();
             self.grid(&rows, surface);
         }
     }
 
     /// Adds cloth that hangs in folds: `width` along x from `left`, `drop` downwards; `fold` is the width of one fold.
-    pub(super) fn drape(
-        &mut self,
-        left: Vec3,
-        width: f32,
-        drop: f32,
-        fold: f32,
-        surface: &Surface,
-    ) {
+    pub(super) fn drape(&mut self, left: Vec3, width: f32, drop: f32, fold: f32, surface: &Surface) {
         let columns = ((width / fold) as usize).max(1) * 8;
         let rows: [Vec<Vec3>; 4] = [0.0, 0.33, 0.67, 1.0].map(|height| {
             (0..=columns)
@@ -364,24 +307,12 @@ impl Mesh {
     /// Adds another mesh, rotated about y by `angle` and then moved by `offset`.
     pub(super) fn add(&mut self, other: &Self, offset: Vec3, angle: f32) {
         let rotation = cos_sin(angle);
-        let surfaces: Vec<usize> = other
-            .surfaces
-            .iter()
-            .map(|s| self.surface_index(s))
-            .collect();
+        let surfaces: Vec<usize> = other.surfaces.iter().map(|s| self.surface_index(s)).collect();
         self.faces.extend(other.faces.iter().map(|face| Face {
             corners: face.corners.map(|corner| {
-                let [position, normal] = [corner.position, corner.normal].map(|v| {
-                    vec3(
-                        v.x * rotation.x + v.z * rotation.y,
-                        v.y,
-                        v.z * rotation.x - v.x * rotation.y,
-                    )
-                });
-                Corner {
-                    position: offset + position,
-                    normal,
-                }
+                let [position, normal] = [corner.position, corner.normal]
+                    .map(|v| vec3(v.x * rotation.x + v.z * rotation.y, v.y, v.z * rotation.x - v.x * rotation.y));
+                Corner { position: offset + position, normal }
             }),
             surface: surfaces[face.surface],
         }));
@@ -406,10 +337,12 @@ impl Mesh {
 
 /// Lowest and highest corner of the bounding box of triangles.
 pub(super) fn bounds(faces: &[Face]) -> [Vec3; 2] {
-    faces.iter().flat_map(|face| face.corners).fold(
-        [Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)],
-        |[low, high], corner| [low.min(corner.position), high.max(corner.position)],
-    )
+    faces
+        .iter()
+        .flat_map(|face| face.corners)
+        .fold([Vec3::splat(f32::MAX), Vec3::splat(f32::MIN)], |[low, high], corner| {
+            [low.min(corner.position), high.max(corner.position)]
+        })
 }
 
 /// Closed ring of points about y, given by its radius and its height above `foot`; `depth` stretches it along z.

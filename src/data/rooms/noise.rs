@@ -21,8 +21,7 @@ pub(super) fn value_noise(position: Vec3) -> f32 {
     let [x, y, z] = [cell.x as i32, cell.y as i32, cell.z as i32];
     let sheets = [0, 1].map(|k| {
         let rows = [0, 1].map(|j| {
-            let corners =
-                [0, 1].map(|i| hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k)));
+            let corners = [0, 1].map(|i| hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k)));
             mix(corners, share.x)
         });
         mix(rows, share.y)

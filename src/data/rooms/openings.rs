@@ -55,21 +55,14 @@ impl FloorPlan {
         }
     }
 
-    /// Adds the room behind an open door, given the pose of the door and the distances from its middle to the ends of the wall. The words
-    /// of all things in it end in `/otherroom`.
+    /// Adds the room behind an open door, given the pose of the door and the distances from its middle to the ends of
+    /// the wall. The words of all things in it end in `/otherroom`.
     fn add_next_room(&mut self, pose: &Pose, sides: [f32; 2]) {
         let [left, right] = sides.map(|side| side.min(self.rng.between(1.2, 2.4)));
         let (back, high) = (-WALL_THICKNESS - self.rng.between(1.6, 3.6), self.size.y);
-        let flooring = self
-            .rng
-            .pick(&[Flooring::Wood, Flooring::Tiles, Flooring::Carpet]);
+        let flooring = self.rng.pick(&[Flooring::Wood, Flooring::Tiles, Flooring::Carpet]);
         let floor = floor_surface(flooring, &mut self.rng);
-        let tint = self.rng.pick(&[
-            [196, 186, 170],
-            [164, 172, 170],
-            [186, 160, 136],
-            [140, 150, 164],
-        ]);
+        let tint = self.rng.pick(&[[196, 186, 170], [164, 172, 170], [186, 160, 136], [140, 150, 164]]);
         let paint = Surface::plain(tint).with_pattern(Pattern::Plaster);
         let white = Surface::plain([210, 208, 202]);
         let [ground, ceiling, wall] = ["floor/otherroom", "ceiling/otherroom", "wall/otherroom"];
@@ -77,26 +70,10 @@ impl FloorPlan {
         let sheets = [
             (ground, &floor, [west, east, -0.05, 0.0, back, south]),
             (ground, &floor, [-0.44, 0.44, -0.05, 0.0, south, 0.0]),
-            (
-                ceiling,
-                &white,
-                [west, east, high, high + 0.05, back, south],
-            ),
-            (
-                wall,
-                &paint,
-                [west, east, 0.0, high, back - thickness, back],
-            ),
-            (
-                wall,
-                &paint,
-                [west - thickness, west, 0.0, high, back, south],
-            ),
-            (
-                wall,
-                &paint,
-                [east, east + thickness, 0.0, high, back, south],
-            ),
+            (ceiling, &white, [west, east, high, high + 0.05, back, south]),
+            (wall, &paint, [west, east, 0.0, high, back - thickness, back]),
+            (wall, &paint, [west - thickness, west, 0.0, high, back, south]),
+            (wall, &paint, [east, east + thickness, 0.0, high, back, south]),
         ];
         for (word, surface, [x, to_x, y, to_y, z, to_z]) in sheets {
             let mut mesh = Mesh::default();
@@ -125,11 +102,7 @@ impl FloorPlan {
                 let name = kind("cabinet/otherroom", "cabinet");
                 storage::cabinet(name, vec3(0.9, 1.0, 0.4), 2, rng)
             }
-            3 => seats::chair(
-                kind("chair/otherroom", "chair"),
-                Paint::random(&ALL_COLORS, rng),
-                rng,
-            ),
+            3 => seats::chair(kind("chair/otherroom", "chair"), Paint::random(&ALL_COLORS, rng), rng),
             _ => plants::plant(1.2, rng).with_word("potted plant/otherroom"),
         };
         let half = bounds(&furniture.mesh.faces)[1].x.min((right - left) / 2.0);
@@ -143,27 +116,15 @@ impl FloorPlan {
     }
 
     /// Adds one to three windows as [`Self::add_window`] does.
-    pub(super) fn add_windows(
-        &mut self,
-        choices: &[Wall],
-        width: f32,
-        sill: f32,
-        dressing: WindowDressing,
-    ) {
+    pub(super) fn add_windows(&mut self, choices: &[Wall], width: f32, sill: f32, dressing: WindowDressing) {
         for _ in 0..=self.rng.below(3) {
             self.add_window(choices, width, sill, dressing);
         }
     }
 
-    /// Adds a window with its curtains or blinds to one of these walls, if it has enough free space. `sill` is the height of the window
-    /// sill in metres.
-    pub(super) fn add_window(
-        &mut self,
-        choices: &[Wall],
-        width: f32,
-        sill: f32,
-        dressing: WindowDressing,
-    ) {
+    /// Adds a window with its curtains or blinds to one of these walls, if it has enough free space. `sill` is the
+    /// height of the window sill in metres.
+    pub(super) fn add_window(&mut self, choices: &[Wall], width: f32, sill: f32, dressing: WindowDressing) {
         let reach = width / 2.0
             + match dressing {
                 WindowDressing::Curtains => 0.62,
@@ -189,13 +150,7 @@ impl FloorPlan {
     }
 
     /// Adds the curtains or blinds of a window at a pose.
-    fn add_dressing(
-        &mut self,
-        pose: &Pose,
-        [width, reach]: [f32; 2],
-        sill: f32,
-        dressing: WindowDressing,
-    ) {
+    fn add_dressing(&mut self, pose: &Pose, [width, reach]: [f32; 2], sill: f32, dressing: WindowDressing) {
         match dressing {
             WindowDressing::Bare => {}
             WindowDressing::Blinds => {

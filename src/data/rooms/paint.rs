@@ -31,11 +31,7 @@ const PAINTS: [(&str, &[[u8; 3]]); 11] = [
 /// Linear light of one sRGB code (IEC 61966-2-1).
 fn linear(code: u8) -> f32 {
     let value = f32::from(code) / 255.0;
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        libm::powf((value + 0.055) / 1.055, 2.4)
-    }
+    if value <= 0.04045 { value / 12.92 } else { libm::powf((value + 0.055) / 1.055, 2.4) }
 }
 
 /// sRGB codes of a number in the form `0xrrggbb`.
@@ -52,32 +48,22 @@ impl Paint {
     /// Returns a random paint with one of these names.
     pub(super) fn random(names: &[&str], rng: &mut SeededRng) -> Self {
         let name = rng.pick(names);
-        let (name, codes) = PAINTS
-            .iter()
-            .find(|(known, _)| *known == name)
-            .map_or(PAINTS[0], |found| *found);
-        Self {
-            name,
-            color: linear_rgb(rng.pick(codes)),
-        }
+        let (name, codes) = PAINTS.iter().find(|(known, _)| *known == name).map_or(PAINTS[0], |found| *found);
+        Self { name, color: linear_rgb(rng.pick(codes)) }
     }
 
     /// Creates a paint whose colour has no name that people agree on.
     pub(super) fn nameless(codes: [u8; 3]) -> Self {
-        Self {
-            name: "",
-            color: linear_rgb(codes),
-        }
+        Self { name: "", color: linear_rgb(codes) }
     }
 }
 
 /// Colour names for furniture and textiles. A name that is listed twice is twice as likely.
 pub(super) const COMMON_COLORS: [&str; 16] = [
-    "black", "grey", "grey", "white", "white", "red", "red", "orange", "yellow", "green", "green",
-    "blue", "blue", "purple", "pink", "brown",
+    "black", "grey", "grey", "white", "white", "red", "red", "orange", "yellow", "green", "green", "blue", "blue",
+    "purple", "pink", "brown",
 ];
 
 /// The eleven basic colour terms.
-pub(super) const ALL_COLORS: [&str; 11] = [
-    "black", "grey", "white", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown",
-];
+pub(super) const ALL_COLORS: [&str; 11] =
+    ["black", "grey", "white", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown"];

@@ -1,6 +1,7 @@
 //! Patterns of surfaces: [`Pattern`] varies a colour with the position in the coordinates of the thing.
 //!
-//! Details smaller than a pixel fade out, as in a camera. A pattern therefore needs the width of a pixel on the surface.
+//! Details smaller than a pixel fade out, as in a camera. A pattern therefore needs the width of a pixel on the
+//! surface.
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
@@ -18,8 +19,8 @@ pub(super) enum Pattern {
     Grain(usize),
     /// Boards along an axis, of this width.
     Boards(usize, f32),
-    /// Tiles of this width and height, with joints of this colour. Every second row is shifted by half a tile if the tiles are wider than
-    /// high.
+    /// Tiles of this width and height, with joints of this colour. Every second row is shifted by half a tile if the
+    /// tiles are wider than high.
     Tiles([f32; 2], Vec3),
     /// Stones of different sizes, with joints.
     Masonry,
@@ -76,12 +77,11 @@ impl PatternPoint {
 
     /// Brightness of wood with streaks along an axis.
     fn grain(&self, position: Vec3, axis: usize) -> f32 {
-        let [fine, streaks, broad] =
-            [(190.0, 0.04), (70.0, 0.05), (14.0, 0.1)].map(|(cells, stretch)| {
-                let mut cells = Vec3::splat(cells);
-                cells[axis] *= stretch;
-                self.noise_at(position, cells)
-            });
+        let [fine, streaks, broad] = [(190.0, 0.04), (70.0, 0.05), (14.0, 0.1)].map(|(cells, stretch)| {
+            let mut cells = Vec3::splat(cells);
+            cells[axis] *= stretch;
+            self.noise_at(position, cells)
+        });
         0.97 + 0.1 * fine + 0.16 * streaks + 0.12 * broad
     }
 
@@ -101,11 +101,7 @@ impl PatternPoint {
         let shift = Vec3::splat(hash(row as i32, piece as i32, 3) * 9.0);
         let wood = tint * self.grain(self.position + shift, axis);
         let joint = x.min(width - x).min(z.min(LENGTH - z)) < 0.003_f32.max(self.pixel_width * 0.5);
-        if joint {
-            wood * (1.0 - 0.6 * self.line_visibility(0.006))
-        } else {
-            wood
-        }
+        if joint { wood * (1.0 - 0.6 * self.line_visibility(0.006)) } else { wood }
     }
 
     fn tiles(&self, color: Vec3, [width, height]: [f32; 2], joint: Vec3) -> Vec3 {
@@ -124,7 +120,8 @@ impl PatternPoint {
         }
     }
 
-    /// Colour of masonry: the stones are cells of a jittered grid (Worley, SIGGRAPH 1996), with a joint where two are equally near.
+    /// Colour of masonry: the stones are cells of a jittered grid (Worley, SIGGRAPH 1996), with a joint where two are
+    /// equally near.
     fn masonry(&self, color: Vec3) -> Vec3 {
         let scaled = self.uv * vec2(3.4, 6.0);
         let cell = scaled.floor();
@@ -141,10 +138,7 @@ impl PatternPoint {
             }
         }
         let stone = color * (0.62 + 0.5 * own + 0.16 * self.noise(60.0) + 0.14 * self.noise(18.0));
-        stone.lerp(
-            color * 1.05,
-            ((0.14 - (second - first)) / 0.05).clamp(0.0, 1.0),
-        )
+        stone.lerp(color * 1.05, ((0.14 - (second - first)) / 0.05).clamp(0.0, 1.0))
     }
 
     /// Brightness of woven cloth.
@@ -162,7 +156,8 @@ impl PatternPoint {
         0.92 + 0.2 * self.noise(150.0) + 0.16 * self.noise(60.0) + 0.08 * self.noise(18.0)
     }
 
-    /// True if the point is on a printed flower. The flowers have five petals and form a grid with every second row shifted.
+    /// True if the point is on a printed flower. The flowers have five petals and form a grid with every second row
+    /// shifted.
     fn is_on_flower(&self, distance: f32) -> bool {
         let row = (self.uv.y / distance).floor();
         let x = self.uv.x / distance + 0.5 * row.rem_euclid(2.0);
@@ -175,8 +170,7 @@ impl PatternPoint {
     fn rug(&self, color: Vec3, size: Vec2, border: Vec3) -> Vec3 {
         let edge = (size.x / 2.0 - self.position.x.abs()).min(size.y / 2.0 - self.position.z.abs());
         let motif = edge > 0.22 && (0.3..0.42).contains(&diamond(self.uv * 3.1));
-        let small = edge < 0.17 && diamond(self.uv * 12.0) < 0.3
-            || edge > 0.22 && diamond(self.uv * 9.3) < 0.2;
+        let small = edge < 0.17 && diamond(self.uv * 12.0) < 0.3 || edge > 0.22 && diamond(self.uv * 9.3) < 0.2;
         let dyed = match () {
             () if (0.03..0.05).contains(&edge) || (0.17..0.2).contains(&edge) || motif => border,
             () if small => color.lerp(border, 0.55),
@@ -188,14 +182,10 @@ impl PatternPoint {
 }
 
 impl Pattern {
-    /// Applies the pattern to a colour at a position with a surface normal, both in the coordinates of the thing. `pixel_width` is the
-    /// width of a pixel there, in metres.
+    /// Applies the pattern to a colour at a position with a surface normal, both in the coordinates of the thing.
+    /// `pixel_width` is the width of a pixel there, in metres.
     pub(super) fn color(self, color: Vec3, position: Vec3, normal: Vec3, pixel_width: f32) -> Vec3 {
-        let point = PatternPoint {
-            position,
-            uv: project_to_axis_plane(position, normal),
-            pixel_width,
-        };
+        let point = PatternPoint { position, uv: project_to_axis_plane(position, normal), pixel_width };
         match self {
             Self::Plain => color,
             Self::Brushed => color * (1.0 + 0.07 * point.noise(90.0) + 0.06 * point.noise(30.0)),
@@ -310,9 +300,7 @@ fn painting(position: Vec3, size: Vec2, seed: u32) -> Vec3 {
 /// Colour of the view through a window: trees under a sky.
 fn outdoor_view(position: Vec3, height: f32) -> Vec3 {
     let up = position.y / height;
-    let trees = 0.34
-        + 0.3 * value_noise(vec3(position.x * 2.2, 3.0, 7.0))
-        + 0.12 * value_noise(position * 9.0);
+    let trees = 0.34 + 0.3 * value_noise(vec3(position.x * 2.2, 3.0, 7.0)) + 0.12 * value_noise(position * 9.0);
     let sky = vec3(0.72, 0.84, 1.0).lerp(vec3(0.95, 0.97, 1.0), (1.0 - up).clamp(0.0, 1.0));
     let leaves = 0.4 + 0.7 * value_noise(position * 9.0) + 0.5 * value_noise(position * 34.0);
     let green = vec3(0.22, 0.33, 0.16) * leaves;

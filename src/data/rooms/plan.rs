@@ -59,7 +59,8 @@ pub(super) struct FloorPlan {
 const TRIES: usize = 60;
 
 impl FloorPlan {
-    /// Creates an empty room with floor and ceiling. [`FloorPlan::add_walls`] adds the walls once all doorways are known.
+    /// Creates an empty room with floor and ceiling. [`FloorPlan::add_walls`] adds the walls once all doorways are
+    /// known.
     pub(super) fn new(size: Vec3, flooring: Flooring, tiled: bool, mut rng: SeededRng) -> Self {
         let shell = Shell::new(tiled, &mut rng);
         let mut plan = Self {
@@ -95,13 +96,8 @@ impl FloorPlan {
     pub(super) fn add_walls(&mut self) {
         for (i, wall) in WALLS.into_iter().enumerate() {
             let width = self.wall_length(wall);
-            let mut doorways: Vec<Doorway> = self
-                .shell
-                .doorways
-                .iter()
-                .filter(|doorway| doorway.wall == wall)
-                .copied()
-                .collect();
+            let mut doorways: Vec<Doorway> =
+                self.shell.doorways.iter().filter(|doorway| doorway.wall == wall).copied().collect();
             doorways.sort_by(|a, b| a.along[0].total_cmp(&b.along[0]));
             let [left, right] = [-width / 2.0 - WALL_THICKNESS, width / 2.0 + WALL_THICKNESS];
             let (mut mesh, mut built_to) = (Mesh::default(), left);
@@ -117,15 +113,12 @@ impl FloorPlan {
         }
     }
 
-    /// Adds the part of a wall between `left` and `right` to its mesh, from the height `bottom` up to the ceiling, in metres.
+    /// Adds the part of a wall between `left` and `right` to its mesh, from the height `bottom` up to the ceiling, in
+    /// metres.
     fn add_panel(&self, mesh: &mut Mesh, wall: usize, [left, right]: [f32; 2], bottom: f32) {
         let shell = &self.shell;
         let corner = vec3(right, self.size.y, 0.0);
-        mesh.block(
-            vec3(left, bottom, -WALL_THICKNESS),
-            corner,
-            &shell.walls[wall],
-        );
+        mesh.block(vec3(left, bottom, -WALL_THICKNESS), corner, &shell.walls[wall]);
         let mut layer = |surface: &Surface, top: f32, depth: f32| {
             if top > bottom {
                 mesh.block(vec3(left, bottom, 0.0), vec3(right, top, depth), surface);
@@ -148,7 +141,8 @@ impl FloorPlan {
         }
     }
 
-    /// Pose of a piece with its back at a wall, `along` metres from the left end of the wall and `up` metres above the floor.
+    /// Pose of a piece with its back at a wall, `along` metres from the left end of the wall and `up` metres above the
+    /// floor.
     pub(super) fn wall_pose(&self, wall: Wall, along: f32, up: f32) -> Pose {
         let position = match wall {
             Wall::North => vec3(along, up, 0.0),
@@ -168,14 +162,9 @@ impl FloorPlan {
         self.scene.things.len() - 1
     }
 
-    /// Adds a piece on or next to another one, whose pose is `base`; `position` is in the coordinates of `base`. Returns its index.
-    pub(super) fn add_relative(
-        &mut self,
-        base: &Pose,
-        piece: Piece,
-        position: Vec3,
-        angle: f32,
-    ) -> usize {
+    /// Adds a piece on or next to another one, whose pose is `base`; `position` is in the coordinates of `base`.
+    /// Returns its index.
+    pub(super) fn add_relative(&mut self, base: &Pose, piece: Piece, position: Vec3, angle: f32) -> usize {
         self.add(piece, Pose::new(base.to_room(position), base.angle + angle))
     }
 
@@ -188,13 +177,11 @@ impl FloorPlan {
         first
     }
 
-    /// Floor area of a box of this size, whose back is `from` metres in front of the pose. The angle must be a multiple of 90°.
+    /// Floor area of a box of this size, whose back is `from` metres in front of the pose. The angle must be a multiple
+    /// of 90°.
     fn footprint(pose: &Pose, size: Vec3, from: f32) -> FloorArea {
-        let corners = [
-            vec3(-size.x / 2.0, 0.0, from),
-            vec3(size.x / 2.0, 0.0, from + size.z),
-        ]
-        .map(|corner| pose.to_room(corner));
+        let corners =
+            [vec3(-size.x / 2.0, 0.0, from), vec3(size.x / 2.0, 0.0, from + size.z)].map(|corner| pose.to_room(corner));
         let (low, high) = (corners[0].min(corners[1]), corners[0].max(corners[1]));
         FloorArea([low.x, low.z, high.x, high.z])
     }
@@ -220,13 +207,9 @@ impl FloorPlan {
         })
     }
 
-    /// Places a set at a wall, with its middle `along` metres from the left end. Returns its pose; `None` if something is in the way.
-    pub(super) fn try_place_at_wall(
-        &mut self,
-        set: FurnitureSet,
-        wall: Wall,
-        along: f32,
-    ) -> Option<Pose> {
+    /// Places a set at a wall, with its middle `along` metres from the left end. Returns its pose; `None` if something
+    /// is in the way.
+    pub(super) fn try_place_at_wall(&mut self, set: FurnitureSet, wall: Wall, along: f32) -> Option<Pose> {
         let pose = self.wall_pose(wall, along, 0.0);
         let pose = Pose::new(pose.to_room(vec3(0.0, 0.0, 0.016)), pose.angle);
         let area = Self::footprint(&pose, set.size, 0.0);
@@ -251,27 +234,19 @@ impl FloorPlan {
         })
     }
 
-    /// Places a set in a random corner, with its back to one of these walls. Returns its pose; `None` without free space.
+    /// Places a set in a random corner, with its back to one of these walls. Returns its pose; `None` without free
+    /// space.
     pub(super) fn place_in_corner(&mut self, set: &FurnitureSet, choices: &[Wall]) -> Option<Pose> {
         (0..TRIES).find_map(|_| {
             let wall = self.rng.pick(choices);
             let half = set.size.x / 2.0 + 0.04;
-            let along = if self.rng.chance(0.5) {
-                half
-            } else {
-                self.wall_length(wall) - half
-            };
+            let along = if self.rng.chance(0.5) { half } else { self.wall_length(wall) - half };
             self.try_place_at_wall(set.clone(), wall, along)
         })
     }
 
     /// Places a set away from walls, centred on a position. Returns its pose; `None` if something is in the way.
-    pub(super) fn place_away_from_walls(
-        &mut self,
-        set: FurnitureSet,
-        position: Vec3,
-        angle: f32,
-    ) -> Option<Pose> {
+    pub(super) fn place_away_from_walls(&mut self, set: FurnitureSet, position: Vec3, angle: f32) -> Option<Pose> {
         let back = Pose::new(position, angle).to_room(vec3(0.0, 0.0, -set.size.z / 2.0));
         let pose = Pose::new(back, angle);
         let area = Self::footprint(&pose, set.size, 0.0);
@@ -301,8 +276,7 @@ impl FloorPlan {
         (0..TRIES).find_map(|_| {
             let wall = self.rng.pick(choices);
             let along = self.rng.between(half, self.wall_length(wall) - half);
-            let patch =
-                WallPatch::around(wall, along, half, [up + low.y - 0.05, up + high.y + 0.05]);
+            let patch = WallPatch::around(wall, along, half, [up + low.y - 0.05, up + high.y + 0.05]);
             self.is_free_on_wall(&patch).then(|| {
                 self.patches.push(patch);
                 let pose = self.wall_pose(wall, along, up);
@@ -315,9 +289,7 @@ impl FloorPlan {
     /// Hangs a piece `up` metres above a pose at a wall without checking for free space. Returns its index.
     pub(super) fn hang_above(&mut self, pose: &Pose, piece: Piece, up: f32) -> usize {
         let [low, high] = bounds(&piece.mesh.faces);
-        let wall = WALLS
-            .into_iter()
-            .find(|wall| (wall.angle() - pose.angle).abs() < 1e-3);
+        let wall = WALLS.into_iter().find(|wall| (wall.angle() - pose.angle).abs() < 1e-3);
         if let Some(wall) = wall {
             let along = match wall {
                 Wall::North => pose.position.x,

@@ -1,8 +1,8 @@
 //! Image and maps of a room from one camera: [`render`].
 //!
-//! Every pixel is traced once, and pixels at edges four more times. Light changes slowly, so it is sampled at every second
-//! pixel of every second row, smoothed between points of the same plane, and interpolated. A point without a similar
-//! neighbour gets its own samples.
+//! Every pixel is traced once, and pixels at edges four more times. Light changes slowly, so it is sampled at every
+//! second pixel of every second row, smoothed between points of the same plane, and interpolated. A point without a
+//! similar neighbour gets its own samples.
 
 use std::sync::{Arc, LazyLock};
 
@@ -29,27 +29,17 @@ pub(super) struct RenderedView {
 }
 
 /// Offsets of the four rays of a pixel at an edge, in pixels (rotated grid).
-const SUBPIXELS: [[f32; 2]; 4] = [
-    [-0.125, -0.375],
-    [0.375, -0.125],
-    [0.125, 0.375],
-    [-0.375, 0.125],
-];
+const SUBPIXELS: [[f32; 2]; 4] = [[-0.125, -0.375], [0.375, -0.125], [0.125, 0.375], [-0.375, 0.125]];
 
-/// Linear light of a white surface in the typical light of the view (chosen, so that the rooms are on average as bright as photographs of
-/// rooms).
+/// Linear light of a white surface in the typical light of the view (chosen, so that the rooms are on average as bright
+/// as photographs of rooms).
 const EXPOSURE: f32 = 0.98;
 
 /// Minimum difference of tone-mapped colours between neighbouring pixels that makes an edge (chosen).
 const EDGE_CONTRAST: f32 = 0.06;
 
 /// Renders the image and the maps of a scene. `encoding` is the encoding of the image.
-pub(super) fn render(
-    scene: &Scene,
-    tree: &Bvh,
-    camera: &Camera,
-    encoding: RoomLight,
-) -> RenderedView {
+pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, encoding: RoomLight) -> RenderedView {
     let [width, height] = camera.size;
     let points = trace_pixels(scene, tree, camera);
     let lighting = estimate_lighting(scene, tree, &points);
@@ -78,8 +68,7 @@ pub(super) fn render(
                 .map(|[dx, dy]| [at[0] as f32 + dx, at[1] as f32 + dy])
                 .map(|[x, y]| {
                     let point = SurfacePoint::through_mirror(scene, tree, &camera.ray(x, y));
-                    let color =
-                        point.map_or(color, |point| light.shade(&point, camera.position, [x, y]));
+                    let color = point.map_or(color, |point| light.shade(&point, camera.position, [x, y]));
                     curve(color * exposure)
                 })
                 .iter()
@@ -92,28 +81,19 @@ pub(super) fn render(
     let indices = (0..width * height).into_par_iter();
     let pixels = match encoding {
         RoomLight::Display => {
-            let codes: Vec<[u8; 3]> = indices
-                .map(|i| pixel(i, tone_map).to_array().map(srgb_code))
-                .collect();
-            let image = Rgb::new(height, width, codes.concat())
-                .unwrap_or_else(|_| Rgb::black(height, width));
+            let codes: Vec<[u8; 3]> = indices.map(|i| pixel(i, tone_map).to_array().map(srgb_code)).collect();
+            let image = Rgb::new(height, width, codes.concat()).unwrap_or_else(|_| Rgb::black(height, width));
             Pixels::Codes8(Arc::new(image))
         }
         RoomLight::Linear => {
-            let light: Vec<[f32; 3]> = indices
-                .map(|i| pixel(i, |light| light.max(Vec3::ZERO)).to_array())
-                .collect();
-            let image = Light::new(height, width, light.concat())
-                .unwrap_or_else(|_| Light::black(height, width));
+            let light: Vec<[f32; 3]> = indices.map(|i| pixel(i, |light| light.max(Vec3::ZERO)).to_array()).collect();
+            let image = Light::new(height, width, light.concat()).unwrap_or_else(|_| Light::black(height, width));
             Pixels::Light(Arc::new(image))
         }
     };
     RenderedView {
         depth: depth(&points, camera),
-        things: points
-            .iter()
-            .map(|point| point.map_or(0, |point| point.thing as u16 + 1))
-            .collect(),
+        things: points.iter().map(|point| point.map_or(0, |point| point.thing as u16 + 1)).collect(),
         pixels,
     }
 }
@@ -139,9 +119,7 @@ fn depth(points: &[Option<SurfacePoint>], camera: &Camera) -> Vec<u16> {
         .enumerate()
         .map(|(i, point)| {
             let ray = camera.ray((i % width) as f32, (i / width) as f32);
-            point.map_or(0, |point| {
-                (point.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u16
-            })
+            point.map_or(0, |point| (point.distance * ray.direction.dot(axis) * 1000.0 + 0.5) as u16)
         })
         .collect()
 }
@@ -159,24 +137,13 @@ pub(super) fn preview(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<u32> {
 }
 
 /// Estimates the ambient light of a scene from the direct light and the colours of visible points.
-fn estimate_lighting<'a>(
-    scene: &'a Scene,
-    tree: &'a Bvh,
-    points: &[Option<SurfacePoint>],
-) -> Lighting<'a> {
-    let mut lighting = Lighting {
-        scene,
-        tree,
-        ambient: Vec3::ZERO,
-    };
+fn estimate_lighting<'a>(scene: &'a Scene, tree: &'a Bvh, points: &[Option<SurfacePoint>]) -> Lighting<'a> {
+    let mut lighting = Lighting { scene, tree, ambient: Vec3::ZERO };
     let step = (points.len() / 1024).max(1);
     let (mut direct, mut albedo, mut count) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     for (i, point) in points.iter().step_by(step).flatten().enumerate() {
         if point.glow == Vec3::ZERO {
-            let sample = LightSample {
-                stratum: i % (STRATA * STRATA),
-                pixel: [i as i32, -1],
-            };
+            let sample = LightSample { stratum: i % (STRATA * STRATA), pixel: [i as i32, -1] };
             direct += lighting.direct(point.position, point.normal, sample);
             albedo += point.color;
             count += 1.0;
@@ -213,16 +180,13 @@ fn is_edge(
             (Some(a), Some(b)) => a.thing != b.thing || a.seen_thing != b.seen_thing,
             _ => true,
         };
-        let (a, b) = (
-            tone_map(colors[own] * exposure),
-            tone_map(colors[other] * exposure),
-        );
+        let (a, b) = (tone_map(colors[own] * exposure), tone_map(colors[other] * exposure));
         is_thing_edge || (a - b).abs().max_element() > EDGE_CONTRAST
     })
 }
 
-/// Compresses bright linear light, so that windows keep details. All channels are divided by the same number, so that a bright colour
-/// keeps its name.
+/// Compresses bright linear light, so that windows keep details. All channels are divided by the same number, so that a
+/// bright colour keeps its name.
 fn tone_map(light: Vec3) -> Vec3 {
     const KNEE: f32 = 0.6;
     let most = light.max_element();
@@ -241,11 +205,7 @@ fn srgb_code(value: f32) -> u8 {
         (1..=255)
             .map(|code: u16| {
                 let value = (f32::from(code) - 0.5) / 255.0;
-                if value <= 0.04045 {
-                    value / 12.92
-                } else {
-                    libm::powf((value + 0.055) / 1.055, 2.4)
-                }
+                if value <= 0.04045 { value / 12.92 } else { libm::powf((value + 0.055) / 1.055, 2.4) }
             })
             .collect()
     });

@@ -47,14 +47,7 @@ impl RenderedFrame {
             depth: Some(self.map(shape, self.depth.iter().copied().map(u32::from))?),
             depth_kind: DepthKind::Planar,
             intrinsics: Some(self.camera.intrinsics()),
-            semantic: Some(
-                self.map(
-                    shape,
-                    self.things
-                        .iter()
-                        .map(|thing| self.classes[usize::from(*thing)]),
-                )?,
-            ),
+            semantic: Some(self.map(shape, self.things.iter().map(|thing| self.classes[usize::from(*thing)]))?),
             segments: Some(self.map(shape, self.things.iter().copied().map(u32::from))?),
             segmentation: Segmentation::Instances,
             names: Arc::clone(&self.names),
@@ -64,7 +57,6 @@ impl RenderedFrame {
     }
 
     fn map<T>(&self, shape: (usize, usize), values: impl Iterator<Item = T>) -> Result<Array2<T>> {
-        Array2::from_shape_vec(shape, values.collect())
-            .map_err(|e| Error::data(format_args!("frame {}", self.id), e))
+        Array2::from_shape_vec(shape, values.collect()).map_err(|e| Error::data(format_args!("frame {}", self.id), e))
     }
 }

@@ -19,11 +19,7 @@ pub(super) struct ThingKind {
 impl ThingKind {
     /// Name of a segment that shows such a thing.
     pub(super) fn segment_name(&self) -> SegmentName {
-        SegmentName {
-            name: self.word.to_owned(),
-            canonical: self.class.to_owned(),
-            region: None,
-        }
+        SegmentName { name: self.word.to_owned(), canonical: self.class.to_owned(), region: None }
     }
 }
 
@@ -44,12 +40,7 @@ pub(super) struct Piece {
 
 impl Piece {
     pub(super) fn new(kind: ThingKind, mesh: Mesh, color: &'static str) -> Self {
-        Self {
-            kind,
-            mesh,
-            color,
-            light: None,
-        }
+        Self { kind, mesh, color, light: None }
     }
 
     /// Returns the piece with another word.
@@ -79,22 +70,13 @@ impl Pose {
     /// Rotates a direction from room coordinates to those of the piece.
     pub(super) fn direction_to_piece(&self, v: Vec3) -> Vec3 {
         let rotation = cos_sin(self.angle);
-        vec3(
-            v.x * rotation.x - v.z * rotation.y,
-            v.y,
-            v.z * rotation.x + v.x * rotation.y,
-        )
+        vec3(v.x * rotation.x - v.z * rotation.y, v.y, v.z * rotation.x + v.x * rotation.y)
     }
 
     /// Transforms a point from the coordinates of the piece to room coordinates.
     pub(super) fn to_room(self, v: Vec3) -> Vec3 {
         let rotation = cos_sin(self.angle);
-        self.position
-            + vec3(
-                v.x * rotation.x + v.z * rotation.y,
-                v.y,
-                v.z * rotation.x - v.x * rotation.y,
-            )
+        self.position + vec3(v.x * rotation.x + v.z * rotation.y, v.y, v.z * rotation.x - v.x * rotation.y)
     }
 }
 
@@ -109,45 +91,24 @@ pub(super) struct Thing {
 /// A light source of the room.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum LightSource {
-    /// A flat light, such as the daylight in a window: a corner, two edges, the direction it shines in, and radiance by channel.
-    Panel {
-        corner: Vec3,
-        edges: [Vec3; 2],
-        normal: Vec3,
-        radiance: Vec3,
-    },
+    /// A flat light, such as the daylight in a window: a corner, two edges, the direction it shines in, and radiance by
+    /// channel.
+    Panel { corner: Vec3, edges: [Vec3; 2], normal: Vec3, radiance: Vec3 },
     /// A glowing sphere, such as a bulb: center and radius in metres, and radiance by channel.
-    Bulb {
-        middle: Vec3,
-        radius: f32,
-        radiance: Vec3,
-    },
+    Bulb { middle: Vec3, radius: f32, radiance: Vec3 },
 }
 
 impl LightSource {
     /// Transforms the light of a piece to room coordinates.
     fn to_room(self, pose: &Pose) -> Self {
         match self {
-            Self::Panel {
-                corner,
-                edges,
-                normal,
-                radiance,
-            } => Self::Panel {
+            Self::Panel { corner, edges, normal, radiance } => Self::Panel {
                 corner: pose.to_room(corner),
                 edges: edges.map(|edge| pose.to_room(edge) - pose.position),
                 normal: pose.to_room(normal) - pose.position,
                 radiance,
             },
-            Self::Bulb {
-                middle,
-                radius,
-                radiance,
-            } => Self::Bulb {
-                middle: pose.to_room(middle),
-                radius,
-                radiance,
-            },
+            Self::Bulb { middle, radius, radiance } => Self::Bulb { middle: pose.to_room(middle), radius, radiance },
         }
     }
 }
@@ -170,21 +131,17 @@ impl Scene {
     /// Adds a piece at a pose.
     pub(super) fn add(&mut self, piece: &Piece, pose: Pose) {
         self.mesh.add(&piece.mesh, pose.position, pose.angle);
-        self.face_owners
-            .resize(self.mesh.faces.len(), self.things.len());
+        self.face_owners.resize(self.mesh.faces.len(), self.things.len());
         if let Some(light) = piece.light {
             self.lights.push(light.to_room(&pose));
             self.light_owners.push(self.things.len());
         }
-        self.things.push(Thing {
-            kind: piece.kind,
-            color: piece.color,
-            pose,
-        });
+        self.things.push(Thing { kind: piece.kind, color: piece.color, pose });
     }
 
-    /// Radiance of each thing: of the daylight for a window, of the shade for a lamp, `None` for other things. The flux of a bulb, 4π²r²
-    /// times its radiance, leaves through the shade, which is modelled as a Lambertian surface: π times its area times its radiance.
+    /// Radiance of each thing: of the daylight for a window, of the shade for a lamp, `None` for other things. The flux
+    /// of a bulb, 4π²r² times its radiance, leaves through the shade, which is modelled as a Lambertian surface: π
+    /// times its area times its radiance.
     pub(super) fn radiances(&self) -> Vec<Option<Vec3>> {
         let mut areas = vec![0.0_f32; self.things.len()];
         for (index, (face, owner)) in self.mesh.faces.iter().zip(&self.face_owners).enumerate() {
@@ -197,9 +154,7 @@ impl Scene {
         for (light, owner) in self.lights.iter().zip(&self.light_owners) {
             radiances[*owner] = match *light {
                 LightSource::Panel { radiance, .. } => Some(radiance),
-                LightSource::Bulb {
-                    radius, radiance, ..
-                } => {
+                LightSource::Bulb { radius, radiance, .. } => {
                     let share = 4.0 * std::f32::consts::PI * radius * radius;
                     let area = areas[*owner];
                     (area > 0.0).then(|| radiance * (share / area))
@@ -217,10 +172,7 @@ impl Scene {
     /// Builds the tree over all faces, for tracing rays.
     pub(super) fn tree(&self) -> Bvh {
         Bvh::new(self.mesh.faces.iter().map(|face| {
-            let passes_light = matches!(
-                self.mesh.surfaces[face.surface].finish,
-                SurfaceFinish::Glow(_)
-            );
+            let passes_light = matches!(self.mesh.surfaces[face.surface].finish, SurfaceFinish::Glow(_));
             (face.corners.map(|corner| corner.position), passes_light)
         }))
     }

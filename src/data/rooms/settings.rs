@@ -28,12 +28,7 @@ pub struct Rooms {
 
 impl Default for Rooms {
     fn default() -> Self {
-        Self {
-            frames: 48,
-            seed: 7,
-            size: [640, 480],
-            light: RoomLight::default(),
-        }
+        Self { frames: 48, seed: 7, size: [640, 480], light: RoomLight::default() }
     }
 }
 
@@ -45,11 +40,7 @@ const MAX_FRAMES: usize = 1_000_000;
 impl fmt::Display for Rooms {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [width, height] = self.size;
-        write!(
-            f,
-            "frames={},seed={},size={width}x{height}",
-            self.frames, self.seed
-        )?;
+        write!(f, "frames={},seed={},size={width}x{height}", self.frames, self.seed)?;
         match self.light {
             RoomLight::Display => Ok(()),
             RoomLight::Linear => write!(f, ",light={}", self.light),
@@ -66,10 +57,9 @@ impl FromStr for Rooms {
             let (key, value) = part.split_once('=').unwrap_or((part, ""));
             match (key.trim(), value.trim()) {
                 ("frames", value) => parse_frames(value).map(|frames| rooms.frames = frames),
-                ("seed", value) => value
-                    .parse()
-                    .map(|seed| rooms.seed = seed)
-                    .map_err(|_| "a whole number expected".to_owned()),
+                ("seed", value) => {
+                    value.parse().map(|seed| rooms.seed = seed).map_err(|_| "a whole number expected".to_owned())
+                }
                 ("size", value) => parse_size(value).map(|size| rooms.size = size),
                 ("light", value) => RoomLight::from_str(value, false)
                     .map(|light| rooms.light = light)
@@ -99,9 +89,7 @@ fn parse_size(text: &str) -> Result<[usize; 2], String> {
 
 /// Parses a width or a height in pixels; `None` if it is out of range.
 fn parse_side(text: &str) -> Option<usize> {
-    text.parse()
-        .ok()
-        .filter(|side| (32..=MAX_SIDE).contains(side))
+    text.parse().ok().filter(|side| (32..=MAX_SIDE).contains(side))
 }
 
 #[cfg(test)]

@@ -80,8 +80,8 @@ pub(super) struct Shell {
 
 /// sRGB codes of paints for walls.
 const WALL_PAINTS: [u32; 14] = [
-    0xcec6b8, 0xc2b8a8, 0xb8bcb6, 0xbaa892, 0x96a298, 0x9eaab8, 0xccba9c, 0x88949e, 0xb88e76,
-    0xd2ccc0, 0x8a9078, 0xb0a0a4, 0x787e86, 0xc4b080,
+    0xcec6b8, 0xc2b8a8, 0xb8bcb6, 0xbaa892, 0x96a298, 0x9eaab8, 0xccba9c, 0x88949e, 0xb88e76, 0xd2ccc0, 0x8a9078,
+    0xb0a0a4, 0x787e86, 0xc4b080,
 ];
 
 /// sRGB codes of floors: boards, tiles and carpets.
@@ -94,10 +94,7 @@ impl Shell {
     pub(super) fn new(tiled: bool, rng: &mut SeededRng) -> Self {
         let tint = linear_rgb(codes_from_hex(rng.pick(&WALL_PAINTS)));
         let base = Surface::plain([0; 3]).with_pattern(Pattern::Plaster);
-        let plaster = Surface {
-            color: tint,
-            ..base.clone()
-        };
+        let plaster = Surface { color: tint, ..base.clone() };
         let other = tint * rng.between(0.66, 0.84);
         let paper = match rng.below(9) {
             0 => Pattern::Stripes(rng.between(0.04, 0.12), other),
@@ -119,20 +116,12 @@ impl Shell {
         if let Some(stone) = stone {
             walls[rng.below(4)] = Surface::plain(accent).with_pattern(stone);
         }
-        let glaze = rng.pick(&[
-            [182, 194, 196],
-            [150, 172, 168],
-            [192, 184, 168],
-            [140, 152, 168],
-        ]);
+        let glaze = rng.pick(&[[182, 194, 196], [150, 172, 168], [192, 184, 168], [140, 152, 168]]);
         let side = rng.pick(&[[0.2, 0.2], [0.15, 0.15], [0.3, 0.1], [0.25, 0.4]]);
         let wood = rng.pick(&[[110, 78, 54], [168, 160, 144], [88, 98, 96]]);
         let lower = if tiled {
             let tiles = Pattern::Tiles(side, linear_rgb([208, 204, 196]));
-            Some((
-                Surface::plain(glaze).with_pattern(tiles),
-                rng.between(1.3, 2.1),
-            ))
+            Some((Surface::plain(glaze).with_pattern(tiles), rng.between(1.3, 2.1)))
         } else {
             let panels = Surface::plain(wood).with_pattern(Pattern::Boards(1, 0.1));
             rng.chance(0.15).then_some((panels, 0.9))
@@ -152,14 +141,12 @@ pub(super) fn floor_surface(flooring: Flooring, rng: &mut SeededRng) -> Surface 
         Flooring::Wood => {
             let width = rng.between(0.07, 0.16);
             let axis = rng.pick(&[0, 2]);
-            Surface::plain(codes_from_hex(rng.pick(&BOARDS)))
-                .with_pattern(Pattern::Boards(axis, width))
+            Surface::plain(codes_from_hex(rng.pick(&BOARDS))).with_pattern(Pattern::Boards(axis, width))
         }
         Flooring::Tiles => {
             let side = rng.between(0.15, 0.4);
             let joint = linear_rgb(rng.pick(&[[110, 106, 100], [198, 194, 186]]));
-            Surface::plain(codes_from_hex(rng.pick(&TILES)))
-                .with_pattern(Pattern::Tiles([side, side], joint))
+            Surface::plain(codes_from_hex(rng.pick(&TILES))).with_pattern(Pattern::Tiles([side, side], joint))
         }
         Flooring::Carpet => {
             let surface = Surface::plain(codes_from_hex(rng.pick(&CARPETS)));

@@ -30,11 +30,7 @@ pub(super) enum SurfaceFinish {
 
 impl Surface {
     fn new(color: Vec3, pattern: Pattern, finish: SurfaceFinish) -> Self {
-        Self {
-            color,
-            pattern,
-            finish,
-        }
+        Self { color, pattern, finish }
     }
 
     /// Matte paint of one colour.
@@ -84,23 +80,17 @@ impl Surface {
         Self::new(paint.color, Pattern::Grain(axis), SurfaceFinish::Matte)
     }
 
-    /// Colour at a point with a surface normal, both in the coordinates of the thing. `pixel_width` is the width of a pixel there, in
-    /// metres.
+    /// Colour at a point with a surface normal, both in the coordinates of the thing. `pixel_width` is the width of a
+    /// pixel there, in metres.
     pub(super) fn color_at(&self, point: Vec3, normal: Vec3, pixel_width: f32) -> Vec3 {
         self.pattern.color(self.color, point, normal, pixel_width)
     }
 
     pub(super) fn with_pattern(&self, pattern: Pattern) -> Self {
-        Self {
-            pattern,
-            ..self.clone()
-        }
+        Self { pattern, ..self.clone() }
     }
 
     pub(super) fn with_finish(&self, finish: SurfaceFinish) -> Self {
-        Self {
-            finish,
-            ..self.clone()
-        }
+        Self { finish, ..self.clone() }
     }
 }

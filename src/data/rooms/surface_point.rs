@@ -46,8 +46,9 @@ impl SurfacePoint {
         Some(Self::new(scene, ray, hit))
     }
 
-    /// Returns the first point that a ray hits, or the point reflected there if that is a mirror, with the `thing` and `distance` of the
-    /// mirror. A second mirror is an ordinary surface. `None` if the ray or its reflection hits nothing.
+    /// Returns the first point that a ray hits, or the point reflected there if that is a mirror, with the `thing` and
+    /// `distance` of the mirror. A second mirror is an ordinary surface. `None` if the ray or its reflection hits
+    /// nothing.
     pub(super) fn through_mirror(scene: &Scene, tree: &Bvh, ray: &Ray) -> Option<Self> {
         let hit = tree.closest_hit(ray, FAR)?;
         let point = Self::new(scene, ray, hit);
@@ -56,8 +57,7 @@ impl SurfacePoint {
         }
         let direction = reflect(ray.direction, point.normal);
         // The reflected ray starts 1 mm above the mirror, so that it does not hit the mirror again.
-        let reflection =
-            Ray::new(point.position + point.normal * 1e-3, direction).with_spread(ray.spread);
+        let reflection = Ray::new(point.position + point.normal * 1e-3, direction).with_spread(ray.spread);
         let mirrored = Self::first_hit(scene, tree, &reflection)?;
         Some(Self {
             color: mirrored.color * MIRROR_REFLECTANCE,
@@ -98,11 +98,7 @@ impl SurfacePoint {
             thing,
             seen_thing: thing,
             distance: hit.distance,
-            gloss: if surface.finish == SurfaceFinish::Glossy {
-                Gloss::Shiny
-            } else {
-                Gloss::Dull
-            },
+            gloss: if surface.finish == SurfaceFinish::Glossy { Gloss::Shiny } else { Gloss::Dull },
         }
     }
 }

@@ -53,11 +53,7 @@ pub(super) fn choose_camera(
     while tries < CANDIDATES * 12 && (tries < CANDIDATES || best.is_none()) {
         tries += 1;
         let margin = if tries > CANDIDATES * 6 { 0.2 } else { 0.42 };
-        let position = vec3(
-            rng.between(0.0, plan.size.x),
-            up,
-            rng.between(0.0, plan.size.z),
-        );
+        let position = vec3(rng.between(0.0, plan.size.x), up, rng.between(0.0, plan.size.z));
         let target = random_target(plan, rng);
         let sway = vec3(rng.between(-0.5, 0.5), 0.0, rng.between(-0.5, 0.5));
         let offset = target + sway - position;
@@ -69,10 +65,7 @@ pub(super) fn choose_camera(
         let angle = libm::atan2f(-offset.x, -offset.z);
         let tilt = libm::atan2f((-offset.y).max(0.0), distance.max(1.5)) * 0.55;
         let camera = Camera::new(position, angle, tilt, size);
-        let score = rate_view(
-            plan,
-            &preview(&plan.scene, tree, &camera.with_size(PREVIEW_SIZE)),
-        );
+        let score = rate_view(plan, &preview(&plan.scene, tree, &camera.with_size(PREVIEW_SIZE)));
         if best.as_ref().is_none_or(|(highest, _)| score > *highest) {
             best = Some((score, camera));
         }
@@ -83,12 +76,8 @@ pub(super) fn choose_camera(
 
 /// Position of a random thing that the camera should look at; the middle of the room without such things.
 fn random_target(plan: &FloorPlan, rng: &mut SeededRng) -> Vec3 {
-    let targets: Vec<usize> = plan
-        .camera_targets
-        .iter()
-        .copied()
-        .filter(|thing| *thing < plan.scene.things.len())
-        .collect();
+    let targets: Vec<usize> =
+        plan.camera_targets.iter().copied().filter(|thing| *thing < plan.scene.things.len()).collect();
     if targets.is_empty() {
         return plan.size / 2.0;
     }
@@ -96,8 +85,8 @@ fn random_target(plan: &FloorPlan, rng: &mut SeededRng) -> Vec3 {
     thing.pose.to_room(vec3(0.0, 0.5, 0.3))
 }
 
-/// Rates a view, given the number of the thing at each pixel. Many things and camera targets raise the rating; very large and cut-off
-/// things lower it.
+/// Rates a view, given the number of the thing at each pixel. Many things and camera targets raise the rating; very
+/// large and cut-off things lower it.
 fn rate_view(plan: &FloorPlan, visible: &[u32]) -> f32 {
     let mut counts = vec![0_usize; plan.scene.things.len() + 1];
     let mut border_counts = vec![0_usize; counts.len()];

@@ -18,8 +18,8 @@ use darkqa_score::answers::record::Detail;
 /// Maximum size of a reply in bytes; chosen: far more than the longest reply of a reasoning model.
 const MAX_REPLY_BYTES: u64 = 4 << 20;
 
-/// Maximum number of checks of an ended batch that wait until its files have as many lines as the server counts; chosen: 19 minutes with
-/// the default of `--poll`.
+/// Maximum number of checks of an ended batch that wait until its files have as many lines as the server counts;
+/// chosen: 19 minutes with the default of `--poll`.
 const MAX_INCOMPLETE: u32 = 10;
 
 /// The same for batches that the user cancels; chosen to be lower, because the user waits.
@@ -68,10 +68,9 @@ impl<D: Detail> Driver<'_, D> {
                 self.batch_failed(part, &batch)
             }
             // A batch that failed midway may have answered some of its requests.
-            BatchState::Failed
-            | BatchState::Completed
-            | BatchState::Expired
-            | BatchState::Cancelled => self.fetch(part, &batch).await,
+            BatchState::Failed | BatchState::Completed | BatchState::Expired | BatchState::Cancelled => {
+                self.fetch(part, &batch).await
+            }
         }
     }
 
@@ -151,8 +150,8 @@ impl<D: Detail> Driver<'_, D> {
         self.all_fetched(part, batch)
     }
 
-    /// The difference between the server's counts and the lines of an ended batch's files, in words. `None` if they agree, or if no trial of
-    /// the batch is waiting any more.
+    /// The difference between the server's counts and the lines of an ended batch's files, in words. `None` if they
+    /// agree, or if no trial of the batch is waiting any more.
     fn missing_lines(&self, part: usize, batch: &RemoteBatch) -> Result<Option<String>> {
         let Some(keys) = self.keys(part)? else {
             return Ok(None);
@@ -178,10 +177,9 @@ impl<D: Detail> Driver<'_, D> {
         let (counts, requests) = (batch.counts, keys.len() as u64);
         let is_counted = counts.is_known();
         let problem = match batch.state {
-            BatchState::Completed if is_counted && counts.done < requests => format!(
-                "the server counts {} of {requests} requests of a batch that is completed",
-                counts.done
-            ),
+            BatchState::Completed if is_counted && counts.done < requests => {
+                format!("the server counts {} of {requests} requests of a batch that is completed", counts.done)
+            }
             BatchState::Completed if !is_counted && lines < requests => {
                 format!("its files have {lines} lines for {requests} requests")
             }
@@ -189,10 +187,9 @@ impl<D: Detail> Driver<'_, D> {
             BatchState::Expired | BatchState::Cancelled if !is_counted && lines == 0 => {
                 "the server states neither counts nor files".to_owned()
             }
-            _ if lines < counts.done && replies < counts.answered => format!(
-                "the server counts {} replies, and its files have {replies}",
-                counts.answered
-            ),
+            _ if lines < counts.done && replies < counts.answered => {
+                format!("the server counts {} replies, and its files have {replies}", counts.answered)
+            }
             _ => return Ok(None),
         };
         Ok(Some(problem))
@@ -206,11 +203,7 @@ impl<D: Detail> Driver<'_, D> {
         let checks = self.notes.incomplete_checks.entry(part).or_default();
         *checks += 1;
         let is_cancelled = self.until == Goal::Cancelled;
-        let max_checks = if is_cancelled {
-            MAX_INCOMPLETE_CANCELLED
-        } else {
-            MAX_INCOMPLETE
-        };
+        let max_checks = if is_cancelled { MAX_INCOMPLETE_CANCELLED } else { MAX_INCOMPLETE };
         let is_last_check = *checks >= max_checks;
         let name = self.part(part).name.clone();
         let text = format!("{name}: batch {}: {problem}", batch.id);
@@ -223,9 +216,7 @@ impl<D: Detail> Driver<'_, D> {
             if states_nothing && !has_files {
                 tracing::warn!("{text}; taken as a batch without replies");
             } else {
-                tracing::warn!(
-                    "{text}; its files stay at the server, and its requests may be asked and paid again"
-                );
+                tracing::warn!("{text}; its files stay at the server, and its requests may be asked and paid again");
                 self.notes.kept_files.insert(part);
             }
             return self.all_fetched(part, batch);
@@ -246,10 +237,7 @@ impl<D: Detail> Driver<'_, D> {
             "{text}; nothing is asked again or deleted. The same command looks again; batch import {run} FILE imports a file of the \
              server's page; batch cancel {run} frees the rest"
         );
-        Err(Error::Endpoint {
-            endpoint: self.part(part).facts.base.clone(),
-            problem,
-        })
+        Err(Error::Endpoint { endpoint: self.part(part).facts.base.clone(), problem })
     }
 
     /// Records that all files of a batch are downloaded.
@@ -287,15 +275,10 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Moved)
     }
 
-    /// The ids of a part's files at the server. If the input file was uploaded more than once, this includes copies whose upload seemed to
-    /// fail.
+    /// The ids of a part's files at the server. If the input file was uploaded more than once, this includes copies
+    /// whose upload seemed to fail.
     pub(super) async fn files_at_server(&self, part: usize) -> Result<Vec<String>> {
-        let Part {
-            name: part_name,
-            files,
-            uploads,
-            ..
-        } = self.part(part);
+        let Part { name: part_name, files, uploads, .. } = self.part(part);
         let mut ids = files.clone();
         if *uploads > 1 {
             let (name, purpose) = (self.remote_name(part), self.purpose(part));
@@ -306,9 +289,9 @@ impl<D: Detail> Driver<'_, D> {
                     ids.sort();
                     ids.dedup();
                 }
-                Err(failure) => tracing::warn!(
-                    "{part_name}: copies of its file may be at the server, as {name}: {failure}"
-                ),
+                Err(failure) => {
+                    tracing::warn!("{part_name}: copies of its file may be at the server, as {name}: {failure}");
+                }
             }
         }
         Ok(ids)

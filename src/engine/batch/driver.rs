@@ -1,6 +1,7 @@
 //! Advances the parts of a batch run, step by step, until nothing is left to do: [`Driver`].
 //!
-//! The journal records each upload and each creation of a batch before the call, so the driver may be stopped at any time.
+//! The journal records each upload and each creation of a batch before the call, so the driver may be stopped at any
+//! time.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,7 +25,8 @@ use crate::types::TrialKey;
 use crate::types::manifests::RunManifest;
 use darkqa_score::answers::record::Detail;
 
-/// Maximum wait between two checks of the batches, as a multiple of `--poll`; chosen: 5 minutes with the default of 10 s.
+/// Maximum wait between two checks of the batches, as a multiple of `--poll`; chosen: 5 minutes with the default of 10
+/// s.
 const MAX_WAIT_POLLS: u32 = 30;
 
 /// Minimum search time for a file or batch that may exist at the server, as a multiple of `--poll`; chosen.
@@ -76,7 +78,8 @@ pub(super) struct Driver<'a, D> {
     pub(super) manifest: &'a RunManifest,
     pub(super) journal: &'a mut Journal,
     pub(super) servers: &'a Servers,
-    /// Models of all phases of the run, used to adapt their requests and to price their replies; empty if no model is asked again.
+    /// Models of all phases of the run, used to adapt their requests and to price their replies; empty if no model is
+    /// asked again.
     pub(super) models: &'a [&'a ModelUnderTest],
     pub(super) args: &'a BatchRunArgs,
     /// Cost limits; `None` if nothing is submitted.
@@ -120,12 +123,12 @@ pub(super) struct Notes {
 }
 
 impl<D: Detail> Driver<'_, D> {
-    /// Advances all parts until the goal is reached or the budget is used up. If a server refuses a call in a way that would stop every
-    /// further call for a model, the parts of that model are left as they are.
+    /// Advances all parts until the goal is reached or the budget is used up. If a server refuses a call in a way that
+    /// would stop every further call for a model, the parts of that model are left as they are.
     ///
     /// # Errors
-    /// If a file cannot be written, the server of a part is unknown, or a server refuses a call and the settings end the run with the
-    /// first stopped model.
+    /// If a file cannot be written, the server of a part is unknown, or a server refuses a call and the settings end
+    /// the run with the first stopped model.
     pub(super) async fn drive(&mut self) -> Result<Driven> {
         let poll = self.args.collect.poll;
         let mut wait = poll;
@@ -146,27 +149,20 @@ impl<D: Detail> Driver<'_, D> {
             if self.is_over_budget()? {
                 return Ok(Driven::OverBudget);
             }
-            wait = if moved {
-                poll
-            } else {
-                (wait * 3 / 2).min(poll * MAX_WAIT_POLLS)
-            };
+            wait = if moved { poll } else { (wait * 3 / 2).min(poll * MAX_WAIT_POLLS) };
             sleep(wait).await;
         }
     }
 
-    /// Runs one step of a part, unless its model is stopped. Stops the model if its server refuses the call in a way that would stop every
-    /// further call.
+    /// Runs one step of a part, unless its model is stopped. Stops the model if its server refuses the call in a way
+    /// that would stop every further call.
     async fn step_or_stop(&mut self, part: usize) -> Result<Step> {
         if self.is_stopped(part) {
             return Ok(Step::Waiting);
         }
         match self.step(part).await {
-            Err(error @ Error::Endpoint { .. })
-                if !self.money.is_some_and(|money| money.fail_fast) =>
-            {
-                self.progress
-                    .print_on_terminal(&format!("stopped: {error}"));
+            Err(error @ Error::Endpoint { .. }) if !self.money.is_some_and(|money| money.fail_fast) => {
+                self.progress.print_on_terminal(&format!("stopped: {error}"));
                 let facts = &self.journal.parts[part].facts;
                 self.stopped.add_part(facts, error);
                 Ok(Step::Waiting)
@@ -183,9 +179,7 @@ impl<D: Detail> Driver<'_, D> {
             return Ok(Step::Waiting);
         }
         match &self.part(part).stage {
-            Stage::Written | Stage::Uploading | Stage::Uploaded
-                if self.until == Goal::Cancelled =>
-            {
+            Stage::Written | Stage::Uploading | Stage::Uploaded if self.until == Goal::Cancelled => {
                 self.withdraw(part).await
             }
             Stage::Written => self.upload(part).await,
@@ -275,8 +269,8 @@ impl<D: Detail> Driver<'_, D> {
     /// Handles a failed check of a part: it is repeated later, and counted if the failure is permanent.
     ///
     /// # Errors
-    /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Goal::Checked`]: the key or the
-    /// address is wrong.
+    /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Goal::Checked`]:
+    /// the key or the address is wrong.
     pub(super) fn check_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
         tracing::debug!("{}: {failure}", self.part(part).name);
         if failure.is_permanent() {
@@ -291,8 +285,8 @@ impl<D: Detail> Driver<'_, D> {
         Ok(Step::Waiting)
     }
 
-    /// True if the file or batch of a part has been missing for long enough to conclude that it does not exist. Otherwise warns that the
-    /// search continues. `what` is `file` or `batch`.
+    /// True if the file or batch of a part has been missing for long enough to conclude that it does not exist.
+    /// Otherwise warns that the search continues. `what` is `file` or `batch`.
     pub(super) fn is_missing(&mut self, part: usize, what: &str) -> bool {
         let now = Instant::now();
         let since = *self.notes.missing_since.entry(part).or_insert(now);
@@ -315,8 +309,8 @@ impl<D: Detail> Driver<'_, D> {
         self.notes.missing_since.remove(&part);
     }
 
-    /// How long to search for the file or batch of a part. A server on this machine with a `--poll` below [`MIN_SEARCH_FROM_POLL`] is
-    /// assumed to have up-to-date lists.
+    /// How long to search for the file or batch of a part. A server on this machine with a `--poll` below
+    /// [`MIN_SEARCH_FROM_POLL`] is assumed to have up-to-date lists.
     fn search_time(&self, part: usize) -> Duration {
         let poll = self.args.collect.poll;
         let base = self.part(part).facts.base.parse::<BaseUrl>();

@@ -16,7 +16,8 @@ pub(crate) struct PartFacts {
     /// The model's name in tables; empty in journals of earlier versions.
     #[serde(default)]
     pub name: String,
-    /// The charged account: the name of the first model with the same base URL, key and headers; empty in journals of earlier versions.
+    /// The charged account: the name of the first model with the same base URL, key and headers; empty in journals of
+    /// earlier versions.
     #[serde(default)]
     pub account: String,
     /// Base URL of the model's endpoint, without secrets.
@@ -27,8 +28,8 @@ pub(crate) struct PartFacts {
     pub tokens: f64,
     /// Expected cost in US dollars, at the price of batches; `None` if the model has no known price.
     pub dollars: Option<f64>,
-    /// Maximum cost of all requests in US dollars, at the price of batches; `None` if the model has no known price, and in journals of
-    /// earlier versions.
+    /// Maximum cost of all requests in US dollars, at the price of batches; `None` if the model has no known price, and
+    /// in journals of earlier versions.
     #[serde(default)]
     pub most_dollars: Option<f64>,
     /// Maximum cost of a single request, in US dollars.
@@ -49,14 +50,8 @@ impl PartFacts {
 
     /// The number of requests whose maximum cost is within `dollars`; all if the model has no known price.
     pub(super) fn requests_within(&self, dollars: f64) -> usize {
-        let each = self
-            .most_dollars_each
-            .unwrap_or(self.max_cost() / self.requests.max(1) as f64);
-        let within = if each > 0.0 {
-            dollars / each
-        } else {
-            f64::INFINITY
-        };
+        let each = self.most_dollars_each.unwrap_or(self.max_cost() / self.requests.max(1) as f64);
+        let within = if each > 0.0 { dollars / each } else { f64::INFINITY };
         (within.max(0.0) as usize).min(self.requests)
     }
 

@@ -13,9 +13,7 @@ use crate::engine::images::stored::StoredImages;
 use crate::engine::images::timings::Timings;
 use crate::engine::images::trials::{Item, Plan};
 use crate::engine::images::workers::pool;
-use crate::engine::open_run::{
-    OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline,
-};
+use crate::engine::open_run::{OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline};
 use crate::error::{Error, Result};
 use crate::runs::outcome::Outcome;
 use crate::types::manifests::Status;
@@ -30,11 +28,9 @@ pub(super) struct Target<'a, I: Item> {
     pub(super) cost: CostOf<'a, I>,
 }
 
-/// Writes the input files of the first phase with remaining trials, and records in the run that these trials are in a batch.
-pub(crate) fn export<E: Experiment>(
-    mut run: OpenRun<'_, E>,
-    files: &BatchFileArgs,
-) -> Result<Outcome> {
+/// Writes the input files of the first phase with remaining trials, and records in the run that these trials are in a
+/// batch.
+pub(crate) fn export<E: Experiment>(mut run: OpenRun<'_, E>, files: &BatchFileArgs) -> Result<Outcome> {
     for phase in 0..E::PHASES.len() {
         let models = run.experiment.models(phase);
         let remaining = run.remaining(phase)?;
@@ -47,12 +43,7 @@ pub(crate) fn export<E: Experiment>(
         let Remaining { plan, in_batch, .. } = remaining;
         let trials = plan.keys.len();
         let answered = trials - plan.remaining() - in_batch;
-        let target = Target {
-            files,
-            quota: None,
-            journal: None,
-            cost: &|_, _| RequestCost::default(),
-        };
+        let target = Target { files, quota: None, journal: None, cost: &|_, _| RequestCost::default() };
         let written = write(&mut run, phase, plan, target)?;
         let mut output = summary(&written, answered, in_batch, run.store.folder());
         if !last {
@@ -75,11 +66,7 @@ pub(super) fn write<E: Experiment>(
     let workers = pool(settings.loading.threads.threads)?;
     let timings = Timings::default();
     let shows_images = !plan.conditions().is_empty();
-    let enhancers = if shows_images {
-        run.enhancers.take_models()?
-    } else {
-        Vec::new()
-    };
+    let enhancers = if shows_images { run.enhancers.take_models()? } else { Vec::new() };
     let limit = image_limit(settings);
     let maker = Maker::new(run.enhancers.version(), &settings.loading.size);
     let images = run.images.as_ref();
@@ -96,10 +83,7 @@ pub(super) fn write<E: Experiment>(
     })?;
     let usages = pipeline.usages();
     let bar = run.progress.bar("writing requests", plan.remaining());
-    let register = Register {
-        store: &mut run.store,
-        journal: target.journal,
-    };
+    let register = Register { store: &mut run.store, journal: target.journal };
     let (models, files) = (experiment.models(phase), target.files);
     let all = every_model(experiment);
     let mut requests = Requests::new(models, &all, files, target.quota, register, target.cost)?;

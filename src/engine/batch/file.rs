@@ -88,13 +88,7 @@ struct OpenFile<D> {
 
 impl<D: Detail> ModelInputFiles<D> {
     /// Files in `folder`, named `stem` with numbers from `first` on.
-    pub(crate) fn new(
-        folder: &Path,
-        stem: &str,
-        first: u32,
-        limits: FileLimits,
-        destination: Destination,
-    ) -> Self {
+    pub(crate) fn new(folder: &Path, stem: &str, first: u32, limits: FileLimits, destination: Destination) -> Self {
         Self {
             folder: folder.to_owned(),
             stem: stem.to_owned(),
@@ -138,9 +132,7 @@ impl<D: Detail> ModelInputFiles<D> {
             None => self.create_next()?,
         };
         let open = self.open.insert(open);
-        open.file
-            .write_all(line)
-            .map_err(|e| Error::file(&open.path, "write", e))?;
+        open.file.write_all(line).map_err(|e| Error::file(&open.path, "write", e))?;
         open.hash.update(line);
         open.bytes += size;
         open.tokens += cost.tokens;
@@ -154,10 +146,7 @@ impl<D: Detail> ModelInputFiles<D> {
     }
 
     /// Closes the last file; returns all files, each with its number of requests.
-    pub(crate) fn finish(
-        mut self,
-        register: &mut Register<'_, D>,
-    ) -> Result<Vec<(PathBuf, usize)>> {
+    pub(crate) fn finish(mut self, register: &mut Register<'_, D>) -> Result<Vec<(PathBuf, usize)>> {
         self.close(register)?;
         Ok(self.done)
     }
@@ -183,8 +172,8 @@ impl<D: Detail> ModelInputFiles<D> {
         })
     }
 
-    /// Completes the open file. The run records its trials before the file gets its final name, so that nobody uploads a file whose replies
-    /// the run would not recognize.
+    /// Completes the open file. The run records its trials before the file gets its final name, so that nobody uploads
+    /// a file whose replies the run would not recognize.
     fn close(&mut self, register: &mut Register<'_, D>) -> Result<()> {
         let Some(open) = self.open.take() else {
             return Ok(());
@@ -195,13 +184,7 @@ impl<D: Detail> ModelInputFiles<D> {
             .and_then(|file| file.sync_all())
             .map_err(|e| Error::file(&open.path, "write", e))?;
         if let Some(journal) = &mut register.journal {
-            let Destination {
-                model,
-                name,
-                account,
-                base,
-                url,
-            } = self.destination.clone();
+            let Destination { model, name, account, base, url } = self.destination.clone();
             let file_name = open.path.file_name().unwrap_or_default();
             journal.add(
                 &file_name.to_string_lossy(),
@@ -222,8 +205,7 @@ impl<D: Detail> ModelInputFiles<D> {
             )?;
         }
         register.store.append_to_batch(&open.blanks)?;
-        fs::rename(open.path.with_extension(PART), &open.path)
-            .map_err(|e| Error::file(&open.path, "write", e))?;
+        fs::rename(open.path.with_extension(PART), &open.path).map_err(|e| Error::file(&open.path, "write", e))?;
         self.done.push((open.path.clone(), open.blanks.len()));
         Ok(())
     }

@@ -43,11 +43,7 @@ impl<'a> FolderBatches<'a> {
     ///
     /// # Errors
     /// If the program submitted no batch of this run, or its server is unknown.
-    pub(crate) fn open(
-        folder: &Path,
-        manifest: &'a RunManifest,
-        access: &AccessArgs,
-    ) -> Result<Self> {
+    pub(crate) fn open(folder: &Path, manifest: &'a RunManifest, access: &AccessArgs) -> Result<Self> {
         let journal = Journal::open(folder, manifest)?;
         if journal.parts.is_empty() {
             return Err(Error::Run {
@@ -57,19 +53,12 @@ impl<'a> FolderBatches<'a> {
         }
         let mut servers = Servers::default();
         if let Some(base) = base_url(&journal, access)? {
-            let access = AccessArgs {
-                base_url: vec![base],
-                ..access.clone()
-            };
+            let access = AccessArgs { base_url: vec![base], ..access.clone() };
             let sending = Sending::default();
             let endpoint = Endpoint::from_addresses(access.server(sending)?.replicas, sending)?;
             servers = Servers::at(endpoint.base().to_string(), endpoint.batch_server()?);
         }
-        Ok(Self {
-            journal,
-            manifest,
-            servers,
-        })
+        Ok(Self { journal, manifest, servers })
     }
 
     /// One line per part, with the state of its batch at the server.
@@ -82,9 +71,7 @@ impl<'a> FolderBatches<'a> {
                 continue;
             };
             let checked = match self.servers.server(&part.facts) {
-                Ok(server) => runtime
-                    .block_on(server.batch(id))
-                    .map_err(|e| e.to_string()),
+                Ok(server) => runtime.block_on(server.batch(id)).map_err(|e| e.to_string()),
                 Err(error) => Err(error.to_string()),
             };
             match checked {
@@ -167,13 +154,11 @@ impl<'a> FolderBatches<'a> {
 
 /// Starts a single-threaded runtime.
 pub(super) fn start_runtime() -> Result<runtime::Runtime> {
-    runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .map_err(|e| thread_start_error(&e))
+    runtime::Builder::new_current_thread().enable_all().build().map_err(|e| thread_start_error(&e))
 }
 
-/// The base URL of the server: from the flags, or else the one at which the parts were created. `None` if nothing is left to do.
+/// The base URL of the server: from the flags, or else the one at which the parts were created. `None` if nothing is
+/// left to do.
 ///
 /// # Errors
 /// If there are several base URLs, or a key would be sent to one that only the folder names.
@@ -182,31 +167,23 @@ fn base_url(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
         [] => {}
         [base] => return Ok(Some(base.clone())),
         _ => {
-            return Err(Error::usage(
-                "--base-url",
-                "batches are at one address; name one",
-            ));
+            return Err(Error::usage("--base-url", "batches are at one address; name one"));
         }
     }
-    let bases: BTreeSet<&str> = journal
-        .parts
-        .iter()
-        .filter(|part| part.stage != Stage::Ended)
-        .map(|part| part.facts.base.as_str())
-        .collect();
+    let bases: BTreeSet<&str> =
+        journal.parts.iter().filter(|part| part.stage != Stage::Ended).map(|part| part.facts.base.as_str()).collect();
     let mut bases = bases.into_iter();
     let (Some(base), None) = (bases.next(), bases.next()) else {
         if journal.has_open_parts() {
-            let problem = "the batches of this run are at several addresses; name one of them, with its key, and then the other";
+            let problem =
+                "the batches of this run are at several addresses; name one of them, with its key, and then the other";
             return Err(Error::usage("--base-url", problem));
         }
         return Ok(None);
     };
     // The journal has no query string, which the variable may have.
     if let Ok(variable) = std::env::var("OPENAI_BASE_URL")
-        && variable
-            .parse::<BaseUrl>()
-            .is_ok_and(|url| url.to_string() == base)
+        && variable.parse::<BaseUrl>().is_ok_and(|url| url.to_string() == base)
     {
         return Ok(Some(variable));
     }

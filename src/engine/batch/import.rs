@@ -15,7 +15,8 @@ use crate::types::{Failure, FailureKind, TrialKey};
 use darkqa_score::answers::record::Detail;
 
 impl<'a, D: Detail> Driver<'a, D> {
-    /// Imports the replies of a part whose batch has ended. Requests without a line in the output fail as timeouts and may be retried.
+    /// Imports the replies of a part whose batch has ended. Requests without a line in the output fail as timeouts and
+    /// may be retried.
     pub(super) fn import_replies(&mut self, part: usize) -> Result<Step> {
         let Stage::Fetched { state } = self.part(part).stage.clone() else {
             return Ok(Step::Waiting);
@@ -24,8 +25,7 @@ impl<'a, D: Detail> Driver<'a, D> {
         let (answered, failed) = (counts.answered, counts.failed);
         self.warn_if_incomplete(part, unparsed)?;
         self.say(part, &format!("{state}: {answered} answered, {failed} not"));
-        self.journal
-            .record(part, Event::TakenOver { answered, failed })?;
+        self.journal.record(part, Event::TakenOver { answered, failed })?;
         Ok(Step::Moved)
     }
 
@@ -40,7 +40,8 @@ impl<'a, D: Detail> Driver<'a, D> {
         Ok(())
     }
 
-    /// Imports the replies in a part's files. Returns the counts of replies and the number of lines that cannot be parsed.
+    /// Imports the replies in a part's files. Returns the counts of replies and the number of lines that cannot be
+    /// parsed.
     ///
     /// `ended` is the final state of the batch, if it has ended: requests without a line fail then.
     fn import_files(&mut self, part: usize, ended: Option<&str>) -> Result<(ReplyCounts, usize)> {
@@ -57,8 +58,7 @@ impl<'a, D: Detail> Driver<'a, D> {
                     unparsed += 1;
                     return Ok(());
                 };
-                if let (Some(refusal), Ok(key)) = (line.refusal.take(), line.id.parse::<TrialKey>())
-                {
+                if let (Some(refusal), Ok(key)) = (line.refusal.take(), line.id.parse::<TrialKey>()) {
                     refusals.entry(key).or_insert(refusal);
                 }
                 replies.add_line(line)
@@ -75,10 +75,7 @@ impl<'a, D: Detail> Driver<'a, D> {
                         for model in &models {
                             is_adapted |= model.adapt_to_refusal(*status, body.as_bytes());
                         }
-                        if models
-                            .iter()
-                            .any(|model| model.may_refuse_content(*status, body.as_bytes()))
-                        {
+                        if models.iter().any(|model| model.may_refuse_content(*status, body.as_bytes())) {
                             content.insert(key);
                         }
                     }
@@ -105,24 +102,16 @@ impl<'a, D: Detail> Driver<'a, D> {
         Ok((counts, unparsed))
     }
 
-    /// Models that a part asks: several if a model is asked both with images and without. If no name matches, because the model was
-    /// renamed, models match by their id at the endpoint.
+    /// Models that a part asks: several if a model is asked both with images and without. If no name matches, because
+    /// the model was renamed, models match by their id at the endpoint.
     fn models_of(&self, part: usize) -> Vec<&'a Model> {
         let facts = &self.part(part).facts;
-        let named: Vec<&Model> = self
-            .models
-            .iter()
-            .filter(|one| facts.asks(&one.name, one.model.name()))
-            .map(|one| &*one.model)
-            .collect();
+        let named: Vec<&Model> =
+            self.models.iter().filter(|one| facts.asks(&one.name, one.model.name())).map(|one| &*one.model).collect();
         if !named.is_empty() {
             return named;
         }
-        self.models
-            .iter()
-            .map(|one| &*one.model)
-            .filter(|model| model.name() == facts.model)
-            .collect()
+        self.models.iter().map(|one| &*one.model).filter(|model| model.name() == facts.model).collect()
     }
 
     /// Warns of output lines that cannot be parsed, and of an input file that is missing.
@@ -148,18 +137,15 @@ impl<'a, D: Detail> Driver<'a, D> {
         let keys = self.keys(part)?;
         let mut replies = ReplyImport::new(self.store, self.manifest)?;
         for key in keys.into_iter().flatten() {
-            let failure = Failure {
-                kind: FailureKind::Timeout,
-                status: None,
-                message: why.clone(),
-            };
+            let failure = Failure { kind: FailureKind::Timeout, status: None, message: why.clone() };
             replies.fail(key, failure);
         }
         replies.finish()?;
         self.journal.record(part, Event::GaveUp { why })
     }
 
-    /// Gives up a part that the user cancels before its batch is created. Deletes its files at the server, unless the user keeps files.
+    /// Gives up a part that the user cancels before its batch is created. Deletes its files at the server, unless the
+    /// user keeps files.
     pub(super) async fn withdraw(&mut self, part: usize) -> Result<Step> {
         if !self.args.collect.keep_files {
             for id in self.files_at_server(part).await? {
@@ -197,7 +183,8 @@ fn missing_line_failure(state: &str) -> Failure {
     }
 }
 
-/// Parses the trial key of a line of an input file. `custom_id` is the first field, so the rest of the line is not parsed.
+/// Parses the trial key of a line of an input file. `custom_id` is the first field, so the rest of the line is not
+/// parsed.
 pub(super) fn key_of(line: &str) -> Option<TrialKey> {
     let (id, _) = line.strip_prefix("{\"custom_id\":\"")?.split_once('"')?;
     id.parse().ok()
@@ -209,11 +196,7 @@ pub(super) fn for_each_line(path: &Path, mut take: impl FnMut(&str) -> Result<()
     let mut line = Vec::new();
     loop {
         line.clear();
-        if file
-            .read_until(b'\n', &mut line)
-            .map_err(|e| Error::file(path, "read", e))?
-            == 0
-        {
+        if file.read_until(b'\n', &mut line).map_err(|e| Error::file(path, "read", e))? == 0 {
             return Ok(());
         }
         let text = String::from_utf8_lossy(&line);

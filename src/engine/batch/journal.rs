@@ -1,7 +1,8 @@
 //! The journal of a run's batches, `batch/state.jsonl`: [`Journal`].
 //!
-//! It has one line per event, synced to disk before and after each call that changes something at the server. So everything that a killed
-//! process did is known, except for the effect of its last call, which is looked up at the server.
+//! It has one line per event, synced to disk before and after each call that changes something at the server. So
+//! everything that a killed process did is known, except for the effect of its last call, which is looked up at the
+//! server.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -44,11 +45,7 @@ impl Line {
         std::iter::once(&self.file)
             .chain(names)
             .find(|name| !is_part_name(name))
-            .map_or(Ok(()), |name| {
-                Err(format!(
-                    "{name:?} is no name of a part, such as part-1-m-001.jsonl"
-                ))
-            })
+            .map_or(Ok(()), |name| Err(format!("{name:?} is no name of a part, such as part-1-m-001.jsonl")))
     }
 }
 
@@ -95,10 +92,8 @@ impl Journal {
             if line.last() != Some(&b'\n') {
                 break;
             }
-            let line: Line =
-                serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
-            line.check_names()
-                .map_err(|problem| Error::line(&path, index + 1, problem))?;
+            let line: Line = serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
+            line.check_names().map_err(|problem| Error::line(&path, index + 1, problem))?;
             journal.apply(&line.file, &line.event, &line.at);
         }
         Ok(journal)
@@ -152,11 +147,7 @@ impl Journal {
 
     /// Maximum cost of batches whose replies are not imported yet, in US dollars.
     pub(crate) fn max_open_cost(&self) -> f64 {
-        self.parts
-            .iter()
-            .filter(|part| part.may_cost())
-            .map(|part| part.facts.max_cost())
-            .sum()
+        self.parts.iter().filter(|part| part.may_cost()).map(|part| part.facts.max_cost()).sum()
     }
 
     /// Records the written file of a part.
@@ -173,13 +164,8 @@ impl Journal {
     /// Appends an event, and syncs the file to disk.
     fn write(&mut self, file: &str, event: Event) -> Result<()> {
         let path = self.path();
-        let line = Line {
-            file: file.to_owned(),
-            event,
-            at: now(),
-        };
-        let mut text =
-            serde_json::to_vec(&line).map_err(|e| Error::file(&path, "write", e.into()))?;
+        let line = Line { file: file.to_owned(), event, at: now() };
+        let mut text = serde_json::to_vec(&line).map_err(|e| Error::file(&path, "write", e.into()))?;
         text.push(b'\n');
         append(&path, &text).map_err(|e| Error::file(&path, "write", e))?;
         tracing::info!("{file}: {}", String::from_utf8_lossy(&text).trim_end());
@@ -202,9 +188,7 @@ impl Journal {
         }
         part.apply(event, at);
         if let Event::Split { into } = event {
-            let pieces = into
-                .iter()
-                .map(|piece| Part::new(&piece.file, piece.facts.clone()));
+            let pieces = into.iter().map(|piece| Part::new(&piece.file, piece.facts.clone()));
             self.parts.extend(pieces);
         }
     }
@@ -228,15 +212,9 @@ fn cut_incomplete_line(path: &Path) -> std::io::Result<()> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         Err(e) => return Err(e),
     };
-    let complete = text
-        .iter()
-        .rposition(|byte| *byte == b'\n')
-        .map_or(0, |last| last + 1);
+    let complete = text.iter().rposition(|byte| *byte == b'\n').map_or(0, |last| last + 1);
     if complete == text.len() {
         return Ok(());
     }
-    File::options()
-        .write(true)
-        .open(path)?
-        .set_len(complete as u64)
+    File::options().write(true).open(path)?.set_len(complete as u64)
 }

@@ -88,10 +88,7 @@ impl Part {
 
     /// True if the batch is still to be created.
     pub(super) fn is_unsubmitted(&self) -> bool {
-        matches!(
-            self.stage,
-            Stage::Written | Stage::Uploading | Stage::Uploaded
-        )
+        matches!(self.stage, Stage::Written | Stage::Uploading | Stage::Uploaded)
     }
 
     /// Updates the part by an event at a time in UTC.
@@ -139,9 +136,7 @@ impl Part {
             Event::Fetched { state, files } => {
                 self.state.clone_from(state);
                 self.files.extend(files.iter().cloned());
-                Stage::Fetched {
-                    state: state.clone(),
-                }
+                Stage::Fetched { state: state.clone() }
             }
             Event::TakenOver { answered, failed } => {
                 self.outcome = Some((*answered, *failed));

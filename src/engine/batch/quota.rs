@@ -1,4 +1,5 @@
-//! Conditions for creating the batch of a part: limits of waiting tokens, waits requested by the server, and `--max-cost`.
+//! Conditions for creating the batch of a part: limits of waiting tokens, waits requested by the server, and
+//! `--max-cost`.
 
 use std::time::Duration;
 
@@ -46,9 +47,8 @@ impl<D: Detail> Driver<'_, D> {
             .filter(|other| !self.stopped.has_part(&other.facts))
             .map(|other| other.facts.tokens)
             .sum();
-        let is_full = self
-            .token_limit(part)
-            .is_some_and(|limit| waiting > 0.0 && waiting + held.facts.tokens > limit as f64);
+        let is_full =
+            self.token_limit(part).is_some_and(|limit| waiting > 0.0 && waiting + held.facts.tokens > limit as f64);
         Ok(is_full || !self.is_affordable(held)?)
     }
 
@@ -59,8 +59,8 @@ impl<D: Detail> Driver<'_, D> {
         self.journal.limits.get(&scope).copied().or(flag)
     }
 
-    /// The number of pieces into which a part must be split, because it exceeds the token limit or `--max-cost`, or was refused several
-    /// times although nothing else of this run is waiting; `None` if it need not be split.
+    /// The number of pieces into which a part must be split, because it exceeds the token limit or `--max-cost`, or was
+    /// refused several times although nothing else of this run is waiting; `None` if it need not be split.
     pub(super) fn required_pieces(&self, part: usize) -> Result<Option<usize>> {
         if matches!(self.until, Goal::Checked | Goal::Cancelled) {
             return Ok(None);
@@ -80,11 +80,7 @@ impl<D: Detail> Driver<'_, D> {
             return Ok(Some(pieces));
         }
         let scope = facts.quota_scope();
-        let is_alone = !self
-            .journal
-            .parts
-            .iter()
-            .any(|other| other.is_out() && other.facts.quota_scope() == scope);
+        let is_alone = !self.journal.parts.iter().any(|other| other.is_out() && other.facts.quota_scope() == scope);
         let is_refused = refusals >= REFUSALS_TO_SPLIT && facts.requests > 1;
         Ok((is_alone && is_refused).then_some(2))
     }
@@ -95,7 +91,8 @@ impl<D: Detail> Driver<'_, D> {
         Ok(remaining.is_none_or(|remaining| part.facts.max_cost() <= remaining))
     }
 
-    /// The number of requests of a part within the remaining budget, if it is some but not all, and no open batch could free more budget.
+    /// The number of requests of a part within the remaining budget, if it is some but not all, and no open batch could
+    /// free more budget.
     fn requests_within_budget(&self, facts: &PartFacts) -> Result<Option<usize>> {
         let has_open_cost = self.journal.max_open_cost() > 0.0;
         let Some(remaining) = self.remaining_budget()?.filter(|_| !has_open_cost) else {
@@ -106,7 +103,8 @@ impl<D: Detail> Driver<'_, D> {
         Ok(is_some.then_some(requests))
     }
 
-    /// The rest of `--max-cost` in US dollars, after all charges and the maximum cost of open batches; `None` without a limit.
+    /// The rest of `--max-cost` in US dollars, after all charges and the maximum cost of open batches; `None` without a
+    /// limit.
     fn remaining_budget(&self) -> Result<Option<f64>> {
         let Some(money) = self.money else {
             return Ok(None);
@@ -117,10 +115,7 @@ impl<D: Detail> Driver<'_, D> {
         let charged = if let Some(charged) = self.notes.charged.get() {
             charged
         } else {
-            let run_models = RunModels {
-                models: self.models,
-                manifest: Some(self.manifest),
-            };
+            let run_models = RunModels { models: self.models, manifest: Some(self.manifest) };
             let trials = self.store.trials()?;
             Budget::for_run(money, &[], run_models, &trials)?.charged()
         };
@@ -132,17 +127,8 @@ impl<D: Detail> Driver<'_, D> {
 
     /// True if no batch is open, and no unsubmitted part is within the remaining budget.
     pub(super) fn is_over_budget(&self) -> Result<bool> {
-        let parts: Vec<&Part> = self
-            .journal
-            .parts
-            .iter()
-            .filter(|part| !self.stopped.has_part(&part.facts))
-            .collect();
-        let unsubmitted: Vec<&Part> = parts
-            .iter()
-            .copied()
-            .filter(|part| part.is_unsubmitted())
-            .collect();
+        let parts: Vec<&Part> = self.journal.parts.iter().filter(|part| !self.stopped.has_part(&part.facts)).collect();
+        let unsubmitted: Vec<&Part> = parts.iter().copied().filter(|part| part.is_unsubmitted()).collect();
         if unsubmitted.is_empty() || parts.iter().any(|part| part.is_out()) {
             return Ok(false);
         }
@@ -154,7 +140,8 @@ impl<D: Detail> Driver<'_, D> {
         Ok(true)
     }
 
-    /// Records that a batch was refused because too many tokens are waiting. A part that must be split advances at once.
+    /// Records that a batch was refused because too many tokens are waiting. A part that must be split advances at
+    /// once.
     pub(super) fn quota_reached(&mut self, part: usize, quota: &QuotaRefusal) -> Result<Step> {
         let limit = quota.limit;
         self.journal.record(part, Event::QuotaReached { limit })?;
@@ -178,8 +165,8 @@ impl<D: Detail> Driver<'_, D> {
         })
     }
 
-    /// Submits nothing of the part's model for some time: as long as the server `requested`, or else 1, 2, 4 … 30 minutes with the default
-    /// `--poll`.
+    /// Submits nothing of the part's model for some time: as long as the server `requested`, or else 1, 2, 4 … 30
+    /// minutes with the default `--poll`.
     pub(super) fn hold(&mut self, part: usize, requested: Option<Duration>) {
         let scope = self.part(part).facts.quota_scope();
         let refusals = self.notes.holds.get(&scope).map_or(0, |(_, n)| *n);

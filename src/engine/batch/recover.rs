@@ -19,8 +19,8 @@ use crate::store::Store;
 use crate::types::TrialKey;
 use darkqa_score::answers::record::Detail;
 
-/// Completes the files of parts with the requests that the run has recorded; gives up parts without such requests, and deletes other
-/// unfinished files.
+/// Completes the files of parts with the requests that the run has recorded; gives up parts without such requests, and
+/// deletes other unfinished files.
 pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Result<()> {
     let waiting = store.pending_in_batches()?;
     for part in 0..journal.parts.len() {
@@ -43,15 +43,13 @@ pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Res
     check_trials(journal, store)
 }
 
-/// Checks that the records of all trials in batches at the server exist. Without them, the trials would be asked and paid for again.
+/// Checks that the records of all trials in batches at the server exist. Without them, the trials would be asked and
+/// paid for again.
 fn check_trials<D: Detail>(journal: &Journal, store: &Store<D>) -> Result<()> {
     let at_server: Vec<usize> = (0..journal.parts.len())
         .filter(|part| {
             let stage = &journal.parts[*part].stage;
-            matches!(
-                stage,
-                Stage::Creating | Stage::Created | Stage::Fetched { .. }
-            )
+            matches!(stage, Stage::Creating | Stage::Created | Stage::Fetched { .. })
         })
         .collect();
     if at_server.is_empty() {
@@ -83,12 +81,7 @@ fn check_trials<D: Detail>(journal: &Journal, store: &Store<D>) -> Result<()> {
 }
 
 /// Completes a file, with only the lines whose trials are recorded. Returns true if there are any.
-fn complete(
-    journal: &mut Journal,
-    part: usize,
-    unfinished: &Path,
-    waiting: &BTreeSet<TrialKey>,
-) -> Result<bool> {
+fn complete(journal: &mut Journal, part: usize, unfinished: &Path, waiting: &BTreeSet<TrialKey>) -> Result<bool> {
     let path = journal.file(part);
     let kept = path.with_extension("kept.part");
     let unwritten = |e| Error::file(&kept, "write", e);
@@ -129,9 +122,7 @@ fn remove_unfinished(folder: &Path) -> Result<()> {
     for entry in entries {
         let path = entry.map_err(|e| Error::file(folder, "read", e))?.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();
-        let is_unfinished = path
-            .extension()
-            .is_some_and(|extension| extension == PART || extension == PIECE);
+        let is_unfinished = path.extension().is_some_and(|extension| extension == PART || extension == PIECE);
         if is_unfinished && name.starts_with("part-") {
             fs::remove_file(&path).map_err(|e| Error::file(&path, "delete", e))?;
         }

@@ -15,9 +15,7 @@ use crate::runs::changed_settings;
 use crate::store::{Store, StoredTrial};
 use crate::types::flags::read_word;
 use crate::types::manifests::RunManifest;
-use crate::types::{
-    Failure, FailureKind, Finish, LostAttempts, Record, Reply, TrialKey, Unstated, Usage,
-};
+use crate::types::{Failure, FailureKind, Finish, LostAttempts, Record, Reply, TrialKey, Unstated, Usage};
 use darkqa_score::answers::record::{Detail, answered};
 
 /// Numbers of lines by outcome.
@@ -60,12 +58,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         Ok(Self {
             blanks: blanks.map(|blank| (blank.key, blank)).collect(),
             waiting: store.pending_in_batches()?,
-            asked_again: store
-                .trials()?
-                .iter()
-                .filter(|trial| trial.may_heal())
-                .map(|trial| trial.key)
-                .collect(),
+            asked_again: store.trials()?.iter().filter(|trial| trial.may_heal()).map(|trial| trial.key).collect(),
             failures: BTreeMap::new(),
             store,
             manifest,
@@ -94,17 +87,13 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
                 if line.charged.is_none() && may_be_charged(failure.kind) {
                     blank.lost.unstated = bound;
                 }
-                let failed = FailedTrial {
-                    blank,
-                    failure,
-                    finish: None,
-                };
+                let failed = FailedTrial { blank, failure, finish: None };
                 self.failures.insert(failed.blank.key, failed);
                 return Ok(());
             }
         };
-        // A word that is not known means a broken generation or the model's own end: the next batch asks once more. A trial that ends so
-        // twice is the model's.
+        // A word that is not known means a broken generation or the model's own end: the next batch asks once more. A
+        // trial that ends so twice is the model's.
         if reply.may_heal && !self.asked_again.contains(&blank.key) {
             if !has_failed {
                 let failed = FailedTrial::from_doubtful(blank, bound, reply);
@@ -121,18 +110,11 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
             Some(usage) => unstated_rest(bound, usage),
             None => bound,
         };
-        let lost = LostAttempts {
-            unstated,
-            ..reply.lost
-        };
+        let lost = LostAttempts { unstated, ..reply.lost };
         self.counts.answered += 1;
         let constrain = constrain(self.manifest, &blank.model)?;
         let choices = blank.detail.choices().len();
-        let reply = Reply {
-            attempts: 1,
-            lost,
-            ..with_letter(reply, constrain, choices)
-        };
+        let reply = Reply { attempts: 1, lost, ..with_letter(reply, constrain, choices) };
         self.store.append(&answered(blank, reply)?)
     }
 
@@ -144,25 +126,19 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         {
             let mut blank = blank.clone().in_batch();
             blank.lost = LostAttempts::default();
-            let failed = FailedTrial {
-                blank,
-                failure,
-                finish: None,
-            };
+            let failed = FailedTrial { blank, failure, finish: None };
             self.failures.insert(key, failed);
         }
     }
 
     /// Trials whose request failed, with the kind of failure.
     pub(super) fn failures(&self) -> impl Iterator<Item = (TrialKey, FailureKind)> {
-        self.failures
-            .iter()
-            .map(|(key, failed)| (*key, failed.failure.kind))
+        self.failures.iter().map(|(key, failed)| (*key, failed.failure.kind))
     }
 
-    /// Decides about trials that may have been refused for their content, if the run has answers to others. Refused before in the same
-    /// words, a trial is stored as a reply that a filter withheld; else it is asked once more. Returns the trials that are not to be left
-    /// out of the next batch.
+    /// Decides about trials that may have been refused for their content, if the run has answers to others. Refused
+    /// before in the same words, a trial is stored as a reply that a filter withheld; else it is asked once more.
+    /// Returns the trials that are not to be left out of the next batch.
     pub(super) fn filter_refused(&mut self, content: &BTreeSet<TrialKey>) -> Result<Vec<TrialKey>> {
         if content.is_empty() || self.store.trials()?.iter().all(StoredTrial::failed) {
             return Ok(Vec::new());
@@ -207,10 +183,7 @@ impl<'a, D: Detail> ReplyImport<'a, D> {
         for failed in std::mem::take(&mut self.failures).into_values() {
             self.counts.failed += 1;
             let record = failed.blank.with_failure(failed.failure, 1);
-            self.store.append(&Record {
-                finish: failed.finish,
-                ..record
-            })?;
+            self.store.append(&Record { finish: failed.finish, ..record })?;
         }
         self.store.sync()?;
         Ok(self.counts)
@@ -233,11 +206,7 @@ impl<D> FailedTrial<D> {
             status: None,
             message: format!("the batch says: {end}; asked once more"),
         };
-        Self {
-            blank,
-            failure,
-            finish: Some(reply.finish.shorten()),
-        }
+        Self { blank, failure, finish: Some(reply.finish.shorten()) }
     }
 }
 
@@ -255,10 +224,7 @@ fn refusal_words(failure: &Failure) -> String {
 
 /// The part of a token bound that the server's stated tokens leave open.
 fn unstated_rest(bound: Unstated, usage: Usage) -> Unstated {
-    let tokens = TokenBound {
-        prompt: bound.prompt_tokens,
-        reply: bound.completion_tokens,
-    };
+    let tokens = TokenBound { prompt: bound.prompt_tokens, reply: bound.completion_tokens };
     match tokens.missing_from(usage) {
         missing if missing == TokenBound::default() => Unstated::default(),
         missing => missing.unstated(),
@@ -270,24 +236,19 @@ fn may_be_charged(kind: FailureKind) -> bool {
     matches!(kind, FailureKind::Server | FailureKind::Response)
 }
 
-/// Imports the replies in output and error files; returns a summary. Each reply is imported once, even if a file is imported again.
+/// Imports the replies in output and error files; returns a summary. Each reply is imported once, even if a file is
+/// imported again.
 ///
 /// # Errors
 /// If the run has written no batch, or a line is not in the format of a Batch API. Earlier replies stay imported.
-pub(crate) fn import<D: Detail>(
-    store: &mut Store<D>,
-    manifest: &RunManifest,
-    files: &[PathBuf],
-) -> Result<String> {
+pub(crate) fn import<D: Detail>(store: &mut Store<D>, manifest: &RunManifest, files: &[PathBuf]) -> Result<String> {
     let folder = store.folder().to_owned();
     let mut replies = ReplyImport::new(store, manifest)?;
     if replies.blanks.is_empty() {
         let problem =
-            "this run has written no requests for a batch; write them first, by batch export or openeqa --batch".to_owned();
-        return Err(Error::Run {
-            path: folder,
-            problem,
-        });
+            "this run has written no requests for a batch; write them first, by batch export or openeqa --batch"
+                .to_owned();
+        return Err(Error::Run { path: folder, problem });
     }
     for path in files {
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
@@ -305,8 +266,7 @@ pub(crate) fn import<D: Detail>(
 }
 
 fn not_a_line(path: &Path, line: usize) -> Error {
-    let problem =
-        "not a line of a Batch API's output: {\"custom_id\", \"response\", \"error\"} expected";
+    let problem = "not a line of a Batch API's output: {\"custom_id\", \"response\", \"error\"} expected";
     Error::line(path, line, problem)
 }
 
@@ -318,12 +278,7 @@ fn constrain(manifest: &RunManifest, model: &str) -> Result<Constrain> {
 }
 
 fn summary(counts: &ReplyCounts, waiting: usize) -> String {
-    let ReplyCounts {
-        answered,
-        failed,
-        imported_before,
-        unknown,
-    } = counts;
+    let ReplyCounts { answered, failed, imported_before, unknown } = counts;
     let mut text = format!("replies: {answered} imported, {failed} failed");
     if *imported_before > 0 {
         let _ = write!(text, ", {imported_before} imported before");

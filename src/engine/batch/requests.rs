@@ -15,8 +15,8 @@ use crate::error::{Error, Result};
 use crate::store::BATCH;
 use crate::types::text::counted;
 
-/// Maximum tokens of a part, as a share of the tokens that may wait for batches; chosen below a half, so that one part can wait while
-/// another one is processed.
+/// Maximum tokens of a part, as a share of the tokens that may wait for batches; chosen below a half, so that one part
+/// can wait while another one is processed.
 pub(super) const SHARE_OF_QUOTA: f64 = 0.45;
 
 /// Maximum tokens of a part if the limit is unknown; chosen.
@@ -54,7 +54,8 @@ impl<'a, I: Item> Requests<'a, I> {
         let journal = register.journal.as_deref();
         let (mut files, mut urls) = (Vec::new(), Vec::new());
         for (i, model) in models.iter().enumerate() {
-            // The number makes the name unique: two models may have the same file name, or one may be asked with and without images.
+            // The number makes the name unique: two models may have the same file name, or one may be asked with and
+            // without images.
             let stem = file_name(&format!("{}-{}", i + 1, model.name));
             let destination = destination(model, all, args)?;
             urls.push(destination.url.clone());
@@ -65,35 +66,18 @@ impl<'a, I: Item> Requests<'a, I> {
                     let stem = format!("part-{stem}");
                     let scope = (destination.base.clone(), destination.model.clone());
                     let limit = journal.limits.get(&scope).copied().or(quota);
-                    let tokens =
-                        limit.map_or(MAX_PART_TOKENS, |limit| SHARE_OF_QUOTA * limit as f64);
+                    let tokens = limit.map_or(MAX_PART_TOKENS, |limit| SHARE_OF_QUOTA * limit as f64);
                     (stem.clone(), journal.free_number(&stem), tokens)
                 }
             };
             let limits = FileLimits {
-                bytes: args
-                    .file_size
-                    .unwrap_or(known.file_size())
-                    .get()
-                    .saturating_mul(1_000_000),
+                bytes: args.file_size.unwrap_or(known.file_size()).get().saturating_mul(1_000_000),
                 requests: args.file_requests.unwrap_or(known.requests()).get(),
                 tokens,
             };
-            files.push(ModelInputFiles::new(
-                &folder,
-                &stem,
-                first,
-                limits,
-                destination,
-            ));
+            files.push(ModelInputFiles::new(&folder, &stem, first, limits, destination));
         }
-        Ok(Self {
-            models,
-            urls,
-            files,
-            register,
-            cost,
-        })
+        Ok(Self { models, urls, files, register, cost })
     }
 
     /// Adds all requests of a group.
@@ -105,8 +89,7 @@ impl<'a, I: Item> Requests<'a, I> {
             let model = &under_test.model;
             let (id, query) = (trial.key.to_string(), trial.item.query());
             let message = trial.prompt.message(&stimulus.images);
-            let line =
-                model.batch_line(&id, &self.urls[trial.model], message, query.choice_count());
+            let line = model.batch_line(&id, &self.urls[trial.model], message, query.choice_count());
             let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
                 continue;
             };
@@ -132,11 +115,7 @@ impl<'a, I: Item> Requests<'a, I> {
 }
 
 /// Model and endpoint of the requests to a model.
-fn destination(
-    model: &ModelUnderTest,
-    all: &[&ModelUnderTest],
-    args: &BatchFileArgs,
-) -> Result<Destination> {
+fn destination(model: &ModelUnderTest, all: &[&ModelUnderTest], args: &BatchFileArgs) -> Result<Destination> {
     let base = model.model.batch_base().unwrap_or_default();
     let known = BatchInterface::at(&base);
     let usual = model.model.batch_url().unwrap_or_default();
@@ -158,10 +137,7 @@ pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
     match models.iter().find(|model| !model.model.is_remote()) {
         None => Ok(()),
         Some(local) => {
-            let problem = format_args!(
-                "{} is built in; a batch can only ask models of an endpoint",
-                local.name
-            );
+            let problem = format_args!("{} is built in; a batch can only ask models of an endpoint", local.name);
             Err(Error::usage("--model", problem))
         }
     }
@@ -179,12 +155,7 @@ pub(super) fn require_files(models: &[ModelUnderTest]) -> Result<()> {
 }
 
 /// The text about the written files and the next step for the user.
-pub(crate) fn summary(
-    written: &[(PathBuf, usize)],
-    answered: usize,
-    in_batch: usize,
-    run: &Path,
-) -> String {
+pub(crate) fn summary(written: &[(PathBuf, usize)], answered: usize, in_batch: usize, run: &Path) -> String {
     let requests: usize = written.iter().map(|(_, requests)| requests).sum();
     let mut text = format!(
         "{} in {}; {answered} already answered, {in_batch} waiting for an earlier batch\n",

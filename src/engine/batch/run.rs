@@ -47,11 +47,7 @@ enum PhaseEnd {
 ///
 /// # Errors
 /// If a model is built in, or a server refuses all further calls. The batches stay, and the same command continues.
-pub(crate) fn run<E: Experiment>(
-    run: OpenRun<'_, E>,
-    files: &BatchFileArgs,
-    args: &BatchRunArgs,
-) -> Result<Outcome> {
+pub(crate) fn run<E: Experiment>(run: OpenRun<'_, E>, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
     let journal = Journal::open(run.store.folder(), &run.manifest)?;
     let mut batches = BatchRun {
         run,
@@ -89,9 +85,7 @@ fn reply_lengths(models: &[ModelUnderTest], stored: &[StoredTrial]) -> Vec<Optio
                 .iter()
                 .filter(|trial| **trial.model == *model.name)
                 .filter_map(|trial| trial.usage()?.completion_tokens);
-            let (count, sum) = tokens.fold((0.0, 0.0), |(count, sum), tokens| {
-                (count + 1.0, sum + tokens as f64)
-            });
+            let (count, sum) = tokens.fold((0.0, 0.0), |(count, sum), tokens| (count + 1.0, sum + tokens as f64));
             (count > 0.0).then(|| sum / count)
         })
         .collect()
@@ -164,15 +158,10 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             .plan
             .groups()
             .flat_map(|(_, group)| &group.trials)
-            .filter(|trial| {
-                self.stopped
-                    .has_model(phase, trial.model, &models[trial.model])
-            })
+            .filter(|trial| self.stopped.has_model(phase, trial.model, &models[trial.model]))
             .map(|trial| trial.key)
             .collect();
-        remaining
-            .plan
-            .exclude(|key| self.refused.contains(key) || excluded.contains(key));
+        remaining.plan.exclude(|key| self.refused.contains(key) || excluded.contains(key));
         Ok(remaining)
     }
 
@@ -202,8 +191,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         }
     }
 
-    /// Asks one trial of each model directly, to find out what the server refuses before a batch is created. A model that cannot be asked
-    /// any further is stopped; the others continue.
+    /// Asks one trial of each model directly, to find out what the server refuses before a batch is created. A model
+    /// that cannot be asked any further is stopped; the others continue.
     fn scout(&mut self, phase: usize, mut remaining: Remaining<E>) -> Result<EndReason> {
         let mut scouts = BTreeMap::new();
         for (_, group) in remaining.plan.groups() {
@@ -225,20 +214,15 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     }
 
     /// Stops the models whose scout trial has no reply because of one of these errors.
-    fn stop_unanswered(
-        &mut self,
-        phase: usize,
-        scouts: &BTreeMap<usize, TrialKey>,
-        errors: Vec<Error>,
-    ) -> Result<()> {
+    fn stop_unanswered(&mut self, phase: usize, scouts: &BTreeMap<usize, TrialKey>, errors: Vec<Error>) -> Result<()> {
         let answered = answered(&self.run.store.trials()?);
         let models = self.run.experiment.models(phase);
         for (model, _) in scouts.iter().filter(|(_, key)| !answered.contains(key)) {
             // Each error begins with the name of its model. Without an error, only this question has failed.
             let name = format!("{}: ", models[*model].name);
-            let has_error = errors.iter().any(|error| {
-                matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name))
-            });
+            let has_error = errors
+                .iter()
+                .any(|error| matches!(error, Error::Endpoint { problem, .. } if problem.starts_with(&name)));
             if has_error {
                 self.stopped.add_model(phase, *model);
             }
@@ -257,10 +241,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
         let experiment = self.run.experiment;
         let (models, money) = (experiment.models(phase), &experiment.settings().money);
         let all = every_model(experiment);
-        let run_models = RunModels {
-            models: &all,
-            manifest: Some(&self.run.manifest),
-        };
+        let run_models = RunModels { models: &all, manifest: Some(&self.run.manifest) };
         let budget = Budget::for_run(money, models, run_models, &remaining.stored)?;
         if self.args.no_scout {
             BudgetNotes::new(models).warn_unlimited(budget.spending());
@@ -276,19 +257,12 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             RequestCost {
                 tokens,
                 dollars: dollars.map(|dollars| money.prices.batch * dollars),
-                most_dollars: request
-                    .as_ref()
-                    .map(|request| money.prices.batch * request.max_cost()),
+                most_dollars: request.as_ref().map(|request| money.prices.batch * request.max_cost()),
                 bound: request.map(|request| request.current_bound()),
             }
         };
         let quota = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
-        let target = export::Target {
-            files: self.files,
-            quota,
-            journal: Some(&mut self.journal),
-            cost: &cost,
-        };
+        let target = export::Target { files: self.files, quota, journal: Some(&mut self.journal), cost: &cost };
         export::write(&mut self.run, phase, remaining.plan, target)?;
         Ok(())
     }
@@ -318,11 +292,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             args: self.args,
             money: Some(&experiment.settings().money),
             progress: self.run.progress,
-            until: if self.args.detach {
-                Goal::Submitted
-            } else {
-                Goal::Imported
-            },
+            until: if self.args.detach { Goal::Submitted } else { Goal::Imported },
             refused: &mut self.refused,
             stopped: &mut self.stopped,
             notes: Notes::default(),
@@ -373,8 +343,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
                      them"
                 )
             } else {
-                "interrupted: no batch is at the server; the same command continues the run"
-                    .to_owned()
+                "interrupted: no batch is at the server; the same command continues the run".to_owned()
             };
             self.run.progress.note(&line);
         }

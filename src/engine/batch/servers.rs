@@ -49,13 +49,7 @@ impl Servers {
     /// A single server, for all models.
     pub(super) fn at(base: String, server: BatchServer) -> Self {
         let [name, id, account] = [(); 3].map(|()| String::new());
-        Self(vec![ModelServer {
-            base,
-            name,
-            id,
-            account,
-            server,
-        }])
+        Self(vec![ModelServer { base, name, id, account, server }])
     }
 
     /// True if there is a server at a base URL.
@@ -63,7 +57,8 @@ impl Servers {
         self.0.iter().any(|one| one.base == base)
     }
 
-    /// The server of a part, with the key of its model. For a renamed model, all models at the base URL must have the same account.
+    /// The server of a part, with the key of its model. For a renamed model, all models at the base URL must have the
+    /// same account.
     ///
     /// # Errors
     /// If no flag names the base URL, or the account is ambiguous.

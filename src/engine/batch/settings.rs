@@ -33,8 +33,8 @@ pub(crate) struct BatchRunArgs {
     /// Send no single request of each model before its batches; such a request finds out what the server refuses
     #[arg(long, add = Decides::Nothing)]
     pub no_scout: bool,
-    /// The tokens that the server lets wait for batches of a model; parts have at most 45 % of it; default: what the server states when
-    /// it refuses a batch, and parts of 2 million
+    /// The tokens that the server lets wait for batches of a model; parts have at most 45 % of it; default: what the
+    /// server states when it refuses a batch, and parts of 2 million
     #[arg(long, value_name = "N", add = Decides::Nothing)]
     pub enqueued_tokens: Option<NonZeroU64>,
     /// The time within which the server is to end a batch

@@ -19,8 +19,8 @@ pub(super) const PIECE: &str = "split";
 impl<D: Detail> Driver<'_, D> {
     /// Splits a part into `pieces` new parts.
     ///
-    /// The files of the pieces are written first, then one event records all of them, then they get their final names. So a killed process
-    /// leaves either the part or its pieces.
+    /// The files of the pieces are written first, then one event records all of them, then they get their final names.
+    /// So a killed process leaves either the part or its pieces.
     ///
     /// # Errors
     /// If the part has only one request, or a file cannot be written.
@@ -32,10 +32,7 @@ impl<D: Detail> Driver<'_, D> {
                 "{}: one request has about {:.0} tokens, more than may wait for batches of {}; send smaller images with --image max-side=N",
                 whole.name, whole.facts.tokens, whole.facts.model
             );
-            return Err(Error::Endpoint {
-                endpoint: whole.facts.base,
-                problem,
-            });
+            return Err(Error::Endpoint { endpoint: whole.facts.base, problem });
         }
         for id in &self.files_at_server(part).await? {
             // A remaining file is harmless, because only the pieces are used.
@@ -49,8 +46,7 @@ impl<D: Detail> Driver<'_, D> {
         self.journal.record(part, Event::Split { into })?;
         for name in names {
             let path = self.journal.folder().join(name);
-            fs::rename(path.with_extension(PIECE), &path)
-                .map_err(|e| Error::file(&path, "write", e))?;
+            fs::rename(path.with_extension(PIECE), &path).map_err(|e| Error::file(&path, "write", e))?;
         }
         let path = self.journal.file(part);
         fs::remove_file(&path).map_err(|e| Error::file(&path, "delete", e))?;
@@ -60,10 +56,7 @@ impl<D: Detail> Driver<'_, D> {
     /// Writes the files of the pieces, with the extension [`PIECE`].
     fn write_pieces(&self, part: usize, pieces: usize) -> Result<Vec<Piece>> {
         let whole = self.part(part);
-        let stem = whole
-            .stem()
-            .rsplit_once('-')
-            .map_or(whole.stem(), |(stem, _)| stem);
+        let stem = whole.stem().rsplit_once('-').map_or(whole.stem(), |(stem, _)| stem);
         let first = self.journal.free_number(stem) as usize;
         let max_requests = whole.facts.requests.div_ceil(pieces);
         let name = |index: usize| format!("{stem}-{:03}.jsonl", first + index);
@@ -75,13 +68,8 @@ impl<D: Detail> Driver<'_, D> {
         let mut into = Vec::new();
         let finish = |writer: PieceWriter, into: &mut Vec<Piece>| {
             let index = into.len();
-            let facts = writer
-                .finish(&whole.facts)
-                .map_err(|e| Error::file(path(index), "write", e))?;
-            into.push(Piece {
-                file: name(index),
-                facts,
-            });
+            let facts = writer.finish(&whole.facts).map_err(|e| Error::file(path(index), "write", e))?;
+            into.push(Piece { file: name(index), facts });
             Ok(())
         };
         for_each_line(&self.journal.file(part), |line| {
@@ -89,9 +77,7 @@ impl<D: Detail> Driver<'_, D> {
                 finish(std::mem::take(&mut writer), &mut into)?;
             }
             let path = path(into.len());
-            writer
-                .add(line, || create_new(&path))
-                .map_err(|e| Error::file(&path, "write", e))
+            writer.add(line, || create_new(&path)).map_err(|e| Error::file(&path, "write", e))
         })?;
         finish(writer, &mut into)?;
         Ok(into)
@@ -108,11 +94,7 @@ struct PieceWriter {
 }
 
 impl PieceWriter {
-    fn add(
-        &mut self,
-        line: &str,
-        create: impl FnOnce() -> std::io::Result<File>,
-    ) -> std::io::Result<()> {
+    fn add(&mut self, line: &str, create: impl FnOnce() -> std::io::Result<File>) -> std::io::Result<()> {
         let file = match self.file.take() {
             Some(file) => file,
             None => BufWriter::new(create()?),
@@ -127,9 +109,7 @@ impl PieceWriter {
     /// Syncs the file to disk; returns the facts about the piece of a part.
     fn finish(self, whole: &PartFacts) -> std::io::Result<PartFacts> {
         if let Some(file) = self.file {
-            file.into_inner()
-                .map_err(std::io::IntoInnerError::into_error)?
-                .sync_all()?;
+            file.into_inner().map_err(std::io::IntoInnerError::into_error)?.sync_all()?;
         }
         let share = self.requests as f64 / whole.requests as f64;
         Ok(PartFacts {
@@ -139,9 +119,7 @@ impl PieceWriter {
             tokens: (whole.tokens * share).round(),
             dollars: whole.dollars.map(|dollars| dollars * share),
             // The piece may contain the most expensive requests.
-            most_dollars: whole
-                .most_dollars_each
-                .map(|each| each * self.requests as f64),
+            most_dollars: whole.most_dollars_each.map(|each| each * self.requests as f64),
             ..whole.clone()
         })
     }

@@ -11,8 +11,8 @@ use crate::error::Error;
 pub(super) struct StoppedModels {
     /// Base URLs and names of models whose parts stay as they are.
     models: BTreeSet<(String, String)>,
-    /// Phases and indices of models that are not asked any more in a phase. In another phase or without images, the same model may still be
-    /// asked.
+    /// Phases and indices of models that are not asked any more in a phase. In another phase or without images, the
+    /// same model may still be asked.
     in_phase: BTreeSet<(usize, usize)>,
     errors: Vec<Error>,
 }
@@ -42,8 +42,7 @@ impl StoppedModels {
     /// True if the model with this index in a phase is stopped.
     pub(super) fn has_model(&self, phase: usize, index: usize, model: &ModelUnderTest) -> bool {
         let base = model.model.batch_base().unwrap_or_default();
-        self.in_phase.contains(&(phase, index))
-            || self.models.contains(&(base, model.name.to_string()))
+        self.in_phase.contains(&(phase, index)) || self.models.contains(&(base, model.name.to_string()))
     }
 
     /// The errors that stopped models; empty if no model is stopped.

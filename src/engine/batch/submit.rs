@@ -1,4 +1,5 @@
-//! Steps of a part until its batch is created: upload, creation, and the search for files and batches of a killed process.
+//! Steps of a part until its batch is created: upload, creation, and the search for files and batches of a killed
+//! process.
 
 use super::driver::{Driver, Goal, Step};
 use super::event::Event;
@@ -9,8 +10,8 @@ use crate::types::text::counted;
 use crate::types::text::money;
 use darkqa_score::answers::record::Detail;
 
-/// Number of consecutive failed uploads or creations after which a model is stopped; chosen: 15 minutes by [`hold`](Driver::hold) with the
-/// default of `--poll`.
+/// Number of consecutive failed uploads or creations after which a model is stopped; chosen: 15 minutes by
+/// [`hold`](Driver::hold) with the default of `--poll`.
 const MAX_FAILED_CALLS: u32 = 5;
 
 impl<D: Detail> Driver<'_, D> {
@@ -28,10 +29,7 @@ impl<D: Detail> Driver<'_, D> {
             return self.give_up(part, why).map(|()| Step::Moved);
         }
         let expected = self.part(part).facts.bytes;
-        if path
-            .metadata()
-            .is_ok_and(|metadata| metadata.len() != expected)
-        {
+        if path.metadata().is_ok_and(|metadata| metadata.len() != expected) {
             let problem = format!(
                 "the file was changed after it was written: {expected} bytes expected; batch cancel {} frees its requests",
                 self.store.folder().display()
@@ -68,18 +66,14 @@ impl<D: Detail> Driver<'_, D> {
             Err(failure) => return self.check_failed(part, &failure),
         };
         let bytes = self.part(part).facts.bytes;
-        let found = files
-            .into_iter()
-            .find(|file| file.name == name && file.bytes.is_none_or(|other| other == bytes));
+        let found = files.into_iter().find(|file| file.name == name && file.bytes.is_none_or(|other| other == bytes));
         let event = match found {
             Some(file) => {
                 self.end_search(part);
                 Event::Uploaded { id: file.id }
             }
             None if !self.is_missing(part, "file") => return Ok(Step::Waiting),
-            None => Event::Refused {
-                why: "the file is not at the server".to_owned(),
-            },
+            None => Event::Refused { why: "the file is not at the server".to_owned() },
         };
         self.journal.record(part, event)?;
         Ok(Step::Moved)
@@ -119,12 +113,7 @@ impl<D: Detail> Driver<'_, D> {
         let attempt = self.part(part).attempt + 1;
         self.journal.record(part, Event::Creating { attempt })?;
         let (mark, url) = (self.mark(part), self.part(part).facts.url.clone());
-        let new = NewBatch {
-            file: &file,
-            url: &url,
-            window: &self.args.window,
-            mark: &mark,
-        };
+        let new = NewBatch { file: &file, url: &url, window: &self.args.window, mark: &mark };
         match self.server(part)?.create(new).await {
             Ok(batch) => self.batch_created(part, batch.id),
             Err(failure) => self.call_failed(part, &failure),
@@ -149,14 +138,13 @@ impl<D: Detail> Driver<'_, D> {
                 self.end_search(part);
                 self.batch_created(part, batch.id)
             }
-            None if self.is_missing(part, "batch") => {
-                self.refuse(part, "the batch is not at the server")
-            }
+            None if self.is_missing(part, "batch") => self.refuse(part, "the batch is not at the server"),
             None => Ok(Step::Waiting),
         }
     }
 
-    /// Searches for a batch that an earlier attempt created although it seemed to fail; `None` if a new one must be created.
+    /// Searches for a batch that an earlier attempt created although it seemed to fail; `None` if a new one must be
+    /// created.
     async fn find_earlier(&mut self, part: usize) -> Result<Option<Step>> {
         let listed = self.server(part)?.batches().await;
         match listed {
@@ -176,8 +164,7 @@ impl<D: Detail> Driver<'_, D> {
         let (last, earlier) = batches
             .into_iter()
             .filter(|batch| {
-                batch.mark == last_mark
-                    || (batch.mark.starts_with(&prefix) && batch.state != BatchState::Failed)
+                batch.mark == last_mark || (batch.mark.starts_with(&prefix) && batch.state != BatchState::Failed)
             })
             .partition::<Vec<_>, _>(|batch| batch.mark == last_mark);
         last.into_iter().chain(earlier).next()
@@ -254,10 +241,7 @@ impl<D: Detail> Driver<'_, D> {
         let part = self.part(part);
         let id = part.files.first().map_or("", String::as_str);
         let problem = format!("{}: the server could not read this file ({id})", part.name);
-        Error::Endpoint {
-            endpoint: part.facts.base.clone(),
-            problem,
-        }
+        Error::Endpoint { endpoint: part.facts.base.clone(), problem }
     }
 
     /// The error for a batch that may exist at a server that does not list batches.

@@ -7,7 +7,8 @@ use std::fmt::Write as _;
 use super::journal::Journal;
 use super::part::{Part, Stage};
 
-/// One line per part, with its file, requests, batch and state. `states` are current states from the server, by name of the part.
+/// One line per part, with its file, requests, batch and state. `states` are current states from the server, by name of
+/// the part.
 pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> String {
     let mut text = String::new();
     for part in &journal.parts {
@@ -18,10 +19,7 @@ pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> Str
             part.name,
             counted(part.facts.requests, "request"),
             part.facts.model,
-            states
-                .get(&part.name)
-                .cloned()
-                .unwrap_or_else(|| state_words(part))
+            states.get(&part.name).cloned().unwrap_or_else(|| state_words(part))
         );
     }
     text

@@ -4,8 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::ask::{
-    ChargeRatios, Price, PricedRequest, ReplyExcess, Reservation, Spending, TokenBound, Unpriced,
-    stated_charge,
+    ChargeRatios, Price, PricedRequest, ReplyExcess, Reservation, Spending, TokenBound, Unpriced, stated_charge,
 };
 use crate::engine::costs::money::MoneySettings;
 use crate::engine::costs::prompt_bounds::{self, PromptBounds, PromptFacts};
@@ -88,20 +87,14 @@ impl Budget {
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
-    pub(crate) fn new(
-        money: &MoneySettings,
-        models: &[ModelUnderTest],
-        stored: &[StoredTrial],
-    ) -> Result<Self> {
+    pub(crate) fn new(money: &MoneySettings, models: &[ModelUnderTest], stored: &[StoredTrial]) -> Result<Self> {
         let all: Vec<&ModelUnderTest> = models.iter().collect();
-        let run_models = RunModels {
-            models: &all,
-            manifest: None,
-        };
+        let run_models = RunModels { models: &all, manifest: None };
         Self::for_run(money, models, run_models, stored)
     }
 
-    /// A budget for the `models` that are asked now. It includes the cost of the stored records of all models of the run.
+    /// A budget for the `models` that are asked now. It includes the cost of the stored records of all models of the
+    /// run.
     ///
     /// # Errors
     /// If `--max-cost` is set and a model has no price, because the limit could not be enforced.
@@ -139,15 +132,12 @@ impl Budget {
         })
     }
 
-    /// Adds an upper bound in US dollars of the cost of requests without a record: those of batches that have not ended, and those of
-    /// killed processes.
+    /// Adds an upper bound in US dollars of the cost of requests without a record: those of batches that have not
+    /// ended, and those of killed processes.
     pub(crate) fn with_unrecorded(self, dollars: f64) -> Self {
         let max_cost = self.spending.limit();
         let spending = Spending::new(max_cost, self.spending.spent()).with_pending_batches(dollars);
-        Self {
-            spending: Arc::new(spending),
-            ..self
-        }
+        Self { spending: Arc::new(spending), ..self }
     }
 
     /// Asks for permission to ask a question now, and reserves the upper bound of the cost of its first request.
@@ -187,8 +177,8 @@ impl Budget {
         })
     }
 
-    /// Corrects the bounds of later prompts by the charged tokens of a trial's prompt. Adds the stated charge of a model without a price,
-    /// for which nothing is reserved.
+    /// Corrects the bounds of later prompts by the charged tokens of a trial's prompt. Adds the stated charge of a
+    /// model without a price, for which nothing is reserved.
     pub(crate) fn observe<'a, I: Item>(
         &mut self,
         model: &ModelUnderTest,
@@ -229,9 +219,7 @@ impl Budget {
         mut images: impl Iterator<Item = &'a ImageFacts>,
     ) -> Option<f64> {
         let price = self.models[index].price;
-        images.try_fold(0.0, |sum, image| {
-            Some(sum + image_tokens(model, price, image.width, image.height)?)
-        })
+        images.try_fold(0.0, |sum, image| Some(sum + image_tokens(model, price, image.width, image.height)?))
     }
 
     /// US dollars spent so far; `None` if no model has a price and no server states a charge.
@@ -271,13 +259,15 @@ impl Budget {
         &self.dearer
     }
 
-    /// Expected cost of a request to a model, in US dollars, by the price table and the charges so far; `None` if it has no known price.
+    /// Expected cost of a request to a model, in US dollars, by the price table and the charges so far; `None` if it
+    /// has no known price.
     pub(crate) fn expected_cost(&self, model: usize, prompt: f64, reply: f64) -> Option<f64> {
         let ModelBudget { price, charges, .. } = &self.models[model];
         Some(charges.mean().unwrap_or(1.0) * (*price)?.cost(prompt, reply))
     }
 
-    /// The reason why the price of a model is unknown, if it is another one than that the table does not have the model.
+    /// The reason why the price of a model is unknown, if it is another one than that the table does not have the
+    /// model.
     pub(crate) fn unpriced(money: &MoneySettings, model: &ModelUnderTest) -> Option<String> {
         let reason = model.priced(&money.prices).err()?;
         let is_told = reason != Unpriced::Model;
@@ -291,12 +281,7 @@ fn facts<'a, I: Item>(
     sizes: &'a [(usize, usize)],
     image_tokens: Option<f64>,
 ) -> PromptFacts<'a> {
-    PromptFacts {
-        prompt: &trial.prompt,
-        sizes,
-        system_bytes: model.model.system_bytes(),
-        image_tokens,
-    }
+    PromptFacts { prompt: &trial.prompt, sizes, system_bytes: model.model.system_bytes(), image_tokens }
 }
 
 /// Expected tokens of a prompt's text.
@@ -305,8 +290,8 @@ pub(crate) fn text_tokens(prompt: &Prompt) -> f64 {
     characters.iter().sum::<usize>() as f64 / CHARACTERS_PER_TOKEN + MESSAGE_TOKENS
 }
 
-/// Tokens of the images in a request about a source: `charged` tokens each if that is known, else by size. `None` if the tokens of an
-/// image are unknown.
+/// Tokens of the images in a request about a source: `charged` tokens each if that is known, else by size. `None` if
+/// the tokens of an image are unknown.
 pub(crate) fn shown_tokens(
     model: &ModelUnderTest,
     price: Option<Price>,
@@ -322,12 +307,7 @@ pub(crate) fn shown_tokens(
 }
 
 /// Tokens of an image for a model: from the table of prices, else by the model's family; `None` if unknown.
-fn image_tokens(
-    model: &ModelUnderTest,
-    price: Option<Price>,
-    width: usize,
-    height: usize,
-) -> Option<f64> {
+fn image_tokens(model: &ModelUnderTest, price: Option<Price>, width: usize, height: usize) -> Option<f64> {
     price
         .and_then(|price| price.image_tokens)
         .or_else(|| model.model.image_tokens(width as u64, height as u64))

@@ -18,11 +18,7 @@ pub(crate) struct BudgetNotes<'a> {
 
 impl<'a> BudgetNotes<'a> {
     pub(crate) fn new(models: &'a [ModelUnderTest]) -> Self {
-        Self {
-            models,
-            has_warned: vec![false; models.len()],
-            has_told_charges: vec![[false; 3]; models.len()],
-        }
+        Self { models, has_warned: vec![false; models.len()], has_told_charges: vec![[false; 3]; models.len()] }
     }
 
     /// Names models whose price is unknown although the table has a similar one: another version or service tier.
@@ -34,8 +30,8 @@ impl<'a> BudgetNotes<'a> {
         }
     }
 
-    /// Says once for each model that its server states other charges than the price table, charges that are no plausible price, or a
-    /// service tier without a price.
+    /// Says once for each model that its server states other charges than the price table, charges that are no
+    /// plausible price, or a service tier without a price.
     pub(crate) fn warn_of_charges(&mut self, model: usize, budget: &Budget) {
         let charges = budget.charges(model);
         let name = &self.models[model].name;
@@ -85,7 +81,8 @@ impl<'a> BudgetNotes<'a> {
         }
     }
 
-    /// Warns if a reply was charged more tokens than its limit, or if models have no limit any more because their server refuses one.
+    /// Warns if a reply was charged more tokens than its limit, or if models have no limit any more because their
+    /// server refuses one.
     pub(crate) fn warn_exceeded(&mut self, model: usize, budget: &Budget) {
         let spending = budget.spending();
         self.warn_unlimited(spending);

@@ -22,7 +22,8 @@ use darkqa_score::cluster::MIN_CLUSTERS;
 /// Assumed latency of a reply in seconds, if no reply is stored.
 const REPLY_SECONDS: f64 = 2.0;
 
-/// Estimates the remaining requests with their tokens, cost, bytes and time. A few images are made to measure their size.
+/// Estimates the remaining requests with their tokens, cost, bytes and time. A few images are made to measure their
+/// size.
 pub(crate) fn estimate<E: Experiment>(
     experiment: &E,
     plans: &[Plan<E::Item>],
@@ -32,9 +33,7 @@ pub(crate) fn estimate<E: Experiment>(
 ) -> Result<Forecast> {
     let settings = experiment.settings();
     let (money, sources) = (&settings.money, experiment.sources());
-    let expected = plans
-        .first()
-        .map_or_else(Vec::new, |plan| experiment.expected_requests(&plan.sources));
+    let expected = plans.first().map_or_else(Vec::new, |plan| experiment.expected_requests(&plan.sources));
     let (mut lines, mut all_models) = (Vec::new(), Vec::new());
     let mut built_in = Vec::new();
     let mut loads = Vec::new();
@@ -71,11 +70,7 @@ pub(crate) fn estimate<E: Experiment>(
     let planned: usize = plans.iter().map(|plan| plan.keys.len()).sum();
     let remaining: usize = plans.iter().map(Plan::remaining).sum();
     let is_few = experiment.part().is_none() && sources.len() < MIN_CLUSTERS;
-    let few_sources = FewSources {
-        number: sources.len(),
-        needed: MIN_CLUSTERS,
-        of: E::SOURCE,
-    };
+    let few_sources = FewSources { number: sources.len(), needed: MIN_CLUSTERS, of: E::SOURCE };
     Ok(Forecast {
         lines,
         built_in,
@@ -87,33 +82,22 @@ pub(crate) fn estimate<E: Experiment>(
         bytes: images.bytes,
         largest_image: largest.map_or(0, |image| image.bytes),
         sampled: sample.images.len(),
-        too_large: limit
-            .zip(largest)
-            .and_then(|(limit, image)| too_large(limit, image, sources)),
+        too_large: limit.zip(largest).and_then(|(limit, image)| too_large(limit, image, sources)),
         making_seconds: images.seconds,
         asking_seconds,
         pace,
         prices: format!("prices of {}", money.prices.as_of),
         batch: money.prices.batch,
-        image_store: images
-            .set
-            .map(|set| StoreForecast::new(set.description(), set.bytes(), set.room())),
+        image_store: images.set.map(|set| StoreForecast::new(set.description(), set.bytes(), set.room())),
         reply: E::REPLY,
         few_sources: is_few.then_some(few_sources),
         power: experiment.power().filter(|_| experiment.part().is_none()),
-        largest_request: sources
-            .iter()
-            .any(|source| source.order.len() > 1)
-            .then_some(images.largest_request),
+        largest_request: sources.iter().any(|source| source.order.len() > 1).then_some(images.largest_request),
     })
 }
 
 /// Built-in models that a plan asks, with the number of trials of each.
-fn built_in_models<E: Experiment>(
-    experiment: &E,
-    phase: usize,
-    plan: &Plan<E::Item>,
-) -> Vec<(String, usize)> {
+fn built_in_models<E: Experiment>(experiment: &E, phase: usize, plan: &Plan<E::Item>) -> Vec<(String, usize)> {
     let models = experiment.models(phase);
     let mut trials = vec![0; models.len()];
     for trial in plan.groups().flat_map(|(_, group)| &group.trials) {
@@ -137,14 +121,10 @@ fn label(model: &ModelUnderTest, phase: &str) -> String {
     format!("{}{role}", model.name)
 }
 
-/// The reason why a request is too large for an endpoint, judged by the largest image and the largest number of images in a request;
-/// `None` if all fit.
+/// The reason why a request is too large for an endpoint, judged by the largest image and the largest number of images
+/// in a request; `None` if all fit.
 fn too_large(limit: ImageLimit, image: &ImageFacts, sources: &[Source]) -> Option<String> {
-    let max_images = sources
-        .iter()
-        .map(|source| source.order.len())
-        .max()
-        .unwrap_or(0);
+    let max_images = sources.iter().map(|source| source.order.len()).max().unwrap_or(0);
     limit
         .check(image)
         .and_then(|()| limit.check_request(max_images, Some(image)))
@@ -217,19 +197,12 @@ fn add_load(loads: &mut Vec<Load>, model: &ModelUnderTest, line: &CostLine) {
     };
     let requests = line.requests as f64;
     let tokens = line.text_tokens + line.image_tokens.unwrap_or(0.0) + line.reply_tokens;
-    match loads
-        .iter_mut()
-        .find(|load| Arc::ptr_eq(&load.server, server))
-    {
+    match loads.iter_mut().find(|load| Arc::ptr_eq(&load.server, server)) {
         Some(load) => {
             load.requests += requests;
             load.tokens += tokens;
         }
-        None => loads.push(Load {
-            server: Arc::clone(server),
-            requests,
-            tokens,
-        }),
+        None => loads.push(Load { server: Arc::clone(server), requests, tokens }),
     }
 }
 
@@ -245,12 +218,7 @@ struct Tokens {
 
 impl Default for Tokens {
     fn default() -> Self {
-        Self {
-            requests: 0,
-            text: 0.0,
-            reply: 0.0,
-            image: Some(0.0),
-        }
+        Self { requests: 0, text: 0.0, reply: 0.0, image: Some(0.0) }
     }
 }
 
@@ -264,7 +232,8 @@ impl Tokens {
         })
     }
 
-    /// The cost in US dollars if all replies together have `reply` tokens; `None` if the price or the tokens of images are unknown.
+    /// The cost in US dollars if all replies together have `reply` tokens; `None` if the price or the tokens of images
+    /// are unknown.
     fn dollars(&self, price: Option<Price>, reply: f64) -> Option<f64> {
         Some(price?.cost(self.text + self.image?, reply))
     }
@@ -286,16 +255,10 @@ fn cost_line(
 ) -> CostLine {
     let tokens = Tokens::sum(by_profile.values());
     let requests = tokens.requests as f64;
-    let longest = model
-        .model
-        .max_tokens()
-        .map(|limit| requests * f64::from(limit));
+    let longest = model.model.max_tokens().map(|limit| requests * f64::from(limit));
     CostLine {
         model: label(model, phase),
-        endpoints: model
-            .server
-            .as_deref()
-            .map_or_else(Vec::new, Server::addresses),
+        endpoints: model.server.as_deref().map_or_else(Vec::new, Server::addresses),
         requests: tokens.requests,
         text_tokens: tokens.text,
         image_tokens: tokens.image,
@@ -317,20 +280,12 @@ fn cost_line(
     }
 }
 
-/// Seconds until all replies of an endpoint have arrived, and a description of the limit that determines them: `--rpm`, `--tpm`, or the
-/// mean latency of stored replies.
+/// Seconds until all replies of an endpoint have arrived, and a description of the limit that determines them: `--rpm`,
+/// `--tpm`, or the mean latency of stored replies.
 fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
-    let Load {
-        server,
-        requests,
-        tokens,
-    } = load;
+    let Load { server, requests, tokens } = load;
     let (requests, tokens) = (*requests, *tokens);
-    let times: Vec<f64> = latencies_ms
-        .iter()
-        .filter(|ms| **ms > 0)
-        .map(|ms| *ms as f64 / 1e3)
-        .collect();
+    let times: Vec<f64> = latencies_ms.iter().filter(|ms| **ms > 0).map(|ms| *ms as f64 / 1e3).collect();
     let (latency, origin) = if times.is_empty() {
         (REPLY_SECONDS, "assumed")
     } else {
@@ -338,14 +293,9 @@ fn asking_time(load: &Load, latencies_ms: &[u64]) -> (f64, String) {
     };
     let sending = &server.sending;
     let concurrency = server.max_in_flight();
-    let mut slowest = (
-        requests * latency / concurrency as f64,
-        format!("{latency:.1} s a reply {origin}, {concurrency} at once"),
-    );
-    let quotas = [
-        ("--rpm", requests, sending.quota.requests),
-        ("--tpm", tokens, sending.quota.tokens),
-    ];
+    let mut slowest =
+        (requests * latency / concurrency as f64, format!("{latency:.1} s a reply {origin}, {concurrency} at once"));
+    let quotas = [("--rpm", requests, sending.quota.requests), ("--tpm", tokens, sending.quota.tokens)];
     for (flag, number, per_minute) in quotas {
         let Some(per_minute) = per_minute else {
             continue;

@@ -1,5 +1,5 @@
-//! The cost of requests in flight, as a file in the run folder: [`InFlightCost`]. If the process is killed, the file remains, and the next
-//! process counts the requests that may have been charged without a record.
+//! The cost of requests in flight, as a file in the run folder: [`InFlightCost`]. If the process is killed, the file
+//! remains, and the next process counts the requests that may have been charged without a record.
 
 use std::fs;
 use std::path::Path;
@@ -38,9 +38,8 @@ impl InFlightCost {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(Self::default()),
             Err(e) => return Err(Error::file(path, "read", e)),
         };
-        let note = serde_json::from_slice::<Self>(&text)
-            .ok()
-            .filter(|note| is_cost(note.killed) && is_cost(note.in_flight));
+        let note =
+            serde_json::from_slice::<Self>(&text).ok().filter(|note| is_cost(note.killed) && is_cost(note.in_flight));
         let Some(note) = note else {
             let aside = set_file_aside(&path)?;
             tracing::warn!(
@@ -50,10 +49,7 @@ impl InFlightCost {
             );
             return Ok(Self::default());
         };
-        Ok(Self {
-            killed: note.killed + note.in_flight,
-            in_flight: 0.0,
-        })
+        Ok(Self { killed: note.killed + note.in_flight, in_flight: 0.0 })
     }
 
     /// Upper bound of the cost of requests that killed processes left without a record, in US dollars.
@@ -70,7 +66,8 @@ impl InFlightCost {
         self.write(folder)
     }
 
-    /// Writes that nothing is in flight, once all requests have a record. Deletes the file if no process was killed either.
+    /// Writes that nothing is in flight, once all requests have a record. Deletes the file if no process was killed
+    /// either.
     pub(crate) fn end(&mut self, folder: &Path) -> Result<()> {
         if self.in_flight <= 0.0 {
             return Ok(());

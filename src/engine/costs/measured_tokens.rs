@@ -1,7 +1,8 @@
 //! Tokens of images as the server charges them: [`MeasuredTokens`].
 //!
-//! Before the first reply, the tokens of an image are estimated by the rule of the model's family, from which the server may deviate.
-//! Afterwards they are measured: the charged tokens of a prompt minus the estimated tokens of its text.
+//! Before the first reply, the tokens of an image are estimated by the rule of the model's family, from which the
+//! server may deviate. Afterwards they are measured: the charged tokens of a prompt minus the estimated tokens of its
+//! text.
 
 use std::collections::HashMap;
 
@@ -34,9 +35,7 @@ pub(crate) struct Difference {
 impl MeasuredTokens {
     /// No measurements yet, for a number of models.
     pub(crate) fn new(models: usize) -> Self {
-        Self {
-            images: vec![Vec::new(); models],
-        }
+        Self { images: vec![Vec::new(); models] }
     }
 
     /// Measures the stored replies to the trials of a plan about these sources.
@@ -46,10 +45,8 @@ impl MeasuredTokens {
         sources: &[Source],
         stored: &[StoredTrial],
     ) -> Self {
-        let charged: HashMap<TrialKey, u64> = stored
-            .iter()
-            .filter_map(|record| Some((record.key, record.usage()?.prompt_tokens?)))
-            .collect();
+        let charged: HashMap<TrialKey, u64> =
+            stored.iter().filter_map(|record| Some((record.key, record.usage()?.prompt_tokens?))).collect();
         let mut measured = Self::new(models);
         for (place, group) in plan.groups().filter(|(_, group)| group.condition.is_some()) {
             let images = sources[place].order.len();
@@ -78,15 +75,10 @@ impl MeasuredTokens {
         (images.len() == REPLIES).then(|| f64::midpoint(images[middle - 1], images[middle]))
     }
 
-    /// Compares the estimated tokens of a prompt with the charged ones: `text` and `image_tokens` are the estimates for the text and for
-    /// all `images` together. `None` if they differ by at most [`TOLERANCE`], or before [`REPLIES`] replies.
-    pub(crate) fn difference(
-        &self,
-        model: usize,
-        text: f64,
-        images: usize,
-        image_tokens: f64,
-    ) -> Option<Difference> {
+    /// Compares the estimated tokens of a prompt with the charged ones: `text` and `image_tokens` are the estimates for
+    /// the text and for all `images` together. `None` if they differ by at most [`TOLERANCE`], or before [`REPLIES`]
+    /// replies.
+    pub(crate) fn difference(&self, model: usize, text: f64, images: usize, image_tokens: f64) -> Option<Difference> {
         let charged = text + self.image(model)? * images as f64;
         let estimated = text + image_tokens;
         let differs = (charged - estimated).abs() > TOLERANCE * estimated;

@@ -53,20 +53,14 @@ impl MoneySettings {
     ///
     /// # Errors
     /// If the file of prices, or the table in the settings, cannot be used.
-    pub(crate) fn resolve(
-        args: &MoneyArgs,
-        shard: Shard,
-        stored: &BTreeMap<String, Value>,
-    ) -> Result<Self> {
+    pub(crate) fn resolve(args: &MoneyArgs, shard: Shard, stored: &BTreeMap<String, Value>) -> Result<Self> {
         let prices = match &args.prices {
             Some(path) => Prices::load(path)?,
             None => Prices::from_settings(stored)?,
         };
         if args.prices.is_none() && args.max_cost.is_some() && prices.setting().is_some() {
             // The folder may come from another user, and its prices determine when the run stops.
-            tracing::warn!(
-                "--max-cost counts with the prices that the run folder keeps; --prices FILE names others"
-            );
+            tracing::warn!("--max-cost counts with the prices that the run folder keeps; --prices FILE names others");
         }
         Ok(Self {
             prices,

@@ -10,7 +10,8 @@ use crate::runs::run_plan::FrameCost;
 /// Processor seconds for each million pixels of an image that is degraded and encoded; measured on 1280 × 720, rounded.
 const SECONDS_PER_MEGAPIXEL: f64 = 0.1;
 
-/// Processor seconds for each million pixels of an enhanced image; chosen between 0.1 and 8, the range of the enhancers.
+/// Processor seconds for each million pixels of an enhanced image; chosen between 0.1 and 8, the range of the
+/// enhancers.
 const ENHANCED_SECONDS_PER_MEGAPIXEL: f64 = 1.0;
 
 /// Processor seconds for each request; chosen.
@@ -19,20 +20,11 @@ const SECONDS_PER_REQUEST: f64 = 0.002;
 /// The cost of the trials of the first phase of an experiment, for each of its sources in their order.
 pub(crate) fn costs<E: Experiment>(experiment: &E, plan: &[SourcePlan<E::Item>]) -> Vec<FrameCost> {
     let sources = experiment.sources();
-    let zero_cost = FrameCost {
-        tokens: Some(0.0),
-        dollars: Some(0.0),
-        ..FrameCost::default()
-    };
+    let zero_cost = FrameCost { tokens: Some(0.0), dollars: Some(0.0), ..FrameCost::default() };
     let mut costs = vec![zero_cost; sources.len()];
     for part in plan {
         for group in &part.groups {
-            add_group(
-                experiment,
-                &sources[part.source],
-                group,
-                &mut costs[part.source],
-            );
+            add_group(experiment, &sources[part.source], group, &mut costs[part.source]);
         }
     }
     // Rounded to microseconds, because further digits may differ between machines.
@@ -43,12 +35,7 @@ pub(crate) fn costs<E: Experiment>(experiment: &E, plan: &[SourcePlan<E::Item>])
 }
 
 /// Adds the trials of a group about a source to its cost.
-fn add_group<E: Experiment>(
-    experiment: &E,
-    source: &Source,
-    group: &TrialGroup<E::Item>,
-    cost: &mut FrameCost,
-) {
+fn add_group<E: Experiment>(experiment: &E, source: &Source, group: &TrialGroup<E::Item>, cost: &mut FrameCost) {
     let models = experiment.models(0);
     if let Some(condition) = &group.condition {
         let seconds_per_megapixel = match condition.enhancer {

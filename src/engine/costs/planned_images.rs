@@ -13,7 +13,8 @@ use crate::engine::images::trials::Plan;
 use crate::error::Result;
 use crate::types::{Condition, ImageFacts};
 
-/// Number of sources whose images are made to measure their size. Images with enhancers are made for the first of them only.
+/// Number of sources whose images are made to measure their size. Images with enhancers are made for the first of them
+/// only.
 const SAMPLED_SOURCES: usize = 3;
 
 /// Bytes of a request besides its images and its text.
@@ -40,11 +41,7 @@ pub(crate) struct PlannedImages {
 
 impl PlannedImages {
     /// Estimates the images of the remaining trials in these plans, one plan for each phase.
-    pub(crate) fn new<E: Experiment>(
-        experiment: &E,
-        plans: &[Plan<E::Item>],
-        sample: &SampledImages,
-    ) -> Self {
+    pub(crate) fn new<E: Experiment>(experiment: &E, plans: &[Plan<E::Item>], sample: &SampledImages) -> Self {
         let mut all = Self {
             made: 0,
             sent: 0,
@@ -79,13 +76,7 @@ impl PlannedImages {
     }
 
     /// Adds the images of a source in a condition.
-    fn add_made(
-        &mut self,
-        condition: &Condition,
-        source: &Source,
-        mean: Option<ImageMeans>,
-        cores: usize,
-    ) {
+    fn add_made(&mut self, condition: &Condition, source: &Source, mean: Option<ImageMeans>, cores: usize) {
         let frames = source.frames.len();
         self.made += frames;
         if let Some(set) = &mut self.set {
@@ -94,9 +85,7 @@ impl PlannedImages {
         }
         // The frames of a walk are made in parallel, one per core. For a single frame, all cores work together.
         let in_parallel = if frames > 1 { cores } else { 1 };
-        self.seconds += mean.map_or(0.0, |mean| {
-            mean.seconds * frames as f64 / in_parallel as f64
-        });
+        self.seconds += mean.map_or(0.0, |mean| mean.seconds * frames as f64 / in_parallel as f64);
     }
 }
 
@@ -153,9 +142,6 @@ impl SampledImages {
 
     fn mean(&self, condition: &Condition) -> Option<ImageMeans> {
         let (bytes, seconds, n) = self.sums.get(condition)?;
-        Some(ImageMeans {
-            bytes: bytes / *n as f64,
-            seconds: seconds / *n as f64,
-        })
+        Some(ImageMeans { bytes: bytes / *n as f64, seconds: seconds / *n as f64 })
     }
 }

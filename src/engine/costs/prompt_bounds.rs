@@ -1,8 +1,8 @@
 //! Upper bounds of the tokens of prompts: [`PromptBounds`].
 //!
-//! Before the first reply, a bound is computed from the length of the text and the rule of the model's family for images. Afterwards it is
-//! computed from the charged tokens of an earlier prompt with images of the same sizes, plus the bytes of the differing text: no tokenizer
-//! makes more tokens than bytes.
+//! Before the first reply, a bound is computed from the length of the text and the rule of the model's family for
+//! images. Afterwards it is computed from the charged tokens of an earlier prompt with images of the same sizes, plus
+//! the bytes of the differing text: no tokenizer makes more tokens than bytes.
 
 use std::collections::VecDeque;
 
@@ -24,11 +24,12 @@ const JOINS: u64 = 4;
 /// Number of earlier prompts that are kept for comparison; chosen.
 const MAX_REFERENCES: usize = 16;
 
-/// Number of later prompts that must agree with an earlier one before it replaces the bound by length. Chosen: the first reply of a server
-/// may come from another replica, or from a cache.
+/// Number of later prompts that must agree with an earlier one before it replaces the bound by length. Chosen: the
+/// first reply of a server may come from another replica, or from a cache.
 const MIN_AGREEING: usize = 2;
 
-/// Ratio of a bound to the charged tokens up to which the bound is close, so that the prompt need not be kept for comparison; chosen.
+/// Ratio of a bound to the charged tokens up to which the bound is close, so that the prompt need not be kept for
+/// comparison; chosen.
 const MAX_CLOSE_RATIO: f64 = 1.05;
 
 /// Facts that determine the tokens of a prompt.
@@ -77,11 +78,7 @@ pub(crate) struct PromptBounds {
 
 impl PromptBounds {
     pub(crate) fn new() -> Self {
-        Self {
-            references: VecDeque::new(),
-            excess_by_length: 1.0,
-            excess_by_comparison: 1.0,
-        }
+        Self { references: VecDeque::new(), excess_by_length: 1.0, excess_by_comparison: 1.0 }
     }
 
     /// Upper bound of the tokens of a prompt.
@@ -89,9 +86,7 @@ impl PromptBounds {
         let by_length = by_length(facts) * self.excess_by_length;
         let by_comparison = self.by_comparison(facts);
         let by_comparison = by_comparison.map(|tokens| tokens * self.excess_by_comparison);
-        by_comparison
-            .map_or(by_length, |tokens| tokens.min(by_length))
-            .ceil() as u64
+        by_comparison.map_or(by_length, |tokens| tokens.min(by_length)).ceil() as u64
     }
 
     /// Corrects the bounds of later prompts by the charged tokens of a prompt.
@@ -103,11 +98,7 @@ impl PromptBounds {
         self.excess_by_length = self.excess_by_length.max(tokens / by_length(facts));
         let by_comparison = self.by_comparison(facts);
         let mut is_close = false;
-        for one in self
-            .references
-            .iter_mut()
-            .filter(|one| one.sizes == facts.sizes)
-        {
+        for one in self.references.iter_mut().filter(|one| one.sizes == facts.sizes) {
             let most = one.most_tokens(facts);
             one.agreeing += usize::from(tokens <= most);
             is_close |= (tokens..=MAX_CLOSE_RATIO * tokens).contains(&most);
@@ -128,8 +119,8 @@ impl PromptBounds {
         }
     }
 
-    /// Lowest upper bound by comparison with earlier prompts. Only prompts with images of the same sizes count, if enough later ones agree
-    /// with them; `None` without any.
+    /// Lowest upper bound by comparison with earlier prompts. Only prompts with images of the same sizes count, if
+    /// enough later ones agree with them; `None` without any.
     fn by_comparison(&self, facts: PromptFacts<'_>) -> Option<f64> {
         self.references
             .iter()
@@ -154,14 +145,10 @@ fn by_length(facts: PromptFacts<'_>) -> f64 {
     text as f64 + images
 }
 
-/// Number of bytes of a prompt's text without the beginnings and ends that its parts share with those of another prompt.
+/// Number of bytes of a prompt's text without the beginnings and ends that its parts share with those of another
+/// prompt.
 fn differing_bytes(other: &Prompt, prompt: &Prompt) -> usize {
-    other
-        .parts()
-        .into_iter()
-        .zip(prompt.parts())
-        .map(|(other, text)| unshared(other.as_bytes(), text.as_bytes()))
-        .sum()
+    other.parts().into_iter().zip(prompt.parts()).map(|(other, text)| unshared(other.as_bytes(), text.as_bytes())).sum()
 }
 
 /// Number of bytes of a text without the beginning and end that it shares with another one.
@@ -179,12 +166,7 @@ mod tests {
     const SIZES: &[(usize, usize)] = &[(640, 480)];
 
     fn facts(prompt: &Prompt, image_tokens: Option<f64>) -> PromptFacts<'_> {
-        PromptFacts {
-            prompt,
-            sizes: SIZES,
-            system_bytes: 0,
-            image_tokens,
-        }
+        PromptFacts { prompt, sizes: SIZES, system_bytes: 0, image_tokens }
     }
 
     fn prompt(number: usize) -> Prompt {
@@ -209,14 +191,8 @@ mod tests {
         bounds.observe(facts(&prompt(8), None), 301);
         bounds.observe(facts(&prompt(9), None), 300);
         assert_eq!(bounds.bound(facts(&prompt(123), None)), 300 + 3 + 4);
-        let other_size = PromptFacts {
-            sizes: &[(320, 240)],
-            ..facts(&seven, None)
-        };
-        assert!(
-            bounds.bound(other_size) > 2000,
-            "another image may have more tokens"
-        );
+        let other_size = PromptFacts { sizes: &[(320, 240)], ..facts(&seven, None) };
+        assert!(bounds.bound(other_size) > 2000, "another image may have more tokens");
     }
 
     #[test]
@@ -226,10 +202,7 @@ mod tests {
         assert!(bounds.bound(facts(&prompt(8), Some(80.0))) >= 2000);
         bounds.observe(facts(&prompt(8), Some(80.0)), 4000);
         assert!(bounds.bound(facts(&prompt(9), Some(80.0))) >= 3990);
-        let other_size = PromptFacts {
-            sizes: &[(320, 240)],
-            ..facts(&seven, Some(80.0))
-        };
+        let other_size = PromptFacts { sizes: &[(320, 240)], ..facts(&seven, Some(80.0)) };
         assert!(bounds.bound(other_size) >= 4000);
     }
 

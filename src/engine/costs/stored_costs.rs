@@ -27,12 +27,7 @@ struct ModelCosts {
 
 impl StoredCosts {
     /// Adds a record of a model with this price; without one, only stated charges count.
-    pub(crate) fn add(
-        &mut self,
-        price: Option<Price>,
-        money: &MoneySettings,
-        record: &StoredTrial,
-    ) {
+    pub(crate) fn add(&mut self, price: Option<Price>, money: &MoneySettings, record: &StoredTrial) {
         let lost = record.lost();
         let usages = [record.usage(), lost.map(|lost| lost.usage)];
         if price.is_none() && usages.iter().flatten().all(|usage| usage.cost.is_none()) {
@@ -60,15 +55,14 @@ impl StoredCosts {
         known + self.unstated().1
     }
 
-    /// Number of requests without stated tokens, and the upper bound of their cost in US dollars: as dear as the other requests.
+    /// Number of requests without stated tokens, and the upper bound of their cost in US dollars: as dear as the other
+    /// requests.
     pub(crate) fn unstated(&self) -> (u32, f64) {
-        self.by_model
-            .values()
-            .fold((0, 0.0), |(count, sum), model| {
-                let (requests, dollars) = model.unstated;
-                let dollars = model.charges.factor() * dollars;
-                (u32::saturating_add(count, requests), sum + dollars)
-            })
+        self.by_model.values().fold((0, 0.0), |(count, sum), model| {
+            let (requests, dollars) = model.unstated;
+            let dollars = model.charges.factor() * dollars;
+            (u32::saturating_add(count, requests), sum + dollars)
+        })
     }
 
     /// Charges that the server of a model states.
@@ -77,12 +71,11 @@ impl StoredCosts {
         costs.map_or_else(Arc::default, |costs| Arc::clone(&costs.charges))
     }
 
-    /// Number of replies by model that were charged more than the price table says; models without such replies are left out.
+    /// Number of replies by model that were charged more than the price table says; models without such replies are
+    /// left out.
     pub(crate) fn dearer(&self) -> BTreeMap<String, usize> {
         let models = self.by_model.iter().filter(|(_, model)| model.dearer > 0);
-        models
-            .map(|(name, model)| (name.clone(), model.dearer))
-            .collect()
+        models.map(|(name, model)| (name.clone(), model.dearer)).collect()
     }
 }
 
@@ -104,8 +97,5 @@ impl ModelCosts {
 const DEARER: f64 = 1.05;
 
 fn bound(unstated: Unstated) -> TokenBound {
-    TokenBound {
-        prompt: unstated.prompt_tokens,
-        reply: unstated.completion_tokens,
-    }
+    TokenBound { prompt: unstated.prompt_tokens, reply: unstated.completion_tokens }
 }

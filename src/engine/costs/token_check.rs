@@ -7,8 +7,8 @@ use crate::engine::images::trials::{Item, Trial};
 use crate::engine::models::ModelUnderTest;
 use crate::types::{ImageFacts, Usage};
 
-/// Charged tokens of the prompts of a run, for each of its models. Warns once for each if they differ from the estimate, and if they show
-/// that the server shrinks the images.
+/// Charged tokens of the prompts of a run, for each of its models. Warns once for each if they differ from the
+/// estimate, and if they show that the server shrinks the images.
 #[derive(Debug)]
 pub(crate) struct TokenCheck {
     measured: MeasuredTokens,
@@ -95,9 +95,8 @@ impl TokenCheck {
             return;
         }
         let sizes = images.map(|image| (image.width as u64, image.height as u64));
-        let expected: Option<Vec<u64>> = sizes
-            .map(|(width, height)| model.model.scaling_image_tokens(width, height))
-            .collect();
+        let expected: Option<Vec<u64>> =
+            sizes.map(|(width, height)| model.model.scaling_image_tokens(width, height)).collect();
         let Some(expected) = expected else {
             return;
         };

@@ -63,12 +63,7 @@ impl ImageStore {
     ///
     /// # Errors
     /// If the folder cannot be created or read.
-    pub(crate) fn open(
-        folder: &Path,
-        access: FolderAccess,
-        kinds: StoredKinds,
-        capacity: u64,
-    ) -> Result<Self> {
+    pub(crate) fn open(folder: &Path, access: FolderAccess, kinds: StoredKinds, capacity: u64) -> Result<Self> {
         let store = Self {
             argument: folder.to_owned(),
             folder: StoreFolder::new(folder, access),
@@ -76,11 +71,8 @@ impl ImageStore {
             capacity,
             state: Mutex::default(),
         };
-        let swept = store
-            .folder
-            .create()
-            .and_then(|()| sweep(&store.folder, capacity, SystemTime::now()))
-            .map_err(|e| {
+        let swept =
+            store.folder.create().and_then(|()| sweep(&store.folder, capacity, SystemTime::now())).map_err(|e| {
                 let folder = folder.display();
                 let problem = format_args!(
                     "cannot use the folder {folder}: {e}; name a folder that can be written to, or leave the flag out"
@@ -114,18 +106,12 @@ impl ImageStore {
 
     /// True if the store has a file for this key, which may be damaged.
     pub(crate) fn contains(&self, key: &Key) -> bool {
-        self.with_state(|state| state.health) != Health::Unusable
-            && self.folder.path(key.digest()).is_file()
+        self.with_state(|state| state.health) != Health::Unusable && self.folder.path(key.digest()).is_file()
     }
 
-    /// Reads the entry of a key; `None` if it is missing. A damaged entry is removed and counts as missing, like an entry for which
-    /// `is_sufficient` is false. Hits and misses are counted for images only.
-    pub(crate) fn get(
-        &self,
-        key: &Key,
-        content: Content,
-        is_sufficient: impl FnOnce(&Entry) -> bool,
-    ) -> Option<Entry> {
+    /// Reads the entry of a key; `None` if it is missing. A damaged entry is removed and counts as missing, like an
+    /// entry for which `is_sufficient` is false. Hits and misses are counted for images only.
+    pub(crate) fn get(&self, key: &Key, content: Content, is_sufficient: impl FnOnce(&Entry) -> bool) -> Option<Entry> {
         if self.with_state(|state| state.health) == Health::Unusable {
             return None;
         }
@@ -172,9 +158,7 @@ impl ImageStore {
         });
         if count == 1 {
             let file = place.display();
-            tracing::warn!(
-                "--images-cache: {file} is damaged, and made again; so is each further one"
-            );
+            tracing::warn!("--images-cache: {file} is damaged, and made again; so is each further one");
         }
     }
 
@@ -233,9 +217,7 @@ impl ImageStore {
                 Err(e) => self.degrade(Health::ReadOnly, "sweep", &e),
             }
         }
-        self.with_state(|state| {
-            state.health == Health::Usable && state.bytes + bytes <= self.capacity
-        })
+        self.with_state(|state| state.health == Health::Usable && state.bytes + bytes <= self.capacity)
     }
 
     /// Lowers the health of the store after a failed `action`, with one warning for each level.
@@ -259,7 +241,8 @@ impl ImageStore {
     }
 }
 
-/// Reads a file, and updates its time as a sign of use. A file that is too large, or has no valid footer, counts as damaged.
+/// Reads a file, and updates its time as a sign of use. A file that is too large, or has no valid footer, counts as
+/// damaged.
 fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
     let mut file = reading::open(path)?;
     let data = file.metadata()?;

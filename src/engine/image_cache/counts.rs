@@ -41,10 +41,7 @@ impl fmt::Display for StoreCounts {
             self.written_bytes as f64 / 1e6,
         )?;
         for (count, what) in [
-            (
-                self.left_out,
-                "not stored because the store is full (--images-cache size)",
-            ),
+            (self.left_out, "not stored because the store is full (--images-cache size)"),
             (self.damaged, "damaged and made again"),
             (self.evicted, "removed that nobody had used for 14 days"),
         ] {

@@ -1,6 +1,7 @@
 //! File format of one entry of the store: [`Entry`].
 //!
-//! A file consists of the encoded image as it is sent to models, facts about it as JSON, and a footer of [`FOOTER`] bytes:
+//! A file consists of the encoded image as it is sent to models, facts about it as JSON, and a footer of [`FOOTER`]
+//! bytes:
 //!
 //! | bytes | |
 //! |---|---|
@@ -99,12 +100,7 @@ impl fmt::Display for Shown {
 impl EntryFacts {
     /// Facts about an entry that took this time to compute.
     pub(crate) fn new(shown: Shown, milliseconds: u64, notes: Value) -> Self {
-        Self {
-            shown,
-            milliseconds,
-            notes,
-            recipe: Value::Null,
-        }
+        Self { shown, milliseconds, notes, recipe: Value::Null }
     }
 }
 
@@ -115,30 +111,16 @@ pub(super) struct Damaged;
 impl Entry {
     /// An entry without an image.
     pub(crate) fn from_facts(facts: EntryFacts) -> Self {
-        Self {
-            image: Vec::new(),
-            size: [0, 0],
-            facts,
-        }
+        Self { image: Vec::new(), size: [0, 0], facts }
     }
 
     /// Encodes the entry as the file for a key.
     pub(super) fn encode(&self, key: &Key) -> Vec<u8> {
-        let facts = EntryFacts {
-            recipe: key.recipe().clone(),
-            ..self.facts.clone()
-        };
+        let facts = EntryFacts { recipe: key.recipe().clone(), ..self.facts.clone() };
         let facts = serde_json::json!(facts).to_string();
         let numbers = numbers(self.image.len() as u64, facts.len() as u32, self.size);
         let digest = digest(key, &numbers, &self.image, facts.as_bytes());
-        [
-            &self.image,
-            facts.as_bytes(),
-            digest.as_bytes(),
-            &numbers,
-            MAGIC,
-        ]
-        .concat()
+        [&self.image, facts.as_bytes(), digest.as_bytes(), &numbers, MAGIC].concat()
     }
 
     /// Decodes the file of a key.
@@ -154,16 +136,12 @@ impl Entry {
         }
         let facts = serde_json::from_slice(facts).map_err(|_| Damaged)?;
         file.truncate(footer.image);
-        Ok(Self {
-            image: file,
-            size: footer.size,
-            facts,
-        })
+        Ok(Self { image: file, size: footer.size, facts })
     }
 }
 
-/// Decodes the facts and the image's length in bytes from the end of a file, `tail`, without checking the digest. `length` is the length of
-/// the whole file.
+/// Decodes the facts and the image's length in bytes from the end of a file, `tail`, without checking the digest.
+/// `length` is the length of the whole file.
 pub(super) fn facts_at_end(tail: &[u8], length: u64) -> Option<(EntryFacts, u64)> {
     let start = tail.len().checked_sub(FOOTER)?;
     let (body, footer) = tail.split_at(start);
@@ -247,20 +225,13 @@ mod tests {
         Entry {
             image: (0..=255).collect(),
             size: [16, 9],
-            facts: EntryFacts {
-                milliseconds: 120,
-                notes: serde_json::json!({"psnr": 21.5}),
-                ..EntryFacts::default()
-            },
+            facts: EntryFacts { milliseconds: 120, notes: serde_json::json!({"psnr": 21.5}), ..EntryFacts::default() },
         }
     }
 
     #[test]
     fn decoding_inverts_encoding_and_detects_every_changed_byte() {
-        let (key, other) = (
-            Key::from_recipe(&["a"]).unwrap(),
-            Key::from_recipe(&["b"]).unwrap(),
-        );
+        let (key, other) = (Key::from_recipe(&["a"]).unwrap(), Key::from_recipe(&["b"]).unwrap());
         let file = entry().encode(&key);
         let read = Entry::decode(&key, file.clone()).unwrap();
         assert_eq!((&read.image, read.size), (&entry().image, [16, 9]));
@@ -272,10 +243,7 @@ mod tests {
             assert_eq!(Entry::decode(&key, changed), Err(Damaged), "{place}");
             assert_eq!(Entry::decode(&key, file[..place].to_vec()), Err(Damaged));
         }
-        assert_eq!(
-            Entry::decode(&key, [&file[..], b"x"].concat()),
-            Err(Damaged)
-        );
+        assert_eq!(Entry::decode(&key, [&file[..], b"x"].concat()), Err(Damaged));
     }
 
     #[test]

@@ -50,11 +50,8 @@ pub(super) enum FileKind {
 impl StoreFolder {
     pub(super) fn new(folder: &Path, access: FolderAccess) -> Self {
         let host = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
-        let host: String = host
-            .chars()
-            .filter(|letter| letter.is_ascii_alphanumeric() || *letter == '-')
-            .take(64)
-            .collect();
+        let host: String =
+            host.chars().filter(|letter| letter.is_ascii_alphanumeric() || *letter == '-').take(64).collect();
         Self {
             root: folder.join(VERSION),
             access,
@@ -100,8 +97,8 @@ impl StoreFolder {
         result
     }
 
-    /// All files of the store, sorted by path. Foreign files are left out, as are files that are deleted while the folder is read. A
-    /// missing folder has no files.
+    /// All files of the store, sorted by path. Foreign files are left out, as are files that are deleted while the
+    /// folder is read. A missing folder has no files.
     ///
     /// # Errors
     /// If the folder cannot be read.
@@ -136,9 +133,7 @@ impl StoreFolder {
         let path = self.root.join(".lock");
         refuse_link(&path)?;
         match reading::refuse_pipes(&path) {
-            Err(e) if e.kind() != io::ErrorKind::NotFound => {
-                Err(io::Error::new(e.kind(), format!(".lock: {e}")))
-            }
+            Err(e) if e.kind() != io::ErrorKind::NotFound => Err(io::Error::new(e.kind(), format!(".lock: {e}"))),
             _ => options.open(path),
         }
     }
@@ -165,19 +160,11 @@ fn stored_file(entry: &fs::DirEntry) -> Option<StoredFile> {
         return None;
     };
     let data = entry.metadata().ok().filter(fs::Metadata::is_file)?;
-    Some(StoredFile {
-        path: entry.path(),
-        kind,
-        bytes: data.len(),
-        used: data.modified().ok()?,
-    })
+    Some(StoredFile { path: entry.path(), kind, bytes: data.len(), used: data.modified().ok()? })
 }
 
 fn is_hexadecimal(text: &str, length: usize) -> bool {
-    text.len() == length
-        && text
-            .bytes()
-            .all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+    text.len() == length && text.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
 }
 
 /// Turns the error about a missing file or folder into `None`.

@@ -13,11 +13,7 @@ pub(crate) struct ImageSet {
 impl ImageSet {
     /// An empty set, for a store with this capacity in bytes.
     pub(super) fn new(kinds: StoredKinds, room: f64) -> Self {
-        Self {
-            kinds,
-            bytes: 0.0,
-            room,
-        }
+        Self { kinds, bytes: 0.0, room }
     }
 
     /// Adds images of this total size in bytes, if the store keeps images of this kind.

@@ -6,8 +6,8 @@ use serde_json::Value;
 use crate::error::Result;
 use crate::types::Digest;
 
-/// Domain and version of the digests. The version is raised when the same recipe gives another image, or when entries get other facts.
-/// Entries of other versions are not found any more, and are evicted when they are old.
+/// Domain and version of the digests. The version is raised when the same recipe gives another image, or when entries
+/// get other facts. Entries of other versions are not found any more, and are evicted when they are old.
 const DOMAIN: &str = "darkqa.image-store/1";
 
 /// Digest of a recipe (everything that determines the file of an image), with the recipe as canonical JSON.

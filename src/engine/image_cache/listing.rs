@@ -64,18 +64,16 @@ pub(crate) fn listing(folder: &Path) -> Result<String> {
         let sum = by_shown.entry(shown).or_default();
         sum.add(file.bytes, milliseconds);
         let age = now.duration_since(file.used).unwrap_or_default();
-        let age_class = AGES
-            .iter()
-            .position(|days| age < Duration::from_hours(24 * days))
-            .unwrap_or(AGES.len());
+        let age_class = AGES.iter().position(|days| age < Duration::from_hours(24 * days)).unwrap_or(AGES.len());
         by_age[age_class].add(file.bytes, milliseconds);
     }
     let mut text = String::from("    files          MB  s to make it\n");
     for (shown, sum) in &by_shown {
-        text += &sum.line(&shown.as_ref().map_or_else(
-            || "damaged, or of another version of the program".to_owned(),
-            ToString::to_string,
-        ));
+        text += &sum.line(
+            &shown
+                .as_ref()
+                .map_or_else(|| "damaged, or of another version of the program".to_owned(), ToString::to_string),
+        );
     }
     for (age_class, sum) in by_age.iter().enumerate().filter(|(_, sum)| sum.images > 0) {
         text += &sum.line(&match AGES.get(age_class) {
@@ -106,12 +104,7 @@ pub(crate) fn clear(folder: &Path) -> Result<String> {
             Err(e) => return Err(Error::file(&file.path, "remove", e)),
         }
     }
-    Ok(format!(
-        "{}: {} removed ({:.1} MB)\n",
-        folder.display(),
-        counted(sum.images, "file"),
-        sum.bytes as f64 / 1e6
-    ))
+    Ok(format!("{}: {} removed ({:.1} MB)\n", folder.display(), counted(sum.images, "file"), sum.bytes as f64 / 1e6))
 }
 
 /// Files of the store in a folder.
@@ -121,9 +114,7 @@ fn files(folder: &Path) -> Result<Vec<StoredFile>> {
         let problem = "no image store: the folder that --images-cache named is expected";
         return Err(Error::data(folder.display(), problem));
     }
-    store
-        .files()
-        .map_err(|e| Error::file(store.root(), "read", e))
+    store.files().map_err(|e| Error::file(store.root(), "read", e))
 }
 
 /// Facts of an entry, read without its image; `None` if the entry is damaged.

@@ -17,14 +17,15 @@ use crate::types::flags::positive;
 #[command(next_help_heading = "Scale")]
 #[expect(clippy::struct_field_names, reason = "the names of the flags")]
 pub(crate) struct StoreArgs {
-    /// Folder of stored images, shared by runs, models, shards and processes; it may be deleted at any time; `darkqa-eval cache DIR` lists
-    /// it; default: no image is stored
+    /// Folder of stored images, shared by runs, models, shards and processes; it may be deleted at any time;
+    /// `darkqa-eval cache DIR` lists it; default: no image is stored
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub images_cache: Option<PathBuf>,
     /// Images to store
     #[arg(long, value_name = "WHAT", value_enum, default_value_t = StoredKinds::Enhanced, add = Decides::Nothing)]
     pub images_cache_what: StoredKinds,
-    /// Maximum size in GB (10⁹ bytes); when it is reached, images unused for 14 days are removed; if there are none, no image is added
+    /// Maximum size in GB (10⁹ bytes); when it is reached, images unused for 14 days are removed; if there are none, no
+    /// image is added
     #[arg(long, value_name = "GB", value_parser = positive, default_value = "20", add = Decides::Nothing)]
     pub images_cache_size: f64,
 }

@@ -6,9 +6,9 @@ use std::time::{Duration, SystemTime};
 
 use super::folder::{FileKind, StoreFolder, StoredFile};
 
-/// Time since the last use after which an image may be evicted from a full store; chosen. Images used more recently stay even if new ones
-/// then find no room: every model goes through all frames in the same order, so a store that evicted the oldest image of a larger set
-/// would never contain the next one.
+/// Time since the last use after which an image may be evicted from a full store; chosen. Images used more recently
+/// stay even if new ones then find no room: every model goes through all frames in the same order, so a store that
+/// evicted the oldest image of a larger set would never contain the next one.
 const UNUSED: Duration = Duration::from_hours(14 * 24);
 /// Age from which on an incomplete file counts as left behind by a killed process; chosen.
 const ABANDONED: Duration = Duration::from_hours(24);
@@ -22,16 +22,12 @@ pub(super) struct SweepResult {
     pub(super) evicted: usize,
 }
 
-/// Removes abandoned files, and the least recently used of the unused images while the store has more than `max_bytes`. While another
-/// process is sweeping, the bytes are only counted.
+/// Removes abandoned files, and the least recently used of the unused images while the store has more than `max_bytes`.
+/// While another process is sweeping, the bytes are only counted.
 ///
 /// # Errors
 /// If the folder cannot be read.
-pub(super) fn sweep(
-    folder: &StoreFolder,
-    max_bytes: u64,
-    now: SystemTime,
-) -> io::Result<SweepResult> {
+pub(super) fn sweep(folder: &StoreFolder, max_bytes: u64, now: SystemTime) -> io::Result<SweepResult> {
     let mut files = folder.files()?;
     let bytes = files.iter().map(|file| file.bytes).sum();
     let mut result = SweepResult { bytes, evicted: 0 };
@@ -74,26 +70,20 @@ mod tests {
         Digest::from_bytes(&day.to_le_bytes())
     }
 
-    /// Sweeps a store with files of 100 bytes that were last used this number of days ago; returns the days of the remaining files.
+    /// Sweeps a store with files of 100 bytes that were last used this number of days ago; returns the days of the
+    /// remaining files.
     fn days_after_sweep(days: &[u64], max_bytes: u64) -> Vec<u64> {
         let place = tempfile::tempdir().unwrap();
         let folder = StoreFolder::new(place.path(), FolderAccess::Private);
         let now = SystemTime::now();
         for day in days {
             folder.write(&key(*day), &[0; 100]).unwrap();
-            let file = fs::File::options()
-                .write(true)
-                .open(folder.path(&key(*day)))
-                .unwrap();
+            let file = fs::File::options().write(true).open(folder.path(&key(*day))).unwrap();
             let used = now - Duration::from_hours(24 * day);
             file.set_modified(used).unwrap();
         }
         let result = sweep(&folder, max_bytes, now).unwrap();
-        let left: Vec<u64> = days
-            .iter()
-            .copied()
-            .filter(|day| folder.path(&key(*day)).exists())
-            .collect();
+        let left: Vec<u64> = days.iter().copied().filter(|day| folder.path(&key(*day)).exists()).collect();
         assert_eq!(result.bytes, 100 * left.len() as u64);
         assert_eq!(result.evicted, days.len() - left.len());
         left
@@ -118,10 +108,7 @@ mod tests {
             fs::write(inside.join(name), b"123").unwrap();
         }
         let later = SystemTime::now() + Duration::from_hours(25);
-        let fresh = fs::File::options()
-            .write(true)
-            .open(inside.join(".tmp-other-2-0"))
-            .unwrap();
+        let fresh = fs::File::options().write(true).open(inside.join(".tmp-other-2-0")).unwrap();
         fresh.set_modified(later).unwrap();
         assert_eq!(sweep(&folder, 1000, later).unwrap().bytes, 9 + 3);
         assert!(!inside.join(".tmp-other-1-0").exists());
@@ -139,12 +126,6 @@ mod tests {
         lock.lock().unwrap();
         assert_eq!(sweep(&folder, 0, later).unwrap().bytes, 9);
         drop(lock);
-        assert_eq!(
-            sweep(&folder, 0, later).unwrap(),
-            SweepResult {
-                bytes: 0,
-                evicted: 1
-            }
-        );
+        assert_eq!(sweep(&folder, 0, later).unwrap(), SweepResult { bytes: 0, evicted: 1 });
     }
 }

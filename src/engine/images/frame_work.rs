@@ -16,9 +16,7 @@ use crate::error::{Error, Result};
 use crate::pictures::Scaling;
 use crate::pictures::bilinear;
 use crate::pictures::{Payload, PayloadFormat};
-use crate::types::{
-    Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, PhotoName, Pixels, Rgb,
-};
+use crate::types::{Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, PhotoName, Pixels, Rgb};
 use darkqa_light::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 
 /// Cached steps of one frame (file, clean pixels, degraded image). Each is computed on first use.
@@ -53,9 +51,7 @@ impl<'a> FrameWork<'a> {
     pub(crate) fn for_source(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
         let key = steps.recipe.noise_key(&source.name, &frame.id);
         Self {
-            origin: steps
-                .stored
-                .map(|_| Box::new((source.name.clone(), frame.clone()))),
+            origin: steps.stored.map(|_| Box::new((source.name.clone(), frame.clone()))),
             size: Some(frame.size),
             photographs: frame.photographs.clone(),
             ..Self::new(steps, frame.id.clone(), key, Some(frame.digest))
@@ -68,12 +64,7 @@ impl<'a> FrameWork<'a> {
         Self::new(steps, frame, key, None)
     }
 
-    fn new(
-        steps: ImageSteps<'a>,
-        frame: FrameId,
-        key: NoiseKey,
-        planned_digest: Option<Digest>,
-    ) -> Self {
+    fn new(steps: ImageSteps<'a>, frame: FrameId, key: NoiseKey, planned_digest: Option<Digest>) -> Self {
         Self {
             steps,
             frame,
@@ -123,13 +114,8 @@ impl<'a> FrameWork<'a> {
 
     /// The file of the frame, if it is a plain PNG that can be sent unchanged; else `None`.
     pub(crate) fn unchanged_file(&mut self, condition: &Condition) -> Result<Option<Arc<Payload>>> {
-        let Recipe {
-            format, scaling, ..
-        } = *self.steps.recipe;
-        if *condition != Condition::L0
-            || format != PayloadFormat::Png
-            || matches!(scaling, Scaling::LongerSide(_))
-        {
+        let Recipe { format, scaling, .. } = *self.steps.recipe;
+        if *condition != Condition::L0 || format != PayloadFormat::Png || matches!(scaling, Scaling::LongerSide(_)) {
             return Ok(None);
         }
         let Picture::Encoded(file) = self.picture()? else {
@@ -164,15 +150,14 @@ impl<'a> FrameWork<'a> {
         })
     }
 
-    /// The pixels of the clean frame in the bit depth of its file. They are scaled already if frames are degraded after scaling.
+    /// The pixels of the clean frame in the bit depth of its file. They are scaled already if frames are degraded after
+    /// scaling.
     ///
     /// # Errors
     /// If the file is broken, or a frame of more than 8 bits would be degraded after scaling.
     pub(crate) fn pixels(&mut self) -> Result<&Pixels> {
         if self.pixels.is_none() {
-            let ImageSteps {
-                recipe, timings, ..
-            } = self.steps;
+            let ImageSteps { recipe, timings, .. } = self.steps;
             let picture = self.picture()?;
             let pixels = timings.time(TimedStep::Decode, || picture.pixels())?;
             let pixels = match (recipe.degraded_at, recipe.scaling) {
@@ -183,9 +168,7 @@ impl<'a> FrameWork<'a> {
             };
             self.pixels = Some(pixels);
         }
-        get_or_try_insert(&mut self.pixels, || {
-            Err(Error::data(&self.frame, "the frame was not read"))
-        })
+        get_or_try_insert(&mut self.pixels, || Err(Error::data(&self.frame, "the frame was not read")))
     }
 
     /// The clean frame as 8-bit codes, in the size of [`Self::pixels`].
@@ -193,9 +176,7 @@ impl<'a> FrameWork<'a> {
         if self.clean.is_none() {
             self.clean = Some(self.pixels()?.codes());
         }
-        get_or_try_insert(&mut self.clean, || {
-            Err(Error::data(&self.frame, "the frame was not read"))
-        })
+        get_or_try_insert(&mut self.clean, || Err(Error::data(&self.frame, "the frame was not read")))
     }
 
     /// The clean frame in the size sent.
@@ -211,22 +192,13 @@ impl<'a> FrameWork<'a> {
     /// The parameters of a degradation for this frame.
     pub(crate) fn apply(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
         let recipe = self.steps.recipe;
-        let view = if how.kind().has_motion() {
-            self.view()?
-        } else {
-            FrameView::default()
-        };
-        recipe
-            .kinds
-            .apply(how, view, &self.key)
-            .map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
+        let view = if how.kind().has_motion() { self.view()? } else { FrameView::default() };
+        recipe.kinds.apply(how, view, &self.key).map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
     }
 
     /// The camera's exposure in a condition; `None` for a kind that leaves it open.
     pub(crate) fn exposure(&mut self, condition: &Condition) -> Result<Option<ExposureFacts>> {
-        let how = condition
-            .degradation()
-            .filter(|how| how.kind().has_motion());
+        let how = condition.degradation().filter(|how| how.kind().has_motion());
         let applied = how.map(|how| self.apply(how)).transpose()?;
         Ok(applied.and_then(|applied| applied.exposure()))
     }
@@ -248,32 +220,21 @@ impl<'a> FrameWork<'a> {
         self.pixels.is_some()
     }
 
-    /// The degraded frame, or the clean one without a degradation. The last degraded frame is cached, because several enhancers use it.
+    /// The degraded frame, or the clean one without a degradation. The last degraded frame is cached, because several
+    /// enhancers use it.
     pub(crate) fn degraded(&mut self, how: Option<&Degradation>) -> Result<&Arc<Rgb>> {
         let Some(how) = how else {
             return self.clean();
         };
         let applied = self.apply(how)?;
         self.pixels()?;
-        let Self {
-            steps,
-            frame,
-            key,
-            pixels,
-            exposures,
-            degraded,
-            ..
-        } = self;
+        let Self { steps, frame, key, pixels, exposures, degraded, .. } = self;
         if degraded.as_ref().is_some_and(|(cached, _)| cached != how) {
             *degraded = None;
         }
         let (_, image) = get_or_try_insert(degraded, || {
-            let pixels = pixels
-                .as_ref()
-                .ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
-            let image = steps.timings.time(TimedStep::Degrade, || {
-                exposures.degrade(pixels.into(), &applied, key)
-            });
+            let pixels = pixels.as_ref().ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
+            let image = steps.timings.time(TimedStep::Degrade, || exposures.degrade(pixels.into(), &applied, key));
             Ok((how.clone(), Arc::new(image)))
         })?;
         Ok(image)
@@ -286,7 +247,8 @@ fn resize(pixels: Pixels, side: usize) -> Result<Pixels, String> {
         return Ok(pixels);
     }
     let Pixels::Codes8(codes) = &pixels else {
-        let problem = "the frame has more than 8 bits, and --degrade resized scales frames of 8 bits; take --degrade native";
+        let problem =
+            "the frame has more than 8 bits, and --degrade resized scales frames of 8 bits; take --degrade native";
         return Err(problem.to_owned());
     };
     let resized = bilinear(codes, side).map_err(|e| e.to_string())?;

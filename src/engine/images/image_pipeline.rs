@@ -1,7 +1,7 @@
 //! The pipeline from a frame to images: degrade → enhance → scale → encode ([`ImagePipeline`]).
 //!
-//! The images of a frame are made condition by condition, those of a walk all at once. The channel to the requests is bounded, so that
-//! memory contains only the images in flight, one or two more groups, and the frame of each worker.
+//! The images of a frame are made condition by condition, those of a walk all at once. The channel to the requests is
+//! bounded, so that memory contains only the images in flight, one or two more groups, and the frame of each worker.
 
 mod image_and_notes;
 mod opening;
@@ -60,25 +60,15 @@ enum SourceWork<'a> {
 
 impl<'a> ImagePipeline<'a> {
     /// A pipeline with open enhancers.
-    pub(crate) fn new(
-        steps: ImageSteps<'a>,
-        enhancers: Vec<Enhancer>,
-        implausible: Implausible,
-    ) -> Self {
-        Self {
-            steps,
-            enhancers,
-            lazy: Vec::new(),
-            enhancer_sets: Vec::new(),
-            implausible,
-            whole_run: &[],
-        }
+    pub(crate) fn new(steps: ImageSteps<'a>, enhancers: Vec<Enhancer>, implausible: Implausible) -> Self {
+        Self { steps, enhancers, lazy: Vec::new(), enhancer_sets: Vec::new(), implausible, whole_run: &[] }
     }
 
     /// Makes the images of all sources, until they are done or the channel is closed.
     ///
-    /// Normally each worker has one thread, its own frame and its own set of enhancers. All workers share one source in three cases:
-    /// if the enhancers are open only once (they have their own threads), for walks, and if there are few frames.
+    /// Normally each worker has one thread, its own frame and its own set of enhancers. All workers share one source in
+    /// three cases: if the enhancers are open only once (they have their own threads), for walks, and if there are few
+    /// frames.
     pub(crate) fn develop<I: Item>(
         mut self,
         sources: &[Source],
@@ -87,12 +77,8 @@ impl<'a> ImagePipeline<'a> {
         workers: &Workers,
         groups: &Sender<PreparedGroup<I>>,
     ) {
-        if !self.enhancers.is_empty()
-            || !has_frames_for_all_workers(sources, &plan, workers.single_threaded.len())
-        {
-            return workers
-                .shared
-                .install(|| self.send_groups(sources, plan.into_iter(), missing, groups));
+        if !self.enhancers.is_empty() || !has_frames_for_all_workers(sources, &plan, workers.single_threaded.len()) {
+            return workers.shared.install(|| self.send_groups(sources, plan.into_iter(), missing, groups));
         }
         let steps = self.steps;
         let plan = Mutex::new(plan.into_iter());
@@ -113,9 +99,8 @@ impl<'a> ImagePipeline<'a> {
                 };
                 scope.spawn(move || {
                     worker.install(|| {
-                        let next_part = std::iter::from_fn(|| {
-                            plan.lock().unwrap_or_else(PoisonError::into_inner).next()
-                        });
+                        let next_part =
+                            std::iter::from_fn(|| plan.lock().unwrap_or_else(PoisonError::into_inner).next());
                         pipeline.send_groups(sources, next_part, missing, groups);
                     });
                 });
@@ -133,10 +118,7 @@ impl<'a> ImagePipeline<'a> {
         let timings = self.steps.timings;
         // The error means that the channel is closed.
         let _ = self.for_each_group(sources, plan, missing, |group| {
-            timings
-                .time(TimedStep::Waiting, || groups.blocking_send(group).is_ok())
-                .then_some(())
-                .ok_or(())
+            timings.time(TimedStep::Waiting, || groups.blocking_send(group).is_ok()).then_some(()).ok_or(())
         });
     }
 
@@ -161,12 +143,7 @@ impl<'a> ImagePipeline<'a> {
                     Ok((images, notes)) => (images, notes, None),
                     Err(problem) => (Vec::new(), ImageNotes::default(), Some(problem)),
                 };
-                take(PreparedGroup {
-                    stimulus: Stimulus { condition, images },
-                    trials,
-                    problem,
-                    notes,
-                })?;
+                take(PreparedGroup { stimulus: Stimulus { condition, images }, trials, problem, notes })?;
             }
         }
         Ok(())
@@ -189,8 +166,8 @@ impl<'a> ImagePipeline<'a> {
         }
     }
 
-    /// Makes the images of a group in the order shown, with the missing notes; none without a condition. Several images share one
-    /// thumbnail, and their fidelity is not measured.
+    /// Makes the images of a group in the order shown, with the missing notes; none without a condition. Several images
+    /// share one thumbnail, and their fidelity is not measured.
     fn make_group(
         &mut self,
         work: &mut SourceWork<'_>,
@@ -205,10 +182,7 @@ impl<'a> ImagePipeline<'a> {
         let wanted = missing.wanted(name, condition);
         match work {
             SourceWork::Frame(work) => {
-                let shown = work.size().map(|size| ShownObjects {
-                    size,
-                    objects: missing.objects(name),
-                });
+                let shown = work.size().map(|size| ShownObjects { size, objects: missing.objects(name) });
                 let (image, notes) = self.image_and_notes(work, condition, name, shown, wanted)?;
                 Ok((vec![image], notes))
             }
@@ -218,10 +192,7 @@ impl<'a> ImagePipeline<'a> {
                     .thumbnail
                     .then(|| thumbnail_of_all(name, condition, &images))
                     .and_then(|made| ok_or_warn(name, condition, made).flatten());
-                let notes = ImageNotes {
-                    thumbnail,
-                    fidelity: None,
-                };
+                let notes = ImageNotes { thumbnail, fidelity: None };
                 Ok((images, notes))
             }
             SourceWork::Failed(Error::EnhancerEnded { path, problem }) => {
@@ -236,11 +207,7 @@ impl<'a> ImagePipeline<'a> {
     ///
     /// # Errors
     /// If the source cannot be shown, or one of its images cannot be made.
-    pub(crate) fn images(
-        &mut self,
-        source: &Source,
-        conditions: &[&Condition],
-    ) -> Result<Vec<Vec<Arc<Payload>>>> {
+    pub(crate) fn images(&mut self, source: &Source, conditions: &[&Condition]) -> Result<Vec<Vec<Arc<Payload>>>> {
         if let Some(problem) = &source.problem {
             return Err(Error::data(&source.name, problem));
         }
@@ -268,13 +235,7 @@ impl<'a> ImagePipeline<'a> {
         }
         Ok(images
             .into_iter()
-            .map(|images| {
-                source
-                    .order
-                    .iter()
-                    .map(|index| Arc::clone(&images[*index]))
-                    .collect()
-            })
+            .map(|images| source.order.iter().map(|index| Arc::clone(&images[*index])).collect())
             .collect())
     }
 
@@ -290,14 +251,8 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// Makes the pixels of a frame in a condition, in the size of the frame.
-    pub(crate) fn pixels(
-        &mut self,
-        work: &mut FrameWork<'_>,
-        condition: &Condition,
-    ) -> Result<Arc<Rgb>> {
-        let Resolved {
-            work, condition, ..
-        } = work.resolve(condition)?;
+    pub(crate) fn pixels(&mut self, work: &mut FrameWork<'_>, condition: &Condition) -> Result<Arc<Rgb>> {
+        let Resolved { work, condition, .. } = work.resolve(condition)?;
         let degraded = Arc::clone(work.degraded(condition.degradation())?);
         match &condition.enhancer {
             None => Ok(degraded),
@@ -317,19 +272,11 @@ impl<'a> ImagePipeline<'a> {
     ) -> Result<PreparedImage<'w>> {
         match staged {
             StagedImage::Ready(image) => Ok(image),
-            StagedImage::Stored {
-                image,
-                enhancer,
-                notes,
-            } => {
+            StagedImage::Stored { image, enhancer, notes } => {
                 self.judge_stored_image(&notes, &enhancer, [frame, condition])?;
                 Ok(image)
             }
-            StagedImage::ToEnhance {
-                degraded,
-                enhancer,
-                mut finish,
-            } => {
+            StagedImage::ToEnhance { degraded, enhancer, mut finish } => {
                 let started = Instant::now();
                 let (image, used) = self.enhance(&degraded, &enhancer, frame, condition)?;
                 finish.took += started.elapsed();
@@ -368,27 +315,18 @@ impl<'a> ImagePipeline<'a> {
     ) -> Result<(Rgb, ImageUse)> {
         let (timings, implausible) = (self.steps.timings, self.implausible);
         if let Some(images) = self.steps.recipe.enhanced_images(name) {
-            return timings.time(TimedStep::Decode, || {
-                images.image(image, frame, condition, implausible)
-            });
+            return timings.time(TimedStep::Decode, || images.image(image, frame, condition, implausible));
         }
         let place: [&dyn ToString; 2] = [frame, condition];
         if let Some(lazy) = self.lazy_enhancer(name) {
-            return timings.time(TimedStep::Enhance, || {
-                lazy.enhance_and_judge(image, place, implausible)
-            });
+            return timings.time(TimedStep::Enhance, || lazy.enhance_and_judge(image, place, implausible));
         }
         let enhancer = self.enhancer(name)?;
-        timings.time(TimedStep::Enhance, || {
-            enhancer.enhance_and_judge(image, place, implausible)
-        })
+        timings.time(TimedStep::Enhance, || enhancer.enhance_and_judge(image, place, implausible))
     }
 
     fn lazy_enhancer(&self, name: &EnhancerName) -> Option<&LazyEnhancer> {
-        self.lazy
-            .iter()
-            .map(Arc::as_ref)
-            .find(|enhancer| enhancer.name() == name)
+        self.lazy.iter().map(Arc::as_ref).find(|enhancer| enhancer.name() == name)
     }
 
     fn enhancer(&mut self, name: &EnhancerName) -> Result<&mut Enhancer> {
@@ -400,18 +338,12 @@ impl<'a> ImagePipeline<'a> {
 }
 
 /// True if there are at least two frames per worker, and no walks.
-fn has_frames_for_all_workers<I>(
-    sources: &[Source],
-    plan: &[SourcePlan<I>],
-    workers: usize,
-) -> bool {
-    plan.len() >= 2 * workers
-        && plan
-            .iter()
-            .all(|part| sources[part.source].frames.len() < 2)
+fn has_frames_for_all_workers<I>(sources: &[Source], plan: &[SourcePlan<I>], workers: usize) -> bool {
+    plan.len() >= 2 * workers && plan.iter().all(|part| sources[part.source].frames.len() < 2)
 }
 
-/// Returns the thumbnail; if it could not be made, warns and returns `None`, so that a trial never fails because of the report.
+/// Returns the thumbnail; if it could not be made, warns and returns `None`, so that a trial never fails because of the
+/// report.
 fn ok_or_warn<T>(name: &FrameId, condition: &Condition, made: Result<T>) -> Option<T> {
     made.inspect_err(|problem| {
         tracing::warn!("the report has no thumbnail of {name} at {condition}: {problem}");

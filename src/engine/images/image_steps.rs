@@ -7,9 +7,7 @@ use std::time::Duration;
 use crate::ask::ImageLimit;
 use crate::engine::images::frames::Frames;
 use crate::engine::images::recipes::Recipe;
-use crate::engine::images::stored::{
-    Needed, Similarity, StoredImage, StoredImages, StoredNotes, StoredPlace,
-};
+use crate::engine::images::stored::{Needed, Similarity, StoredImage, StoredImages, StoredNotes, StoredPlace};
 use crate::engine::images::timings::{TimedStep, Timings};
 use crate::error::Result;
 use crate::pictures::Payload;
@@ -30,20 +28,12 @@ pub(crate) struct ImageSteps<'a> {
 impl ImageSteps<'_> {
     /// The same steps without the image store.
     pub(crate) fn without_store(self) -> Self {
-        Self {
-            stored: None,
-            ..self
-        }
+        Self { stored: None, ..self }
     }
 
     /// Reads an image from the store; `None` if it or a needed fact is missing.
-    pub(crate) fn stored_image(
-        &self,
-        place: &StoredPlace<'_>,
-        needed: Needed,
-    ) -> Option<StoredImage> {
-        self.timings
-            .time(TimedStep::Decode, || place.read(self.recipe, needed))
+    pub(crate) fn stored_image(&self, place: &StoredPlace<'_>, needed: Needed) -> Option<StoredImage> {
+        self.timings.time(TimedStep::Decode, || place.read(self.recipe, needed))
     }
 
     /// Similarity of an image to its clean frame, if the store has it without the image.
@@ -52,18 +42,12 @@ impl ImageSteps<'_> {
     }
 
     /// Adds an image to the store. `took` is the time that it took to make.
-    pub(crate) fn store(
-        &self,
-        place: &StoredPlace<'_>,
-        image: &Payload,
-        notes: &StoredNotes,
-        took: Duration,
-    ) {
-        self.timings
-            .time(TimedStep::Encode, || place.write(image, notes, took));
+    pub(crate) fn store(&self, place: &StoredPlace<'_>, image: &Payload, notes: &StoredNotes, took: Duration) {
+        self.timings.time(TimedStep::Encode, || place.write(image, notes, took));
     }
 
-    /// Adds the facts that the store does not keep to an image from it: how its frame was read (`note`), and the camera's exposure.
+    /// Adds the facts that the store does not keep to an image from it: how its frame was read (`note`), and the
+    /// camera's exposure.
     pub(crate) fn stored_payload(
         &self,
         payload: Payload,

@@ -1,7 +1,9 @@
-//! From a frame to the images of a request: degraded, enhanced, scaled, encoded; with the image store and the notes about each image.
+//! From a frame to the images of a request: degraded, enhanced, scaled, encoded; with the image store and the notes
+//! about each image.
 //!
-//! A [`frames::Source`] contains the frames that are shown together, and a [`trials::Plan`] lists the trials by source and condition. The
-//! [`image_pipeline`] makes the images of each condition once, by a [`recipes::Recipe`], for all commands that ask or write them.
+//! A [`frames::Source`] contains the frames that are shown together, and a [`trials::Plan`] lists the trials by source
+//! and condition. The [`image_pipeline`] makes the images of each condition once, by a [`recipes::Recipe`], for all
+//! commands that ask or write them.
 
 pub(crate) mod enhancement;
 pub(crate) mod frame_work;

@@ -51,13 +51,11 @@ impl Progress {
             ProgressForm::Bars => ProgressDrawTarget::stderr(),
             ProgressForm::Lines | ProgressForm::Nothing => ProgressDrawTarget::hidden(),
         };
-        Self {
-            bars: MultiProgress::with_draw_target(target),
-            form,
-        }
+        Self { bars: MultiProgress::with_draw_target(target), form }
     }
 
-    /// Prints one line above the bars. Nothing is printed without bars: if standard error is not a terminal, or with `--quiet`.
+    /// Prints one line above the bars. Nothing is printed without bars: if standard error is not a terminal, or with
+    /// `--quiet`.
     pub(crate) fn print_on_terminal(&self, line: &str) {
         // A line that cannot be printed is no reason to stop.
         let _ = self.bars.println(line);
@@ -72,9 +70,7 @@ impl Progress {
     /// A plain bar for a step of known length.
     pub(crate) fn bar(&self, what: &'static str, length: usize) -> StepBar {
         let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len}");
-        let bar = self
-            .bars
-            .add(ProgressBar::new(length as u64).with_message(what));
+        let bar = self.bars.add(ProgressBar::new(length as u64).with_message(what));
         let bar = style.map_or(bar.clone(), |style| bar.with_style(style));
         // Shown from the start, not only after the first step.
         bar.tick();
@@ -87,11 +83,8 @@ impl Progress {
         let bar = self.bars.add(bar);
         bar.reset_eta();
         bar.enable_steady_tick(Duration::from_millis(500));
-        let style =
-            ProgressStyle::with_template("{wide_bar} {msg} of {len}{prefix} · {rate} · {eta} left");
-        let bar = StepBar(style.map_or(bar.clone(), |style| {
-            bar.with_style(style.with_key("rate", rate))
-        }));
+        let style = ProgressStyle::with_template("{wide_bar} {msg} of {len}{prefix} · {rate} · {eta} left");
+        let bar = StepBar(style.map_or(bar.clone(), |style| bar.with_style(style.with_key("rate", rate))));
         let lines = TrialLines::new(trials, answered, Instant::now());
         let progress = TrialProgress {
             bar,
@@ -166,12 +159,7 @@ struct TrialLines {
 
 impl TrialLines {
     fn new(trials: usize, answered_before: usize, start: Instant) -> Self {
-        Self {
-            trials,
-            answered_before,
-            start,
-            last: start,
-        }
+        Self { trials, answered_before, start, last: start }
     }
 
     /// The line for these numbers of trials and US dollars; `None` within a minute after the last line.
@@ -192,11 +180,8 @@ impl TrialLines {
         let seconds = now.duration_since(self.start).as_secs_f64();
         let rate = done.saturating_sub(self.answered_before) as f64 / seconds;
         let spent = spent.map_or(String::new(), |dollars| format!(" · {}", money(dollars)));
-        let time = if rate > 0.0 {
-            format!("{} left", hours(left as f64 / rate))
-        } else {
-            "time left unknown".to_owned()
-        };
+        let time =
+            if rate > 0.0 { format!("{} left", hours(left as f64 / rate)) } else { "time left unknown".to_owned() };
         Some(format!(
             "{answered} of {} trials answered, {failed} failed, {left} left{pace} · {rate:.1}/s{spent} · {time}",
             self.trials
@@ -209,7 +194,8 @@ impl TrialLines {
 pub(crate) struct LogWriter(MultiProgress);
 
 impl Write for LogWriter {
-    /// Writes a line with hidden characters escaped, because it may quote a file. Errors of a closed terminal or pipe are ignored.
+    /// Writes a line with hidden characters escaped, because it may quote a file. Errors of a closed terminal or pipe
+    /// are ignored.
     fn write(&mut self, line: &[u8]) -> io::Result<usize> {
         let text = String::from_utf8_lossy(line);
         let shown = escape_hidden(&text);
@@ -239,14 +225,9 @@ mod tests {
     fn lines_come_once_a_minute() {
         let start = Instant::now();
         let mut lines = TrialLines::new(1000, 100, start);
+        assert_eq!(lines.next_line(110, 0, None, "", start + Duration::from_secs(59)), None);
         assert_eq!(
-            lines.next_line(110, 0, None, "", start + Duration::from_secs(59)),
-            None
-        );
-        assert_eq!(
-            lines
-                .next_line(218, 2, Some(1.2), "", start + LINE_INTERVAL)
-                .as_deref(),
+            lines.next_line(218, 2, Some(1.2), "", start + LINE_INTERVAL).as_deref(),
             Some("218 of 1000 trials answered, 2 failed, 780 left · 2.0/s · $1.20 · 6 min left")
         );
         let second_line = start + 2 * LINE_INTERVAL;
@@ -260,9 +241,6 @@ mod tests {
         let start = Instant::now();
         let mut lines = TrialLines::new(10, 4, start);
         let line = lines.next_line(4, 0, None, "", start + LINE_INTERVAL);
-        assert_eq!(
-            line.as_deref(),
-            Some("4 of 10 trials answered, 0 failed, 6 left · 0.0/s · time left unknown")
-        );
+        assert_eq!(line.as_deref(), Some("4 of 10 trials answered, 0 failed, 6 left · 0.0/s · time left unknown"));
     }
 }

@@ -63,16 +63,10 @@ impl Timings {
         self.nanoseconds[step as usize].load(Ordering::Relaxed) as f64 / 1e9
     }
 
-    /// One line with the time of each step and the bottleneck of a run that took this time on `threads` threads. `held_back` is the time
-    /// for which requests had to wait for their turn.
+    /// One line with the time of each step and the bottleneck of a run that took this time on `threads` threads.
+    /// `held_back` is the time for which requests had to wait for their turn.
     pub(crate) fn summary(&self, took: Duration, threads: usize, held_back: HeldBack) -> String {
-        TimingsText {
-            timings: self,
-            took: took.as_secs_f64(),
-            threads,
-            held_back,
-        }
-        .to_string()
+        TimingsText { timings: self, took: took.as_secs_f64(), threads, held_back }.to_string()
     }
 }
 
@@ -86,19 +80,9 @@ struct TimingsText<'a> {
 
 impl fmt::Display for TimingsText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            timings,
-            took,
-            threads,
-            held_back,
-        } = *self;
-        let image_steps = [
-            TimedStep::Decode,
-            TimedStep::Degrade,
-            TimedStep::Enhance,
-            TimedStep::Encode,
-            TimedStep::Measure,
-        ];
+        let Self { timings, took, threads, held_back } = *self;
+        let image_steps =
+            [TimedStep::Decode, TimedStep::Degrade, TimedStep::Enhance, TimedStep::Encode, TimedStep::Measure];
         let busy: f64 = image_steps.iter().map(|step| timings.seconds(*step)).sum();
         write!(f, "timings: {took:.1} s; images:")?;
         for (step, name) in TimedStep::ALL {
@@ -106,10 +90,7 @@ impl fmt::Display for TimingsText<'_> {
                 write!(f, " {name} {:.1} s,", timings.seconds(step))?;
             }
         }
-        let (idle, full) = (
-            timings.seconds(TimedStep::Idle),
-            timings.seconds(TimedStep::Full),
-        );
+        let (idle, full) = (timings.seconds(TimedStep::Idle), timings.seconds(TimedStep::Full));
         write!(
             f,
             " {:.0} % of {threads} threads; they waited {:.1} s for requests; requests: none in flight {idle:.1} s, as many as allowed \
@@ -122,9 +103,7 @@ impl fmt::Display for TimingsText<'_> {
         if wait > idle && wait > took / 4.0 {
             return write!(f, "held back {wait:.1} s: {cause}");
         }
-        let slowest = image_steps
-            .into_iter()
-            .max_by(|a, b| timings.seconds(*a).total_cmp(&timings.seconds(*b)));
+        let slowest = image_steps.into_iter().max_by(|a, b| timings.seconds(*a).total_cmp(&timings.seconds(*b)));
         f.write_str(match slowest {
             _ if full > idle && full > took / 4.0 => {
                 "the endpoint limits the speed: more --concurrency, or a faster endpoint, would help"
@@ -165,10 +144,7 @@ mod tests {
             timings.summary(Duration::from_secs(10), 2, held_back)
         };
         let stated = line(PaceCause::ReportedLimits, 5);
-        assert!(
-            stated.contains("held back 5.0 s: the limits per minute that the endpoint states"),
-            "{stated}"
-        );
+        assert!(stated.contains("held back 5.0 s: the limits per minute that the endpoint states"), "{stated}");
         assert!(line(PaceCause::Refusals, 5).contains("turns requests away"));
         assert!(line(PaceCause::Quota, 5).contains("--rpm or --tpm limits the speed"));
         let short = line(PaceCause::Quota, 1);
@@ -177,23 +153,11 @@ mod tests {
 
     #[test]
     fn the_summary_names_the_bottleneck() {
-        let line = summary(&[
-            (TimedStep::Encode, 12),
-            (TimedStep::Decode, 6),
-            (TimedStep::Idle, 9),
-        ]);
-        assert!(
-            line.contains("decode 6.0 s") && line.contains("90 % of 2 threads"),
-            "{line}"
-        );
+        let line = summary(&[(TimedStep::Encode, 12), (TimedStep::Decode, 6), (TimedStep::Idle, 9)]);
+        assert!(line.contains("decode 6.0 s") && line.contains("90 % of 2 threads"), "{line}");
         assert!(line.contains("encoding most"), "{line}");
         assert!(summary(&[(TimedStep::Full, 9)]).contains("the endpoint limits the speed"));
-        assert!(
-            summary(&[(TimedStep::Enhance, 9), (TimedStep::Idle, 5)]).contains("enhancement most")
-        );
-        assert!(
-            summary(&[(TimedStep::Encode, 1), (TimedStep::Idle, 1)])
-                .contains("nothing limits the speed much")
-        );
+        assert!(summary(&[(TimedStep::Enhance, 9), (TimedStep::Idle, 5)]).contains("enhancement most"));
+        assert!(summary(&[(TimedStep::Encode, 1), (TimedStep::Idle, 1)]).contains("nothing limits the speed much"));
     }
 }

@@ -12,7 +12,8 @@ use crate::types::flags::threads;
 /// The flag `--threads`.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub(crate) struct ThreadArgs {
-    /// Threads for synthesis, enhancement and reading, 1024 at most; default: all cores, or as many as a control group allows (Slurm, containers)
+    /// Threads for synthesis, enhancement and reading, 1024 at most; default: all cores, or as many as a control group
+    /// allows (Slurm, containers)
     #[arg(long, value_name = "N", value_parser = threads, help_heading = "Scale", add = Decides::Nothing)]
     pub threads: Option<NonZeroUsize>,
 }
@@ -20,13 +21,12 @@ pub(crate) struct ThreadArgs {
 impl ThreadArgs {
     /// Number of threads; by default one per core.
     pub(crate) fn count(self) -> usize {
-        self.threads
-            .or_else(|| std::thread::available_parallelism().ok())
-            .map_or(1, NonZeroUsize::get)
+        self.threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get)
     }
 }
 
-/// Thread pools: one of all threads, for work on one source together, and pools of one thread each, for one source per worker.
+/// Thread pools: one of all threads, for work on one source together, and pools of one thread each, for one source per
+/// worker.
 pub(crate) struct Workers {
     pub(crate) shared: ThreadPool,
     pub(crate) single_threaded: Vec<ThreadPool>,
@@ -39,13 +39,9 @@ impl Workers {
     /// If the operating system refuses to start them.
     pub(crate) fn start(threads: Option<NonZeroUsize>) -> Result<Self> {
         let shared = pool(threads)?;
-        let single_threaded = (0..shared.current_num_threads())
-            .map(|_| pool(Some(NonZeroUsize::MIN)))
-            .collect::<Result<_>>()?;
-        Ok(Self {
-            shared,
-            single_threaded,
-        })
+        let single_threaded =
+            (0..shared.current_num_threads()).map(|_| pool(Some(NonZeroUsize::MIN))).collect::<Result<_>>()?;
+        Ok(Self { shared, single_threaded })
     }
 }
 
@@ -55,10 +51,7 @@ impl Workers {
 /// If the operating system refuses to start them.
 pub(crate) fn pool(threads: Option<NonZeroUsize>) -> Result<ThreadPool> {
     let threads = threads.map_or(0, NonZeroUsize::get);
-    ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| thread_start_error(&e))
+    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|e| thread_start_error(&e))
 }
 
 /// The error for a thread that the operating system refused to start.

@@ -11,8 +11,9 @@ use crate::types::Decides;
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Model")]
 pub(crate) struct ModelArgs {
-    /// Model to ask, by its name at the endpoint (required, or --models); repeatable; built in: room-net (a small network that sees drawn
-    /// rooms), observer (frames with maps), its controls (observer:CONTROL), random, script:FILE
+    /// Model to ask, by its name at the endpoint (required, or --models); repeatable; built in: room-net (a small
+    /// network that sees drawn rooms), observer (frames with maps), its controls (observer:CONTROL), random,
+    /// script:FILE
     #[arg(long, value_name = "NAME", add = Decides::Trials)]
     pub model: Vec<ModelName>,
     /// Send the models text only, no image

@@ -50,11 +50,7 @@ impl AskingArgs {
     /// The names of all settings, as flags.
     pub(super) fn flags() -> Vec<String> {
         let command = command();
-        command
-            .get_arguments()
-            .filter_map(|arg| arg.get_long())
-            .map(str::to_owned)
-            .collect()
+        command.get_arguments().filter_map(|arg| arg.get_long()).map(str::to_owned).collect()
     }
 
     /// Removes the API key, because it belongs to another address.
@@ -68,14 +64,13 @@ impl AskingArgs {
         self.access.header_env.clear();
     }
 
-    /// Replaces the settings named by these command-line words, and keeps the others. A switch is written `--flag=true`.
+    /// Replaces the settings named by these command-line words, and keeps the others. A switch is written
+    /// `--flag=true`.
     ///
     /// # Errors
     /// The message of the parser if a value is invalid.
     pub(super) fn update(&mut self, words: &[String]) -> Result<(), String> {
-        let matches = command()
-            .try_get_matches_from(words)
-            .map_err(|e| line(&e))?;
+        let matches = command().try_get_matches_from(words).map_err(|e| line(&e))?;
         // A source of the key or of the system message replaces the other source.
         if matches.contains_id("api_key_env") || matches.contains_id("api_key_file") {
             self.forget_key();
@@ -89,16 +84,11 @@ impl AskingArgs {
 
 /// A parser of settings that overrides others. No flag has a default, so that only named settings change.
 fn command() -> Command {
-    let command = Command::new("model")
-        .no_binary_name(true)
-        .disable_help_flag(true);
+    let command = Command::new("model").no_binary_name(true).disable_help_flag(true);
     AskingArgs::augment_args_for_update(command).mut_args(|arg| {
         let arg = arg.required(false).default_value(Resettable::Reset);
         match arg.get_action() {
-            ArgAction::SetTrue => arg
-                .action(ArgAction::Set)
-                .num_args(1)
-                .value_parser(value_parser!(bool)),
+            ArgAction::SetTrue => arg.action(ArgAction::Set).num_args(1).value_parser(value_parser!(bool)),
             _ => arg,
         }
     })
@@ -129,14 +119,10 @@ mod tests {
         let before = format!("{args:?}");
         args.update(&[]).unwrap();
         assert_eq!(format!("{args:?}"), before);
-        args.update(&["--allow-http=false".into(), "--rpm=30".into()])
-            .unwrap();
+        args.update(&["--allow-http=false".into(), "--rpm=30".into()]).unwrap();
         assert!(!args.access.allow_http);
         assert_eq!(args.sending.quota.requests.unwrap().get(), 30);
-        assert_eq!(
-            (args.sending.retries, args.parameters.top_p),
-            (9, Some(0.5))
-        );
+        assert_eq!((args.sending.retries, args.parameters.top_p), (9, Some(0.5)));
         assert_eq!(args.sending.timeout, Sending::default().timeout);
         let error = args.update(&["--rpm=0".into()]).unwrap_err();
         assert!(error.contains("--rpm"), "{error}");

@@ -10,7 +10,8 @@ use crate::ask::{Message, Model};
 use crate::error::{Error, Result};
 use crate::types::text::counted;
 
-/// Lines about each model: its name, its endpoint, the source of its key, its request, and the digest that is part of its trial keys.
+/// Lines about each model: its name, its endpoint, the source of its key, its request, and the digest that is part of
+/// its trial keys.
 ///
 /// # Errors
 /// If a model cannot be opened.
@@ -18,31 +19,20 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
     let mut text = String::new();
     let notes = ask.file.as_ref().and_then(|file| file.resolved.as_array());
     for model in &ask.models {
-        let note = notes
-            .into_iter()
-            .flatten()
-            .find(|note| note["name"] == *model.name);
+        let note = notes.into_iter().flatten().find(|note| note["name"] == *model.name);
         let _ = writeln!(text, "{} ({})", model.name, model.view);
         write_line(&mut text, "id", &model.id.label());
         let Some(opened) = open_model(model)? else {
             continue;
         };
-        for address in field(note, "endpoints")
-            .and_then(Value::as_array)
-            .into_iter()
-            .flatten()
-        {
+        for address in field(note, "endpoints").and_then(Value::as_array).into_iter().flatten() {
             write_line(&mut text, "endpoint", address.as_str().unwrap_or_default());
         }
         if let Some(key) = field(note, "key").and_then(Value::as_str) {
             write_line(&mut text, "key", key);
         }
-        let headers: Vec<&str> = field(note, "headers")
-            .and_then(Value::as_array)
-            .into_iter()
-            .flatten()
-            .filter_map(Value::as_str)
-            .collect();
+        let headers: Vec<&str> =
+            field(note, "headers").and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str).collect();
         if !headers.is_empty() {
             write_line(&mut text, "headers", &headers.join(", "));
         }
@@ -52,11 +42,7 @@ pub(crate) fn describe(ask: &AskSettings) -> Result<String> {
         }
         write_line(&mut text, "digest", &opened.digest()?.to_string()[..16]);
         if let Some(limit) = model.limit {
-            write_line(
-                &mut text,
-                "limit",
-                &format!("the first {}", counted(limit, "question")),
-            );
+            write_line(&mut text, "limit", &format!("the first {}", counted(limit, "question")));
         }
     }
     Ok(text)

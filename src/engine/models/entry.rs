@@ -15,18 +15,8 @@ use crate::types::View;
 use crate::types::text::near_name::{did_you_mean, nearest};
 
 /// Keys of a model that do not correspond to a flag, or have another form than the flag.
-const MODEL_KEYS: [&str; 10] = [
-    "name",
-    "id",
-    "deployment",
-    "group",
-    "view",
-    "price",
-    "limit",
-    "headers",
-    "body",
-    "omit",
-];
+const MODEL_KEYS: [&str; 10] =
+    ["name", "id", "deployment", "group", "view", "price", "limit", "headers", "body", "omit"];
 
 /// Keys with another name than their flag, each with the flag.
 const RENAMED_KEYS: [(&str, &str); 5] = [
@@ -40,7 +30,8 @@ const RENAMED_KEYS: [(&str, &str); 5] = [
 /// Keys that cannot be set for all models together.
 const NOT_IN_DEFAULTS: [&str; 4] = ["name", "id", "deployment", "endpoints"];
 
-/// Keys of settings that apply to the whole run, because all models are shown the same images at the same position in the prompt.
+/// Keys of settings that apply to the whole run, because all models are shown the same images at the same position in
+/// the prompt.
 const RUN_KEYS: [&str; 3] = ["image", "max-side", "image-first"];
 
 /// Names from other tools, each with the key that users probably mean.
@@ -92,33 +83,22 @@ impl Entry {
         }
     }
 
-    /// A model of a models file: the settings of the flags, overridden by each layer in order. `keys` is the model's own table.
+    /// A model of a models file: the settings of the flags, overridden by each layer in order. `keys` is the model's
+    /// own table.
     ///
     /// # Errors
     /// If a key is unknown or has an invalid value; the error names the line.
-    pub(super) fn from_file(
-        keys: &Keys,
-        layers: &[&Keys],
-        view: View,
-        asking: AskingArgs,
-    ) -> Result<Self> {
+    pub(super) fn from_file(keys: &Keys, layers: &[&Keys], view: View, asking: AskingArgs) -> Result<Self> {
         let place = keys.values().map(|located| located.place.clone()).min();
         let place = place.unwrap_or_default();
         let id = keys.get("id").ok_or_else(|| {
-            Error::usage(
-                &place,
-                "a model without id: what the endpoint calls it, or random, observer, script:FILE",
-            )
+            Error::usage(&place, "a model without id: what the endpoint calls it, or random, observer, script:FILE")
         })?;
-        let name: ModelName = id_text(id, "id")?
-            .parse()
-            .map_err(|problem| id.error(problem))?;
-        let mut entry = Self {
-            place: Some(id.place.clone()),
-            ..Self::from_flag(name, view, asking)
-        };
+        let name: ModelName = id_text(id, "id")?.parse().map_err(|problem| id.error(problem))?;
+        let mut entry = Self { place: Some(id.place.clone()), ..Self::from_flag(name, view, asking) };
         if keys.contains_key("endpoints") {
-            // An API key from the flags belongs to the address of the flags. One from [defaults] is for all models of the file.
+            // An API key from the flags belongs to the address of the flags. One from [defaults] is for all models of
+            // the file.
             entry.asking.forget_key();
         }
         for layer in layers {
@@ -151,9 +131,7 @@ impl Entry {
                         // A table of headers replaces that of an earlier layer, even if it is empty.
                         self.asking.forget_headers();
                     }
-                    self.asking
-                        .update(&words)
-                        .map_err(|problem| located.error(format_args!("{key}: {problem}")))?;
+                    self.asking.update(&words).map_err(|problem| located.error(format_args!("{key}: {problem}")))?;
                 }
             }
         }
@@ -169,9 +147,7 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
     let known = known_keys();
     for (key, located) in keys {
         if is_defaults && NOT_IN_DEFAULTS.contains(&&**key) {
-            return Err(located.error(format_args!(
-                "{key} belongs to one model: it cannot be in [defaults]"
-            )));
+            return Err(located.error(format_args!("{key} belongs to one model: it cannot be in [defaults]")));
         }
         if is_run_key(key) {
             if is_defaults {
@@ -205,12 +181,10 @@ pub(super) fn known_keys() -> BTreeSet<String> {
     AskingArgs::flags()
         .into_iter()
         .filter(|flag| !matches!(&**flag, "header" | "header-env"))
-        .map(
-            |flag| match RENAMED_KEYS.iter().find(|(_, name)| *name == flag) {
-                Some((key, _)) => (*key).to_owned(),
-                None => flag,
-            },
-        )
+        .map(|flag| match RENAMED_KEYS.iter().find(|(_, name)| *name == flag) {
+            Some((key, _)) => (*key).to_owned(),
+            None => flag,
+        })
         .chain(MODEL_KEYS.map(str::to_owned))
         .collect()
 }
@@ -235,9 +209,7 @@ fn words(key: &str, located: &Located) -> Result<Vec<String>> {
                 .map(|(name, value)| match value {
                     Value::String(text) => Ok(format!("--header={name}: {text}")),
                     Value::Table(table) => match (table.len(), table.get("env")) {
-                        (1, Some(Value::String(variable))) => {
-                            Ok(format!("--header-env={name}={variable}"))
-                        }
+                        (1, Some(Value::String(variable))) => Ok(format!("--header-env={name}={variable}")),
                         _ => Err(()),
                     },
                     _ => Err(()),
@@ -254,10 +226,7 @@ fn words(key: &str, located: &Located) -> Result<Vec<String>> {
         (_, Value::Array(items)) => {
             let words: Option<Vec<String>> = items.iter().map(plain_text).collect();
             match words {
-                Some(words) => Ok(words
-                    .iter()
-                    .map(|word| format!("--{flag}={word}"))
-                    .collect()),
+                Some(words) => Ok(words.iter().map(|word| format!("--{flag}={word}")).collect()),
                 None => wrong("a list of texts"),
             }
         }
@@ -295,13 +264,12 @@ fn views(located: &Located) -> Result<Vec<View>> {
 fn price(located: &Located) -> Result<Price> {
     let price: Price = located.value.clone().try_into().map_err(|e: toml::de::Error| {
         let problem = e.message().replace('\n', ", ");
-        located.error(format_args!("price: {problem}; {{ input = 2.5, output = 10 }} expected, dollars per million tokens"))
+        located.error(format_args!(
+            "price: {problem}; {{ input = 2.5, output = 10 }} expected, dollars per million tokens"
+        ))
     })?;
     let numbers = [price.input, price.output, price.cached_input.unwrap_or(0.0)];
-    if numbers
-        .iter()
-        .all(|number| number.is_finite() && *number >= 0.0)
-    {
+    if numbers.iter().all(|number| number.is_finite() && *number >= 0.0) {
         Ok(price)
     } else {
         Err(located.error("price: numbers of 0 or more expected"))
@@ -309,10 +277,7 @@ fn price(located: &Located) -> Result<Price> {
 }
 
 fn limit(located: &Located) -> Result<NonZeroUsize> {
-    let number = located
-        .value
-        .as_integer()
-        .and_then(|number| usize::try_from(number).ok());
+    let number = located.value.as_integer().and_then(|number| usize::try_from(number).ok());
     let number = number.and_then(NonZeroUsize::new);
     number.ok_or_else(|| located.error("limit: a whole number from 1 on expected"))
 }

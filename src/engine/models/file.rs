@@ -42,18 +42,14 @@ impl ModelsFile {
     /// Reads a models file.
     ///
     /// # Errors
-    /// If it cannot be read, is not TOML, has other tables than `[defaults]` and `[[model]]`, or contains a secret. The error names the
-    /// line, and does not show the secret.
+    /// If it cannot be read, is not TOML, has other tables than `[defaults]` and `[[model]]`, or contains a secret. The
+    /// error names the line, and does not show the secret.
     pub(super) fn read(path: &Path) -> Result<Self> {
         let text = reading::settings(path)?;
         let at = |start: usize| in_line(path, line_at(&text, start));
         let values: Table = toml::from_str(&text).map_err(|e| invalid_toml(path, &text, &e))?;
         let spans = DeTable::parse(&text).map_err(|e| invalid_toml(path, &text, &e))?;
-        let mut file = Self {
-            path: path.to_owned(),
-            defaults: Keys::new(),
-            models: Vec::new(),
-        };
+        let mut file = Self { path: path.to_owned(), defaults: Keys::new(), models: Vec::new() };
         for (key, value) in spans.get_ref() {
             let name = &**key.get_ref();
             let place = at(key.span().start);
@@ -63,16 +59,14 @@ impl ModelsFile {
                 }
                 ("model", DeValue::Array(tables), Some(Value::Array(all))) => {
                     for (keys, values) in tables.iter().zip(all) {
-                        let (DeValue::Table(keys), Value::Table(values)) = (keys.get_ref(), values)
-                        else {
+                        let (DeValue::Table(keys), Value::Table(values)) = (keys.get_ref(), values) else {
                             return Err(Error::usage(place, "tables [[model]] expected"));
                         };
                         file.models.push(locate_keys(keys, values, &at)?);
                     }
                 }
                 _ => {
-                    let problem =
-                        format_args!("{name}: only [defaults] and [[model]] are known here");
+                    let problem = format_args!("{name}: only [defaults] and [[model]] are known here");
                     return Err(Error::usage(place, problem));
                 }
             }
@@ -91,10 +85,7 @@ fn in_line(path: &Path, line: usize) -> String {
 
 fn invalid_toml(path: &Path, text: &str, e: &toml::de::Error) -> Error {
     let TomlFault { line, problem } = TomlFault::new(text, e);
-    Error::usage(
-        in_line(path, line),
-        format_args!("not valid TOML: {problem}"),
-    )
+    Error::usage(in_line(path, line), format_args!("not valid TOML: {problem}"))
 }
 
 /// Adds the lines to the keys and values of a table. Refuses secrets, and keys that are set twice.
@@ -106,10 +97,7 @@ fn locate_keys(keys: &DeTable<'_>, values: &Table, at: &impl Fn(usize) -> String
             continue;
         };
         refuse_secrets(name, spanned, name == "headers", at)?;
-        let located = Located {
-            value: value.clone(),
-            place: at(key.span().start),
-        };
+        let located = Located { value: value.clone(), place: at(key.span().start) };
         let name = name.replace('_', "-");
         if found.insert(name.clone(), located).is_some() {
             let problem = format_args!("{name} is set twice");
@@ -128,12 +116,8 @@ fn refuse_secrets(
 ) -> Result<()> {
     match value.get_ref() {
         DeValue::String(text) => {
-            let is_key_as_variable =
-                matches!(key, "key-env" | "key_env" | "env") && looks_like_key(text);
-            if is_secret_value(text)
-                || is_key_as_variable
-                || in_headers && is_secret_header(key, text)
-            {
+            let is_key_as_variable = matches!(key, "key-env" | "key_env" | "env") && looks_like_key(text);
+            if is_secret_value(text) || is_key_as_variable || in_headers && is_secret_header(key, text) {
                 let problem = format_args!(
                     "{key} looks like a secret, which is not shown here and must not be in a file of models: name a variable \
                      that holds it (key-env = \"NAME\", or {{ env = \"NAME\" }} for a header)"
@@ -142,12 +126,10 @@ fn refuse_secrets(
             }
             Ok(())
         }
-        DeValue::Array(items) => items
-            .iter()
-            .try_for_each(|item| refuse_secrets(key, item, in_headers, at)),
-        DeValue::Table(table) => table
-            .iter()
-            .try_for_each(|(key, item)| refuse_secrets(key.get_ref(), item, in_headers, at)),
+        DeValue::Array(items) => items.iter().try_for_each(|item| refuse_secrets(key, item, in_headers, at)),
+        DeValue::Table(table) => {
+            table.iter().try_for_each(|(key, item)| refuse_secrets(key.get_ref(), item, in_headers, at))
+        }
         _ => Ok(()),
     }
 }
@@ -164,7 +146,9 @@ mod tests {
 
     #[test]
     fn tables_are_read_with_their_lines() {
-        let file = read("[defaults]\nmax_tokens = 64\n\n[[model]]\nid = \"a\"\n[[model]]\nid = \"b\"\nbody = { a = 1 }\n").unwrap();
+        let file =
+            read("[defaults]\nmax_tokens = 64\n\n[[model]]\nid = \"a\"\n[[model]]\nid = \"b\"\nbody = { a = 1 }\n")
+                .unwrap();
         assert_eq!(file.defaults["max-tokens"].value, Value::Integer(64));
         assert_eq!(file.models.len(), 2);
         assert!(file.models[1]["id"].place.ends_with(", line 7"));
@@ -189,20 +173,10 @@ mod tests {
             "headers = { X-Auth-Token = \"0123456789abcdef0123\" }",
             "body = { a = { b = [\"AIza0123456789\"] } }",
         ] {
-            let error = read(&format!("[[model]]\n{secret}\n"))
-                .unwrap_err()
-                .to_string();
+            let error = read(&format!("[[model]]\n{secret}\n")).unwrap_err().to_string();
             assert!(error.contains("line 2: "), "{error}");
-            assert!(
-                error.contains("name a variable") && !error.contains("0123"),
-                "{error}"
-            );
+            assert!(error.contains("name a variable") && !error.contains("0123"), "{error}");
         }
-        assert!(
-            read(
-                "[[model]]\nkey-env = \"GATEWAY_KEY\"\nheaders = { X-Auth = { env = \"TOKEN\" } }\n"
-            )
-            .is_ok()
-        );
+        assert!(read("[[model]]\nkey-env = \"GATEWAY_KEY\"\nheaders = { X-Auth = { env = \"TOKEN\" } }\n").is_ok());
     }
 }

@@ -14,7 +14,8 @@ use crate::types::text::near_name::is_nearly;
 pub(crate) enum ModelName {
     /// Built-in model that guesses at random.
     Random,
-    /// Built-in model that knows the frame and answers only what the degraded pixels still show; or one of its controls.
+    /// Built-in model that knows the frame and answers only what the degraded pixels still show; or one of its
+    /// controls.
     Observer(Option<Control>),
     /// Built-in network that answers from the pixels of the image alone.
     RoomNet,
@@ -48,8 +49,8 @@ impl ModelName {
         Err(Error::usage("--model", problem))
     }
 
-    /// Refuses a misspelt name of a built-in model, and a comma-separated list of names. Without this check, the images would be sent
-    /// to an endpoint.
+    /// Refuses a misspelt name of a built-in model, and a comma-separated list of names. Without this check, the images
+    /// would be sent to an endpoint.
     ///
     /// # Errors
     /// If a remote model's name contains a comma, or is close to a built-in name and not in the built-in price table.
@@ -59,10 +60,7 @@ impl ModelName {
         };
         let listed: Vec<&str> = name.split(',').map(str::trim).collect();
         if listed.len() > 1 {
-            let flags: Vec<String> = listed
-                .iter()
-                .map(|model| format!("--model {model}"))
-                .collect();
+            let flags: Vec<String> = listed.iter().map(|model| format!("--model {model}")).collect();
             let problem = format_args!(
                 "{name}: several models are several flags: {}. To ask an endpoint for a model of this name: --models FILE, or --base-url",
                 flags.join(" ")
@@ -70,16 +68,10 @@ impl ModelName {
             return Err(Error::usage("--model", problem));
         }
         let first_word = name.split(':').next().unwrap_or(name).to_lowercase();
-        let mut near = BUILT_IN
-            .into_iter()
-            .filter(|built_in| is_nearly(&first_word, built_in));
+        let mut near = BUILT_IN.into_iter().filter(|built_in| is_nearly(&first_word, built_in));
         match near.next() {
             Some(built_in) if Prices::built_in()?.find(name).is_none() => {
-                let hint = if built_in == "script" {
-                    "script:FILE"
-                } else {
-                    built_in
-                };
+                let hint = if built_in == "script" { "script:FILE" } else { built_in };
                 let problem = format_args!(
                     "{name}: did you mean {hint}? To ask an endpoint for a model of this name: --models FILE, or --base-url"
                 );
@@ -95,10 +87,9 @@ impl ModelName {
             Self::Random => "random".to_owned(),
             Self::Observer(control) => observer::name(*control),
             Self::RoomNet => room_net::NAME.to_owned(),
-            Self::Script(path) => path.file_stem().map_or_else(
-                || "script".to_owned(),
-                |stem| stem.to_string_lossy().into_owned(),
-            ),
+            Self::Script(path) => {
+                path.file_stem().map_or_else(|| "script".to_owned(), |stem| stem.to_string_lossy().into_owned())
+            }
             Self::Remote(name) => name.clone(),
         }
     }
@@ -124,9 +115,7 @@ impl FromStr for ModelName {
             name => match name.strip_prefix("script:") {
                 Some(path) => Ok(Self::Script(path.into())),
                 None if name.len() > MAX_NAME_BYTES || name.contains(char::is_control) => {
-                    Err(format!(
-                        "the name of a model has at most {MAX_NAME_BYTES} bytes and no control characters"
-                    ))
+                    Err(format!("the name of a model has at most {MAX_NAME_BYTES} bytes and no control characters"))
                 }
                 None => Ok(Self::Remote(name.to_owned())),
             },
@@ -144,23 +133,13 @@ mod tests {
 
     #[test]
     fn near_misses_of_built_in_names_are_refused() {
-        for wrong in [
-            "rndom",
-            "Random",
-            "randmo",
-            "obsrver",
-            "observr:tiles",
-            "scrip:a.jsonl",
-            "Script:x",
-        ] {
+        for wrong in ["rndom", "Random", "randmo", "obsrver", "observr:tiles", "scrip:a.jsonl", "Script:x"] {
             let error = check(wrong).unwrap_err().to_string();
             assert!(error.contains("did you mean"), "{wrong}: {error}");
         }
         let error = check("random,gpt-4o").unwrap_err().to_string();
         assert!(error.contains("--model random --model gpt-4o"), "{error}");
-        for name in [
-            "random", "observer", "script:a", "gpt-4o", "qwen:7b", "rando-vl", "o3",
-        ] {
+        for name in ["random", "observer", "script:a", "gpt-4o", "qwen:7b", "rando-vl", "o3"] {
             assert!(check(name).is_ok(), "{name}");
         }
     }

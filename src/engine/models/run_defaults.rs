@@ -28,10 +28,6 @@ pub(crate) fn run_defaults(path: &Path) -> Result<Vec<RunDefault>> {
         .defaults
         .into_iter()
         .filter(|(key, _)| is_run_key(key))
-        .map(|(flag, located)| RunDefault {
-            flag,
-            value: located.value,
-            place: located.place,
-        })
+        .map(|(flag, located)| RunDefault { flag, value: located.value, place: located.place })
         .collect())
 }

@@ -9,43 +9,27 @@ use crate::error::{Error, Result};
 /// # Errors
 /// If no model has the name, or the key or its value is invalid.
 pub(super) fn apply_set(entries: &mut [Entry], text: &str) -> Result<()> {
-    let (place, value) = text
-        .split_once('=')
-        .ok_or_else(|| Error::usage("--set", "NAME.KEY=VALUE expected, as GPT-4o.rpm=60"))?;
+    let (place, value) =
+        text.split_once('=').ok_or_else(|| Error::usage("--set", "NAME.KEY=VALUE expected, as GPT-4o.rpm=60"))?;
     // The longest matching name, because a name may contain a dot and begin with another name.
     let longest_match = entries
         .iter()
-        .filter(|entry| {
-            place
-                .strip_prefix(&*entry.name)
-                .is_some_and(|rest| rest.starts_with('.'))
-        })
+        .filter(|entry| place.strip_prefix(&*entry.name).is_some_and(|rest| rest.starts_with('.')))
         .map(|entry| entry.name.clone())
         .max_by_key(String::len);
     let Some(name) = longest_match else {
         let names: Vec<&str> = entries.iter().map(|entry| &*entry.name).collect();
-        let problem = format!(
-            "{place}: no model of this name; the models are {}",
-            names.join(", ")
-        );
+        let problem = format!("{place}: no model of this name; the models are {}", names.join(", "));
         return Err(Error::usage("--set", problem));
     };
     // A value that is not TOML is taken as a string.
     let mut parsed: toml::Table = format!("value = {value}").parse().unwrap_or_default();
-    let value = parsed
-        .remove("value")
-        .unwrap_or_else(|| toml::Value::String(value.to_owned()));
+    let value = parsed.remove("value").unwrap_or_else(|| toml::Value::String(value.to_owned()));
     let key = place[name.len() + 1..].replace('_', "-");
     if matches!(&*key, "name" | "id") {
-        return Err(Error::usage(
-            "--set",
-            format_args!("{key} identifies the model, and cannot be set"),
-        ));
+        return Err(Error::usage("--set", format_args!("{key} identifies the model, and cannot be set")));
     }
-    let located = Located {
-        value,
-        place: "--set".to_owned(),
-    };
+    let located = Located { value, place: "--set".to_owned() };
     let keys = Keys::from([(key, located)]);
     check_keys(&keys, false)?;
     for entry in entries.iter_mut().filter(|entry| entry.name == name) {
@@ -69,10 +53,7 @@ pub(super) fn retain_only(entries: &mut Vec<Entry>, only: &[String]) -> Result<(
     for name in only {
         if !entries.iter().any(|entry| entry.name == *name) {
             let names: Vec<&str> = entries.iter().map(|entry| &*entry.name).collect();
-            let problem = format_args!(
-                "{name}: no model of this name; the models are {}",
-                names.join(", ")
-            );
+            let problem = format_args!("{name}: no model of this name; the models are {}", names.join(", "));
             return Err(Error::usage("--only", problem));
         }
     }

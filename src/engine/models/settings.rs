@@ -97,23 +97,17 @@ impl AskSettings {
     pub(crate) fn views(&self) -> Views {
         let mut views = Views::new();
         for model in &self.models {
-            views
-                .entry(model.name.clone())
-                .or_default()
-                .insert(model.view);
+            views.entry(model.name.clone()).or_default().insert(model.view);
         }
         views
     }
 
-    /// Resolves the models of these flags and of the models file that they name. Reads the API keys that the models need.
+    /// Resolves the models of these flags and of the models file that they name. Reads the API keys that the models
+    /// need.
     ///
     /// # Errors
     /// [`Error::Usage`] with the flag, or the line of the file, that cannot be used.
-    pub(crate) fn resolve(
-        args: &ModelArgs,
-        asking: &AskingArgs,
-        context: ResolveContext<'_>,
-    ) -> Result<Self> {
+    pub(crate) fn resolve(args: &ModelArgs, asking: &AskingArgs, context: ResolveContext<'_>) -> Result<Self> {
         let view = if args.blind { View::Blind } else { View::Image };
         let file = args.models.as_deref().map(ModelsFile::read).transpose()?;
         let mut entries = match &file {
@@ -121,37 +115,20 @@ impl AskSettings {
             None => Vec::new(),
         };
         if let Some(file) = &file {
-            let trust = if args.trust_models {
-                Trust::Stated
-            } else {
-                Trust::ByLocation
-            };
+            let trust = if args.trust_models { Trust::Stated } else { Trust::ByLocation };
             trust::check(file, &entries, asking, context.data, trust)?;
         }
         refuse_models_of_file(&entries, &args.blind_model)?;
-        entries.extend(
-            args.model
-                .iter()
-                .map(|name| Entry::from_flag(name.clone(), view, asking.clone())),
-        );
-        entries.extend(
-            args.blind_model
-                .iter()
-                .map(|name| Entry::from_flag(name.clone(), View::Blind, asking.clone())),
-        );
+        entries.extend(args.model.iter().map(|name| Entry::from_flag(name.clone(), view, asking.clone())));
+        entries.extend(args.blind_model.iter().map(|name| Entry::from_flag(name.clone(), View::Blind, asking.clone())));
         for text in &args.set {
             apply_set(&mut entries, text)?;
         }
         if context.text_baseline == TextBaseline::Always {
             add_text_baselines(&mut entries);
         }
-        let listed: Vec<ListedModel> = entries
-            .iter()
-            .map(|entry| ListedModel {
-                name: entry.name.clone(),
-                group: entry.group.clone(),
-            })
-            .collect();
+        let listed: Vec<ListedModel> =
+            entries.iter().map(|entry| ListedModel { name: entry.name.clone(), group: entry.group.clone() }).collect();
         retain_only(&mut entries, &args.only)?;
         if asking.access.base_url.is_empty() {
             entries
@@ -164,23 +141,14 @@ impl AskSettings {
         for entry in &entries {
             let resolved = resolve(entry, context, &mut servers)?;
             notes.push(manifest_note(entry, &resolved));
-            models.extend(entry.views.iter().map(|view| ModelSettings {
-                view: *view,
-                ..resolved.clone()
-            }));
+            models.extend(entry.views.iter().map(|view| ModelSettings { view: *view, ..resolved.clone() }));
         }
         refuse_same_names(&models)?;
-        Ok(Self {
-            models,
-            file: file.map(|_| FileNote {
-                resolved: json!(notes),
-                listed,
-            }),
-        })
+        Ok(Self { models, file: file.map(|_| FileNote { resolved: json!(notes), listed }) })
     }
 
-    /// Adapts the settings to a stored run, so that settings that may change in it do not change its trial keys. Models whose settings the
-    /// run has, under this or another name, are left as they are.
+    /// Adapts the settings to a stored run, so that settings that may change in it do not change its trial keys. Models
+    /// whose settings the run has, under this or another name, are left as they are.
     pub(crate) fn continue_from(&mut self, run: &Continuation) {
         let Some(stored) = run.columns.get("model") else {
             return;
@@ -189,17 +157,12 @@ impl AskSettings {
             let ModelName::Remote(id) = &model.id else {
                 continue;
             };
-            let parameters = Parameters {
-                model: id.clone(),
-                ..model.parameters.clone()
-            };
-            if stored
-                .values()
-                .any(|column| parameters.match_column(column))
-            {
+            let parameters = Parameters { model: id.clone(), ..model.parameters.clone() };
+            if stored.values().any(|column| parameters.match_column(column)) {
                 continue;
             }
-            // In a models file, a model with other settings is another model of the run. So is a judge of the same name.
+            // In a models file, a model with other settings is another model of the run. So is a judge of the same
+            // name.
             let judges = run.columns.get(JUDGES);
             let is_judge = judges
                 .and_then(|judges| judges.get(&model.name))
@@ -213,9 +176,7 @@ impl AskSettings {
 
     /// True if the model of this name is asked with images.
     pub(crate) fn shows_images_to(&self, id: &ModelName) -> bool {
-        self.models
-            .iter()
-            .any(|model| model.id == *id && model.view == View::Image)
+        self.models.iter().any(|model| model.id == *id && model.view == View::Image)
     }
 
     /// The endpoints, each once.
@@ -232,11 +193,8 @@ impl AskSettings {
 
 /// Adds the view without images to every model that does not have it.
 fn add_text_baselines(entries: &mut [Entry]) {
-    let blind: BTreeSet<String> = entries
-        .iter()
-        .filter(|entry| entry.views.contains(&View::Blind))
-        .map(|entry| entry.name.clone())
-        .collect();
+    let blind: BTreeSet<String> =
+        entries.iter().filter(|entry| entry.views.contains(&View::Blind)).map(|entry| entry.name.clone()).collect();
     for entry in entries {
         if !blind.contains(&entry.name) {
             entry.views.push(View::Blind);
@@ -244,7 +202,8 @@ fn add_text_baselines(entries: &mut [Entry]) {
     }
 }
 
-/// The models of a models file. Flags on the command line override its `[defaults]`, and its `[[model]]` tables override the flags.
+/// The models of a models file. Flags on the command line override its `[defaults]`, and its `[[model]]` tables
+/// override the flags.
 fn entries_from_file(
     file: &ModelsFile,
     view: View,
@@ -259,7 +218,8 @@ fn entries_from_file(
         "key-env" | "key-file" => typed.contains("api-key-env") || typed.contains("api-key-file"),
         key => flag_of(key).is_some_and(|flag| typed.contains(flag)),
     };
-    // An API key from the flags is not sent to an address of the file, so it does not override a key from [defaults] there.
+    // An API key from the flags is not sent to an address of the file, so it does not override a key from [defaults]
+    // there.
     let mut entries = Vec::new();
     let mut overridden = BTreeSet::new();
     for keys in &file.models {
@@ -274,12 +234,7 @@ fn entries_from_file(
             })
             .collect();
         overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
-        entries.push(Entry::from_file(
-            keys,
-            &[&defaults, keys],
-            view,
-            asking.clone(),
-        )?);
+        entries.push(Entry::from_file(keys, &[&defaults, keys], view, asking.clone())?);
     }
     if !overridden.is_empty() {
         let keys: Vec<String> = overridden.into_iter().collect();
@@ -310,21 +265,9 @@ impl Servers {
 }
 
 /// Resolves the endpoint and parameters of a model, with the first of its views.
-fn resolve(
-    entry: &Entry,
-    context: ResolveContext<'_>,
-    servers: &mut Servers,
-) -> Result<ModelSettings> {
-    let AskingArgs {
-        parameters,
-        request,
-        access,
-        sending,
-        constrain,
-        probabilities,
-        seed,
-        reply_headers,
-    } = entry.asking.clone();
+fn resolve(entry: &Entry, context: ResolveContext<'_>, servers: &mut Servers) -> Result<ModelSettings> {
+    let AskingArgs { parameters, request, access, sending, constrain, probabilities, seed, reply_headers } =
+        entry.asking.clone();
     let with_place = |e: Error| match (&entry.place, e) {
         (Some(place), Error::Usage { origin, problem }) => {
             Error::usage(place, format_args!("{}: {origin}: {problem}", entry.name))
@@ -334,31 +277,17 @@ fn resolve(
     let mut extra = request.resolve().map_err(with_place)?;
     for name in reply_headers {
         let value = plain_header(&access.header, &name);
-        let problem =
-            "no header of this name with a value in headers: only such a one can decide replies";
-        let value = value.ok_or_else(|| {
-            with_place(Error::usage(
-                "reply-headers",
-                format_args!("{name}: {problem}"),
-            ))
-        })?;
+        let problem = "no header of this name with a value in headers: only such a one can decide replies";
+        let value =
+            value.ok_or_else(|| with_place(Error::usage("reply-headers", format_args!("{name}: {problem}"))))?;
         extra.reply_headers.insert(name.to_lowercase(), value);
     }
     extra.deployment.clone_from(&entry.deployment);
-    let parameters = Parameters {
-        seed,
-        constrain,
-        probabilities,
-        extra,
-        ..parameters
-    };
+    let parameters = Parameters { seed, constrain, probabilities, extra, ..parameters };
     if probabilities {
         parameters.require_greedy().map_err(with_place)?;
     }
-    let sending = Sending {
-        quota: context.shard.quota(sending.quota, context.workers),
-        ..sending
-    };
+    let sending = Sending { quota: context.shard.quota(sending.quota, context.workers), ..sending };
     // A dry run sends nothing, so it needs no key.
     let access = match context.keys {
         KeyUse::Needed => access,
@@ -404,13 +333,7 @@ fn manifest_note(entry: &Entry, resolved: &ModelSettings) -> Value {
         let sending = &server.sending;
         note["endpoints"] = json!(server.addresses());
         note["key"] = json!(access.key_source(&server.replicas[0]));
-        note["headers"] = json!(
-            [
-                header_names(&access.header),
-                header_names(&access.header_env)
-            ]
-            .concat()
-        );
+        note["headers"] = json!([header_names(&access.header), header_names(&access.header_env)].concat());
         note["pace"] = json!({
             "concurrency": sending.concurrency.to_string(), "rpm": sending.quota.requests, "tpm": sending.quota.tokens,
             "timeout": sending.timeout.as_secs_f64(), "retries": sending.retries, "max-wait": sending.max_wait.as_secs_f64(),
@@ -428,25 +351,14 @@ fn manifest_note(entry: &Entry, resolved: &ModelSettings) -> Value {
 }
 
 fn header_names(headers: &[String]) -> Vec<String> {
-    headers
-        .iter()
-        .map(|text| {
-            text.split([':', '='])
-                .next()
-                .unwrap_or_default()
-                .trim()
-                .to_owned()
-        })
-        .collect()
+    headers.iter().map(|text| text.split([':', '=']).next().unwrap_or_default().trim().to_owned()).collect()
 }
 
-/// Refuses `--blind-model` with a model of the models file, because it would be asked at another address and with other settings than
-/// with images.
+/// Refuses `--blind-model` with a model of the models file, because it would be asked at another address and with other
+/// settings than with images.
 fn refuse_models_of_file(entries: &[Entry], blind: &[ModelName]) -> Result<()> {
     for name in blind.iter().map(ModelName::label) {
-        let known = entries
-            .iter()
-            .find(|entry| entry.name == name || entry.id.label() == name);
+        let known = entries.iter().find(|entry| entry.name == name || entry.id.label() == name);
         if let Some(Entry { name, id, .. }) = known
             && matches!(id, ModelName::Remote(_))
         {
@@ -464,10 +376,7 @@ fn refuse_same_names(models: &[ModelSettings]) -> Result<()> {
     for (i, model) in models.iter().enumerate() {
         let mut before = models[..i].iter();
         if before.any(|other| other.view == model.view && other.name == model.name) {
-            let problem = format_args!(
-                "{} is named twice; in a file of models, give each its own name",
-                model.name
-            );
+            let problem = format_args!("{} is named twice; in a file of models, give each its own name", model.name);
             return Err(Error::usage("--model", problem));
         }
     }

@@ -1,6 +1,7 @@
 //! Refuses dangerous settings in a models file that may have come with the data: [`check`].
 //!
-//! Such a file may be written by an attacker: it could name a variable or a file of this machine, and an address to send its content to.
+//! Such a file may be written by an attacker: it could name a variable or a file of this machine, and an address to
+//! send its content to.
 
 use std::path::{Path, PathBuf};
 
@@ -22,10 +23,10 @@ pub(super) enum Trust {
     ByLocation,
 }
 
-/// Refuses an untrusted models file that would send variables other than those of the host's own tools, or files outside its own folder.
-/// A file is untrusted in the folder of the `data`, unless the working directory is in that folder too. The check applies to the merged
-/// models of the file, `entries`, and not to single tables. Variables and files that the `flags` name are allowed, but only at the
-/// addresses of the flags.
+/// Refuses an untrusted models file that would send variables other than those of the host's own tools, or files
+/// outside its own folder. A file is untrusted in the folder of the `data`, unless the working directory is in that
+/// folder too. The check applies to the merged models of the file, `entries`, and not to single tables. Variables and
+/// files that the `flags` name are allowed, but only at the addresses of the flags.
 ///
 /// # Errors
 /// [`Error::Usage`] with the line of the key.
@@ -43,12 +44,7 @@ pub(super) fn check(
         return Ok(());
     }
     for (keys, entry) in file.models.iter().zip(entries) {
-        let model = UntrustedModel {
-            file,
-            keys,
-            entry,
-            flags,
-        };
+        let model = UntrustedModel { file, keys, entry, flags };
         model.check_files()?;
         model.check_connection()?;
         model.check_variables()?;
@@ -58,11 +54,7 @@ pub(super) fn check(
 
 /// True if a file is in the folder of the data, and the working directory is not.
 fn is_in_data_folder(file: &Path, data: &Path) -> bool {
-    let folder = if data.is_dir() {
-        Some(data)
-    } else {
-        data.parent()
-    };
+    let folder = if data.is_dir() { Some(data) } else { data.parent() };
     let folder = folder.and_then(canonical_path);
     is_below(folder.as_deref(), file) && !is_below(folder.as_deref(), Path::new("."))
 }
@@ -76,11 +68,7 @@ fn is_below(folder: Option<&Path>, path: &Path) -> bool {
 
 /// The absolute path without symbolic links; `None` if there is no such file. An empty path is the working directory.
 fn canonical_path(path: &Path) -> Option<PathBuf> {
-    let path = if path.as_os_str().is_empty() {
-        Path::new(".")
-    } else {
-        path
-    };
+    let path = if path.as_os_str().is_empty() { Path::new(".") } else { path };
     path.canonicalize().ok()
 }
 
@@ -107,16 +95,8 @@ impl UntrustedModel<'_> {
     fn check_files(&self) -> Result<()> {
         let (asking, flags) = (&self.entry.asking, self.flags);
         let files = [
-            (
-                "key-file",
-                asking.access.api_key_file.clone(),
-                flags.access.api_key_file.clone(),
-            ),
-            (
-                "system-file",
-                asking.request.system_file.clone(),
-                flags.request.system_file.clone(),
-            ),
+            ("key-file", asking.access.api_key_file.clone(), flags.access.api_key_file.clone()),
+            ("system-file", asking.request.system_file.clone(), flags.request.system_file.clone()),
             ("body", body_file(asking), body_file(flags)),
         ];
         for (key, path, flag_path) in files {
@@ -131,8 +111,8 @@ impl UntrustedModel<'_> {
         Ok(())
     }
 
-    /// Refuses settings that select the variables to send or the trusted authorities of a connection, or that allow unencrypted
-    /// connections.
+    /// Refuses settings that select the variables to send or the trusted authorities of a connection, or that allow
+    /// unencrypted connections.
     fn check_connection(&self) -> Result<()> {
         let (access, flags) = (&self.entry.asking.access, &self.flags.access);
         if access.vendor != flags.vendor {
@@ -169,23 +149,14 @@ impl UntrustedModel<'_> {
         Ok(())
     }
 
-    /// The default key variable, which is sent to hosts without variables of their own if no other key is named and the variable is set.
-    fn default_key(
-        &self,
-        base: &BaseUrl,
-        host_variables: &[&str],
-    ) -> Option<SentVariable<'static>> {
+    /// The default key variable, which is sent to hosts without variables of their own if no other key is named and the
+    /// variable is set.
+    fn default_key(&self, base: &BaseUrl, host_variables: &[&str]) -> Option<SentVariable<'static>> {
         let (access, flags) = (&self.entry.asking.access, &self.flags.access);
-        let has_no_key =
-            |access: &AccessArgs| access.api_key_env.is_none() && access.api_key_file.is_none();
+        let has_no_key = |access: &AccessArgs| access.api_key_env.is_none() && access.api_key_file.is_none();
         let is_set = std::env::var_os(OPENAI_KEY).is_some_and(|text| !text.is_empty());
-        let is_sent =
-            has_no_key(access) && host_variables.is_empty() && !base.is_loopback() && is_set;
-        is_sent.then(|| SentVariable {
-            key: "endpoints",
-            variable: OPENAI_KEY,
-            by_flags: has_no_key(flags),
-        })
+        let is_sent = has_no_key(access) && host_variables.is_empty() && !base.is_loopback() && is_set;
+        is_sent.then(|| SentVariable { key: "endpoints", variable: OPENAI_KEY, by_flags: has_no_key(flags) })
     }
 
     /// The error for a variable that the tools of a host do not read.
@@ -206,15 +177,12 @@ impl UntrustedModel<'_> {
     /// The key of the model's own table, else that of `[defaults]`, if it names the variable.
     fn stated(&self, key: &str, variable: &str) -> Option<&Located> {
         let layers = [self.keys.get(key), self.file.defaults.get(key)];
-        layers
-            .into_iter()
-            .flatten()
-            .find(|located| match &located.value {
-                toml::Value::Table(table) => table
-                    .values()
-                    .any(|value| value.get("env").and_then(toml::Value::as_str) == Some(variable)),
-                value => value.as_str() == Some(variable),
-            })
+        layers.into_iter().flatten().find(|located| match &located.value {
+            toml::Value::Table(table) => {
+                table.values().any(|value| value.get("env").and_then(toml::Value::as_str) == Some(variable))
+            }
+            value => value.as_str() == Some(variable),
+        })
     }
 
     fn is_inside(&self, path: &Path) -> bool {
@@ -251,11 +219,7 @@ fn body_file(asking: &AskingArgs) -> Option<PathBuf> {
 
 /// The variables that the settings of an endpoint name for its key and its headers.
 fn named_variables<'a>(access: &'a AccessArgs, flags: &AccessArgs) -> Vec<SentVariable<'a>> {
-    let key = access
-        .api_key_env
-        .as_deref()
-        .filter(|name| *name != NO_KEY)
-        .filter(|_| access.api_key_file.is_none());
+    let key = access.api_key_env.as_deref().filter(|name| *name != NO_KEY).filter(|_| access.api_key_file.is_none());
     let key = key.map(|variable| SentVariable {
         key: "key-env",
         variable,
@@ -263,11 +227,7 @@ fn named_variables<'a>(access: &'a AccessArgs, flags: &AccessArgs) -> Vec<SentVa
     });
     let headers = access.header_env.iter().filter_map(|text| {
         let (_, variable) = text.split_once('=')?;
-        Some(SentVariable {
-            key: "headers",
-            variable: variable.trim(),
-            by_flags: flags.header_env.contains(text),
-        })
+        Some(SentVariable { key: "headers", variable: variable.trim(), by_flags: flags.header_env.contains(text) })
     });
     key.into_iter().chain(headers).collect()
 }

@@ -1,5 +1,5 @@
-//! Properties of a model's input and output that its graph may not declare: [`TensorLayout`], [`Channels`], [`ChannelOrder`],
-//! [`ValueRange`], [`ValueScale`], [`Padding`], [`Locality`], [`Rounding`].
+//! Properties of a model's input and output that its graph may not declare: [`TensorLayout`], [`Channels`],
+//! [`ChannelOrder`], [`ValueRange`], [`ValueScale`], [`Padding`], [`Locality`], [`Rounding`].
 //!
 //! The text form of each property is a value in the sidecar, `MODEL.onnx.toml`.
 
@@ -69,7 +69,8 @@ pub(crate) enum Channels {
     /// Red, green and blue.
     #[default]
     Rgb,
-    /// Luma alone ([`LUMA`]), in 0..1. The change in luma is added to each channel of the image, which preserves the chroma.
+    /// Luma alone ([`LUMA`]), in 0..1. The change in luma is added to each channel of the image, which preserves the
+    /// chroma.
     Y,
 }
 
@@ -183,10 +184,7 @@ impl Normalisation {
             Self::Stated(mean_and_std) => mean_and_std,
             Self::ImageNet => [[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]],
             Self::Centred => [[0.5; 3], [1.0; 3]],
-            Self::Clip => [
-                [0.481_454_66, 0.457_827_5, 0.408_210_73],
-                [0.268_629_54, 0.261_302_6, 0.275_777_1],
-            ],
+            Self::Clip => [[0.481_454_66, 0.457_827_5, 0.408_210_73], [0.268_629_54, 0.261_302_6, 0.275_777_1]],
         }
     }
 }
@@ -229,15 +227,9 @@ impl fmt::Display for ValueScale {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Range(range) => range.fmt(f),
-            Self::Normalised(Normalisation::ImageNet) => {
-                f.write_str("0..1 with the mean and std of ImageNet")
-            }
-            Self::Normalised(Normalisation::Clip) => {
-                f.write_str("0..1 with the mean and std of CLIP")
-            }
-            Self::Normalised(Normalisation::Stated(_)) => {
-                f.write_str("0..1 with the mean and std that are set")
-            }
+            Self::Normalised(Normalisation::ImageNet) => f.write_str("0..1 with the mean and std of ImageNet"),
+            Self::Normalised(Normalisation::Clip) => f.write_str("0..1 with the mean and std of CLIP"),
+            Self::Normalised(Normalisation::Stated(_)) => f.write_str("0..1 with the mean and std that are set"),
             Self::Normalised(Normalisation::Centred) => f.write_str("-0.5..0.5 (mean 0.5, std 1)"),
         }
     }
@@ -259,7 +251,8 @@ pub(crate) enum Padding {
 }
 
 impl Padding {
-    /// Index of the source pixel for `position` along a side of `side` pixels; `None` for black. Positions from `side` on are padding.
+    /// Index of the source pixel for `position` along a side of `side` pixels; `None` for black. Positions from `side`
+    /// on are padding.
     pub(crate) fn source(self, position: usize, side: usize) -> Option<usize> {
         if position < side {
             return Some(position);

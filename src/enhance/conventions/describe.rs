@@ -24,7 +24,8 @@ pub(crate) struct Description {
     pub(crate) sidecar: ModelSidecar,
     /// The preset, if one was named.
     pub(crate) preset: Option<Preset>,
-    /// True if the usual value ranges are assumed, because they are not stated and the probe's images are plausible with them.
+    /// True if the usual value ranges are assumed, because they are not stated and the probe's images are plausible
+    /// with them.
     pub(crate) has_assumed_ranges: bool,
     /// Caveats for readers of the results, as sentences that follow the model's name.
     pub(crate) remarks: Vec<String>,
@@ -41,11 +42,7 @@ struct Lines(Vec<ConventionLine>);
 
 impl Lines {
     fn add(&mut self, name: &str, value: impl std::fmt::Display, source: impl Into<String>) {
-        self.0.push(ConventionLine {
-            key: name.to_owned(),
-            value: value.to_string(),
-            source: source.into(),
-        });
+        self.0.push(ConventionLine { key: name.to_owned(), value: value.to_string(), source: source.into() });
     }
 }
 
@@ -91,11 +88,7 @@ impl Description {
     /// The table as text, with additional rows about weights and ONNX Runtime.
     pub(crate) fn text(&self, path: &Path, graph: &Graph, convention: &ModelSidecar) -> String {
         let mut lines = Lines(self.lines(graph, convention));
-        lines.add(
-            "subnormal weights",
-            self.flushed,
-            "set to zero, which changes no byte",
-        );
+        lines.add("subnormal weights", self.flushed, "set to zero, which changes no byte");
         let runtime = graph.runtime();
         let source = format!("{}: {}", runtime.place(), runtime.path().display());
         lines.add("ONNX Runtime", runtime.version(), source);
@@ -108,18 +101,15 @@ impl Description {
         lines.add("input", &signature.input.port, GRAPH);
         let source = self.source(|s| s.layout_in.is_some(), "graph: the dimension of size 3");
         lines.add("layout_in", encoding.layout, source);
-        let [height, width] = [signature.height, signature.width]
-            .map(|side| side.map_or("any".to_owned(), |side| side.to_string()));
+        let [height, width] =
+            [signature.height, signature.width].map(|side| side.map_or("any".to_owned(), |side| side.to_string()));
         lines.add("height × width", format!("{height} × {width}"), GRAPH);
         if let Some([width, height]) = convention.fixed {
             let source = self.source(|s| s.fixed.is_some(), "");
             lines.add("fixed", format!("{height} × {width}"), source);
         }
         if graph.batch() > 1 {
-            let cost = format!(
-                "graph: each image is repeated {0} times, which takes {0} times as long",
-                graph.batch()
-            );
+            let cost = format!("graph: each image is repeated {0} times, which takes {0} times as long", graph.batch());
             lines.add("batch", graph.batch(), cost);
         }
         let default = "default; a graph does not contain it";
@@ -133,10 +123,7 @@ impl Description {
         }
         let source = self.source(|s| s.color.is_some(), "default, cannot be checked");
         lines.add("color", encoding.color, source);
-        let source = self.source(
-            |s| s.range_in.is_some(),
-            self.range_source("default for its type"),
-        );
+        let source = self.source(|s| s.range_in.is_some(), self.range_source("default for its type"));
         lines.add("range_in", encoding.range, source);
         if convention.mean.is_some() || convention.std.is_some() {
             let value = format!("{:?}, {:?}", encoding.mean, encoding.std);
@@ -146,32 +133,16 @@ impl Description {
         let fixed = [signature.height, signature.width];
         match convention.multiple {
             Some(multiple) => {
-                lines.add(
-                    "multiple",
-                    multiple,
-                    self.source(|s| s.multiple.is_some(), ""),
-                );
+                lines.add("multiple", multiple, self.source(|s| s.multiple.is_some(), ""));
             }
             None if SizeRule::new(fixed, convention, encoding.pad).takes_any_size() => {
-                let others = MULTIPLES[1..]
-                    .iter()
-                    .map(ToString::to_string)
-                    .collect::<Vec<_>>()
-                    .join(", ");
+                let others = MULTIPLES[1..].iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
                 let source = format!("tried first, then {others} if it fails");
                 lines.add("multiple", MULTIPLES[0], source);
             }
-            None => lines.add(
-                "multiple",
-                1,
-                "fixed size: other images are padded or tiled if the model is local",
-            ),
+            None => lines.add("multiple", 1, "fixed size: other images are padded or tiled if the model is local"),
         }
-        lines.add(
-            "pad",
-            encoding.pad,
-            self.source(|s| s.pad.is_some(), "default"),
-        );
+        lines.add("pad", encoding.pad, self.source(|s| s.pad.is_some(), "default"));
         if convention.pad_always == Some(true) {
             let source = self.source(|s| s.pad_always.is_some(), "");
             lines.add("pad_always", "at least one row and one column", source);
@@ -186,18 +157,13 @@ impl Description {
     fn output(&self, lines: &mut Lines, graph: &Graph) {
         let (outputs, composition) = (&graph.signature.outputs, &graph.decoding);
         if let Some(image) = &graph.convention.image {
-            let fallback = self
-                .preset
-                .as_ref()
-                .map_or(GRAPH.to_owned(), |preset| format!("preset {}", preset.name));
+            let fallback = self.preset.as_ref().map_or(GRAPH.to_owned(), |preset| format!("preset {}", preset.name));
             let source = self.source(|s| s.image.is_some(), &fallback);
             lines.add("image = ", image, source);
         }
         for (output, decoding) in outputs.iter().zip(&composition.outputs) {
             let source = match (output.reason, &self.preset) {
-                ("stated", Some(preset)) => {
-                    self.source(|s| s.output.is_some(), &format!("preset {}", preset.name))
-                }
+                ("stated", Some(preset)) => self.source(|s| s.output.is_some(), &format!("preset {}", preset.name)),
                 ("stated", None) => "sidecar".to_owned(),
                 (reason, _) => reason.to_owned(),
             };
@@ -229,11 +195,7 @@ impl Description {
 
     /// Source of an unstated value range: `otherwise`, unless ranges were assumed after the probe.
     fn range_source(&self, otherwise: &'static str) -> &'static str {
-        if self.has_assumed_ranges {
-            ASSUMED
-        } else {
-            otherwise
-        }
+        if self.has_assumed_ranges { ASSUMED } else { otherwise }
     }
 
     /// Source of a value: the sidecar or the preset if `states` holds for it, else `otherwise`.
@@ -258,20 +220,12 @@ fn align(path: &Path, lines: &[ConventionLine]) -> String {
     let mut text = format!("{}\n", path.display());
     for ConventionLine { key, value, source } in lines {
         // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "  {key:0$}  {value:1$}  {source}",
-            widths[0], widths[1]
-        );
+        let _ = writeln!(text, "  {key:0$}  {value:1$}  {source}", widths[0], widths[1]);
     }
     text
 }
 
 /// Width of the widest cell of at most [`MAX_PADDED`] characters.
 fn column_width<'a>(cells: impl Iterator<Item = &'a str>) -> usize {
-    cells
-        .map(|cell| cell.chars().count())
-        .filter(|width| *width <= MAX_PADDED)
-        .max()
-        .unwrap_or(0)
+    cells.map(|cell| cell.chars().count()).filter(|width| *width <= MAX_PADDED).max().unwrap_or(0)
 }

@@ -90,11 +90,7 @@ impl TryFrom<Table> for ExtraValue {
                         "noise with std = {std}, divide = {divide}; std must be 0 or more, divide a whole number of at least 1"
                     ));
                 }
-                Ok(Self::Noise(NoiseStatement {
-                    std,
-                    seed: table.seed.unwrap_or(0),
-                    divide,
-                }))
+                Ok(Self::Noise(NoiseStatement { std, seed: table.seed.unwrap_or(0), divide }))
             }
             _ => Err(format!("a table in [extra] must be {FORMS}")),
         }
@@ -123,11 +119,7 @@ impl Serialize for ExtraValue {
         match self {
             Self::Number(number) => number.serialize(serializer),
             Self::List(numbers) => numbers.serialize(serializer),
-            Self::Map(number) => Table {
-                map: Some(*number),
-                ..Table::default()
-            }
-            .serialize(serializer),
+            Self::Map(number) => Table { map: Some(*number), ..Table::default() }.serialize(serializer),
             Self::Noise(noise) => Table {
                 noise: Some(Distribution::Normal),
                 std: Some(noise.std),
@@ -136,11 +128,9 @@ impl Serialize for ExtraValue {
                 ..Table::default()
             }
             .serialize(serializer),
-            Self::From(expression) => Table {
-                from: Some(expression.clone()),
-                ..Table::default()
+            Self::From(expression) => {
+                Table { from: Some(expression.clone()), ..Table::default() }.serialize(serializer)
             }
-            .serialize(serializer),
         }
     }
 }
@@ -152,10 +142,7 @@ impl<'de> Visitor<'de> for ExtraValueVisitor {
     type Value = ExtraValue;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "a number, true, false, a list of these, {FORMS} (other keys stand above [extra])"
-        )
+        write!(f, "a number, true, false, a list of these, {FORMS} (other keys stand above [extra])")
     }
 
     fn visit_bool<E: Error>(self, value: bool) -> Result<ExtraValue, E> {
@@ -175,9 +162,7 @@ impl<'de> Visitor<'de> for ExtraValueVisitor {
         while let Some(number) = list.next_element()? {
             numbers.push(number);
             if numbers.len() > MAX_NUMBERS {
-                return Err(A::Error::custom(format!(
-                    "a list can have at most {MAX_NUMBERS} numbers"
-                )));
+                return Err(A::Error::custom(format!("a list can have at most {MAX_NUMBERS} numbers")));
             }
         }
         Ok(ExtraValue::List(numbers))
@@ -211,25 +196,16 @@ impl ExtraValue {
     /// A message about the faulty value of the key `name`.
     pub(super) fn check(&self, name: &str) -> Result<(), String> {
         match self {
-            Self::Number(Number::Float(value)) | Self::Map(Number::Float(value))
-                if !value.is_finite() =>
-            {
+            Self::Number(Number::Float(value)) | Self::Map(Number::Float(value)) if !value.is_finite() => {
                 Err(format!("extra.{name} is {value}; expected a finite number"))
             }
             Self::List(numbers) => {
-                match numbers
-                    .iter()
-                    .find(|n| matches!(n, Number::Float(value) if !value.is_finite()))
-                {
+                match numbers.iter().find(|n| matches!(n, Number::Float(value) if !value.is_finite())) {
                     None => Ok(()),
-                    Some(value) => {
-                        Err(format!("extra.{name} has {value}; expected finite numbers"))
-                    }
+                    Some(value) => Err(format!("extra.{name} has {value}; expected finite numbers")),
                 }
             }
-            Self::From(expression) => {
-                expression.check_names(&format!("extra.{name}.from"), &["image"])
-            }
+            Self::From(expression) => expression.check_names(&format!("extra.{name}.from"), &["image"]),
             _ => Ok(()),
         }
     }
@@ -272,31 +248,14 @@ mod tests {
             ("3", ExtraValue::Number(Number::Integer(3))),
             ("0.8", ExtraValue::Number(Number::Float(0.8))),
             ("true", ExtraValue::Number(Number::Bool(true))),
-            (
-                "[1, 2.5]",
-                ExtraValue::List(vec![Number::Integer(1), Number::Float(2.5)]),
-            ),
+            ("[1, 2.5]", ExtraValue::List(vec![Number::Integer(1), Number::Float(2.5)])),
             ("{ map = 5.0 }", ExtraValue::Map(Number::Float(5.0))),
             (
                 "{ noise = \"normal\", std = 0.9, seed = 7, divide = 8 }",
-                ExtraValue::Noise(NoiseStatement {
-                    std: 0.9,
-                    seed: 7,
-                    divide: 8,
-                }),
+                ExtraValue::Noise(NoiseStatement { std: 0.9, seed: 7, divide: 8 }),
             ),
-            (
-                "{ noise = \"normal\" }",
-                ExtraValue::Noise(NoiseStatement {
-                    std: 1.0,
-                    seed: 0,
-                    divide: 1,
-                }),
-            ),
-            (
-                "{ from = \"1 - max(image)\" }",
-                ExtraValue::From("1 - max(image)".parse().unwrap()),
-            ),
+            ("{ noise = \"normal\" }", ExtraValue::Noise(NoiseStatement { std: 1.0, seed: 0, divide: 1 })),
+            ("{ from = \"1 - max(image)\" }", ExtraValue::From("1 - max(image)".parse().unwrap())),
         ];
         for (text, value) in rows {
             assert_eq!(parse(text), Ok(value), "{text}");
@@ -315,10 +274,7 @@ mod tests {
             ("{ noise = \"uniform\" }", "normal"),
             ("{ noise = \"normal\", std = -1 }", "std must be"),
             ("{ noise = \"normal\", std = inf }", "std must be"),
-            (
-                "{ noise = \"normal\", divide = 0 }",
-                "divide a whole number",
-            ),
+            ("{ noise = \"normal\", divide = 0 }", "divide a whole number"),
             ("{ from = \"image +\" }", "the end"),
             ("{ from = \"input\" }", "the names are `image`"),
             ("nan", "extra.a is NaN"),
@@ -331,13 +287,9 @@ mod tests {
 
     #[test]
     fn integers_are_serialized_as_floats_where_that_is_exact() {
-        for (value, json) in [
-            ("1", "1.0"),
-            ("0.8", "0.8"),
-            ("1e-7", "1e-7"),
-            ("true", "true"),
-            ("9007199254740993", "9007199254740993"),
-        ] {
+        for (value, json) in
+            [("1", "1.0"), ("0.8", "0.8"), ("1e-7", "1e-7"), ("true", "true"), ("9007199254740993", "9007199254740993")]
+        {
             assert_eq!(serde_json::to_string(&parse(value).unwrap()).unwrap(), json);
         }
     }

@@ -8,8 +8,8 @@ pub(super) mod sidecar;
 mod signature;
 
 pub(super) use convention::{
-    ChannelOrder, Channels, ElementType, LUMA, Locality, Normalisation, Padding, Rounding,
-    TensorLayout, ValueRange, ValueScale,
+    ChannelOrder, Channels, ElementType, LUMA, Locality, Normalisation, Padding, Rounding, TensorLayout, ValueRange,
+    ValueScale,
 };
 pub(super) use describe::Description;
 pub(super) use extra::{ExtraValue, NoiseStatement, Number};

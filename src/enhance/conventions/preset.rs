@@ -113,11 +113,9 @@ fn all_presets() -> Result<BTreeMap<String, PresetContent>> {
 
 /// Value that a preset states for an input of this name, with the preset's name.
 pub(crate) fn known_number(input: &str) -> Option<(Number, String)> {
-    all_presets().ok()?.into_iter().find_map(|(name, content)| {
-        match content.sidecar.extra.get(input)? {
-            ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
-            ExtraValue::List(_) | ExtraValue::Noise(_) | ExtraValue::From(_) => None,
-        }
+    all_presets().ok()?.into_iter().find_map(|(name, content)| match content.sidecar.extra.get(input)? {
+        ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
+        ExtraValue::List(_) | ExtraValue::Noise(_) | ExtraValue::From(_) => None,
     })
 }
 
@@ -136,18 +134,13 @@ impl PresetContent {
     fn index_by_channels(&self, outputs: &[Port]) -> Option<usize> {
         let channels: Vec<Option<usize>> = outputs.iter().map(Port::channels).collect();
         let list = self.signatures.iter().find(|list| {
-            list.channels.len() == channels.len()
-                && list
-                    .channels
-                    .iter()
-                    .zip(&channels)
-                    .all(|(a, b)| Some(*a) == *b)
+            list.channels.len() == channels.len() && list.channels.iter().zip(&channels).all(|(a, b)| Some(*a) == *b)
         })?;
         list.nth.checked_sub(1)
     }
 
-    /// Index of the image output, identified by name. The name of the first output counts only if the others were named too; see
-    /// [`Port::is_numbered`].
+    /// Index of the image output, identified by name. The name of the first output counts only if the others were named
+    /// too; see [`Port::is_numbered`].
     fn index_by_name(&self, outputs: &[Port]) -> Option<usize> {
         if outputs.iter().map(|port| &port.name).eq(&self.own_export) {
             return Some(0);
@@ -162,10 +155,7 @@ impl PresetContent {
     /// The preset's expression of the image; `None` if the graph lacks an output that it names.
     fn image_expression(&self, outputs: &[Port]) -> Option<&Expression> {
         self.image.as_ref().filter(|image| {
-            image
-                .names()
-                .iter()
-                .all(|name| name == "input" || outputs.iter().any(|port| port.name == *name))
+            image.names().iter().all(|name| name == "input" || outputs.iter().any(|port| port.name == *name))
         })
     }
 }
@@ -173,29 +163,18 @@ impl PresetContent {
 impl PresetContent {
     /// Lines about this preset in the list of presets.
     fn entry(&self, name: &str) -> String {
-        let folder = self
-            .repository
-            .split('/')
-            .next_back()
-            .unwrap_or(&self.repository);
+        let folder = self.repository.split('/').next_back().unwrap_or(&self.repository);
         let file = format!("{name}.onnx");
         let weights = match &self.weights {
             Some(path) => format!("{folder}/{path}"),
             None => "WEIGHTS".to_owned(),
         };
-        let size = self
-            .one_size
-            .as_ref()
-            .map_or_else(String::new, |size| format!(" --size {size}"));
+        let size = self.one_size.as_ref().map_or_else(String::new, |size| format!(" --size {size}"));
         let export = match &self.ready_made {
             Some(source) => format!("  file: {source}\n"),
             None => format!(
                 "  export: python models/export.py {name} {folder} {weights} {file}{size}{}\n",
-                if self.weights.is_some() {
-                    ""
-                } else {
-                    "; WEIGHTS are linked from its README"
-                }
+                if self.weights.is_some() { "" } else { "; WEIGHTS are linked from its README" }
             ),
         };
         format!(
@@ -216,20 +195,14 @@ impl PresetContent {
             Some(image) => format!("image = {image:?}"),
             None => format!("output {}", self.names.join(" or ")),
         };
-        let mut keys: BTreeMap<String, toml::Value> = [
-            ("range_in", "0..1"),
-            ("range_out", "0..1"),
-            ("rounding", "round"),
-        ]
-        .map(|(key, value)| (key.to_owned(), toml::Value::from(value)))
-        .into();
+        let mut keys: BTreeMap<String, toml::Value> =
+            [("range_in", "0..1"), ("range_out", "0..1"), ("rounding", "round")]
+                .map(|(key, value)| (key.to_owned(), toml::Value::from(value)))
+                .into();
         if let Ok(toml::Value::Table(stated)) = toml::Value::try_from(&self.sidecar) {
             keys.extend(stated);
         }
-        let keys: Vec<String> = keys
-            .into_iter()
-            .map(|(key, value)| format!("{key} = {value}"))
-            .collect();
+        let keys: Vec<String> = keys.into_iter().map(|(key, value)| format!("{key} = {value}")).collect();
         format!("RGB, {outputs}, {}", keys.join(", "))
     }
 }
@@ -240,21 +213,12 @@ impl PresetContent {
 /// If `presets.toml` is invalid, which is a bug.
 pub fn list_of_presets() -> Result<String> {
     let entries = all_presets()?;
-    Ok(entries
-        .iter()
-        .map(|(name, content)| content.entry(name))
-        .collect())
+    Ok(entries.iter().map(|(name, content)| content.entry(name)).collect())
 }
 
 impl fmt::Display for PresetContent {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            repository,
-            commit,
-            file,
-            paper,
-            ..
-        } = self;
+        let Self { repository, commit, file, paper, .. } = self;
         write!(f, "{paper}; github.com/{repository} at {commit}: {file}")
     }
 }
@@ -280,16 +244,15 @@ impl Preset {
             let names: Vec<String> = all.into_keys().collect();
             let near = suggestion(&known, &names);
             let names = names.join(", ");
-            let problem = format_args!(
-                "{name:?} before the colon is not a preset; the presets are {names}{near}"
-            );
+            let problem = format_args!("{name:?} before the colon is not a preset; the presets are {names}{near}");
             return Err(Error::usage("--llie", problem));
         };
         let name = name.to_owned();
         Ok((Some(Self { name, content }), PathBuf::from(file)))
     }
 
-    /// Another preset whose name occurs in the file name; `None` if this preset's family occurs in it, such as `ruas` of `ruas-lol`.
+    /// Another preset whose name occurs in the file name; `None` if this preset's family occurs in it, such as `ruas`
+    /// of `ruas-lol`.
     pub(crate) fn other_preset_in_name(&self, file: &Path) -> Option<String> {
         let stem = file.file_stem()?.to_string_lossy().to_lowercase();
         if name_occurs(family(&self.name.replace("-pp", "++")), &stem) {
@@ -313,7 +276,8 @@ impl Preset {
         }
     }
 
-    /// The preset's convention for a graph, with values for the inputs that the graph has and the choice of the image output.
+    /// The preset's convention for a graph, with values for the inputs that the graph has and the choice of the image
+    /// output.
     ///
     /// # Errors
     /// If the image output cannot be identified.
@@ -379,11 +343,7 @@ impl Preset {
     /// True if the image is a single output, and exactly one output can have one or three channels.
     fn is_only_image(&self, outputs: &[Port]) -> bool {
         self.content.image.is_none()
-            && outputs
-                .iter()
-                .filter(|port| port.channels().is_none_or(|count| matches!(count, 1 | 3)))
-                .count()
-                == 1
+            && outputs.iter().filter(|port| port.channels().is_none_or(|count| matches!(count, 1 | 3))).count() == 1
     }
 
     /// Differences between a graph and the authors' model; `None` if there are none.
@@ -406,17 +366,9 @@ impl Preset {
                 format_ports(outputs)
             ));
         }
-        let others: Vec<Port> = inputs
-            .iter()
-            .filter(|port| !content.sidecar.extra.contains_key(&port.name))
-            .cloned()
-            .collect();
-        (others.len() > 1).then(|| {
-            format!(
-                "inputs differ from the preset: found {}",
-                format_ports(&others)
-            )
-        })
+        let others: Vec<Port> =
+            inputs.iter().filter(|port| !content.sidecar.extra.contains_key(&port.name)).cloned().collect();
+        (others.len() > 1).then(|| format!("inputs differ from the preset: found {}", format_ports(&others)))
     }
 
     /// Description of the outputs that the preset expects.
@@ -445,15 +397,13 @@ fn family(name: &str) -> &str {
 /// True if a lower-case file stem contains a preset name. Punctuation is ignored; short names must be whole words.
 fn name_occurs(name: &str, stem: &str) -> bool {
     let name = letters_of(name);
-    stem.split(|c: char| !c.is_alphabetic())
-        .any(|word| word == name)
+    stem.split(|c: char| !c.is_alphabetic()).any(|word| word == name)
         || name.len() > MAX_SHORT_NAME && letters_of(stem).contains(&name)
 }
 
 /// Letters and digits of a text, in lower case.
 fn letters_of(text: &str) -> String {
-    text.to_lowercase()
-        .replace(|c: char| !c.is_alphanumeric(), "")
+    text.to_lowercase().replace(|c: char| !c.is_alphanumeric(), "")
 }
 
 #[cfg(test)]

@@ -9,9 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::convention::{
-    ChannelOrder, Channels, Locality, Padding, Rounding, TensorLayout, ValueRange, ValueScale,
-};
+use super::convention::{ChannelOrder, Channels, Locality, Padding, Rounding, TensorLayout, ValueRange, ValueScale};
 use super::extra::ExtraValue;
 use crate::expressions::Expression;
 use darkqa_base::error::{Error, Result};
@@ -76,10 +74,7 @@ pub(crate) struct ModelSidecar {
 
 /// Output of a graph, by index or by name.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(
-    untagged,
-    expecting = "`output` is an index from 0 or a name in quotes"
-)]
+#[serde(untagged, expecting = "`output` is an index from 0 or a name in quotes")]
 pub(crate) enum OutputChoice {
     /// Index among the outputs, from 0.
     Index(usize),
@@ -136,8 +131,7 @@ pub(crate) fn text_for(model: &Path) -> Result<String> {
 const MAX_LINE: usize = 60;
 
 /// End of messages about wrong keys, with the page that lists all keys.
-const KEYS: &str =
-    "; all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/enhancers.md";
+const KEYS: &str = "; all keys: https://github.com/darkqa-eval/darkqa-eval/blob/main/src/docs/enhancers.md";
 
 /// Maximum side, in pixels, of the key `fixed`; chosen, because this program handles no larger images.
 const MAX_SIDE: usize = 1 << 16;
@@ -145,7 +139,8 @@ const MAX_SIDE: usize = 1 << 16;
 /// Maximum area, in pixels, of the key `fixed`: the default of `--decode max-pixels`.
 const MAX_PIXELS: usize = 100_000_000;
 
-/// Maximum multiple, in pixels; chosen: twice the largest of any published model, and small images padded to it still fit into memory.
+/// Maximum multiple, in pixels; chosen: twice the largest of any published model, and small images padded to it still
+/// fit into memory.
 const MAX_MULTIPLE: usize = 1024;
 
 /// Maximum length of the name of training data, in characters; chosen, because it is printed with each result.
@@ -166,14 +161,7 @@ impl ModelSidecar {
         let path = path_for(model);
         let sidecar: Self = toml::from_str(text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(text, &e);
-            let stated: String = text
-                .lines()
-                .nth(line - 1)
-                .unwrap_or_default()
-                .trim()
-                .chars()
-                .take(MAX_LINE)
-                .collect();
+            let stated: String = text.lines().nth(line - 1).unwrap_or_default().trim().chars().take(MAX_LINE).collect();
             Error::line(&path, line, format_args!("`{stated}`: {problem}{KEYS}"))
         })?;
         match sidecar.check() {
@@ -187,8 +175,7 @@ impl ModelSidecar {
         self.check_bounds()?;
         if self.output.is_some() && self.image.is_some() {
             return Err(
-                "`output` and `image` are both set; delete `output`, because `image` names its outputs"
-                    .to_owned(),
+                "`output` and `image` are both set; delete `output`, because `image` names its outputs".to_owned()
             );
         }
         for (name, value) in &self.extra {
@@ -209,46 +196,26 @@ impl ModelSidecar {
     /// Means and standard deviations of the output; `None` if neither is stated.
     pub(crate) fn mean_and_std_out(&self) -> Option<[[f32; 3]; 2]> {
         let is_stated = self.mean_out.is_some() || self.std_out.is_some();
-        is_stated.then(|| {
-            [
-                self.mean_out.unwrap_or([0.0; 3]),
-                self.std_out.unwrap_or([1.0; 3]),
-            ]
-        })
+        is_stated.then(|| [self.mean_out.unwrap_or([0.0; 3]), self.std_out.unwrap_or([1.0; 3])])
     }
 
     /// The sidecar with another scale of the input.
     pub(crate) fn with_input_scale(self, scale: ValueScale) -> Self {
-        let [mean, std] = scale
-            .mean_and_std()
-            .map_or([self.mean, self.std], |both| both.map(Some));
-        Self {
-            range_in: Some(scale.range()),
-            mean,
-            std,
-            ..self
-        }
+        let [mean, std] = scale.mean_and_std().map_or([self.mean, self.std], |both| both.map(Some));
+        Self { range_in: Some(scale.range()), mean, std, ..self }
     }
 
     /// The sidecar with another scale of the output.
     pub(crate) fn with_output_scale(self, scale: ValueScale) -> Self {
         let stated = [self.mean_out, self.std_out];
         let [mean_out, std_out] = scale.mean_and_std().map_or(stated, |both| both.map(Some));
-        Self {
-            range_out: Some(scale.range()),
-            mean_out,
-            std_out,
-            ..self
-        }
+        Self { range_out: Some(scale.range()), mean_out, std_out, ..self }
     }
 
     /// Checks that numbers are within their bounds.
     fn check_bounds(&self) -> Result<(), String> {
-        let are_means_valid = [self.mean, self.mean_out]
-            .into_iter()
-            .flatten()
-            .flatten()
-            .all(|mean: f32| mean.abs() <= MAX_SCALE);
+        let are_means_valid =
+            [self.mean, self.mean_out].into_iter().flatten().flatten().all(|mean: f32| mean.abs() <= MAX_SCALE);
         let are_deviations_valid = [self.std, self.std_out]
             .into_iter()
             .flatten()
@@ -260,10 +227,7 @@ impl ModelSidecar {
                 1.0 / MAX_SCALE
             ));
         }
-        if self
-            .multiple
-            .is_some_and(|multiple| multiple.get() > MAX_MULTIPLE)
-        {
+        if self.multiple.is_some_and(|multiple| multiple.get() > MAX_MULTIPLE) {
             return Err(format!("`multiple` can be at most {MAX_MULTIPLE} pixels"));
         }
         if let Some([width, height]) = self.fixed {
@@ -274,12 +238,12 @@ impl ModelSidecar {
                 ));
             }
         }
-        if self.trained_on.as_ref().is_some_and(|text| {
-            text.chars().count() > MAX_TRAINED_ON || text.contains(char::is_control)
-        }) {
-            return Err(format!(
-                "`trained_on` must be one line of at most {MAX_TRAINED_ON} characters"
-            ));
+        if self
+            .trained_on
+            .as_ref()
+            .is_some_and(|text| text.chars().count() > MAX_TRAINED_ON || text.contains(char::is_control))
+        {
+            return Err(format!("`trained_on` must be one line of at most {MAX_TRAINED_ON} characters"));
         }
         if self.extra.len() > MAX_EXTRA {
             return Err(format!("`[extra]` can have at most {MAX_EXTRA} inputs"));
@@ -381,17 +345,11 @@ mod tests {
         assert_eq!(read.layout_in, Some(TensorLayout::Nhwc));
         assert_eq!(read.tile, Some(Locality::Exact(12)));
         assert_eq!(read.extra.len(), 2);
-        assert_eq!(
-            (read.color_out, read.channels),
-            (Some(ChannelOrder::Rgb), Some(Channels::Y))
-        );
+        assert_eq!((read.color_out, read.channels), (Some(ChannelOrder::Rgb), Some(Channels::Y)));
         assert_eq!(read.input, "image ^ 0.8".parse().ok());
         assert_eq!(read.output, Some(OutputChoice::Name("enhanced".into())));
         assert_eq!(ModelSidecar::default().with_defaults(&read), read);
-        let own = ModelSidecar {
-            multiple: NonZeroUsize::new(4),
-            ..ModelSidecar::default()
-        };
+        let own = ModelSidecar { multiple: NonZeroUsize::new(4), ..ModelSidecar::default() };
         assert_eq!(own.with_defaults(&read).multiple, NonZeroUsize::new(4));
     }
 
@@ -399,14 +357,8 @@ mod tests {
     fn errors_about_keys_and_values_name_the_file() {
         let model = Path::new("a/model.onnx");
         for (text, part) in [
-            (
-                "range = \"-1..1\"",
-                "line 1: `range = \"-1..1\"`: unknown field",
-            ),
-            (
-                "color = \"rgb\"\nmultiple = 4 4",
-                "line 2: `multiple = 4 4`: ",
-            ),
+            ("range = \"-1..1\"", "line 1: `range = \"-1..1\"`: unknown field"),
+            ("color = \"rgb\"\nmultiple = 4 4", "line 2: `multiple = 4 4`: "),
             ("range_in = \"0..2\"", "0..2"),
             ("output = -1", "index from 0"),
             ("output = [1]", "index from 0"),

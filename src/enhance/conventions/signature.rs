@@ -1,7 +1,7 @@
 //! Roles of a graph's tensors: the degraded image, the enhanced image and further inputs ([`Signature::infer`]).
 //!
-//! A graph declares element types, ranks and fixed sizes. Value range and colour order come from a sidecar or a preset; the default is that
-//! of most published models, RGB in 0..1.
+//! A graph declares element types, ranks and fixed sizes. Value range and colour order come from a sidecar or a preset;
+//! the default is that of most published models, RGB in 0..1.
 
 use super::convention::{Channels, TensorLayout};
 use super::sidecar::{ADD, ModelSidecar};
@@ -40,11 +40,7 @@ impl Signature {
     ///
     /// # Errors
     /// A message with a remedy, to follow the file's name.
-    pub(crate) fn infer(
-        inputs: &[Port],
-        outputs: &[Port],
-        convention: &ModelSidecar,
-    ) -> Result<Self, String> {
+    pub(crate) fn infer(inputs: &[Port], outputs: &[Port], convention: &ModelSidecar) -> Result<Self, String> {
         let (image, layout) = image_input(inputs, convention)?;
         let [_, height, width] = layout.axes().map(|place| &image.dims[place]);
         let channels = convention.channels.unwrap_or_default();
@@ -52,10 +48,7 @@ impl Signature {
             check_equal("mean", convention.mean)?;
             check_equal("std", convention.std)?;
         }
-        let input = ImageInput {
-            port: image.clone(),
-            layout,
-        };
+        let input = ImageInput { port: image.clone(), layout };
         let extras = inputs
             .iter()
             .filter(|port| port.name != image.name)
@@ -64,57 +57,33 @@ impl Signature {
                 FurtherInput::new(port, value, layout, input.takes_any_side())
             })
             .collect::<Result<Vec<_>, String>>()?;
-        if let Some(name) = convention
-            .extra
-            .keys()
-            .find(|name| !extras.iter().any(|extra| extra.port.name == **name))
-        {
+        if let Some(name) = convention.extra.keys().find(|name| !extras.iter().any(|extra| extra.port.name == **name)) {
             return Err(format!(
                 "MODEL.onnx.toml sets {name:?} under [extra], which is not an input besides the image; move that line above [extra] if it is another key, else delete it; inputs: {}",
                 format_ports(inputs)
             ));
         }
         let fits = |port: &Port, count: usize| {
-            let layout = convention
-                .layout_out
-                .or(port.layout(count))
-                .unwrap_or(layout);
+            let layout = convention.layout_out.or(port.layout(count)).unwrap_or(layout);
             port.can_be_image(layout, count, [height, width])
         };
         let read = match &convention.image {
             Some(expression) => Output::for_expression(outputs, expression, channels, fits)?,
-            None => vec![Output::choose(
-                outputs,
-                convention.output.as_ref(),
-                channels,
-                fits,
-            )?],
+            None => vec![Output::choose(outputs, convention.output.as_ref(), channels, fits)?],
         };
-        let unread = outputs
-            .iter()
-            .filter(|port| !read.iter().any(|output| output.port.name == port.name))
-            .cloned()
-            .collect();
-        Ok(Self {
-            height: height.known(),
-            width: width.known(),
-            extras,
-            unread,
-            outputs: read,
-            input,
-        })
+        let unread =
+            outputs.iter().filter(|port| !read.iter().any(|output| output.port.name == port.name)).cloned().collect();
+        Ok(Self { height: height.known(), width: width.known(), extras, unread, outputs: read, input })
     }
 }
 
 /// Checks that the numbers for the channels of a model of the luma are equal; `key` is the sidecar's.
 fn check_equal(key: &str, numbers: Option<[f32; 3]>) -> Result<(), String> {
     match numbers {
-        Some([a, b, c]) if a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits() => {
-            Err(format!(
-                "takes one channel (channels = \"y\"), but {key} = {:?} in MODEL.onnx.toml or the preset has different numbers; write the same one three times",
-                [a, b, c]
-            ))
-        }
+        Some([a, b, c]) if a.to_bits() != b.to_bits() || b.to_bits() != c.to_bits() => Err(format!(
+            "takes one channel (channels = \"y\"), but {key} = {:?} in MODEL.onnx.toml or the preset has different numbers; write the same one three times",
+            [a, b, c]
+        )),
         _ => Ok(()),
     }
 }
@@ -123,9 +92,7 @@ impl ImageInput {
     /// True if the input accepts any height or any width.
     pub(crate) fn takes_any_side(&self) -> bool {
         let [_, height, width] = self.layout.axes();
-        [height, width]
-            .iter()
-            .any(|place| self.port.dims[*place].known().is_none())
+        [height, width].iter().any(|place| self.port.dims[*place].known().is_none())
     }
 }
 
@@ -142,15 +109,10 @@ impl Signature {
 }
 
 /// Finds the input that is the image, and its layout.
-fn image_input<'a>(
-    inputs: &'a [Port],
-    convention: &ModelSidecar,
-) -> Result<(&'a Port, TensorLayout), String> {
+fn image_input<'a>(inputs: &'a [Port], convention: &ModelSidecar) -> Result<(&'a Port, TensorLayout), String> {
     let channels = convention.channels.unwrap_or_default();
-    let images: Vec<&Port> = inputs
-        .iter()
-        .filter(|port| !port.is_scalar() && !convention.extra.contains_key(&port.name))
-        .collect();
+    let images: Vec<&Port> =
+        inputs.iter().filter(|port| !port.is_scalar() && !convention.extra.contains_key(&port.name)).collect();
     // Without a clear candidate, take the first one: the error message then names it.
     let Some(image) = images
         .iter()
@@ -158,10 +120,7 @@ fn image_input<'a>(
         .or(images.first())
         .copied()
     else {
-        if let Some(port) = inputs
-            .iter()
-            .find(|port| port.dims.is_empty() && port.element.is_input_type())
-        {
+        if let Some(port) = inputs.iter().find(|port| port.dims.is_empty() && port.element.is_input_type()) {
             return Err(format!(
                 "takes {port}, an input without a shape; export it with one, such as [1, 3, height, width]"
             ));
@@ -172,9 +131,7 @@ fn image_input<'a>(
         ));
     };
     if !image.element.is_input_type() {
-        return Err(format!(
-            "takes {image}, an unsupported type; export it with float32, float16 or uint8"
-        ));
+        return Err(format!("takes {image}, an unsupported type; export it with float32, float16 or uint8"));
     }
     if let [first, _, _, _] = image.dims.as_slice()
         && !first.can_be(1)
@@ -215,9 +172,7 @@ fn image_input<'a>(
         }
     };
     match layout {
-        Some(layout) if image.dims[layout.axes()[0]].can_be(channels.count()) => {
-            Ok((image, layout))
-        }
+        Some(layout) if image.dims[layout.axes()[0]].can_be(channels.count()) => Ok((image, layout)),
         _ => Err(format!(
             "takes {image}, which does not fit `layout_in` in MODEL.onnx.toml or the preset; correct or delete that line"
         )),

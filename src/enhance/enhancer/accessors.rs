@@ -53,9 +53,9 @@ impl Enhancer {
         }
     }
 
-    /// Value ranges of input and output, as far as the sidecar, a preset or the element types state them. A preset without a range
-    /// means 0..1, which all authors of presets use. A sidecar with an expression also means 0..1, because expressions are defined
-    /// on values in 0..1.
+    /// Value ranges of input and output, as far as the sidecar, a preset or the element types state them. A preset
+    /// without a range means 0..1, which all authors of presets use. A sidecar with an expression also means 0..1,
+    /// because expressions are defined on values in 0..1.
     pub(crate) fn stated_ranges(&self) -> [Option<ValueRange>; 2] {
         let (signature, convention) = (&self.graph.signature, self.convention());
         let normalised_in = range_of_normalisation([convention.mean, convention.std]);
@@ -64,17 +64,13 @@ impl Enhancer {
         // Authors who normalise the input and do not document the output return 0..1.
         let range_out = convention.range_out.or(normalised_out).or(normalised_in);
         let has_expression = convention.input.is_some() || convention.image.is_some();
-        let implied =
-            (self.description.preset.is_some() || has_expression).then_some(ValueRange::Unit);
-        [
-            (range_in, &signature.input.port.element),
-            (range_out, &signature.outputs[0].port.element),
-        ]
-        .map(|(range, element)| range.or(element.implied_range()).or(implied))
+        let implied = (self.description.preset.is_some() || has_expression).then_some(ValueRange::Unit);
+        [(range_in, &signature.input.port.element), (range_out, &signature.outputs[0].port.element)]
+            .map(|(range, element)| range.or(element.implied_range()).or(implied))
     }
 
-    /// True if a preset defines input and output, and the sidecar overrides neither a value range nor the channel order of
-    /// the output.
+    /// True if a preset defines input and output, and the sidecar overrides neither a value range nor the channel order
+    /// of the output.
     pub(crate) fn follows_preset(&self) -> bool {
         let sidecar = &self.description.sidecar;
         self.description.preset.is_some()
@@ -83,8 +79,8 @@ impl Enhancer {
             && sidecar.color_out.is_none()
     }
 
-    /// Scales of input and output to try: all, unless a range is given or the convention states a normalisation. Where the input's
-    /// normalisation is stated, the output may have the same.
+    /// Scales of input and output to try: all, unless a range is given or the convention states a normalisation. Where
+    /// the input's normalisation is stated, the output may have the same.
     pub(crate) fn scales_to_try(
         &self,
         range_in: Option<ValueRange>,
@@ -106,9 +102,7 @@ impl Enhancer {
         let stated_in = same.unwrap_or(ranges.input);
         let inputs = try_all(range_in, mean_and_std_in.is_some(), stated_in);
         let mut outputs = try_all(range_out, is_stated_out, ranges.output);
-        let is_known = outputs
-            .iter()
-            .any(|known| known.mean_and_std() == mean_and_std_in);
+        let is_known = outputs.iter().any(|known| known.mean_and_std() == mean_and_std_in);
         if is_rgb && range_out.is_none() && !is_stated_out && !is_known {
             outputs.extend(same);
         }
@@ -158,8 +152,8 @@ impl Enhancer {
         self.search.found()
     }
 
-    /// Records the result of the probe, and writes the current value ranges into the convention as stated ones. Later output values
-    /// outside these ranges are clamped without an error.
+    /// Records the result of the probe, and writes the current value ranges into the convention as stated ones. Later
+    /// output values outside these ranges are clamped without an error.
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.
@@ -167,15 +161,9 @@ impl Enhancer {
         let is_stated = self.stated_ranges().iter().all(Option::is_some);
         let ranges = self.ranges();
         let convention = self.convention().clone();
-        let convention = convention
-            .with_input_scale(ranges.input)
-            .with_output_scale(ranges.output);
-        self.graph = self
-            .graph
-            .with_convention(convention)
-            .map_err(|problem| self.error(problem))?;
-        self.description.has_assumed_ranges |=
-            !is_stated && probe.outcome == ProbeOutcome::Plausible;
+        let convention = convention.with_input_scale(ranges.input).with_output_scale(ranges.output);
+        self.graph = self.graph.with_convention(convention).map_err(|problem| self.error(problem))?;
+        self.description.has_assumed_ranges |= !is_stated && probe.outcome == ProbeOutcome::Plausible;
         self.usage.update(|note| note.probe = Some(probe));
         self.note_convention();
         Ok(())
@@ -192,8 +180,8 @@ impl Enhancer {
     }
 }
 
-/// Value range to which a mean and a deviation refer: 0..1 if one is stated and no magnitude exceeds 2. Otherwise unknown, because some
-/// libraries state them for 0..255.
+/// Value range to which a mean and a deviation refer: 0..1 if one is stated and no magnitude exceeds 2. Otherwise
+/// unknown, because some libraries state them for 0..255.
 fn range_of_normalisation(mean_and_std: [Option<[f32; 3]>; 2]) -> Option<ValueRange> {
     let mut numbers = mean_and_std.into_iter().flatten().flatten().peekable();
     let is_stated = numbers.peek().is_some();

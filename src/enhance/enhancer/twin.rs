@@ -9,8 +9,8 @@ use crate::limits::memory;
 use darkqa_base::error::{Error, Result};
 
 impl Enhancer {
-    /// A copy of this enhancer with its own session and thread. It starts with the sizes, context and memory cost measured so far, and
-    /// shares the usage record, in which `number` identifies the twin.
+    /// A copy of this enhancer with its own session and thread. It starts with the sizes, context and memory cost
+    /// measured so far, and shares the usage record, in which `number` identifies the twin.
     ///
     /// # Errors
     /// If the model's file has changed, or its session cannot be opened.
@@ -23,15 +23,9 @@ impl Enhancer {
             });
         }
         let runtime = self.graph.runtime().with_new_thread()?;
-        let limits = LoadLimits {
-            time: self.graph.time_limit(),
-            memory: self.graph.memory_limit(),
-        };
+        let limits = LoadLimits { time: self.graph.time_limit(), memory: self.graph.memory_limit() };
         let mut twin = Self::open_within(file, &runtime, Some(threads), limits)?;
-        twin.graph = twin
-            .graph
-            .with_convention(self.convention().clone())
-            .map_err(|problem| self.error(problem))?;
+        twin.graph = twin.graph.with_convention(self.convention().clone()).map_err(|problem| self.error(problem))?;
         Ok(Self {
             tiling: self.tiling,
             fitting: self.fitting,
@@ -48,8 +42,9 @@ impl Enhancer {
     }
 }
 
-/// Number of sets of enhancers that can run in parallel: at most `cores`, and as many as fit into the free memory. The memory of one set is
-/// estimated as the resident memory of the process, to be measured after the first image of each enhancer.
+/// Number of sets of enhancers that can run in parallel: at most `cores`, and as many as fit into the free memory. The
+/// memory of one set is estimated as the resident memory of the process, to be measured after the first image of each
+/// enhancer.
 pub fn sets_in_memory(cores: usize) -> usize {
     match (memory::resident(), memory::available()) {
         (Some(resident), Some(available)) => {

@@ -1,9 +1,10 @@
 //! Pixelwise arithmetic expression of a sidecar, such as `L ^ 0.2 * R`: [`Expression`].
 //!
-//! An expression has numbers, names (in backticks unless made of letters, digits and `_`), `+ - * / ^ ( )`, and the functions `min`,
-//! `max`, `clip(x, low, high)`, `mean(x)` (the mean over the channels) and `curves(x, a, b, …)` (the curves of Zero-DCE). `x[4:7]` selects
-//! three channels of the output `x`. `^` is right-associative, with negative bases taken as 0. One channel is broadcast to three where the
-//! other argument has three. All arithmetic is in 32-bit floats.
+//! An expression has numbers, names (in backticks unless made of letters, digits and `_`), `+ - * / ^ ( )`, and the
+//! functions `min`, `max`, `clip(x, low, high)`, `mean(x)` (the mean over the channels) and `curves(x, a, b, …)` (the
+//! curves of Zero-DCE). `x[4:7]` selects three channels of the output `x`. `^` is right-associative, with negative
+//! bases taken as 0. One channel is broadcast to three where the other argument has three. All arithmetic is in 32-bit
+//! floats.
 
 use std::fmt;
 use std::str::FromStr;
@@ -26,11 +27,7 @@ impl FromStr for Expression {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let parsed = parser::parse(text).map_err(|problem| format!("{text:?}: {problem}"))?;
-        Ok(Self {
-            text: text.trim().to_owned(),
-            terms: parsed.terms,
-            names: parsed.names,
-        })
+        Ok(Self { text: text.trim().to_owned(), terms: parsed.terms, names: parsed.names })
     }
 }
 
@@ -58,12 +55,8 @@ impl Expression {
     /// # Errors
     /// A message with the unknown names and the known ones.
     pub(crate) fn check_names(&self, key: &str, known: &[&str]) -> Result<(), String> {
-        let unknown: Vec<String> = self
-            .names
-            .iter()
-            .filter(|n| !known.contains(&n.as_str()))
-            .map(|name| format!("`{name}`"))
-            .collect();
+        let unknown: Vec<String> =
+            self.names.iter().filter(|n| !known.contains(&n.as_str())).map(|name| format!("`{name}`")).collect();
         if unknown.is_empty() {
             return Ok(());
         }
@@ -100,14 +93,11 @@ impl Expression {
                 samples[channel * plane + pixel] = value;
             }
         }
-        Planes {
-            height,
-            width,
-            samples,
-        }
+        Planes { height, width, samples }
     }
 
-    /// Number of channels of the result, for images with these numbers of channels in the order of [`Expression::names`].
+    /// Number of channels of the result, for images with these numbers of channels in the order of
+    /// [`Expression::names`].
     pub(crate) fn channels(&self, image_channels: &[usize]) -> usize {
         let samples: Vec<Sample> = image_channels
             .iter()
@@ -172,10 +162,7 @@ mod tests {
             ("min(3, 1, 2) + max(1, 2)", 3.0),
             ("clip(5, 0, 1) + clip(0 - 5, 0, 1)", 1.0),
             ("mean(c * 4 - 1)", 4.0 / 3.0),
-            (
-                "curves(x, 0 - 1, 2)",
-                0.25 + 0.1875 + 2.0 * (0.4375 * 0.4375 - 0.4375),
-            ),
+            ("curves(x, 0 - 1, 2)", 0.25 + 0.1875 + 2.0 * (0.4375 * 0.4375 - 0.4375)),
             ("max(c) - min(c)", 0.75),
             ("mean(3)", 3.0),
         ] {
@@ -189,24 +176,13 @@ mod tests {
         assert_eq!(value("1 - c"), Sample::Three([0.5, 0.75, 0.0]));
         assert_eq!(value("min(c, 0.5)"), Sample::Three([0.5, 0.25, 0.5]));
         let expression: Expression = "a * b".parse().unwrap();
-        assert_eq!(
-            [[1, 1], [1, 3], [3, 1]].map(|n| expression.channels(&n)),
-            [1, 3, 3]
-        );
+        assert_eq!([[1, 1], [1, 3], [3, 1]].map(|n| expression.channels(&n)), [1, 3, 3]);
     }
 
     #[test]
     fn nan_is_propagated() {
-        for text in [
-            "max(0 / 0, 1)",
-            "min(1, 0 / 0)",
-            "clip(0 / 0, 0, 1)",
-            "(0 / 0) ^ 1",
-            "mean(c / 0 - c / 0)",
-        ] {
-            let Sample::One(found) = value(text) else {
-                panic!("{text}")
-            };
+        for text in ["max(0 / 0, 1)", "min(1, 0 / 0)", "clip(0 / 0, 0, 1)", "(0 / 0) ^ 1", "mean(c / 0 - c / 0)"] {
+            let Sample::One(found) = value(text) else { panic!("{text}") };
             assert!(found.is_nan(), "{text}: {found}");
         }
     }
@@ -239,12 +215,7 @@ mod tests {
 
     #[test]
     fn depth_and_length_are_bounded() {
-        for text in [
-            "(".repeat(900),
-            "-".repeat(900),
-            "2^".repeat(400) + "2",
-            "min(".repeat(200),
-        ] {
+        for text in ["(".repeat(900), "-".repeat(900), "2^".repeat(400) + "2", "min(".repeat(200)] {
             let message = Expression::from_str(&text).unwrap_err();
             assert!(message.contains("deeper than 50"), "{message}");
         }
@@ -258,12 +229,7 @@ mod tests {
     fn unknown_names_are_listed_with_the_known_ones() {
         let expression: Expression = "L ^ 0.2 * R".parse().unwrap();
         assert_eq!(expression.check_names("image", &["R", "L"]), Ok(()));
-        let message = expression
-            .check_names("image", &["input", "R"])
-            .unwrap_err();
-        assert!(
-            message.contains("names `L`") && message.ends_with("the names are `input`, `R`"),
-            "{message}"
-        );
+        let message = expression.check_names("image", &["input", "R"]).unwrap_err();
+        assert!(message.contains("names `L`") && message.ends_with("the names are `input`, `R`"), "{message}");
     }
 }

@@ -34,15 +34,8 @@ pub(super) fn parse(text: &str) -> Result<Parsed, String> {
             characters.len()
         ));
     }
-    let mut parser = Parser {
-        characters,
-        position: 0,
-        depth: 0,
-        parsed: Parsed {
-            terms: Vec::new(),
-            names: Vec::new(),
-        },
-    };
+    let mut parser =
+        Parser { characters, position: 0, depth: 0, parsed: Parsed { terms: Vec::new(), names: Vec::new() } };
     parser.sum()?;
     match parser.peek() {
         None => Ok(parser.parsed),
@@ -116,11 +109,7 @@ impl Parser {
             Some(c) if c.is_ascii_alphabetic() || c == '_' => {
                 let start = self.position;
                 let word = self.take_while(|c| c.is_ascii_alphanumeric() || c == '_');
-                if self.accept('(') {
-                    self.function(&word, start)
-                } else {
-                    self.name(word)
-                }
+                if self.accept('(') { self.function(&word, start) } else { self.name(word) }
             }
             _ => Err(self.error("a number, a name or an opening parenthesis")),
         }
@@ -167,9 +156,7 @@ impl Parser {
             ("curves", 2..) => Term::Curves(arguments),
             _ => {
                 self.position = start;
-                return Err(
-                    self.error("min(…), max(…), clip(x, low, high), mean(x) or curves(x, a, …)")
-                );
+                return Err(self.error("min(…), max(…), clip(x, low, high), mean(x) or curves(x, a, …)"));
             }
         };
         self.parsed.terms.push(term);
@@ -186,32 +173,21 @@ impl Parser {
             }
         }
         let names = &mut self.parsed.names;
-        let index = names
-            .iter()
-            .position(|known| *known == name)
-            .unwrap_or_else(|| {
-                names.push(name);
-                names.len() - 1
-            });
+        let index = names.iter().position(|known| *known == name).unwrap_or_else(|| {
+            names.push(name);
+            names.len() - 1
+        });
         self.parsed.terms.push(Term::Name(index));
         Ok(())
     }
 
     fn close(&mut self) -> Result<(), String> {
-        if self.accept(')') {
-            Ok(())
-        } else {
-            Err(self.error("an operator or a closing parenthesis"))
-        }
+        if self.accept(')') { Ok(()) } else { Err(self.error("an operator or a closing parenthesis")) }
     }
 
     /// Skips white space and returns the next character without consuming it.
     fn peek(&mut self) -> Option<char> {
-        while self
-            .characters
-            .get(self.position)
-            .is_some_and(|c| c.is_whitespace())
-        {
+        while self.characters.get(self.position).is_some_and(|c| c.is_whitespace()) {
             self.position += 1;
         }
         self.characters.get(self.position).copied()
@@ -225,18 +201,12 @@ impl Parser {
     }
 
     fn operator(&mut self, operators: &[(char, Term)]) -> Option<Term> {
-        operators
-            .iter()
-            .find(|(c, _)| self.accept(*c))
-            .map(|(_, term)| *term)
+        operators.iter().find(|(c, _)| self.accept(*c)).map(|(_, term)| *term)
     }
 
     /// Consumes and returns the following characters that satisfy `accepts`.
     fn take_while(&mut self, accepts: impl Fn(char) -> bool) -> String {
-        let text: String = self.characters[self.position..]
-            .iter()
-            .take_while(|c| accepts(**c))
-            .collect();
+        let text: String = self.characters[self.position..].iter().take_while(|c| accepts(**c)).collect();
         self.position += text.chars().count();
         text
     }
@@ -246,10 +216,7 @@ impl Parser {
             None => "the end".to_owned(),
             Some(c) => format!("{c:?}"),
         };
-        format!(
-            "expected {expected} at character {}, found {found}",
-            self.position + 1
-        )
+        format!("expected {expected} at character {}, found {found}", self.position + 1)
     }
 }
 

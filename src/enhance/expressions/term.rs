@@ -118,9 +118,9 @@ impl Term {
             (Self::Min(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.zip_with(*b, smaller)),
             (Self::Max(_), [a, rest @ ..]) => rest.iter().fold(*a, |a, b| a.zip_with(*b, larger)),
             (Self::Clip, [a, low, high]) => a.zip_with(*low, larger).zip_with(*high, smaller),
-            (Self::Curves(_), [x, curves @ ..]) => curves
-                .iter()
-                .fold(*x, |x, a| x.zip_with(*a, |x, a| x + a * (x * x - x))),
+            (Self::Curves(_), [x, curves @ ..]) => {
+                curves.iter().fold(*x, |x, a| x.zip_with(*a, |x, a| x + a * (x * x - x)))
+            }
             (Self::Mean, [a]) => match a.fold_channels(|a, b| a + b) {
                 Sample::One(sum) if matches!(a, Sample::Three(_)) => Sample::One(sum / 3.0),
                 same => same,

@@ -7,8 +7,9 @@ use darkqa_models::{BUILT_IN, BuiltIn};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::types::text::near_name::nearest;
 
-/// Finds the built-in enhancer named by the argument of `--llie`. `None` if the argument is a path: it has an extension, a folder or a
-/// colon. So a file in the current folder that is named `lift` is never confused with the enhancer.
+/// Finds the built-in enhancer named by the argument of `--llie`. `None` if the argument is a path: it has an
+/// extension, a folder or a colon. So a file in the current folder that is named `lift` is never confused with the
+/// enhancer.
 ///
 /// # Errors
 /// If the argument is neither a path nor the name of a built-in enhancer.
@@ -58,10 +59,7 @@ mod tests {
         assert!(typo.contains("did you mean lift?"), "{typo}");
         for wrong in ["lfit", "zerodce", "Lift", ""] {
             let message = find_built_in(Path::new(wrong)).err().unwrap().to_string();
-            assert!(
-                message.contains("lift, gray-gain") && message.contains("--llie"),
-                "{message}"
-            );
+            assert!(message.contains("lift, gray-gain") && message.contains("--llie"), "{message}");
         }
     }
 }

@@ -1,7 +1,8 @@
 //! Products of two computed matrices in a graph, whose bits depend on the number of threads: [`computed_products`].
 //!
-//! ONNX Runtime (1.31 and 1.32) divides the sum of such a product over the threads if it is long, so its result has other last bits with
-//! two threads than with one. Products with constant weights, convolutions and reductions give the same bits with any number.
+//! ONNX Runtime (1.31 and 1.32) divides the sum of such a product over the threads if it is long, so its result has
+//! other last bits with two threads than with one. Products with constant weights, convolutions and reductions give the
+//! same bits with any number.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
@@ -11,14 +12,7 @@ use std::ops::Range;
 use super::protobuf::{FieldValue, Malformed, byte_fields, fields};
 
 /// Operators that multiply matrices; the `Fused…` and `Transpose…` ones are ONNX Runtime's own.
-const PRODUCTS: [&str; 6] = [
-    "MatMul",
-    "Gemm",
-    "Einsum",
-    "FusedMatMul",
-    "FusedGemm",
-    "TransposeMatMul",
-];
+const PRODUCTS: [&str; 6] = ["MatMul", "Gemm", "Einsum", "FusedMatMul", "FusedGemm", "TransposeMatMul"];
 
 /// End of the names of operators that multiply computed matrices within them.
 const ATTENTION: &str = "Attention";
@@ -49,13 +43,7 @@ fn find(model: &[u8]) -> Result<BTreeSet<String>, Malformed> {
             let computed = |name: &String| !name.is_empty() && !constants.contains(name);
             let count = node.inputs.iter().filter(|name| computed(name)).count();
             let is_product = PRODUCTS.contains(&node.operator.as_str())
-                && node
-                    .inputs
-                    .iter()
-                    .take(node.factors())
-                    .filter(|name| computed(name))
-                    .count()
-                    > 1;
+                && node.inputs.iter().take(node.factors()).filter(|name| computed(name)).count() > 1;
             if is_product || node.operator.ends_with(ATTENTION) {
                 found.insert(node.operator.clone());
             }
@@ -63,11 +51,7 @@ fn find(model: &[u8]) -> Result<BTreeSet<String>, Malformed> {
             if node.operator == "Constant" || count == 0 && !node.inputs.is_empty() {
                 constants.extend(node.outputs);
             }
-            bodies.extend(
-                node.subgraphs
-                    .into_iter()
-                    .map(|graph| (graph, 1, constants.clone())),
-            );
+            bodies.extend(node.subgraphs.into_iter().map(|graph| (graph, 1, constants.clone())));
         }
     }
     Ok(found)
@@ -75,14 +59,10 @@ fn find(model: &[u8]) -> Result<BTreeSet<String>, Malformed> {
 
 /// Names of the initializers of a graph that no input overrides.
 fn initializers(model: &[u8], graph: Range<usize>) -> HashSet<String> {
-    let name_of = |message: Range<usize>, number| {
-        byte_fields(model, message, number)
-            .next()
-            .map(|name| text(model, name))
-    };
-    let mut names: HashSet<String> = byte_fields(model, graph.clone(), 5)
-        .filter_map(|tensor| name_of(tensor, 8))
-        .collect();
+    let name_of =
+        |message: Range<usize>, number| byte_fields(model, message, number).next().map(|name| text(model, name));
+    let mut names: HashSet<String> =
+        byte_fields(model, graph.clone(), 5).filter_map(|tensor| name_of(tensor, 8)).collect();
     // Below IR version 4, every initializer is also listed as an input, and is constant.
     let version = fields(model, 0..model.len()).find_map(|field| match field {
         Ok((1, FieldValue::Varint(version))) => Some(version),
@@ -128,11 +108,7 @@ impl Node {
 
     /// Number of inputs that are factors: all of an `Einsum`, else two, which a summand may follow.
     fn factors(&self) -> usize {
-        if self.operator == "Einsum" {
-            self.inputs.len()
-        } else {
-            2
-        }
+        if self.operator == "Einsum" { self.inputs.len() } else { 2 }
     }
 }
 
@@ -146,18 +122,11 @@ mod tests {
     use super::*;
 
     fn field(number: u8, bytes: &[u8]) -> Vec<u8> {
-        [
-            &[number << 3 | 2, u8::try_from(bytes.len()).unwrap()],
-            bytes,
-        ]
-        .concat()
+        [&[number << 3 | 2, u8::try_from(bytes.len()).unwrap()], bytes].concat()
     }
 
     fn node(operator: &str, inputs: &[&str], output: &str) -> Vec<u8> {
-        let mut node: Vec<u8> = inputs
-            .iter()
-            .flat_map(|name| field(1, name.as_bytes()))
-            .collect();
+        let mut node: Vec<u8> = inputs.iter().flat_map(|name| field(1, name.as_bytes())).collect();
         node.extend(field(2, output.as_bytes()));
         node.extend(field(4, operator.as_bytes()));
         field(1, &node)
@@ -212,11 +181,7 @@ mod tests {
 
     #[test]
     fn products_in_subgraphs_are_found() {
-        let inner = [
-            node("MatMul", &["x", "w"], "a"),
-            node("MatMul", &["x", "a"], "b"),
-        ]
-        .concat();
+        let inner = [node("MatMul", &["x", "w"], "a"), node("MatMul", &["x", "a"], "b")].concat();
         let body = [field(4, b"Loop"), field(5, &field(6, &inner))].concat();
         assert_eq!(found(8, &["x"], &[field(1, &body)]), ["MatMul"]);
         let inner = node("MatMul", &["x", "w"], "a");

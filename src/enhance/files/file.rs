@@ -41,18 +41,15 @@ impl ModelFile {
     /// Also reads the optional sidecar `FILE.onnx.toml` and the files of external data.
     ///
     /// # Errors
-    /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an unknown key, or the
-    /// built-in enhancer or the preset does not exist.
+    /// If a file cannot be read or is not an ONNX model, its name is not an [`EnhancerName`], the sidecar has an
+    /// unknown key, or the built-in enhancer or the preset does not exist.
     pub fn read(model: &Path) -> Result<Self> {
         if let Some(built_in) = find_built_in(model)? {
             let path = PathBuf::from(format!("{} (built in)", built_in.name));
             let name = EnhancerName::new(built_in.name)?;
             let bytes = built_in.model.to_vec();
             let file = Self::from_bytes(path, name, None, bytes, built_in.sidecar)?;
-            return Ok(Self {
-                argument: model.to_owned(),
-                ..file
-            });
+            return Ok(Self { argument: model.to_owned(), ..file });
         }
         let (preset, path) = Preset::split(model)?;
         let bytes = read_model(&path)?;
@@ -72,10 +69,7 @@ impl ModelFile {
         }
         let text = sidecar::text_for(&path)?;
         let file = Self::from_bytes(path, name, preset, bytes, &text)?;
-        Ok(Self {
-            argument: model.to_owned(),
-            ..file
-        })
+        Ok(Self { argument: model.to_owned(), ..file })
     }
 
     /// Parses an ONNX model and the TOML text of its sidecar, and computes the digest.
@@ -132,7 +126,8 @@ impl ModelFile {
         &self.name
     }
 
-    /// Leaves the shapes of intermediate tensors out of a model with a Fourier transform; returns true if it had such shapes.
+    /// Leaves the shapes of intermediate tensors out of a model with a Fourier transform; returns true if it had such
+    /// shapes.
     pub(crate) fn leave_out_wrong_shapes(&mut self) -> bool {
         let Some(bytes) = without_value_info(&self.bytes) else {
             return false;
@@ -149,8 +144,8 @@ impl ModelFile {
 
     /// Digest of everything that affects opening and probing the model.
     ///
-    /// Unlike [`digest`](Self::digest), it depends on whether a value comes from the sidecar or from the preset, which changes the
-    /// described convention but not the images.
+    /// Unlike [`digest`](Self::digest), it depends on whether a value comes from the sidecar or from the preset, which
+    /// changes the described convention but not the images.
     ///
     /// # Errors
     /// If a number of the sidecar is infinite or NaN.
@@ -167,19 +162,17 @@ impl ModelFile {
     }
 }
 
-/// Name of an enhancer whose file has this stem. Each run of characters other than ASCII letters, digits, `_`, `-` and `.` becomes `-`.
+/// Name of an enhancer whose file has this stem. Each run of characters other than ASCII letters, digits, `_`, `-` and
+/// `.` becomes `-`.
 ///
-/// A stem that is not ASCII gets a suffix, the first 6 hexadecimal digits of its digest, because such stems often differ only in the
-/// replaced characters.
+/// A stem that is not ASCII gets a suffix, the first 6 hexadecimal digits of its digest, because such stems often
+/// differ only in the replaced characters.
 fn enhancer_name(stem: &str) -> Result<EnhancerName> {
     if stem.chars().all(is_allowed_in_name) {
         return EnhancerName::new(stem);
     }
-    let mut name = stem
-        .split(|c: char| !is_allowed_in_name(c))
-        .filter(|word| !word.is_empty())
-        .collect::<Vec<_>>()
-        .join("-");
+    let mut name =
+        stem.split(|c: char| !is_allowed_in_name(c)).filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-");
     if !stem.is_ascii() {
         let digest = Digest::from_bytes(stem.as_bytes()).to_string();
         let digits = digest.rsplit(':').next().unwrap_or_default();
@@ -226,36 +219,30 @@ fn digest(
         Some(preset) => sidecar.with_defaults(&preset.content.sidecar),
     };
     // The preset chooses the output unless the convention states `output` or `image`, or the model has only one output.
-    let preset_chooses_output =
-        convention.output.is_none() && convention.image.is_none() && output_count(bytes) != 1;
+    let preset_chooses_output = convention.output.is_none() && convention.image.is_none() && output_count(bytes) != 1;
     let facts = EnhancementFacts {
         file: Digest::from_bytes(bytes),
         external,
         convention: convention.without_defaults(),
-        outputs: preset
-            .filter(|_| preset_chooses_output)
-            .map(Preset::outputs),
+        outputs: preset.filter(|_| preset_chooses_output).map(Preset::outputs),
     };
     Digest::canonical("darkqa.enhancer/2", &facts)
 }
 
-/// Number of outputs of a model: field 12 of its `GraphProto`, which is field 7 of the `ModelProto` (`onnx/onnx.proto`).
+/// Number of outputs of a model: field 12 of its `GraphProto`, which is field 7 of the `ModelProto`
+/// (`onnx/onnx.proto`).
 fn output_count(model: &[u8]) -> usize {
-    byte_fields(model, 0..model.len(), 7)
-        .map(|graph| byte_fields(model, graph, 12).count())
-        .sum()
+    byte_fields(model, 0..model.len(), 7).map(|graph| byte_fields(model, graph, 12).count()).sum()
 }
 
 /// Path of a file of external data.
 ///
 /// # Errors
-/// If the file is not in the model's folder or a subfolder, by its name or by a link. ONNX Runtime refuses such names too, and not in
-/// every version such links.
+/// If the file is not in the model's folder or a subfolder, by its name or by a link. ONNX Runtime refuses such names
+/// too, and not in every version such links.
 fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
     let relative = Path::new(location);
-    let is_inside = relative
-        .components()
-        .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
+    let is_inside = relative.components().all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     let folder = model.with_file_name("");
     let path = folder.join(relative);
     if is_inside && !location.is_empty() && !leads_out(model, &path) {
@@ -270,8 +257,8 @@ fn external_path(model: &Path, location: &str) -> Result<PathBuf> {
     })
 }
 
-/// True if a file exists and is, with links resolved, neither below the model's folder nor below the folder that the model itself is a link
-/// into: in a hub's cache, both are links into one folder.
+/// True if a file exists and is, with links resolved, neither below the model's folder nor below the folder that the
+/// model itself is a link into: in a hub's cache, both are links into one folder.
 fn leads_out(model: &Path, file: &Path) -> bool {
     let Ok(real) = file.canonicalize() else {
         return false;
@@ -283,10 +270,7 @@ fn leads_out(model: &Path, file: &Path) -> bool {
     let model = model.canonicalize().ok();
     let own = model.as_deref().and_then(Path::parent);
     let folders = [folder.canonicalize().ok(), own.map(Path::to_owned)];
-    !folders
-        .iter()
-        .flatten()
-        .any(|folder| real.starts_with(folder))
+    !folders.iter().flatten().any(|folder| real.starts_with(folder))
 }
 
 /// Reads a file of external data.
@@ -307,10 +291,7 @@ fn read_weights(model: &Path, file: &Path, min_size: u64) -> Result<Vec<u8>> {
         ),
         Err(e) => return Err(Error::file(file, "read", e)),
     };
-    Err(Error::Enhancer {
-        path: model.to_owned(),
-        problem,
-    })
+    Err(Error::Enhancer { path: model.to_owned(), problem })
 }
 
 /// Maximum size of a file of external data, in bytes (chosen): 100 times the largest published enhancers.
@@ -327,9 +308,7 @@ const MAX_MODEL_BYTES: u64 = i32::MAX as u64;
 fn read_model(path: &Path) -> Result<Vec<u8>> {
     let size = std::fs::metadata(path)
         .map_err(|e| match e.kind() {
-            ErrorKind::NotFound => {
-                Error::usage("--llie", format_args!("{}: no such file", path.display()))
-            }
+            ErrorKind::NotFound => Error::usage("--llie", format_args!("{}: no such file", path.display())),
             _ => Error::file(path, "read", e),
         })?
         .len();
@@ -351,10 +330,7 @@ fn not_onnx(path: &Path, bytes: &[u8]) -> Error {
     } else {
         "is not a complete ONNX model; download it again, or export it to ONNX if it is a PyTorch or TensorFlow model"
     };
-    Error::Enhancer {
-        path: path.to_owned(),
-        problem: problem.to_owned(),
-    }
+    Error::Enhancer { path: path.to_owned(), problem: problem.to_owned() }
 }
 
 #[cfg(test)]
@@ -412,10 +388,7 @@ mod tests {
         std::fs::write(path("own/a.onnx"), model("a.bin")).unwrap();
         symlink(path("private/a.bin"), path("own/a.bin")).unwrap();
         let refused = ModelFile::read(&path("own/a.onnx")).unwrap_err();
-        assert!(
-            refused.to_string().contains("outside its folder"),
-            "{refused}"
-        );
+        assert!(refused.to_string().contains("outside its folder"), "{refused}");
         std::fs::remove_file(path("own/a.bin")).unwrap();
         std::fs::copy(path("private/a.bin"), path("own/a.bin")).unwrap();
         assert!(ModelFile::read(&path("own/a.onnx")).is_ok());
@@ -447,29 +420,24 @@ mod tests {
         }
     }
 
-    /// The digest covers the canonical JSON of the keys that the sidecar states, so that new keys do not change the digests of old files.
+    /// The digest covers the canonical JSON of the keys that the sidecar states, so that new keys do not change the
+    /// digests of old files.
     #[test]
     fn digest_covers_only_stated_keys() {
         let folder = tempfile::tempdir().unwrap();
         let file = model("a.bin");
         std::fs::write(folder.path().join("a.onnx"), &file).unwrap();
         std::fs::write(folder.path().join("a.bin"), [1]).unwrap();
-        let [weights_digest, file_digest] = [&[1][..], &file]
-            .map(|bytes| serde_json::to_string(&Digest::from_bytes(bytes)).unwrap());
+        let [weights_digest, file_digest] =
+            [&[1][..], &file].map(|bytes| serde_json::to_string(&Digest::from_bytes(bytes)).unwrap());
         for (sidecar, convention) in [
             ("", ""),
-            (
-                "color_out = \"rgb\"\nchannels = \"rgb\"\ninput = \"image\"",
-                "",
-            ),
+            ("color_out = \"rgb\"\nchannels = \"rgb\"\ninput = \"image\"", ""),
             (
                 "range_in = \"-1..1\"\noutput = 0\n[extra]\na = 0.5\nb = 1",
                 r#""extra":{"a":0.5,"b":1.0},"output":0,"range_in":"-1..1""#,
             ),
-            (
-                "image = \"L ^ 0.2 * R\"\n[extra]\nr = { map = 5 }",
-                r#""extra":{"r":{"map":5.0}},"image":"L ^ 0.2 * R""#,
-            ),
+            ("image = \"L ^ 0.2 * R\"\n[extra]\nr = { map = 5 }", r#""extra":{"r":{"map":5.0}},"image":"L ^ 0.2 * R""#),
         ] {
             let facts = format!(
                 r#"darkqa.enhancer/2{}{{"convention":{{{convention}}},"external":{{"a.bin":{weights_digest}}},"file":{file_digest}}}"#,
@@ -482,15 +450,11 @@ mod tests {
 
     #[test]
     fn file_stems_become_enhancer_names() {
-        let [plain, spaced, one, other, mixed] =
-            ["zero-dce_v1.2", "zero dce (1)", "低光", "增强", "模型 v2"]
-                .map(|stem| enhancer_name(stem).unwrap().to_string());
+        let [plain, spaced, one, other, mixed] = ["zero-dce_v1.2", "zero dce (1)", "低光", "增强", "模型 v2"]
+            .map(|stem| enhancer_name(stem).unwrap().to_string());
         assert_eq!(plain, "zero-dce_v1.2");
         assert_eq!(spaced, "zero-dce-1");
-        assert!(
-            one.len() == 6 && other.len() == 6 && one != other,
-            "{one} {other}"
-        );
+        assert!(one.len() == 6 && other.len() == 6 && one != other, "{one} {other}");
         assert!(mixed.starts_with("v2-"));
     }
 
@@ -507,11 +471,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let cases: [(&str, &[u8], &str); 4] = [
             ("text.onnx", b"not a model", "is not a complete ONNX model"),
-            (
-                "lfs.onnx",
-                b"version https://git-lfs.github.com/spec/v1\n",
-                "git lfs pull",
-            ),
+            ("lfs.onnx", b"version https://git-lfs.github.com/spec/v1\n", "git lfs pull"),
             ("out.onnx", &model("../secret"), "outside its folder"),
             ("gone.onnx", &model("gone.bin"), "its weights are missing: "),
         ];
@@ -528,10 +488,6 @@ mod tests {
         let message = ModelFile::read(&large).unwrap_err().to_string();
         assert!(message.contains("2.1 GB"), "{message}");
         let missing = ModelFile::read(Path::new("missing.onnx")).unwrap_err();
-        assert!(
-            missing
-                .to_string()
-                .starts_with("--llie: missing.onnx: no such file")
-        );
+        assert!(missing.to_string().starts_with("--llie: missing.onnx: no such file"));
     }
 }

@@ -21,16 +21,13 @@ impl OnnxMessage {
             (Self::Graph, 1) | (Self::Function, 7) => Some(Self::Node),
             (Self::Node, 5) => Some(Self::Attribute),
             (Self::Graph, 15) | (Self::Attribute, 22 | 23) => Some(Self::SparseTensor),
-            (Self::Graph, 5) | (Self::Attribute, 5 | 10) | (Self::SparseTensor, 1) => {
-                Some(Self::Tensor)
-            }
+            (Self::Graph, 5) | (Self::Attribute, 5 | 10) | (Self::SparseTensor, 1) => Some(Self::Tensor),
             _ => None,
         }
     }
 
     /// Type of the message in the field with this number; `None` if it cannot contain nodes.
     pub(super) fn child_with_nodes(self, number: u64) -> Option<Self> {
-        self.child(number)
-            .filter(|child| !matches!(child, Self::SparseTensor | Self::Tensor))
+        self.child(number).filter(|child| !matches!(child, Self::SparseTensor | Self::Tensor))
     }
 }

@@ -1,6 +1,7 @@
 //! Schema-free decoding of the fields of a protobuf message: [`fields`].
 //!
-//! The encoding is specified in <https://protobuf.dev/programming-guides/encoding/>. Groups, which ONNX never used, are refused.
+//! The encoding is specified in <https://protobuf.dev/programming-guides/encoding/>. Groups, which ONNX never used, are
+//! refused.
 
 use std::ops::Range;
 
@@ -18,22 +19,15 @@ pub(super) enum FieldValue {
     Bytes(Range<usize>),
 }
 
-/// Iterates over the fields of the message at the position `within` of `buffer`, as pairs of field number and value. Ends after the first
-/// error.
+/// Iterates over the fields of the message at the position `within` of `buffer`, as pairs of field number and value.
+/// Ends after the first error.
 pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> Fields<'_> {
     let message = buffer.get(..within.end).unwrap_or_default();
-    Fields {
-        message,
-        at: within.start,
-    }
+    Fields { message, at: within.start }
 }
 
 /// Iterates over the contents of the length-delimited fields with number `wanted`, up to the first malformed field.
-pub(super) fn byte_fields(
-    buffer: &[u8],
-    within: Range<usize>,
-    wanted: u64,
-) -> impl Iterator<Item = Range<usize>> {
+pub(super) fn byte_fields(buffer: &[u8], within: Range<usize>, wanted: u64) -> impl Iterator<Item = Range<usize>> {
     fields(buffer, within).filter_map(move |field| match field {
         Ok((number, FieldValue::Bytes(bytes))) if number == wanted => Some(bytes),
         _ => None,

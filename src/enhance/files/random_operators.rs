@@ -9,14 +9,8 @@ use super::onnx_message::OnnxMessage;
 use super::protobuf::{FieldValue, Malformed, fields, push_bytes};
 
 /// Random operators, whose attribute `seed` is a float.
-const SEEDED_BY_FLOAT: [&str; 6] = [
-    "RandomNormal",
-    "RandomNormalLike",
-    "RandomUniform",
-    "RandomUniformLike",
-    "Multinomial",
-    "Bernoulli",
-];
+const SEEDED_BY_FLOAT: [&str; 6] =
+    ["RandomNormal", "RandomNormalLike", "RandomUniform", "RandomUniformLike", "Multinomial", "Bernoulli"];
 
 /// Maximum depth of nested messages in which seeds are set; chosen.
 const MAX_DEPTH: usize = 60;
@@ -42,7 +36,8 @@ struct Node {
 }
 
 impl RandomOperators {
-    /// Finds the random operators of a `ModelProto`, in its graph, subgraphs and functions. A dropout counts if it may be in training mode.
+    /// Finds the random operators of a `ModelProto`, in its graph, subgraphs and functions. A dropout counts if it may
+    /// be in training mode.
     ///
     /// # Errors
     /// If the bytes are not a protobuf message.
@@ -92,8 +87,7 @@ impl RandomOperators {
         if self.unseeded.is_empty() {
             return model;
         }
-        self.copy_with_seeds(&model, OnnxMessage::Model, 0..model.len(), 0)
-            .unwrap_or(model)
+        self.copy_with_seeds(&model, OnnxMessage::Model, 0..model.len(), 0).unwrap_or(model)
     }
 
     /// Copies the message at `range`, adding seeds to its nodes; `None` if the message is malformed.
@@ -105,11 +99,8 @@ impl RandomOperators {
         depth: usize,
     ) -> Option<Vec<u8>> {
         let is_unseeded = self.unseeded.contains(&(range.start, range.end));
-        let contains_unseeded = self
-            .unseeded
-            .range((range.start, 0)..)
-            .next()
-            .is_some_and(|(start, _)| *start < range.end);
+        let contains_unseeded =
+            self.unseeded.range((range.start, 0)..).next().is_some_and(|(start, _)| *start < range.end);
         if depth > MAX_DEPTH || !contains_unseeded {
             return Some(model.get(range)?.to_vec());
         }
@@ -119,9 +110,7 @@ impl RandomOperators {
         while let Some(field) = all.next() {
             let end = all.position();
             match field.ok()? {
-                (number, FieldValue::Bytes(bytes))
-                    if message.child_with_nodes(number).is_some() =>
-                {
+                (number, FieldValue::Bytes(bytes)) if message.child_with_nodes(number).is_some() => {
                     let child = message.child_with_nodes(number)?;
                     let child = self.copy_with_seeds(model, child, bytes, depth + 1)?;
                     push_bytes(&mut copy, number, &child);
@@ -140,13 +129,8 @@ impl RandomOperators {
 
 impl Node {
     fn read(model: &[u8], range: Range<usize>) -> Result<Self, Malformed> {
-        let mut node = Self {
-            operator: String::new(),
-            inputs: Vec::new(),
-            outputs: Vec::new(),
-            has_seed: false,
-            constant: None,
-        };
+        let mut node =
+            Self { operator: String::new(), inputs: Vec::new(), outputs: Vec::new(), has_seed: false, constant: None };
         let mut attributes = Vec::new();
         for field in fields(model, range) {
             match field? {
@@ -173,10 +157,7 @@ impl Node {
 
     /// True if a dropout may be in training mode: it has a third input that is not the constant `false`.
     fn is_training(&self, constants: &BTreeMap<String, bool>) -> bool {
-        self.inputs
-            .get(2)
-            .filter(|name| !name.is_empty())
-            .is_some_and(|name| constants.get(name) != Some(&false))
+        self.inputs.get(2).filter(|name| !name.is_empty()).is_some_and(|name| constants.get(name) != Some(&false))
     }
 }
 
@@ -196,9 +177,7 @@ fn truth_value(model: &[u8], range: Range<usize>) -> Result<(String, Option<bool
             // int32_data, packed or not; raw_data
             (5, FieldValue::Varint(number)) => value = Some(number != 0),
             (5 | 9, FieldValue::Bytes(bytes)) => {
-                value = model
-                    .get(bytes)
-                    .and_then(|bytes| Some(*bytes.first()? != 0));
+                value = model.get(bytes).and_then(|bytes| Some(*bytes.first()? != 0));
             }
             _ => {}
         }
@@ -260,32 +239,21 @@ mod tests {
         let inner = node("Multinomial", &["x"]);
         let body = field(6, &inner);
         let outer = [field(4, b"If"), field(5, &body)].concat();
-        let graph = [
-            node("RandomNormal", &[]),
-            field(1, &outer),
-            node("Add", &["a"]),
-        ]
-        .concat();
+        let graph = [node("RandomNormal", &[]), field(1, &outer), node("Add", &["a"])].concat();
         assert_eq!(names(&graph), ["Multinomial", "RandomNormal"]);
     }
 
     #[test]
     fn dropout_is_random_only_in_training_mode() {
         let dropout = node("Dropout", &["x", "ratio", "mode"]);
-        assert_eq!(
-            names(&[dropout.clone(), mode_initialiser(1)].concat()),
-            ["Dropout"]
-        );
+        assert_eq!(names(&[dropout.clone(), mode_initialiser(1)].concat()), ["Dropout"]);
         assert!(names(&[dropout, mode_initialiser(0)].concat()).is_empty());
         assert!(names(&node("Dropout", &["x"])).is_empty());
     }
 
     #[test]
     fn missing_seeds_are_added() {
-        let model = field(
-            7,
-            &[node("Relu", &["x"]), node("RandomUniform", &[])].concat(),
-        );
+        let model = field(7, &[node("Relu", &["x"]), node("RandomUniform", &[])].concat());
         let found = RandomOperators::find(&model).unwrap();
         let seeded = found.with_seeds(model.clone());
         assert!(seeded.windows(4).any(|word| word == b"seed"));

@@ -1,9 +1,9 @@
 //! Image sizes that tracing froze into a graph: [`traced_sizes`].
 //!
-//! Tracing replaces `int(x.shape[2])` by a number. Such a graph declares that it accepts any size, but its Reshape operators fail at every
-//! size except the traced one. That size can be read from their constant shapes: it is in the last two entries, or each side is the
-//! product of two entries if the image is split into windows (`[1, 3, 6, 8, 8, 8]` stands for 48 × 64). The sizes found here are guesses
-//! that a run must confirm.
+//! Tracing replaces `int(x.shape[2])` by a number. Such a graph declares that it accepts any size, but its Reshape
+//! operators fail at every size except the traced one. That size can be read from their constant shapes: it is in the
+//! last two entries, or each side is the product of two entries if the image is split into windows (`[1, 3, 6, 8, 8,
+//! 8]` stands for 48 × 64). The sizes found here are guesses that a run must confirm.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
@@ -18,7 +18,8 @@ const SIDES: Range<usize> = 8..4097;
 const MAX_PIXELS: usize = 4 << 20;
 /// Maximum number of sizes that are returned; chosen.
 const MAX_SIZES: usize = 32;
-/// Ratios of the image's sides to those of a feature map within the graph, for networks that halve the image up to three times.
+/// Ratios of the image's sides to those of a feature map within the graph, for networks that halve the image up to
+/// three times.
 const SCALES: [usize; 4] = [1, 2, 4, 8];
 
 /// Maximum number of entries of a constant that may be a shape.
@@ -27,10 +28,7 @@ const MAX_ENTRIES: usize = 8;
 /// Heights and widths that may be frozen into an ONNX model, the most likely ones first.
 pub(crate) fn traced_sizes(model: &[u8]) -> Vec<[usize; 2]> {
     let mut found: Vec<[usize; 2]> = Vec::new();
-    let sizes: Vec<[usize; 2]> = constant_shapes(model)
-        .iter()
-        .flat_map(|shape| sizes_in(shape))
-        .collect();
+    let sizes: Vec<[usize; 2]> = constant_shapes(model).iter().flat_map(|shape| sizes_in(shape)).collect();
     for scale in SCALES {
         for size in &sizes {
             let size = size.map(|side| side.saturating_mul(scale));
@@ -50,10 +48,7 @@ fn sizes_in(shape: &[usize]) -> Vec<[usize; 2]> {
     // Height and width are at the end, or in front of the channels.
     for end in [shape.len(), shape.len().saturating_sub(1)] {
         if end >= 5 {
-            sizes.push([
-                shape[end - 4].saturating_mul(shape[end - 3]),
-                shape[end - 2].saturating_mul(shape[end - 1]),
-            ]);
+            sizes.push([shape[end - 4].saturating_mul(shape[end - 3]), shape[end - 2].saturating_mul(shape[end - 1])]);
         }
         if end >= 3 {
             sizes.push([shape[end - 2], shape[end - 1]]);
@@ -62,12 +57,13 @@ fn sizes_in(shape: &[usize]) -> Vec<[usize; 2]> {
     sizes
 }
 
-/// Constant shapes that are inputs of Reshape, Expand and Resize operators. Shapes with an entry that is not positive are left out (0 keeps
-/// and −1 infers a size).
+/// Constant shapes that are inputs of Reshape, Expand and Resize operators. Shapes with an entry that is not positive
+/// are left out (0 keeps and −1 infers a size).
 fn constant_shapes(model: &[u8]) -> Vec<Vec<usize>> {
     let mut constants: HashMap<Vec<u8>, Vec<usize>> = HashMap::new();
     let mut shape_inputs = Vec::new();
-    // Last input of each Concat by the name of its output: PyTorch joins batch and channels with height and width for a Resize.
+    // Last input of each Concat by the name of its output: PyTorch joins batch and channels with height and width for a
+    // Resize.
     let mut concat_ends: HashMap<Vec<u8>, Range<usize>> = HashMap::new();
     for graph in byte_fields(model, 0..model.len(), 7) {
         for tensor in byte_fields(model, graph.clone(), 5) {
@@ -75,9 +71,7 @@ fn constant_shapes(model: &[u8]) -> Vec<Vec<usize>> {
             constants.insert(name, values);
         }
         for node in byte_fields(model, graph, 1) {
-            let operator = byte_fields(model, node.clone(), 4)
-                .last()
-                .map(|name| &model[name]);
+            let operator = byte_fields(model, node.clone(), 4).last().map(|name| &model[name]);
             let mut inputs = byte_fields(model, node.clone(), 1);
             match operator {
                 Some(b"Constant") => {
@@ -116,7 +110,8 @@ fn constant_shapes(model: &[u8]) -> Vec<Vec<usize>> {
         .collect()
 }
 
-/// Name of a `TensorProto`, and its entries; these are empty unless they are at most [`MAX_ENTRIES`] positive 64-bit integers.
+/// Name of a `TensorProto`, and its entries; these are empty unless they are at most [`MAX_ENTRIES`] positive 64-bit
+/// integers.
 fn read_tensor(model: &[u8], tensor: Range<usize>) -> (Vec<u8>, Vec<usize>) {
     const INT64: u64 = 7;
     let (mut name, mut element, mut values) = (Vec::new(), 0, Vec::new());
@@ -176,19 +171,10 @@ mod tests {
             let bytes: Vec<u8> = shape.iter().flat_map(|entry| entry.to_le_bytes()).collect();
             field(9, &bytes)
         } else {
-            field(
-                7,
-                &shape.iter().map(|entry| *entry as u8).collect::<Vec<_>>(),
-            )
+            field(7, &shape.iter().map(|entry| *entry as u8).collect::<Vec<_>>())
         };
         let tensor = [vec![2 << 3, 7], field(8, b"s"), data].concat();
-        let node = [
-            field(1, b"x"),
-            field(1, b"s"),
-            field(2, b"y"),
-            field(4, operator),
-        ]
-        .concat();
+        let node = [field(1, b"x"), field(1, b"s"), field(2, b"y"), field(4, operator)].concat();
         field(7, &[field(1, &node), field(5, &tensor)].concat())
     }
 

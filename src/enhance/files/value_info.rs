@@ -1,7 +1,8 @@
 //! Shapes of intermediate tensors that an exporter wrote into a graph: [`without_value_info`].
 //!
-//! The exporter of PyTorch (2.15, `dynamo=True`) writes wrong shapes for the inverse Fourier transform. ONNX Runtime (1.31 and 1.32) then
-//! reuses a buffer of the wrong size and fails at every image size. The shapes are optional: without them, ONNX Runtime computes its own.
+//! The exporter of PyTorch (2.15, `dynamo=True`) writes wrong shapes for the inverse Fourier transform. ONNX Runtime
+//! (1.31 and 1.32) then reuses a buffer of the wrong size and fails at every image size. The shapes are optional:
+//! without them, ONNX Runtime computes its own.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
@@ -13,7 +14,8 @@ use super::protobuf::{FieldValue, Malformed, byte_fields, fields, push_bytes};
 /// Operators whose shapes exporters get wrong.
 const FOURIER: [&[u8]; 2] = [b"DFT", b"STFT"];
 
-/// Copy of a model without the shapes of its intermediate tensors; `None` if the model has none, or no Fourier transform.
+/// Copy of a model without the shapes of its intermediate tensors; `None` if the model has none, or no Fourier
+/// transform.
 ///
 /// Other models keep them, because ONNX Runtime optimises by known shapes, which may change the last bits of an image.
 pub(crate) fn without_value_info(model: &[u8]) -> Option<Vec<u8>> {
@@ -56,9 +58,7 @@ fn has_fourier_transform(model: &[u8]) -> Result<bool, Malformed> {
                 continue;
             };
             if (message, number) == (OnnxMessage::Node, 4)
-                && model
-                    .get(bytes.clone())
-                    .is_some_and(|name| FOURIER.contains(&name))
+                && model.get(bytes.clone()).is_some_and(|name| FOURIER.contains(&name))
             {
                 return Ok(true);
             }
@@ -90,10 +90,7 @@ mod tests {
     #[test]
     fn shapes_are_left_out_of_a_model_with_a_fourier_transform() {
         let shapes = [field(13, b"a"), field(13, b"b")].concat();
-        assert_eq!(
-            without_value_info(&model(b"DFT", &shapes)),
-            Some(model(b"DFT", b""))
-        );
+        assert_eq!(without_value_info(&model(b"DFT", &shapes)), Some(model(b"DFT", b"")));
     }
 
     #[test]

@@ -1,10 +1,12 @@
 //! Weights of an ONNX model, and the flushing of subnormal ones to zero: [`Weights`].
 //!
-//! Training with weight decay leaves subnormal weights, below 2⁻¹²⁶. They do not affect the image, but cost some processors a hundred
-//! cycles per operation. A quarter of Zero-DCE's published weights is subnormal: they made it about 45 times slower on an Intel Xeon, and
-//! no slower on an AMD EPYC. ONNX Runtime's option `session.set_denormal_as_zero` takes effect only in the thread that creates the first
-//! session of a process. So the weights themselves are set to zero before a session is created; the images of Zero-DCE stay the same,
-//! byte for byte. Weights in external files are not changed, because such models are loaded by path; for them, only the option applies.
+//! Training with weight decay leaves subnormal weights, below 2⁻¹²⁶. They do not affect the image, but cost some
+//! processors a hundred cycles per operation. A quarter of Zero-DCE's published weights is subnormal: they made it
+//! about 45 times slower on an Intel Xeon, and no slower on an AMD EPYC. ONNX Runtime's option
+//! `session.set_denormal_as_zero` takes effect only in the thread that creates the first session of a process. So the
+//! weights themselves are set to zero before a session is created; the images of Zero-DCE stay the same, byte for byte.
+//! Weights in external files are not changed, because such models are loaded by path; for them, only the option
+//! applies.
 //!
 //! Field numbers are those of `onnx/onnx.proto` (IR version 13).
 
@@ -47,11 +49,7 @@ impl Weights {
                 }
             }
         }
-        if has_graph {
-            Ok(weights)
-        } else {
-            Err(Malformed)
-        }
+        if has_graph { Ok(weights) } else { Err(Malformed) }
     }
 
     /// Adds the positions of the floats of a `TensorProto`, or its file of external data.
@@ -73,12 +71,8 @@ impl Weights {
             }
         }
         if location == EXTERNAL {
-            let [offset, length] = ["offset", "length"].map(|key| {
-                entries
-                    .get(key)
-                    .and_then(|text: &String| text.parse().ok())
-                    .unwrap_or(0_u64)
-            });
+            let [offset, length] = ["offset", "length"]
+                .map(|key| entries.get(key).and_then(|text: &String| text.parse().ok()).unwrap_or(0_u64));
             let end = offset.saturating_add(length);
             if let Some(location) = entries.get("location") {
                 let size = self.external.entry(location.clone()).or_default();
@@ -201,13 +195,8 @@ mod tests {
         let entry = [field(1, b"location"), field(2, b"weights.bin")].concat();
         let offset = [field(1, b"offset"), field(2, b"8")].concat();
         let length = [field(1, b"length"), field(2, b"12")].concat();
-        let content = [
-            &[16, 1, 14 << 3, 1],
-            field(13, &entry).as_slice(),
-            &field(13, &offset),
-            &field(13, &length),
-        ]
-        .concat();
+        let content =
+            [&[16, 1, 14 << 3, 1], field(13, &entry).as_slice(), &field(13, &offset), &field(13, &length)].concat();
         let weights = Weights::find(&model(&field(5, &content))).unwrap();
         let expected = BTreeMap::from([("weights.bin".to_owned(), 20)]);
         assert_eq!(weights.external, expected);

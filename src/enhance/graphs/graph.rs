@@ -7,9 +7,7 @@ use std::time::{Duration, Instant};
 use ort::session::Session;
 
 use super::port::Port;
-use super::session::{
-    GraphSource, SessionOptions, Stopper, one_line, ports, remove_batch, run, session_builder,
-};
+use super::session::{GraphSource, SessionOptions, Stopper, one_line, ports, remove_batch, run, session_builder};
 use crate::conventions::Signature;
 use crate::conventions::preset::Preset;
 use crate::conventions::sidecar::{ADD, ModelSidecar};
@@ -55,10 +53,7 @@ pub struct LoadLimits {
 
 impl LoadLimits {
     /// No limits.
-    pub const NONE: Self = Self {
-        time: TimeLimit::NONE,
-        memory: MemoryLimit::NONE,
-    };
+    pub const NONE: Self = Self { time: TimeLimit::NONE, memory: MemoryLimit::NONE };
 }
 
 /// All inputs and outputs of a graph. For a graph with a fixed batch size, their batch dimension is set to 1.
@@ -90,7 +85,8 @@ impl Graph {
     /// Loads a model with the convention of its sidecar and preset.
     ///
     /// # Errors
-    /// The outer error is a failure of the runtime. The inner one is a message about the model, to follow the file's name.
+    /// The outer error is a failure of the runtime. The inner one is a message about the model, to follow the file's
+    /// name.
     pub(crate) fn load(
         source: GraphSource,
         sidecar: &ModelSidecar,
@@ -100,10 +96,7 @@ impl Graph {
         limits: LoadLimits,
     ) -> Result<std::result::Result<Self, String>> {
         let environment = runtime.environment().clone();
-        let job_limits = JobLimits {
-            time: limits.time.get(),
-            memory: limits.memory,
-        };
+        let job_limits = JobLimits { time: limits.time.get(), memory: limits.memory };
         let end = runtime.thread().run_or_leave(job_limits, move || {
             session_builder(&environment, threads).and_then(|builder| source.commit(builder))
         })?;
@@ -146,17 +139,10 @@ impl Graph {
             }
         };
         let preset_differences = preset.and_then(|preset| preset.differences(&inputs, &outputs));
-        let ports = Ports {
-            inputs,
-            outputs,
-            batch,
-        };
+        let ports = Ports { inputs, outputs, batch };
         let session = Arc::new(Mutex::new(session));
         let graph = Self::from_session(session, Arc::new(ports), convention, runtime)?;
-        Ok(Self {
-            preset_differences,
-            ..graph
-        })
+        Ok(Self { preset_differences, ..graph })
     }
 
     fn from_session(
@@ -189,21 +175,17 @@ impl Graph {
     ///
     /// # Errors
     /// If the graph contradicts the convention; the message follows the file's name.
-    pub(crate) fn with_convention(
-        &self,
-        convention: ModelSidecar,
-    ) -> std::result::Result<Self, String> {
+    pub(crate) fn with_convention(&self, convention: ModelSidecar) -> std::result::Result<Self, String> {
         let (session, ports) = (Arc::clone(&self.session), Arc::clone(&self.ports));
         let mut graph = Self::from_session(session, ports, convention, &self.runtime)?;
         graph.clock = Mutex::new(*self.clock());
         graph.memory = self.memory;
-        graph
-            .preset_differences
-            .clone_from(&self.preset_differences);
+        graph.preset_differences.clone_from(&self.preset_differences);
         Ok(graph)
     }
 
-    /// Caveat about unused outputs of the image's size; `None` without such outputs, or if sidecar or preset state the image.
+    /// Caveat about unused outputs of the image's size; `None` without such outputs, or if sidecar or preset state the
+    /// image.
     pub(crate) fn unread_images(&self) -> Option<String> {
         let is_stated = self.convention.image.is_some() || self.convention.output.is_some();
         let unread: Vec<String> = self
@@ -297,14 +279,9 @@ impl Graph {
             right: window.left + part.right,
             bottom: window.top + part.bottom,
         };
-        let dark = self
-            .decoding
-            .needs_dark()
-            .then(|| self.fed_window(dark, part_in_image).planes().into_owned());
+        let dark = self.decoding.needs_dark().then(|| self.fed_window(dark, part_in_image).planes().into_owned());
         let (decoding, size) = (Arc::clone(&self.decoding), window.size());
-        self.run(&self.options, &fed, move |outputs| {
-            decoding.bytes(outputs, size, part, dark.as_ref())
-        })
+        self.run(&self.options, &fed, move |outputs| decoding.bytes(outputs, size, part, dark.as_ref()))
     }
 
     /// Runs the model on a window of an image and ignores its output.
@@ -313,12 +290,7 @@ impl Graph {
     }
 
     /// Runs the model like [`Self::probe`], and keeps or releases the arena afterwards, for measurements of memory.
-    pub(crate) fn probe_memory(
-        &self,
-        image: &Rgb,
-        window: TileWindow,
-        arena: Arena,
-    ) -> Result<RunResult<()>> {
+    pub(crate) fn probe_memory(&self, image: &Rgb, window: TileWindow, arena: Arena) -> Result<RunResult<()>> {
         let options = match arena {
             Arena::Kept => &self.options,
             Arena::Released => &self.releasing,
@@ -336,16 +308,10 @@ impl Graph {
         })
     }
 
-    /// Runs the model once on a whole image, and decodes its output by the conventions of several graphs, which share the input encoding.
-    pub(crate) fn run_with_conventions(
-        &self,
-        image: &Rgb,
-        graphs: &[Self],
-    ) -> Result<RunResult<Vec<UnclampedImage>>> {
-        let decodings: Vec<Arc<Composition>> = graphs
-            .iter()
-            .map(|graph| Arc::clone(&graph.decoding))
-            .collect();
+    /// Runs the model once on a whole image, and decodes its output by the conventions of several graphs, which share
+    /// the input encoding.
+    pub(crate) fn run_with_conventions(&self, image: &Rgb, graphs: &[Self]) -> Result<RunResult<Vec<UnclampedImage>>> {
+        let decodings: Vec<Arc<Composition>> = graphs.iter().map(|graph| Arc::clone(&graph.decoding)).collect();
         let dark = Planes::from_rgb(image);
         let fed = dark.clone();
         self.run(&self.options, &FedImage::Whole(&fed), move |outputs| {
@@ -365,11 +331,7 @@ impl Graph {
     }
 
     fn fed_window<'a>(&self, dark: &'a DarkImage<'a>, window: TileWindow) -> FedImage<'a> {
-        FedImage::Window {
-            dark,
-            window,
-            pad: self.encoding.pad,
-        }
+        FedImage::Window { dark, window, pad: self.encoding.pad }
     }
 
     /// Tensors of all inputs, by name; `None` if expressions in the sidecar give values that are not finite.
@@ -396,29 +358,18 @@ impl Graph {
         let (session, signature) = (Arc::clone(&self.session), Arc::clone(&self.signature));
         let (decoding, job_options) = (Arc::clone(&self.decoding), Arc::clone(options));
         let (clock, batch, start) = (*self.clock(), self.ports.batch, Instant::now());
-        let limits = JobLimits {
-            time: clock.remaining(),
-            memory: self.memory,
-        };
+        let limits = JobLimits { time: clock.remaining(), memory: self.memory };
         let job = move || {
             let mut session = session.lock().unwrap_or_else(PoisonError::into_inner);
-            run(
-                &mut session,
-                &job_options,
-                batch,
-                inputs,
-                &signature.outputs,
-                |outputs| match decoding.assign_layouts(outputs, size) {
+            run(&mut session, &job_options, batch, inputs, &signature.outputs, |outputs| {
+                match decoding.assign_layouts(outputs, size) {
                     Ok(images) => read(&images).map_or_else(RunResult::Unusable, RunResult::Output),
                     Err(wrong_size) => RunResult::Failed(wrong_size.failure(size)),
-                },
-            )
+                }
+            })
             .unwrap_or_else(|e| RunResult::Failed(RunFailure::from_message(size, one_line(&e))))
         };
-        let end = self
-            .runtime
-            .thread()
-            .run_within(limits, || options.end_run(), job)?;
+        let end = self.runtime.thread().run_within(limits, || options.end_run(), job)?;
         self.clock().add(start.elapsed());
         Ok(match (end, clock.limit()) {
             (JobEnd::Finished(result), _) => result,

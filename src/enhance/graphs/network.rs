@@ -12,8 +12,8 @@ use super::session::{one_line, session_builder};
 use crate::failure::describe_load_failure;
 use crate::libraries::Runtime;
 
-/// A loaded network with one input and any number of outputs, all of 32-bit floats. It runs on one thread, so that its outputs do not
-/// depend on the number of cores.
+/// A loaded network with one input and any number of outputs, all of 32-bit floats. It runs on one thread, so that its
+/// outputs do not depend on the number of cores.
 pub struct Network {
     name: &'static str,
     runtime: Runtime,
@@ -31,21 +31,16 @@ impl Network {
         let environment = runtime.environment().clone();
         let session = runtime
             .thread()
-            .run(move || {
-                session_builder(&environment, Some(NonZeroUsize::MIN))?.commit_from_memory(model)
-            })?
+            .run(move || session_builder(&environment, Some(NonZeroUsize::MIN))?.commit_from_memory(model))?
             .map_err(|e| {
                 let problem = describe_load_failure(&one_line(&e), runtime.version());
                 Error::Runtime(format!("{name}: {problem}"))
             })?;
-        Ok(Self {
-            name,
-            session: Arc::new(Mutex::new(session)),
-            runtime,
-        })
+        Ok(Self { name, session: Arc::new(Mutex::new(session)), runtime })
     }
 
-    /// Runs the network on an input of these dimensions. Returns the outputs in the order of the graph, each flattened row by row.
+    /// Runs the network on an input of these dimensions. Returns the outputs in the order of the graph, each flattened
+    /// row by row.
     ///
     /// # Errors
     /// If the run fails, for example because memory is exhausted.

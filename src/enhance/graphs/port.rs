@@ -85,13 +85,9 @@ impl Port {
         (3..=4).contains(&self.dims.len()) && !is_grey && last.iter().any(|dim| dim.can_be(3))
     }
 
-    /// True if the port can be an output image in this layout, with `count` channels and the height and width of the input.
-    pub(crate) fn can_be_image(
-        &self,
-        layout: TensorLayout,
-        count: usize,
-        [height, width]: [&Dim; 2],
-    ) -> bool {
+    /// True if the port can be an output image in this layout, with `count` channels and the height and width of the
+    /// input.
+    pub(crate) fn can_be_image(&self, layout: TensorLayout, count: usize, [height, width]: [&Dim; 2]) -> bool {
         // Without declared dimensions any shape is possible.
         let [channels, rows, columns] = layout.axes();
         let is_shape_possible = self.dims.is_empty()
@@ -104,8 +100,8 @@ impl Port {
         is_shape_possible && self.element.is_output_type()
     }
 
-    /// True if one of the two axes is a channel axis, not a side of the image: its size is fixed and small, but the other axis and both
-    /// sides of the input are dynamic.
+    /// True if one of the two axes is a channel axis, not a side of the image: its size is fixed and small, but the
+    /// other axis and both sides of the input are dynamic.
     fn has_channels_as_side(&self, axes: [usize; 2], input: [&Dim; 2]) -> bool {
         let is_input_dynamic = input.iter().all(|side| side.known().is_none());
         let has_small_side = match axes.map(|axis| self.dims[axis].known()) {
@@ -125,8 +121,8 @@ impl Port {
             .collect()
     }
 
-    /// Declared number of channels of an image: 3 if a layout has three channels, else the size of the third axis from the end (CHW);
-    /// `None` if that size is dynamic.
+    /// Declared number of channels of an image: 3 if a layout has three channels, else the size of the third axis from
+    /// the end (CHW); `None` if that size is dynamic.
     pub(crate) fn channels(&self) -> Option<usize> {
         let rgb = self.layout(3).map(|_| 3);
         let chw_axis = self.dims.len().checked_sub(3);
@@ -135,21 +131,21 @@ impl Port {
 
     /// True if an exporter generated the name: a number, a module path or an operator's name.
     ///
-    /// If the user passes fewer names than the graph has outputs, the exporter applies them to the first outputs and generates the rest.
-    /// The output that got the name `output` is then not necessarily the image: in Zero-DCE it is another one.
+    /// If the user passes fewer names than the graph has outputs, the exporter applies them to the first outputs and
+    /// generates the rest. The output that got the name `output` is then not necessarily the image: in Zero-DCE it is
+    /// another one.
     pub(crate) fn is_numbered(&self) -> bool {
         const OPERATORS: [&str; 19] = [
-            "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem",
-            "identity", "max", "min", "mul", "pow", "relu", "sigmoid", "slice", "sub", "tanh",
+            "add", "cat", "clamp", "clip", "concat", "conv", "conv2d", "div", "getitem", "identity", "max", "min",
+            "mul", "pow", "relu", "sigmoid", "slice", "sub", "tanh",
         ];
         let name = &self.name;
-        let stem = name
-            .trim_end_matches(|c: char| c.is_ascii_digit() || c == '_')
-            .to_ascii_lowercase();
+        let stem = name.trim_end_matches(|c: char| c.is_ascii_digit() || c == '_').to_ascii_lowercase();
         stem.is_empty() || name.contains(['/', ':', '.']) || OPERATORS.contains(&stem.as_str())
     }
 
-    /// True if the port is a single number: all dimensions are 1. One of them may be dynamic instead, such as the batch size.
+    /// True if the port is a single number: all dimensions are 1. One of them may be dynamic instead, such as the batch
+    /// size.
     pub(crate) fn is_scalar(&self) -> bool {
         let dynamic = self.dims.iter().filter(|dim| dim.known().is_none()).count();
         dynamic <= 1 && self.dims.iter().all(|dim| dim.can_be(1))

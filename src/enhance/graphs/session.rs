@@ -25,23 +25,15 @@ pub(super) struct SessionOptions {
 impl SessionOptions {
     /// Options for runs that return these outputs.
     pub(super) fn for_outputs(outputs: &[Output]) -> ort::Result<Self> {
-        let selector = outputs
-            .iter()
-            .fold(OutputSelector::no_default(), |selector, output| {
-                selector.with(&output.port.name)
-            });
-        Ok(Self {
-            options: RunOptions::new()?.with_outputs(selector),
-            stopped: AtomicBool::new(false),
-        })
+        let selector =
+            outputs.iter().fold(OutputSelector::no_default(), |selector, output| selector.with(&output.port.name));
+        Ok(Self { options: RunOptions::new()?.with_outputs(selector), stopped: AtomicBool::new(false) })
     }
 
     /// Options for runs that return these outputs and release ONNX Runtime's memory arena at their end.
     pub(super) fn releasing_memory(outputs: &[Output]) -> ort::Result<Self> {
         let mut options = Self::for_outputs(outputs)?;
-        options
-            .options
-            .set("memory.enable_memory_arena_shrinkage", "cpu:0")?;
+        options.options.set("memory.enable_memory_arena_shrinkage", "cpu:0")?;
         Ok(options)
     }
 
@@ -64,9 +56,10 @@ impl SessionOptions {
     }
 }
 
-// SAFETY: `ort` withholds `Sync` because a selected output may have a preallocated tensor, to which two runs could write at once. Outputs
-// are never preallocated here (`SessionOptions::for_outputs` selects by name alone), and the session's mutex prevents concurrent runs. The
-// only calls during a run are `terminate` and `unterminate`, which ONNX Runtime documents for use from another thread: they set one flag.
+// SAFETY: `ort` withholds `Sync` because a selected output may have a preallocated tensor, to which two runs could
+// write at once. Outputs are never preallocated here (`SessionOptions::for_outputs` selects by name alone), and the
+// session's mutex prevents concurrent runs. The only calls during a run are `terminate` and `unterminate`, which ONNX
+// Runtime documents for use from another thread: they set one flag.
 #[expect(unsafe_code, reason = "there is no other way to stop a run")]
 unsafe impl Sync for SessionOptions {}
 
@@ -84,15 +77,11 @@ impl Stopper {
 
 /// Message of an ONNX Runtime error, in one line.
 pub(super) fn one_line(error: &ort::Error) -> String {
-    error
-        .message()
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ")
+    error.message().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// Runs a session on named inputs, and decodes its outputs with `read` before another run overwrites them. For a graph with a fixed batch
-/// size, each image is repeated, and the first result is decoded.
+/// Runs a session on named inputs, and decodes its outputs with `read` before another run overwrites them. For a graph
+/// with a fixed batch size, each image is repeated, and the first result is decoded.
 pub(super) fn run<T>(
     session: &mut Session,
     options: &SessionOptions,
@@ -117,11 +106,7 @@ pub(super) fn run<T>(
 }
 
 /// First image of an output.
-fn output_tensor<'a>(
-    value: &'a DynValue,
-    element: &ElementType,
-    batch: usize,
-) -> ort::Result<OutputTensor<'a>> {
+fn output_tensor<'a>(value: &'a DynValue, element: &ElementType, batch: usize) -> ort::Result<OutputTensor<'a>> {
     let (dims, samples) = match element {
         ElementType::Uint8 => {
             let (dims, samples) = value.try_extract_tensor::<u8>()?;
@@ -169,7 +154,8 @@ fn first_image<'a, T>(batch: usize, dims: &[i64], samples: &'a [T]) -> (Vec<i64>
     }
 }
 
-/// Converts a tensor for ONNX Runtime. A tensor of rank 4 with a first dimension of 1 is repeated `batch` times along it.
+/// Converts a tensor for ONNX Runtime. A tensor of rank 4 with a first dimension of 1 is repeated `batch` times along
+/// it.
 fn to_ort_tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
     let InputTensor { mut dims, data } = input;
     let times = match dims.as_mut_slice() {
@@ -189,27 +175,15 @@ fn to_ort_tensor(input: InputTensor, batch: usize) -> ort::Result<DynValue> {
         TensorData::Uint16(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
         TensorData::Uint32(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
         TensorData::Uint64(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
-        TensorData::Float16(values) => {
-            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
-        }
-        TensorData::Bfloat16(values) => {
-            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
-        }
-        TensorData::Float32(values) => {
-            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
-        }
-        TensorData::Float64(values) => {
-            Tensor::from_array((dims, repeat(values, times)))?.into_dyn()
-        }
+        TensorData::Float16(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Bfloat16(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Float32(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
+        TensorData::Float64(values) => Tensor::from_array((dims, repeat(values, times)))?.into_dyn(),
     })
 }
 
 fn repeat<T: Copy>(values: Vec<T>, times: usize) -> Vec<T> {
-    if times == 1 {
-        values
-    } else {
-        values.repeat(times)
-    }
+    if times == 1 { values } else { values.repeat(times) }
 }
 
 /// Session option for the folder of external data, of a model in memory (`onnxruntime_session_options_config_keys.h`).
@@ -232,24 +206,18 @@ impl GraphSource {
             Self::Memory(bytes) => builder.commit_from_memory(&bytes),
             Self::MemoryBeside { bytes, folder } => {
                 let folder = folder.to_string_lossy();
-                builder
-                    .with_config_entry(EXTERNAL_FOLDER, folder)?
-                    .commit_from_memory(&bytes)
+                builder.with_config_entry(EXTERNAL_FOLDER, folder)?.commit_from_memory(&bytes)
             }
             Self::Path(path) => builder.commit_from_file(path),
         }
     }
 }
 
-/// Builder of a session with this program's options. `threads` is the number of threads, by default the number of cores.
-pub(super) fn session_builder(
-    environment: &Environment,
-    threads: Option<NonZeroUsize>,
-) -> ort::Result<SessionBuilder> {
+/// Builder of a session with this program's options. `threads` is the number of threads, by default the number of
+/// cores.
+pub(super) fn session_builder(environment: &Environment, threads: Option<NonZeroUsize>) -> ort::Result<SessionBuilder> {
     // With its own default, ONNX Runtime would pin one thread to each core, even to cores that other programs use.
-    let threads = threads
-        .or_else(|| std::thread::available_parallelism().ok())
-        .map_or(1, NonZeroUsize::get);
+    let threads = threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get);
     let builder = Session::builder(environment)?
         .with_optimization_level(GraphOptimizationLevel::All)?
         .with_intra_threads(threads)?
@@ -259,7 +227,8 @@ pub(super) fn session_builder(
     Ok(builder)
 }
 
-/// Maximum fixed batch size for which an image is repeated; chosen (some models are exported with a batch of a few images).
+/// Maximum fixed batch size for which an image is repeated; chosen (some models are exported with a batch of a few
+/// images).
 const MAX_BATCH: usize = 64;
 
 /// Sets a fixed batch dimension above 1 to 1 in all ports; returns the batch size, or 1 if it is not fixed.
@@ -290,11 +259,7 @@ pub(super) fn ports(outlets: &[Outlet]) -> Vec<Port> {
 
 fn port(outlet: &Outlet) -> Port {
     let (element, dims) = match outlet.dtype() {
-        ValueType::Tensor {
-            ty,
-            shape,
-            dimension_symbols,
-        } => {
+        ValueType::Tensor { ty, shape, dimension_symbols } => {
             let element = match ty {
                 TensorElementType::Float32 => ElementType::Float32,
                 TensorElementType::Float16 => ElementType::Float16,
@@ -323,9 +288,5 @@ fn port(outlet: &Outlet) -> Port {
         }
         other => (ElementType::Other(other.to_string()), Vec::new()),
     };
-    Port {
-        name: outlet.name().to_owned(),
-        element,
-        dims,
-    }
+    Port { name: outlet.name().to_owned(), element, dims }
 }

@@ -16,21 +16,14 @@ pub(crate) struct DarkImage<'a> {
 
 impl<'a> DarkImage<'a> {
     pub(crate) fn new(rgb: &'a Rgb) -> Self {
-        Self {
-            rgb,
-            digest: OnceCell::new(),
-        }
+        Self { rgb, digest: OnceCell::new() }
     }
 }
 
 /// Image that is fed to a model in one run.
 pub(crate) enum FedImage<'a> {
     /// A window of a degraded image, padded beyond the image's edges.
-    Window {
-        dark: &'a DarkImage<'a>,
-        window: TileWindow,
-        pad: Padding,
-    },
+    Window { dark: &'a DarkImage<'a>, window: TileWindow, pad: Padding },
     /// A whole image of floats.
     Whole(&'a Planes),
 }
@@ -76,20 +69,14 @@ impl FedImage<'_> {
             for row in (window.top..window.bottom).map(|at| pad.source(at, dark.height())) {
                 for column in (window.left..window.right).map(|at| pad.source(at, dark.width())) {
                     let byte = match (row, column) {
-                        (Some(row), Some(column)) => {
-                            dark.samples()[3 * (row * dark.width() + column) + channel]
-                        }
+                        (Some(row), Some(column)) => dark.samples()[3 * (row * dark.width() + column) + channel],
                         _ => 0,
                     };
                     samples.push(f32::from(byte) / 255.0);
                 }
             }
         }
-        Cow::Owned(Planes {
-            height,
-            width,
-            samples,
-        })
+        Cow::Owned(Planes { height, width, samples })
     }
 
     /// Digest of the size and pixels of the whole degraded image.
@@ -100,11 +87,7 @@ impl FedImage<'_> {
                 image_digest(size, dark.rgb.samples())
             }),
             Self::Whole(planes) => {
-                let bytes: Vec<u8> = planes
-                    .samples
-                    .iter()
-                    .flat_map(|x| x.to_le_bytes())
-                    .collect();
+                let bytes: Vec<u8> = planes.samples.iter().flat_map(|x| x.to_le_bytes()).collect();
                 image_digest([planes.height, planes.width], &bytes)
             }
         }
@@ -123,16 +106,7 @@ mod tests {
 
     /// A window with two rows of an image.
     fn columns<'a>(dark: &'a DarkImage<'a>, left: usize, right: usize) -> FedImage<'a> {
-        FedImage::Window {
-            dark,
-            window: TileWindow {
-                left,
-                top: 0,
-                right,
-                bottom: 2,
-            },
-            pad: Padding::Reflect,
-        }
+        FedImage::Window { dark, window: TileWindow { left, top: 0, right, bottom: 2 }, pad: Padding::Reflect }
     }
 
     #[test]
@@ -142,10 +116,7 @@ mod tests {
         let padded = columns(&dark, 1, 5);
         let planes = padded.planes().into_owned();
         assert_eq!((planes.height, planes.width), (2, 4));
-        assert_eq!(
-            planes.samples[..8],
-            [0.2, 1.0, 0.2, 0.0, 0.2, 1.0, 0.2, 0.0]
-        );
+        assert_eq!(planes.samples[..8], [0.2, 1.0, 0.2, 0.0, 0.2, 1.0, 0.2, 0.0]);
         assert_eq!(padded.origin(), [0, 1]);
         let part = columns(&dark, 0, 2);
         assert!(columns(&dark, 0, 3).is_whole() && columns(&dark, 0, 5).is_whole());

@@ -27,50 +27,34 @@ struct Axes {
 }
 
 impl Axes {
-    /// Axes of a tensor with the image's size; `None` for scalars, vectors and ranks that no layout has. A layout with one or three
-    /// channels is preferred, then the layout of the image.
+    /// Axes of a tensor with the image's size; `None` for scalars, vectors and ranks that no layout has. A layout with
+    /// one or three channels is preferred, then the layout of the image.
     fn for_port(port: &Port, image: TensorLayout) -> Option<Self> {
         if port.is_scalar() || vector_length(port).is_some() {
             return None;
         }
         if port.dims.len() == 2 {
-            return Some(Self {
-                channels: None,
-                rows: 0,
-                columns: 1,
-            });
+            return Some(Self { channels: None, rows: 0, columns: 1 });
         }
-        let layouts: Vec<TensorLayout> = std::iter::once(image)
-            .chain(TensorLayout::ALL)
-            .filter(|layout| layout.rank() == port.dims.len())
-            .collect();
+        let layouts: Vec<TensorLayout> =
+            std::iter::once(image).chain(TensorLayout::ALL).filter(|layout| layout.rank() == port.dims.len()).collect();
         let [channels, rows, columns] = layouts
             .iter()
             .find(|layout| matches!(port.dims[layout.axes()[0]].known(), Some(1 | 3)))
             .or(layouts.first())?
             .axes();
-        Some(Self {
-            channels: Some(channels),
-            rows,
-            columns,
-        })
+        Some(Self { channels: Some(channels), rows, columns })
     }
 
     /// Dimensions other than channels, rows and columns.
     fn others(self, port: &Port) -> impl Iterator<Item = &Dim> {
         let used = [self.channels, Some(self.rows), Some(self.columns)];
-        port.dims
-            .iter()
-            .enumerate()
-            .filter(move |(axis, _)| !used.contains(&Some(*axis)))
-            .map(|(_, dim)| dim)
+        port.dims.iter().enumerate().filter(move |(axis, _)| !used.contains(&Some(*axis))).map(|(_, dim)| dim)
     }
 
     /// True if the graph fixes both height and width.
     fn has_fixed_size(self, port: &Port) -> bool {
-        [self.rows, self.columns]
-            .iter()
-            .all(|axis| port.dims[*axis].known().is_some())
+        [self.rows, self.columns].iter().all(|axis| port.dims[*axis].known().is_some())
     }
 
     /// Number of channels; `None` if the graph does not fix it.
@@ -103,11 +87,7 @@ impl FurtherInput {
             ));
         }
         let value = value.ok_or_else(|| missing_value_message(port, axes))?;
-        let input = Self {
-            port: port.clone(),
-            value: value.clone(),
-            axes,
-        };
+        let input = Self { port: port.clone(), value: value.clone(), axes };
         input.check().map_err(|problem| {
             format!("takes {port}; MODEL.onnx.toml or the preset sets it to {value}, but {problem}")
         })?;
@@ -120,62 +100,47 @@ impl FurtherInput {
         if let Some(axes) = self.axes
             && let Some(other) = axes.others(&self.port).find(|dim| !dim.can_be(1))
         {
-            return Err(format!(
-                "its dimension of {other} is neither channels, height nor width"
-            ));
+            return Err(format!("its dimension of {other} is neither channels, height nor width"));
         }
         let takes_list = vector_length(&self.port).is_some_and(|length| length > 1);
         match (&self.value, self.axes) {
             (ExtraValue::Number(number), None) if !takes_list => {
                 TensorData::repeated(&self.port.element, *number, 1).map(drop)
             }
-            (ExtraValue::Map(number), Some(_)) => {
-                TensorData::repeated(&self.port.element, *number, 1).map(drop)
-            }
+            (ExtraValue::Map(number), Some(_)) => TensorData::repeated(&self.port.element, *number, 1).map(drop),
             (ExtraValue::List(numbers), None) => {
                 let length = vector_length(&self.port).unwrap_or(1);
                 if numbers.len() != length {
-                    return Err(format!(
-                        "it takes {length} numbers: {}",
-                        list_line(&key, length)
-                    ));
+                    return Err(format!("it takes {length} numbers: {}", list_line(&key, length)));
                 }
                 TensorData::from_numbers(&self.port.element, numbers).map(drop)
             }
             (_, None) if takes_list => {
                 let length = vector_length(&self.port).unwrap_or(1);
-                Err(format!(
-                    "it takes a list of {length} numbers: {}",
-                    list_line(&key, length)
-                ))
+                Err(format!("it takes a list of {length} numbers: {}", list_line(&key, length)))
             }
-            (ExtraValue::List(_), Some(_)) => Err(format!(
-                "it has the image's size; `{key} = {{ map = NUMBER }}` gives every pixel one number"
-            )),
-            (ExtraValue::Number(number), Some(_)) => Err(format!(
-                "it has the image's size; `{key} = {{ map = {number} }}` gives every pixel this number"
-            )),
+            (ExtraValue::List(_), Some(_)) => {
+                Err(format!("it has the image's size; `{key} = {{ map = NUMBER }}` gives every pixel one number"))
+            }
+            (ExtraValue::Number(number), Some(_)) => {
+                Err(format!("it has the image's size; `{key} = {{ map = {number} }}` gives every pixel this number"))
+            }
             (_, None) => Err(format!("it takes a single number: `{key} = NUMBER`")),
             (ExtraValue::Noise(_) | ExtraValue::From(_), Some(_))
                 if TensorData::from_floats(&self.port.element, Vec::new()).is_none() =>
             {
-                Err(format!(
-                    "its type {} cannot hold such values; export it as float32",
-                    self.port.element
-                ))
+                Err(format!("its type {} cannot hold such values; export it as float32", self.port.element))
             }
             (ExtraValue::Noise(_), Some(_)) => Ok(()),
             (ExtraValue::From(expression), Some(axes)) => {
                 let result_channels = expression.channels(&vec![3; expression.names().len()]);
                 match (axes.channels(&self.port), result_channels) {
                     (None | Some(3), _) | (Some(1), 1) => Ok(()),
-                    (Some(1), _) => Err(
-                        "this has three channels, and it takes one; wrap the expression in mean(…) or max(…)"
-                            .to_owned(),
-                    ),
-                    (Some(other), _) => Err(format!(
-                        "it takes {other} channels, and this has {result_channels}"
-                    )),
+                    (Some(1), _) => {
+                        Err("this has three channels, and it takes one; wrap the expression in mean(…) or max(…)"
+                            .to_owned())
+                    }
+                    (Some(other), _) => Err(format!("it takes {other} channels, and this has {result_channels}")),
                 }
             }
         }
@@ -195,7 +160,8 @@ impl FurtherInput {
         }
     }
 
-    /// Value of the input for the tile or whole image `fed`; `None` if the sidecar's expression gives values that are not finite.
+    /// Value of the input for the tile or whole image `fed`; `None` if the sidecar's expression gives values that are
+    /// not finite.
     pub(crate) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
         let Some(axes) = self.axes else {
             if let ExtraValue::List(numbers) = &self.value {
@@ -245,11 +211,7 @@ impl FurtherInput {
 
     /// Dimensions of the port, with 1 for dynamic ones.
     fn fixed_dims(&self) -> Vec<usize> {
-        self.port
-            .dims
-            .iter()
-            .map(|dim| dim.known().unwrap_or(1))
-            .collect()
+        self.port.dims.iter().map(|dim| dim.known().unwrap_or(1)).collect()
     }
 
     /// Dimensions for an image of this size; other dynamic dimensions are 1.
@@ -264,13 +226,7 @@ impl FurtherInput {
     }
 
     /// Converts planar samples to the order of the tensor's dimensions; `None` if the port's type is not a float type.
-    fn arrange_planes(
-        &self,
-        axes: Axes,
-        channels: usize,
-        size: [usize; 2],
-        planes: Vec<f32>,
-    ) -> Option<Tensor> {
+    fn arrange_planes(&self, axes: Axes, channels: usize, size: [usize; 2], planes: Vec<f32>) -> Option<Tensor> {
         let plane = size[0] * size[1];
         let is_planar = axes.channels.is_none_or(|axis| axis < axes.rows);
         let values = if is_planar || channels == 1 {
@@ -288,13 +244,10 @@ impl FurtherInput {
     }
 }
 
-/// Length of a vector; `None` if the port is not a vector. The dimensions of a vector are fixed, and exactly one is above 1.
+/// Length of a vector; `None` if the port is not a vector. The dimensions of a vector are fixed, and exactly one is
+/// above 1.
 fn vector_length(port: &Port) -> Option<usize> {
-    let sizes = port
-        .dims
-        .iter()
-        .map(Dim::known)
-        .collect::<Option<Vec<usize>>>()?;
+    let sizes = port.dims.iter().map(Dim::known).collect::<Option<Vec<usize>>>()?;
     let long = sizes.iter().filter(|size| **size > 1).count();
     (long == 1).then(|| sizes.iter().product())
 }
@@ -310,8 +263,8 @@ fn list_line(key: &str, length: usize) -> String {
 fn missing_value_message(port: &Port, axes: Option<Axes>) -> String {
     let key = toml_key(&port.name);
     let add = format!("{ADD}, below `[extra]`:");
-    let known = preset::known_number(&port.name)
-        .filter(|(number, _)| TensorData::repeated(&port.element, *number, 1).is_ok());
+    let known =
+        preset::known_number(&port.name).filter(|(number, _)| TensorData::repeated(&port.element, *number, 1).is_ok());
     let Some(axes) = axes else {
         if let ElementType::Other(_) = port.element {
             return format!(
@@ -330,9 +283,7 @@ fn missing_value_message(port: &Port, axes: Option<Axes>) -> String {
             (None, ElementType::Bool) => format!("`{key} = true` or `{key} = false`"),
             (None, _) => format!("`{key} = NUMBER` (as in the model's code)"),
         };
-        return format!(
-            "takes {port} in addition to the image, and its value is unknown; {add} {line}"
-        );
+        return format!("takes {port} in addition to the image, and its value is unknown; {add} {line}");
     };
     if is_attention_map(&port.name.to_lowercase()) {
         return format!(
@@ -365,11 +316,7 @@ fn is_attention_map(lower_case_name: &str) -> bool {
 
 /// A name as a TOML key, in quotes if needed.
 fn toml_key(name: &str) -> String {
-    if !name.is_empty()
-        && name
-            .chars()
-            .all(|c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-')
-    {
+    if !name.is_empty() && name.chars().all(|c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
         name.to_owned()
     } else {
         format!("{name:?}")

@@ -1,16 +1,15 @@
 //! Conversion of an image of bytes to a model's input tensor: [`InputEncoding`].
 //!
-//! Usually in one pass: a table of 256 values per channel combines range, mean and standard deviation. With an expression, or for a model
-//! of the luma, the image is converted to floats first; then `input`, channels, range, mean and deviation apply in this order.
+//! Usually in one pass: a table of 256 values per channel combines range, mean and standard deviation. With an
+//! expression, or for a model of the luma, the image is converted to floats first; then `input`, channels, range, mean
+//! and deviation apply in this order.
 
 use half::f16;
 
 use super::fed_image::FedImage;
 use super::tensor::{Tensor, TensorData};
 use crate::conventions::sidecar::ModelSidecar;
-use crate::conventions::{
-    ChannelOrder, Channels, ElementType, Padding, Signature, TensorLayout, ValueRange,
-};
+use crate::conventions::{ChannelOrder, Channels, ElementType, Padding, Signature, TensorLayout, ValueRange};
 use crate::expressions::Expression;
 use crate::outputs::round_to_u8;
 use crate::planes::Planes;
@@ -54,20 +53,15 @@ impl InputEncoding {
     /// Encodes an image; `None` if the sidecar's expression gives values that are not finite.
     pub(crate) fn tensor(&self, fed: &FedImage<'_>) -> Option<Tensor> {
         match fed {
-            FedImage::Window { dark, window, .. }
-                if self.input.is_none() && self.channels == Channels::Rgb =>
-            {
+            FedImage::Window { dark, window, .. } if self.input.is_none() && self.channels == Channels::Rgb => {
                 Some(self.encode_window(dark.rgb, *window))
             }
             _ => {
                 let dark = fed.planes();
                 match &self.input {
-                    None => {
-                        Some(self.encode_planes(&dark.into_owned().with_channels(self.channels)))
-                    }
+                    None => Some(self.encode_planes(&dark.into_owned().with_channels(self.channels))),
                     Some(expression) => {
-                        let image = expression
-                            .evaluate(&vec![&*dark; expression.names().len()], fed.size());
+                        let image = expression.evaluate(&vec![&*dark; expression.names().len()], fed.size());
                         let is_finite = image.samples.iter().all(|sample| sample.is_finite());
                         let image = image.spread().with_channels(self.channels);
                         is_finite.then(|| self.encode_planes(&image))
@@ -79,12 +73,10 @@ impl InputEncoding {
 
     /// Encodes a window of an image, padded beyond the image's edges.
     fn encode_window(&self, image: &Rgb, window: TileWindow) -> Tensor {
-        let rows: Vec<Option<usize>> = (window.top..window.bottom)
-            .map(|row| self.pad.source(row, image.height()))
-            .collect();
-        let columns: Vec<Option<usize>> = (window.left..window.right)
-            .map(|column| self.pad.source(column, image.width()))
-            .collect();
+        let rows: Vec<Option<usize>> =
+            (window.top..window.bottom).map(|row| self.pad.source(row, image.height())).collect();
+        let columns: Vec<Option<usize>> =
+            (window.left..window.right).map(|column| self.pad.source(column, image.width())).collect();
         let (samples, width) = (image.samples(), image.width());
         // Without padded columns, the pixels of a row are contiguous.
         let is_inside = window.right <= image.width();
@@ -92,20 +84,13 @@ impl InputEncoding {
             let channel = self.color.rgb_channel(channel);
             let row = row.map(|row| &samples[row * width * 3..][..width * 3]);
             let columns = &columns;
-            columns
-                .iter()
-                .enumerate()
-                .map(move |(i, column)| match row {
-                    Some(row) if is_inside => row[(window.left + i) * 3 + channel],
-                    Some(row) => column.map_or(0, |column| row[column * 3 + channel]),
-                    None => 0,
-                })
+            columns.iter().enumerate().map(move |(i, column)| match row {
+                Some(row) if is_inside => row[(window.left + i) * 3 + channel],
+                Some(row) => column.map_or(0, |column| row[column * 3 + channel]),
+                None => 0,
+            })
         };
-        let order = if self.layout.is_planar() {
-            SampleOrder::Planar
-        } else {
-            SampleOrder::Packed
-        };
+        let order = if self.layout.is_planar() { SampleOrder::Planar } else { SampleOrder::Packed };
         let size = window.size();
         match self.element {
             ElementType::Uint8 => {
@@ -116,27 +101,17 @@ impl InputEncoding {
             ElementType::Float16 => {
                 let table = self.code_table().map(|values| values.map(f16::from_f32));
                 let mut data = vec![f16::ZERO; 3 * size[0] * size[1]];
-                fill_tensor(
-                    &mut data,
-                    order,
-                    &rows,
-                    size[1],
-                    row_codes,
-                    |channel, code| table[channel][usize::from(code)],
-                );
+                fill_tensor(&mut data, order, &rows, size[1], row_codes, |channel, code| {
+                    table[channel][usize::from(code)]
+                });
                 self.tensor_of_size(size, TensorData::Float16(data))
             }
             _ => {
                 let table = self.code_table();
                 let mut data = vec![0.0; 3 * size[0] * size[1]];
-                fill_tensor(
-                    &mut data,
-                    order,
-                    &rows,
-                    size[1],
-                    row_codes,
-                    |channel, code| table[channel][usize::from(code)],
-                );
+                fill_tensor(&mut data, order, &rows, size[1], row_codes, |channel, code| {
+                    table[channel][usize::from(code)]
+                });
                 self.tensor_of_size(size, TensorData::Float32(data))
             }
         }
@@ -147,13 +122,9 @@ impl InputEncoding {
         let size = planes.size();
         let (channels, pixels) = (self.channels.count(), size[0] * size[1]);
         let channels_and_pixels: Vec<(usize, usize)> = if self.layout.is_planar() {
-            (0..channels)
-                .flat_map(|channel| (0..pixels).map(move |pixel| (channel, pixel)))
-                .collect()
+            (0..channels).flat_map(|channel| (0..pixels).map(move |pixel| (channel, pixel))).collect()
         } else {
-            (0..pixels)
-                .flat_map(|pixel| (0..channels).map(move |channel| (channel, pixel)))
-                .collect()
+            (0..pixels).flat_map(|pixel| (0..channels).map(move |channel| (channel, pixel))).collect()
         };
         let samples = channels_and_pixels.into_iter().map(|(channel, pixel)| {
             let plane = match self.channels {
@@ -163,21 +134,11 @@ impl InputEncoding {
             (channel, planes.samples[plane * pixels + pixel])
         });
         let data = match self.element {
-            ElementType::Uint8 => TensorData::Uint8(
-                samples
-                    .map(|(_, sample)| round_to_u8(sample * 255.0))
-                    .collect(),
-            ),
+            ElementType::Uint8 => TensorData::Uint8(samples.map(|(_, sample)| round_to_u8(sample * 255.0)).collect()),
             ElementType::Float16 => TensorData::Float16(
-                samples
-                    .map(|(channel, sample)| f16::from_f32(self.encode_sample(channel, sample)))
-                    .collect(),
+                samples.map(|(channel, sample)| f16::from_f32(self.encode_sample(channel, sample))).collect(),
             ),
-            _ => TensorData::Float32(
-                samples
-                    .map(|(channel, sample)| self.encode_sample(channel, sample))
-                    .collect(),
-            ),
+            _ => TensorData::Float32(samples.map(|(channel, sample)| self.encode_sample(channel, sample)).collect()),
         };
         self.tensor_of_size(size, data)
     }
@@ -192,10 +153,7 @@ impl InputEncoding {
     }
 
     fn tensor_of_size(&self, size: [usize; 2], data: TensorData) -> Tensor {
-        Tensor {
-            dims: self.layout.dims(size, self.channels.count()),
-            data,
-        }
+        Tensor { dims: self.layout.dims(size, self.channels.count()), data }
     }
 
     /// Encoded value of each 8-bit code, for each channel of the model.
@@ -218,8 +176,8 @@ enum SampleOrder {
     Packed,
 }
 
-/// Fills a tensor row by row. `row_codes` gives the codes of one channel of a source row (`None` for black padding), `value` the encoded
-/// value of a code of a channel.
+/// Fills a tensor row by row. `row_codes` gives the codes of one channel of a source row (`None` for black padding),
+/// `value` the encoded value of a code of a channel.
 fn fill_tensor<T, I: Iterator<Item = u8>>(
     data: &mut [T],
     order: SampleOrder,
@@ -241,12 +199,7 @@ fn fill_tensor<T, I: Iterator<Item = u8>>(
         SampleOrder::Packed => {
             for (row, line) in rows.iter().zip(data.chunks_exact_mut(3 * width)) {
                 for channel in 0..3 {
-                    for (sample, code) in line
-                        .iter_mut()
-                        .skip(channel)
-                        .step_by(3)
-                        .zip(row_codes(*row, channel))
-                    {
+                    for (sample, code) in line.iter_mut().skip(channel).step_by(3).zip(row_codes(*row, channel)) {
                         *sample = value(channel, code);
                     }
                 }

@@ -7,14 +7,10 @@ use darkqa_light::{Component, NoiseKey, Site};
 
 /// Normally distributed noise for the input `name`, in planar order, of the image's size divided by `divide`.
 ///
-/// Each number is a function of the seed, the whole degraded image, the input's name, and its channel, row and column in the noise field of
-/// the whole image. So the noise does not depend on threads, and a tile gets the corresponding part of the field.
-pub(super) fn normal_noise(
-    statement: &NoiseStatement,
-    name: &str,
-    channels: usize,
-    fed: &FedImage<'_>,
-) -> Vec<f32> {
+/// Each number is a function of the seed, the whole degraded image, the input's name, and its channel, row and column
+/// in the noise field of the whole image. So the noise does not depend on threads, and a tile gets the corresponding
+/// part of the field.
+pub(super) fn normal_noise(statement: &NoiseStatement, name: &str, channels: usize, fed: &FedImage<'_>) -> Vec<f32> {
     let frame = FrameId(format!("{} {name}", fed.digest()));
     let stream = NoiseKey::new(statement.seed, &frame).stream(Component::ModelInput);
     let [height, width] = fed.size().map(|side| side.div_ceil(statement.divide));
@@ -40,29 +36,16 @@ mod tests {
     use crate::sizing::TileWindow;
     use darkqa_base::types::Rgb;
 
-    const NOISE: NoiseStatement = NoiseStatement {
-        std: 0.5,
-        seed: 3,
-        divide: 1,
-    };
+    const NOISE: NoiseStatement = NoiseStatement { std: 0.5, seed: 3, divide: 1 };
 
     fn draw(statement: &NoiseStatement, name: &str, rgb: &Rgb, window: TileWindow) -> Vec<f32> {
         let dark = DarkImage::new(rgb);
-        let fed = FedImage::Window {
-            dark: &dark,
-            window,
-            pad: Padding::Reflect,
-        };
+        let fed = FedImage::Window { dark: &dark, window, pad: Padding::Reflect };
         normal_noise(statement, name, 2, &fed)
     }
 
     fn window(left: usize, right: usize) -> TileWindow {
-        TileWindow {
-            left,
-            top: 0,
-            right,
-            bottom: 40,
-        }
+        TileWindow { left, top: 0, right, bottom: 40 }
     }
 
     #[test]
@@ -88,11 +71,7 @@ mod tests {
             draw(&NOISE, "y", &rgb, window(0, 60)),
             draw(&NOISE, "z", &other, window(0, 60)),
         ] {
-            let equal = first
-                .iter()
-                .zip(&different)
-                .filter(|(a, b)| a.to_bits() == b.to_bits())
-                .count();
+            let equal = first.iter().zip(&different).filter(|(a, b)| a.to_bits() == b.to_bits()).count();
             assert!(equal < 10);
         }
         assert_ne!(first[..2400], first[2400..]);
@@ -112,9 +91,6 @@ mod tests {
         let variance = numbers.iter().map(|x| x * x).sum::<f32>() / n;
         // Bounds are five standard errors for 4800 numbers.
         assert!(mean.abs() < 5.0 * 0.5 / n.sqrt(), "{mean}");
-        assert!(
-            (variance - 0.25).abs() < 5.0 * 0.25 * (2.0 / n).sqrt(),
-            "{variance}"
-        );
+        assert!((variance - 0.25).abs() < 5.0 * 0.25 * (2.0 / n).sqrt(), "{variance}");
     }
 }

@@ -32,15 +32,12 @@ pub(crate) enum TensorData {
 impl TensorData {
     /// The number, repeated `count` times.
     ///
-    /// A fraction is rounded to the nearest float of the type, but not to infinity or 0. Integers and booleans must be represented exactly.
+    /// A fraction is rounded to the nearest float of the type, but not to infinity or 0. Integers and booleans must be
+    /// represented exactly.
     ///
     /// # Errors
     /// If the number does not fit; the message names the number and the type.
-    pub(super) fn repeated(
-        element: &ElementType,
-        number: Number,
-        count: usize,
-    ) -> Result<Self, String> {
+    pub(super) fn repeated(element: &ElementType, number: Number, count: usize) -> Result<Self, String> {
         let fitting = match element {
             ElementType::Bool => match number {
                 Number::Bool(value) => Some(Self::Bool(vec![value; count])),
@@ -99,9 +96,7 @@ impl TensorData {
     pub(super) fn from_floats(element: &ElementType, values: Vec<f32>) -> Option<Self> {
         Some(match element {
             ElementType::Float16 => Self::Float16(values.into_iter().map(f16::from_f32).collect()),
-            ElementType::Bfloat16 => {
-                Self::Bfloat16(values.into_iter().map(bf16::from_f32).collect())
-            }
+            ElementType::Bfloat16 => Self::Bfloat16(values.into_iter().map(bf16::from_f32).collect()),
             ElementType::Float32 => Self::Float32(values),
             ElementType::Float64 => Self::Float64(values.into_iter().map(f64::from).collect()),
             _ => return None,
@@ -114,9 +109,7 @@ fn repeat_integer<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Opti
     let whole = match number {
         Number::Integer(value) => i128::from(value),
         // Integers of 2^64 or more fit no type; smaller ones convert to `i128` exactly.
-        Number::Float(value) if value.fract() == 0.0 && value.abs() < 2.0_f64.powi(65) => {
-            value as i128
-        }
+        Number::Float(value) if value.fract() == 0.0 && value.abs() < 2.0_f64.powi(65) => value as i128,
         Number::Float(_) | Number::Bool(_) => return None,
     };
     T::try_from(whole).ok().map(|value| vec![value; count])
@@ -160,44 +153,20 @@ mod tests {
     fn fitting_numbers_are_converted_to_every_type() {
         let (whole, half) = (Number::Integer(3), Number::Float(0.5));
         let rows = [
-            (
-                ElementType::Bool,
-                Number::Bool(true),
-                TensorData::Bool(vec![true]),
-            ),
+            (ElementType::Bool, Number::Bool(true), TensorData::Bool(vec![true])),
             (ElementType::Int8, whole, TensorData::Int8(vec![3])),
             (ElementType::Int16, whole, TensorData::Int16(vec![3])),
             (ElementType::Int32, whole, TensorData::Int32(vec![3])),
-            (
-                ElementType::Int64,
-                Number::Float(3.0),
-                TensorData::Int64(vec![3]),
-            ),
+            (ElementType::Int64, Number::Float(3.0), TensorData::Int64(vec![3])),
             (ElementType::Uint8, whole, TensorData::Uint8(vec![3])),
             (ElementType::Uint16, whole, TensorData::Uint16(vec![3])),
             (ElementType::Uint32, whole, TensorData::Uint32(vec![3])),
             (ElementType::Uint64, whole, TensorData::Uint64(vec![3])),
-            (
-                ElementType::Float16,
-                half,
-                TensorData::Float16(vec![f16::from_f32(0.5)]),
-            ),
-            (
-                ElementType::Bfloat16,
-                half,
-                TensorData::Bfloat16(vec![bf16::from_f32(0.5)]),
-            ),
-            (
-                ElementType::Float32,
-                Number::Float(0.1),
-                TensorData::Float32(vec![0.1]),
-            ),
+            (ElementType::Float16, half, TensorData::Float16(vec![f16::from_f32(0.5)])),
+            (ElementType::Bfloat16, half, TensorData::Bfloat16(vec![bf16::from_f32(0.5)])),
+            (ElementType::Float32, Number::Float(0.1), TensorData::Float32(vec![0.1])),
             (ElementType::Float32, whole, TensorData::Float32(vec![3.0])),
-            (
-                ElementType::Float64,
-                Number::Float(0.1),
-                TensorData::Float64(vec![0.1]),
-            ),
+            (ElementType::Float64, Number::Float(0.1), TensorData::Float64(vec![0.1])),
         ];
         for (element, number, data) in rows {
             assert_eq!(one(&element, number), Ok(data), "{element} {number}");
@@ -208,11 +177,7 @@ mod tests {
     fn error_names_the_number_and_the_type_it_does_not_fit() {
         for (element, number, text) in [
             (ElementType::Int32, Number::Float(3.5), "3.5"),
-            (
-                ElementType::Int32,
-                Number::Integer(1 << 40),
-                "1099511627776",
-            ),
+            (ElementType::Int32, Number::Integer(1 << 40), "1099511627776"),
             (ElementType::Int64, Number::Float(1e30), "1e30"),
             (ElementType::Int64, Number::Bool(true), "true"),
             (ElementType::Uint8, Number::Integer(-1), "-1"),
@@ -221,18 +186,10 @@ mod tests {
             (ElementType::Float16, Number::Float(1e6), "1000000.0"),
             (ElementType::Float16, Number::Integer(2049), "2049"),
             (ElementType::Bfloat16, Number::Integer(257), "257"),
-            (
-                ElementType::Float32,
-                Number::Integer((1 << 24) + 1),
-                "16777217",
-            ),
+            (ElementType::Float32, Number::Integer((1 << 24) + 1), "16777217"),
             (ElementType::Float32, Number::Float(1e39), "1e39"),
             (ElementType::Float32, Number::Float(1e-60), "1e-60"),
-            (
-                ElementType::Float64,
-                Number::Integer((1 << 53) + 1),
-                "9007199254740993",
-            ),
+            (ElementType::Float64, Number::Integer((1 << 53) + 1), "9007199254740993"),
             (ElementType::Float32, Number::Bool(true), "true"),
             (ElementType::Other("string".into()), Number::Integer(1), "1"),
         ] {

@@ -75,23 +75,17 @@ impl Pin {
     }
 
     fn for_platform(os: &str, arch: &str) -> Option<Self> {
-        PINS.into_iter()
-            .find(|pin| pin.os == os && pin.arch == arch)
+        PINS.into_iter().find(|pin| pin.os == os && pin.arch == arch)
     }
 }
 
 /// Commands that run pip, in the order in which they are tried.
-const PIPS: [&[&str]; 4] = [
-    &["python3", "-m", "pip"],
-    &["pip3"],
-    &["pip"],
-    &["python", "-m", "pip"],
-];
+const PIPS: [&[&str]; 4] = [&["python3", "-m", "pip"], &["pip3"], &["pip"], &["python", "-m", "pip"]];
 
 /// Downloads the pinned wheel with pip, extracts the library, checks it and puts it into `folder`; returns its path.
 ///
-/// The wheel is unpacked in a temporary folder next to `folder`, and the library is then moved in one step. So two processes can install at
-/// once, and an interrupted installation leaves nothing that could be loaded.
+/// The wheel is unpacked in a temporary folder next to `folder`, and the library is then moved in one step. So two
+/// processes can install at once, and an interrupted installation leaves nothing that could be loaded.
 ///
 /// # Errors
 /// A message that names the step that failed.
@@ -133,11 +127,7 @@ fn download(pin: Pin, folder: &Path) -> Result<(), String> {
         match download_command(pip, pin, folder).output() {
             Ok(output) if output.status.success() => return Ok(()),
             Ok(output) if !is_missing(&output) => {
-                return Err(format!(
-                    "`{}` failed: {}",
-                    pip.join(" "),
-                    last_line(&output)
-                ));
+                return Err(format!("`{}` failed: {}", pip.join(" "), last_line(&output)));
             }
             // No such program, or a Python without pip: try the next one.
             Ok(_) | Err(_) => {}
@@ -164,8 +154,7 @@ fn download_command(pip: &[&str], pin: Pin, folder: &Path) -> Command {
 /// True if the program, or pip in its Python, does not exist.
 fn is_missing(output: &Output) -> bool {
     // 127 is the exit status of a shim (pyenv, asdf) for a program that does not exist.
-    output.status.code() == Some(127)
-        || String::from_utf8_lossy(&output.stderr).contains("No module named pip")
+    output.status.code() == Some(127) || String::from_utf8_lossy(&output.stderr).contains("No module named pip")
 }
 
 /// Last non-empty line of stdout and stderr, else the exit status.
@@ -193,12 +182,10 @@ fn wheel_in(folder: &Path) -> Result<PathBuf, String> {
 fn unpack(wheel: &Path, pin: Pin, target: &Path) -> Result<(), String> {
     let file = File::open(wheel).map_err(|e| unreadable_wheel(wheel, e))?;
     let mut archive = ZipArchive::new(file).map_err(|e| unreadable_wheel(wheel, e))?;
-    let mut library = archive
-        .by_name(&format!("onnxruntime/capi/{}", pin.file))
-        .map_err(|e| unreadable_wheel(wheel, e))?;
+    let mut library =
+        archive.by_name(&format!("onnxruntime/capi/{}", pin.file)).map_err(|e| unreadable_wheel(wheel, e))?;
     let mut hasher = Sha256::new();
-    copy(&mut library, target, &mut hasher)
-        .map_err(|e| path_error(target, "cannot be written", &e))?;
+    copy(&mut library, target, &mut hasher).map_err(|e| path_error(target, "cannot be written", &e))?;
     let found = hex(&hasher.finalize());
     if found == pin.sha256 {
         return Ok(());
@@ -240,9 +227,7 @@ mod tests {
     fn wheel(path: &Path, name: &str, content: &[u8]) -> Pin {
         let mut writer = zip::ZipWriter::new(File::create(path).unwrap());
         let options = SimpleFileOptions::default();
-        writer
-            .start_file(format!("onnxruntime/capi/{name}"), options)
-            .unwrap();
+        writer.start_file(format!("onnxruntime/capi/{name}"), options).unwrap();
         writer.write_all(content).unwrap();
         writer.finish().unwrap();
         let sha256 = hex(&Sha256::digest(content)).leak();
@@ -289,8 +274,6 @@ mod tests {
         assert_eq!(last_line(&failed), "ERROR: none found");
         assert!(!is_missing(&failed));
         assert_eq!(last_line(&run_shell("exit 3")), "exit status: 3");
-        assert!(is_missing(&run_shell(
-            "echo \"$0: No module named pip\" >&2; exit 1"
-        )));
+        assert!(is_missing(&run_shell("echo \"$0: No module named pip\" >&2; exit 1")));
     }
 }

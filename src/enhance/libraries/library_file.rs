@@ -1,8 +1,9 @@
 //! Check that the file of a library is complete, before it is loaded: [`LibraryFormat::check`].
 //!
-//! The system's loader maps a library without checking its length: a library without its last megabyte kills the program with SIGBUS, and
-//! one without its last 4,096 bytes may load or not. So the size that the header implies is compared with the size of the file. Sources of
-//! the offsets: the ELF specification (gabi, chapters 4 and 5), Apple's `mach-o/loader.h` and `mach-o/fat.h`, and Microsoft's "PE Format".
+//! The system's loader maps a library without checking its length: a library without its last megabyte kills the
+//! program with SIGBUS, and one without its last 4,096 bytes may load or not. So the size that the header implies is
+//! compared with the size of the file. Sources of the offsets: the ELF specification (gabi, chapters 4 and 5), Apple's
+//! `mach-o/loader.h` and `mach-o/fat.h`, and Microsoft's "PE Format".
 
 use std::env::consts;
 use std::fs::File;
@@ -21,13 +22,15 @@ pub(super) enum LibraryFormat {
     Pe,
 }
 
-/// Maximum number of load commands, segments, sections or architectures that are read; chosen (the ONNX Runtime library has fewer than 50).
+/// Maximum number of load commands, segments, sections or architectures that are read; chosen (the ONNX Runtime library
+/// has fewer than 50).
 const MAX_PARTS: u64 = 4096;
 
 /// Symbol that only the ONNX Runtime library exports.
 const ENTRY: &[u8] = b"OrtGetApiBase\0";
 
-/// Maximum size, in bytes, of a table of dynamic names that is searched for [`ENTRY`]; chosen (that of ONNX Runtime has 30 kB).
+/// Maximum size, in bytes, of a table of dynamic names that is searched for [`ENTRY`]; chosen (that of ONNX Runtime has
+/// 30 kB).
 const MAX_NAMES: u64 = 16 << 20;
 
 impl LibraryFormat {
@@ -49,20 +52,13 @@ impl LibraryFormat {
         let before = size_and_time(&file)?;
         self.check_content(&mut file, before.0, consts::ARCH)?;
         if size_and_time(&file)? != before {
-            return Err(
-                "is being written by another process; wait until it is complete".to_owned(),
-            );
+            return Err("is being written by another process; wait until it is complete".to_owned());
         }
         Ok(())
     }
 
     /// Checks a library of `size` bytes for a processor (named as in [`std::env::consts::ARCH`]).
-    fn check_content(
-        self,
-        file: &mut (impl Read + Seek),
-        size: u64,
-        arch: &str,
-    ) -> Result<(), String> {
+    fn check_content(self, file: &mut (impl Read + Seek), size: u64, arch: &str) -> Result<(), String> {
         let mut header = Header { file, start: 0 };
         let needed = match self {
             Self::Elf => header.elf(arch),
@@ -72,9 +68,9 @@ impl LibraryFormat {
         match needed {
             Ok(needed) if needed <= size => Ok(()),
             Ok(needed) => Err(incomplete_message(&format!("{size} of {needed} bytes"))),
-            Err(HeaderError::Truncated) => Err(incomplete_message(&format!(
-                "{size} bytes, fewer than its header states"
-            ))),
+            Err(HeaderError::Truncated) => {
+                Err(incomplete_message(&format!("{size} bytes, fewer than its header states")))
+            }
             Err(HeaderError::Invalid(problem)) => Err(problem.to_owned()),
             Err(HeaderError::Unreadable(e)) => Err(format!("cannot be read: {e}")),
         }
@@ -83,17 +79,13 @@ impl LibraryFormat {
 
 /// Size of a file in bytes, and the time of its last modification if the system records it.
 fn size_and_time(file: &File) -> Result<(u64, Option<SystemTime>), String> {
-    let metadata = file
-        .metadata()
-        .map_err(|e| format!("cannot be read: {e}"))?;
+    let metadata = file.metadata().map_err(|e| format!("cannot be read: {e}"))?;
     Ok((metadata.len(), metadata.modified().ok()))
 }
 
 /// Message about an incomplete file.
 fn incomplete_message(sizes: &str) -> String {
-    format!(
-        "is incomplete: {sizes}; copy or install it again, or wait if another process is still writing it"
-    )
+    format!("is incomplete: {sizes}; copy or install it again, or wait if another process is still writing it")
 }
 
 /// Error in the header of a library.
@@ -118,10 +110,7 @@ impl<F: Read + Seek> Header<'_, F> {
     fn bytes<const N: usize>(&mut self, at: u64) -> Result<[u8; N], HeaderError> {
         let mut bytes = [0; N];
         let at = self.start.checked_add(at).ok_or(HeaderError::Truncated)?;
-        let result = self
-            .file
-            .seek(SeekFrom::Start(at))
-            .and_then(|_| self.file.read_exact(&mut bytes));
+        let result = self.file.seek(SeekFrom::Start(at)).and_then(|_| self.file.read_exact(&mut bytes));
         match result {
             Ok(()) => Ok(bytes),
             Err(e) if matches!(e.kind(), ErrorKind::UnexpectedEof | ErrorKind::InvalidInput) => {
@@ -143,8 +132,8 @@ impl<F: Read + Seek> Header<'_, F> {
         self.bytes(at).map(u64::from_le_bytes)
     }
 
-    /// Minimum size of an ELF library: the end of its last table or segment. ONNX Runtime's releases end with the section table, so even
-    /// one missing byte is detected.
+    /// Minimum size of an ELF library: the end of its last table or segment. ONNX Runtime's releases end with the
+    /// section table, so even one missing byte is detected.
     fn elf(&mut self, arch: &str) -> Result<u64, HeaderError> {
         // Magic, 64 bits, little-endian; ET_DYN is 3.
         if self.bytes::<6>(0)? != *b"\x7fELF\x02\x01" || self.u16(16)? != 3 {
@@ -168,24 +157,16 @@ impl<F: Read + Seek> Header<'_, F> {
             let segment = end_offset(segments, index * segment_size)?;
             needed = needed.max(end_offset(self.u64(segment + 8)?, self.u64(segment + 32)?)?);
         }
-        let size = self
-            .file
-            .seek(SeekFrom::End(0))
-            .map_err(HeaderError::Unreadable)?;
+        let size = self.file.seek(SeekFrom::End(0)).map_err(HeaderError::Unreadable)?;
         if needed <= size && section_count > 0 {
             self.check_exported_entry(sections, section_size, section_count.min(MAX_PARTS))?;
         }
         Ok(needed)
     }
 
-    /// Checks that the table of dynamic names of an ELF library (SHT_STRTAB with SHF_ALLOC) contains [`ENTRY`]. Other libraries, such as
-    /// those of custom operators, must not be loaded, because that would run their initialisers.
-    fn check_exported_entry(
-        &mut self,
-        sections: u64,
-        size: u64,
-        count: u64,
-    ) -> Result<(), HeaderError> {
+    /// Checks that the table of dynamic names of an ELF library (SHT_STRTAB with SHF_ALLOC) contains [`ENTRY`]. Other
+    /// libraries, such as those of custom operators, must not be loaded, because that would run their initialisers.
+    fn check_exported_entry(&mut self, sections: u64, size: u64, count: u64) -> Result<(), HeaderError> {
         for index in 0..count {
             let section = end_offset(sections, index * size)?;
             let is_table = self.u32(section + 4)? == 3 && self.u64(section + 8)? & 2 != 0;
@@ -199,15 +180,14 @@ impl<F: Read + Seek> Header<'_, F> {
                 .and_then(|_| self.file.read_exact(&mut names))
                 .map_err(HeaderError::Unreadable)?;
             if !names.windows(ENTRY.len()).any(|name| name == ENTRY) {
-                return Err(HeaderError::Invalid(
-                    "is not ONNX Runtime: it exports no OrtGetApiBase",
-                ));
+                return Err(HeaderError::Invalid("is not ONNX Runtime: it exports no OrtGetApiBase"));
             }
         }
         Ok(())
     }
 
-    /// Minimum size of a Mach-O library: the end of its last segment, or of the part for this processor in a universal file.
+    /// Minimum size of a Mach-O library: the end of its last segment, or of the part for this processor in a universal
+    /// file.
     fn mach_o(&mut self, arch: &str) -> Result<u64, HeaderError> {
         // CPU_TYPE_X86_64 and CPU_TYPE_ARM64.
         let cpu = match arch {
@@ -250,10 +230,7 @@ impl<F: Read + Seek> Header<'_, F> {
             if u64::from(u32::from_be_bytes(self.bytes(part)?)) == cpu {
                 let start = u64::from(u32::from_be_bytes(self.bytes(part + 8)?));
                 let length = u64::from(u32::from_be_bytes(self.bytes(part + 12)?));
-                let mut inner = Header {
-                    file: &mut *self.file,
-                    start,
-                };
+                let mut inner = Header { file: &mut *self.file, start };
                 return Ok(inner.mach_o_part(cpu)?.max(end_offset(start, length)?));
             }
         }
@@ -283,10 +260,7 @@ impl<F: Read + Seek> Header<'_, F> {
         let mut needed = 0;
         for index in 0..self.u16(at + 6)?.min(MAX_PARTS) {
             let section = sections + 40 * index;
-            needed = needed.max(end_offset(
-                self.u32(section + 20)?,
-                self.u32(section + 16)?,
-            )?);
+            needed = needed.max(end_offset(self.u32(section + 20)?, self.u32(section + 16)?)?);
         }
         Ok(needed)
     }

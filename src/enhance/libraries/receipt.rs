@@ -1,8 +1,8 @@
 //! Integrity check of the installed library with a receipt: [`check`].
 //!
-//! The header of a library shows that it is complete ([`super::library_file`]), but not that its bytes are unchanged. So a file next to
-//! the installed library records its SHA-256, size and time of modification. The library (29 MB) is hashed again only if size or time
-//! differ from this receipt.
+//! The header of a library shows that it is complete ([`super::library_file`]), but not that its bytes are unchanged.
+//! So a file next to the installed library records its SHA-256, size and time of modification. The library (29 MB) is
+//! hashed again only if size or time differ from this receipt.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -47,9 +47,8 @@ impl Receipt {
 
     /// Writes the receipt next to its library. If that fails, the library is hashed at each start.
     fn write(&self, library: &Path) {
-        let result = toml::to_string(self)
-            .map_err(io::Error::other)
-            .and_then(|text| fs::write(path_for(library), text));
+        let result =
+            toml::to_string(self).map_err(io::Error::other).and_then(|text| fs::write(path_for(library), text));
         if let Err(e) = result {
             tracing::debug!("{} has no receipt: {e}", library.display());
         }
@@ -61,19 +60,15 @@ impl Receipt {
 /// # Errors
 /// A message about the fault, to follow the library's path.
 pub(super) fn check(library: &Path, sha256: &str) -> Result<(), String> {
-    let expected = Receipt::for_library(library, sha256.to_owned())
-        .map_err(|e| format!("cannot be read: {e}"))?;
-    let stored: Option<Receipt> = fs::read_to_string(path_for(library))
-        .ok()
-        .and_then(|text| toml::from_str(&text).ok());
+    let expected = Receipt::for_library(library, sha256.to_owned()).map_err(|e| format!("cannot be read: {e}"))?;
+    let stored: Option<Receipt> =
+        fs::read_to_string(path_for(library)).ok().and_then(|text| toml::from_str(&text).ok());
     if stored.as_ref() == Some(&expected) {
         return Ok(());
     }
     let found = hash(library).map_err(|e| format!("cannot be read: {e}"))?;
     if found != sha256 {
-        return Err(format!(
-            "has changed since its installation: its SHA-256 is {found} instead of {sha256}"
-        ));
+        return Err(format!("has changed since its installation: its SHA-256 is {found} instead of {sha256}"));
     }
     expected.write(library);
     Ok(())
@@ -122,20 +117,13 @@ mod tests {
         let sha256 = hex(&Sha256::digest([7; 1000]));
         assert_eq!(check(&library, &sha256), Ok(()));
         let receipt = fs::read_to_string(path_for(&library)).unwrap();
-        assert!(
-            receipt.contains(&sha256) && receipt.contains("1000"),
-            "{receipt}"
-        );
+        assert!(receipt.contains(&sha256) && receipt.contains("1000"), "{receipt}");
         // Other bytes go unnoticed while size and time match the receipt.
         let time = fs::metadata(&library).unwrap().modified().unwrap();
         write_at(&library, &[8; 1000], time);
         assert_eq!(check(&library, &sha256), Ok(()));
         write_at(&library, &[8; 999], time);
-        assert!(
-            check(&library, &sha256)
-                .unwrap_err()
-                .contains("has changed")
-        );
+        assert!(check(&library, &sha256).unwrap_err().contains("has changed"));
         let later = time + std::time::Duration::from_secs(9);
         write_at(&library, &[7; 1000], later);
         // If only the time differs, the receipt is updated.

@@ -2,9 +2,10 @@
 //!
 //! A process can load only one ONNX Runtime, so later calls of `open` return the first one.
 //!
-//! Released builds send telemetry to Microsoft by default. The C API can disable telemetry only after the library has reported the start
-//! of the process and written an identifier to the user's cache folder (seen with 1.31.1 on Linux). The environment variable
-//! [`TELEMETRY_SWITCH`] takes effect earlier, so programs must call [`disable_telemetry`] first.
+//! Released builds send telemetry to Microsoft by default. The C API can disable telemetry only after the library has
+//! reported the start of the process and written an identifier to the user's cache folder (seen with 1.31.1 on Linux).
+//! The environment variable [`TELEMETRY_SWITCH`] takes effect earlier, so programs must call [`disable_telemetry`]
+//! first.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -58,12 +59,10 @@ const TELEMETRY_SWITCH: &str = "ORT_DISABLE_TELEMETRY";
 ///
 /// # Safety
 /// No other thread of the process may be running: C code in another thread could read the environment while it changes.
-#[expect(
-    unsafe_code,
-    reason = "there is no other way to switch off telemetry before ONNX Runtime starts"
-)]
+#[expect(unsafe_code, reason = "there is no other way to switch off telemetry before ONNX Runtime starts")]
 pub unsafe fn disable_telemetry() {
-    // SAFETY: the caller guarantees that no other thread is running, so none can read the environment during the change.
+    // SAFETY: the caller guarantees that no other thread is running, so none can read the environment during the
+    // change.
     unsafe { std::env::set_var(TELEMETRY_SWITCH, "1") };
 }
 
@@ -71,14 +70,15 @@ pub unsafe fn disable_telemetry() {
 static OPEN: Mutex<Option<Runtime>> = Mutex::new(None);
 
 impl RuntimeSearch {
-    /// Opens the library at `self.library`. If no library is named, opens the first usable one in the places of [`LibraryPlace`]. If no
-    /// place has one, installs version 1.31.1 with pip, unless [`Install::Offline`] forbids it.
+    /// Opens the library at `self.library`. If no library is named, opens the first usable one in the places of
+    /// [`LibraryPlace`]. If no place has one, installs version 1.31.1 with pip, unless [`Install::Offline`] forbids it.
     ///
     /// # Errors
-    /// If the named library is not usable, or if no library was found and none could be installed. The message lists the places tried
-    /// and the remedies.
+    /// If the named library is not usable, or if no library was found and none could be installed. The message lists
+    /// the places tried and the remedies.
     pub fn open(&self) -> Result<Runtime> {
-        // The lock is kept until the function returns, so that a second thread waits while the first one installs the library.
+        // The lock is kept until the function returns, so that a second thread waits while the first one installs the
+        // library.
         let mut open = OPEN.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(runtime) = open.as_ref() {
             return self.check_same(runtime);
@@ -89,11 +89,7 @@ impl RuntimeSearch {
                 let path = std::path::absolute(named).unwrap_or_else(|_| named.clone());
                 let version = probe(&path).map_err(|e| unusable_library(&path, &e))?;
                 let place = "named by --llie-options ort-lib or ORT_DYLIB_PATH".to_owned();
-                FoundLibrary {
-                    path,
-                    version,
-                    place,
-                }
+                FoundLibrary { path, version, place }
             }
             None => find(&SearchFolders::from_this_process(), self.install)?,
         };
@@ -109,10 +105,7 @@ impl RuntimeSearch {
         match &self.library {
             Some(path) if resolve(path) != resolve(runtime.path()) => Err(unusable_library(
                 path,
-                &format!(
-                    "cannot be loaded, because this process has already loaded {}",
-                    runtime.path().display()
-                ),
+                &format!("cannot be loaded, because this process has already loaded {}", runtime.path().display()),
             )),
             _ => Ok(runtime.clone()),
         }
@@ -140,11 +133,7 @@ fn find(folders: &SearchFolders, policy: Install) -> Result<FoundLibrary> {
         match check(place, &path) {
             Ok(version) => {
                 let place = place.to_string();
-                return Ok(FoundLibrary {
-                    path,
-                    version,
-                    place,
-                });
+                return Ok(FoundLibrary { path, version, place });
             }
             Err(problem) if place == LibraryPlace::Cache && policy == Install::Allowed => {
                 rejected.push(format!("{} {problem}", path.display()));
@@ -171,7 +160,8 @@ fn find(folders: &SearchFolders, policy: Install) -> Result<FoundLibrary> {
     installed.map_err(|problem| Error::Runtime(not_found_message(&problem, &rejected)))
 }
 
-/// Checks a candidate and returns its version. The pinned library in the cache must also match its installation receipt.
+/// Checks a candidate and returns its version. The pinned library in the cache must also match its installation
+/// receipt.
 fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
     if place == LibraryPlace::Cache
         && let Some(pin) = Pin::for_this_platform()
@@ -183,17 +173,9 @@ fn check(place: LibraryPlace, path: &Path) -> Result<String, String> {
 }
 
 /// Installs the pinned library into the cache.
-fn install_into_cache(
-    folders: &SearchFolders,
-    rejected: &[String],
-) -> Result<FoundLibrary, String> {
-    let pin = Pin::for_this_platform().ok_or_else(|| {
-        format!(
-            "no library is known for {} {}",
-            std::env::consts::OS,
-            std::env::consts::ARCH
-        )
-    })?;
+fn install_into_cache(folders: &SearchFolders, rejected: &[String]) -> Result<FoundLibrary, String> {
+    let pin = Pin::for_this_platform()
+        .ok_or_else(|| format!("no library is known for {} {}", std::env::consts::OS, std::env::consts::ARCH))?;
     let folder = folders.cached_library_folder().ok_or_else(|| {
         let variables = match std::env::consts::OS {
             "windows" => "LOCALAPPDATA is not set",
@@ -210,11 +192,7 @@ fn install_into_cache(
     let path = install(pin, &folder)?;
     let version = probe(&path).map_err(|e| format!("{} {e}", path.display()))?;
     let place = LibraryPlace::Cache.to_string();
-    Ok(FoundLibrary {
-        path,
-        version,
-        place,
-    })
+    Ok(FoundLibrary { path, version, place })
 }
 
 /// Note in brackets with the rejected libraries and packages and their problems; empty if none was rejected.
@@ -248,11 +226,7 @@ fn start_error(path: &Path, error: impl fmt::Display) -> Error {
 impl Runtime {
     /// Loads a library that [`probe`] accepted, and starts its thread.
     fn start(found: FoundLibrary) -> Result<Self> {
-        let FoundLibrary {
-            path,
-            version,
-            place,
-        } = found;
+        let FoundLibrary { path, version, place } = found;
         if std::env::var_os(TELEMETRY_SWITCH).is_none_or(|value| value != "1") {
             tracing::warn!(
                 "ONNX Runtime may report its use to Microsoft; set {TELEMETRY_SWITCH}=1 in the environment to forbid it"
@@ -273,25 +247,16 @@ impl Runtime {
         environment.set_log_level(LogLevel::Warning);
         let thread = RuntimeThread::start().map_err(|e| start_error(&path, e))?;
         tracing::debug!("ONNX Runtime {version} from {}", path.display());
-        Ok(Self(Arc::new(OpenRuntime {
-            path,
-            version,
-            place,
-            environment,
-            thread,
-        })))
+        Ok(Self(Arc::new(OpenRuntime { path, version, place, environment, thread })))
     }
 
     /// The same library with a second thread, so that the sessions of both threads run in parallel.
     ///
-    /// The first thread starts the second one, which on Linux then inherits the CPU setting that treats subnormal numbers as zero. On
-    /// other systems, subnormal numbers may slow the second thread down, but its results have the same bytes.
+    /// The first thread starts the second one, which on Linux then inherits the CPU setting that treats subnormal
+    /// numbers as zero. On other systems, subnormal numbers may slow the second thread down, but its results have the
+    /// same bytes.
     pub(crate) fn with_new_thread(&self) -> Result<Self> {
-        let thread = self
-            .0
-            .thread
-            .run(RuntimeThread::start)?
-            .map_err(|e| Error::Runtime(e.to_string()))?;
+        let thread = self.0.thread.run(RuntimeThread::start)?.map_err(|e| Error::Runtime(e.to_string()))?;
         Ok(Self(Arc::new(OpenRuntime {
             path: self.0.path.clone(),
             version: self.0.version.clone(),
@@ -336,16 +301,9 @@ mod tests {
     fn missing_library_message_lists_remedies() {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("libonnxruntime.so"), "text").unwrap();
-        let folders = SearchFolders {
-            system: vec![folder.path().to_owned()],
-            ..SearchFolders::default()
-        };
+        let folders = SearchFolders { system: vec![folder.path().to_owned()], ..SearchFolders::default() };
         let message = find(&folders, Install::Offline).unwrap_err().to_string();
-        for part in [
-            "--llie-options offline",
-            "--llie-options ort-lib",
-            "pip install onnxruntime==1.31.1",
-        ] {
+        for part in ["--llie-options offline", "--llie-options ort-lib", "pip install onnxruntime==1.31.1"] {
             assert!(message.contains(part), "{message}");
         }
         if cfg!(target_os = "linux") {
@@ -364,10 +322,7 @@ mod tests {
     fn unusable_named_library_is_an_error() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("missing.so");
-        let search = RuntimeSearch {
-            library: Some(path.clone()),
-            install: Install::Allowed,
-        };
+        let search = RuntimeSearch { library: Some(path.clone()), install: Install::Allowed };
         let message = search.open().err().unwrap().to_string();
         assert!(message.contains(&path.display().to_string()), "{message}");
         assert!(message.contains("--llie-options ort-lib"), "{message}");

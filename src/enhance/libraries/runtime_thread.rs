@@ -1,7 +1,8 @@
 //! Thread on which ONNX Runtime creates and runs sessions: [`RuntimeThread`].
 //!
-//! ONNX Runtime sets the CPU flag that treats subnormal numbers as zero when the first session is created, and only in the calling thread.
-//! With one thread for all sessions, the flag applies to every model. Results of other threads do not depend on whether a model was loaded.
+//! ONNX Runtime sets the CPU flag that treats subnormal numbers as zero when the first session is created, and only in
+//! the calling thread. With one thread for all sessions, the flag applies to every model. Results of other threads do
+//! not depend on whether a model was loaded.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
@@ -47,7 +48,8 @@ enum Event<T> {
 /// Time within which a job must end after it was stopped because of its memory; chosen.
 const GRACE: Duration = Duration::from_secs(10);
 
-/// Interval between checks whether the thread is stuck in another caller's job, and longest step in which elapsed time is counted; chosen.
+/// Interval between checks whether the thread is stuck in another caller's job, and longest step in which elapsed time
+/// is counted; chosen.
 const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 impl RuntimeThread {
@@ -57,17 +59,11 @@ impl RuntimeThread {
         std::thread::Builder::new()
             .name("onnxruntime".to_owned())
             .spawn(move || waiting.into_iter().for_each(|job| job()))?;
-        Ok(Self {
-            jobs,
-            stuck: AtomicBool::new(false),
-        })
+        Ok(Self { jobs, stuck: AtomicBool::new(false) })
     }
 
     /// Runs a job, waits for it and returns its result.
-    pub(crate) fn run<T: Send + 'static>(
-        &self,
-        job: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<T> {
+    pub(crate) fn run<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> Result<T> {
         match self.run_within(JobLimits::default(), || {}, job)? {
             JobEnd::Finished(result) => Ok(result),
             JobEnd::TimedOut | JobEnd::MemoryExceeded => Err(thread_ended()),
@@ -77,8 +73,8 @@ impl RuntimeThread {
     /// Runs a job. If it exceeds its `limits`, `stop` is called and must make it end.
     ///
     /// # Errors
-    /// If the job does not end within [`PATIENCE`] times the time limit, or within 10 s after it exceeded the memory limit. The thread is
-    /// then stuck, and every later job is refused.
+    /// If the job does not end within [`PATIENCE`] times the time limit, or within 10 s after it exceeded the memory
+    /// limit. The thread is then stuck, and every later job is refused.
     pub(crate) fn run_within<T: Send + 'static>(
         &self,
         limits: JobLimits,
@@ -89,10 +85,7 @@ impl RuntimeThread {
         let (ended, patience) = match wait_for_end(&events, limits)? {
             JobEnd::TimedOut => {
                 let time = limits.time.unwrap_or_default();
-                (
-                    JobEnd::TimedOut,
-                    time.saturating_mul(PATIENCE - 1).max(POLL_INTERVAL),
-                )
+                (JobEnd::TimedOut, time.saturating_mul(PATIENCE - 1).max(POLL_INTERVAL))
             }
             JobEnd::MemoryExceeded => (JobEnd::MemoryExceeded, GRACE),
             finished @ JobEnd::Finished(_) => return Ok(finished),
@@ -114,7 +107,8 @@ impl RuntimeThread {
         }
     }
 
-    /// Runs a job that cannot be stopped. If it exceeds its `limits`, the thread is abandoned, and every later job is refused.
+    /// Runs a job that cannot be stopped. If it exceeds its `limits`, the thread is abandoned, and every later job is
+    /// refused.
     pub(crate) fn run_or_leave<T: Send + 'static>(
         &self,
         limits: JobLimits,
@@ -129,10 +123,7 @@ impl RuntimeThread {
     }
 
     /// Sends a job to the thread, and waits until it starts.
-    fn start_job<T: Send + 'static>(
-        &self,
-        job: impl FnOnce() -> T + Send + 'static,
-    ) -> Result<Receiver<Event<T>>> {
+    fn start_job<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> Result<Receiver<Event<T>>> {
         let (sender, events) = channel();
         let job = Box::new(move || {
             // Sending fails only if the caller no longer waits.
@@ -162,15 +153,13 @@ impl RuntimeThread {
     }
 }
 
-/// Waits until a job ends or exceeds its limits. A pause of the process (Ctrl-Z, `scontrol suspend`) counts as one polling interval only.
+/// Waits until a job ends or exceeds its limits. A pause of the process (Ctrl-Z, `scontrol suspend`) counts as one
+/// polling interval only.
 fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<JobEnd<T>> {
     let mut left = limits.time;
     loop {
         let step = left.map(|left| left.min(POLL_INTERVAL));
-        let step = [step, limits.memory.poll_interval()]
-            .into_iter()
-            .flatten()
-            .min();
+        let step = [step, limits.memory.poll_interval()].into_iter().flatten().min();
         let start = Instant::now();
         let event = match step {
             None => events.recv().map_err(|_| RecvTimeoutError::Disconnected),
@@ -191,7 +180,8 @@ fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<Job
     }
 }
 
-/// Time during a wait in which the process was running: at most `step`, because a longer wait means that the process was paused.
+/// Time during a wait in which the process was running: at most `step`, because a longer wait means that the process
+/// was paused.
 fn running_time(waited: Duration, step: Option<Duration>) -> Duration {
     step.map_or(waited, |step| waited.min(step))
 }
@@ -215,10 +205,7 @@ mod tests {
 
     /// A time limit without a memory limit.
     fn within(time: Duration) -> JobLimits {
-        JobLimits {
-            time: Some(time),
-            memory: MemoryLimit::NONE,
-        }
+        JobLimits { time: Some(time), memory: MemoryLimit::NONE }
     }
 
     /// Runs a job that ends when it is stopped.
@@ -238,16 +225,10 @@ mod tests {
     #[test]
     fn job_with_too_much_memory_is_stopped() {
         let thread = RuntimeThread::start().unwrap();
-        let [small, large] = ["0.001", "1000000"].map(|gigabytes| JobLimits {
-            time: None,
-            memory: gigabytes.parse().unwrap(),
-        });
+        let [small, large] =
+            ["0.001", "1000000"].map(|gigabytes| JobLimits { time: None, memory: gigabytes.parse().unwrap() });
         assert_eq!(run_until_stopped(&thread, small), JobEnd::MemoryExceeded);
-        let end = thread.run_within(
-            large,
-            || {},
-            || std::thread::sleep(Duration::from_millis(250)),
-        );
+        let end = thread.run_within(large, || {}, || std::thread::sleep(Duration::from_millis(250)));
         assert_eq!(end.unwrap(), JobEnd::Finished(()));
     }
 

@@ -11,7 +11,8 @@ use super::library::{PINNED, is_library_name};
 /// Folders of this process that are searched for a library, directly or in their subfolders.
 #[derive(Debug, Clone, Default)]
 pub(super) struct SearchFolders {
-    /// Folder of the running program, with links resolved, so that its Python environment is found from a link elsewhere.
+    /// Folder of the running program, with links resolved, so that its Python environment is found from a link
+    /// elsewhere.
     pub(super) program: Option<PathBuf>,
     /// Cache folder of the user.
     pub(super) cache: Option<PathBuf>,
@@ -41,14 +42,9 @@ pub(super) enum LibraryPlace {
 }
 
 impl LibraryPlace {
-    /// All places, in the order of the search. The folders of the program come first, so that jobs on a cluster need no setting.
-    pub(super) const ALL: [Self; 5] = [
-        Self::Program,
-        Self::Environment,
-        Self::Cache,
-        Self::Python,
-        Self::System,
-    ];
+    /// All places, in the order of the search. The folders of the program come first, so that jobs on a cluster need no
+    /// setting.
+    pub(super) const ALL: [Self; 5] = [Self::Program, Self::Environment, Self::Cache, Self::Python, Self::System];
 }
 
 impl fmt::Display for LibraryPlace {
@@ -70,8 +66,7 @@ impl SearchFolders {
         let cache = match consts::OS {
             "windows" => folder_variable("LOCALAPPDATA"),
             "macos" => home.as_ref().map(|home| home.join("Library/Caches")),
-            _ => folder_variable("XDG_CACHE_HOME")
-                .or_else(|| home.as_ref().map(|home| home.join(".cache"))),
+            _ => folder_variable("XDG_CACHE_HOME").or_else(|| home.as_ref().map(|home| home.join(".cache"))),
         };
         let mut system = path_variable(match consts::OS {
             "macos" => "DYLD_LIBRARY_PATH",
@@ -104,11 +99,9 @@ impl SearchFolders {
         LibraryPlace::ALL
             .into_iter()
             .flat_map(|place| {
-                self.folders(place).into_iter().flat_map(move |folder| {
-                    libraries_in(&folder)
-                        .into_iter()
-                        .map(move |path| (place, path))
-                })
+                self.folders(place)
+                    .into_iter()
+                    .flat_map(move |folder| libraries_in(&folder).into_iter().map(move |path| (place, path)))
             })
             .filter(|(_, path)| {
                 // One library often has several names, which are links.
@@ -117,8 +110,8 @@ impl SearchFolders {
             .collect()
     }
 
-    /// Folders of Python packages of ONNX Runtime without a separate library. Before version 1.19, the library is part of the Python
-    /// module.
+    /// Folders of Python packages of ONNX Runtime without a separate library. Before version 1.19, the library is part
+    /// of the Python module.
     pub(super) fn packages_without_library(&self) -> Vec<PathBuf> {
         let mut empty: Vec<PathBuf> = [LibraryPlace::Environment, LibraryPlace::Python]
             .into_iter()
@@ -133,17 +126,15 @@ impl SearchFolders {
     fn folders(&self, place: LibraryPlace) -> Vec<PathBuf> {
         match place {
             LibraryPlace::Program => self.program.iter().cloned().collect(),
-            LibraryPlace::Environment => self
-                .program
-                .as_deref()
-                .map_or_else(Vec::new, packages_of_program),
+            LibraryPlace::Environment => self.program.as_deref().map_or_else(Vec::new, packages_of_program),
             LibraryPlace::Cache => self.cached_library_folder().into_iter().collect(),
             LibraryPlace::Python => self.python_packages(),
             LibraryPlace::System => self.system.clone(),
         }
     }
 
-    /// The `onnxruntime/capi` folders of the active Python environment and of those on `PATH`, found without running Python.
+    /// The `onnxruntime/capi` folders of the active Python environment and of those on `PATH`, found without running
+    /// Python.
     fn python_packages(&self) -> Vec<PathBuf> {
         let mut prefixes: Vec<PathBuf> = self.virtual_env.iter().cloned().collect();
         for folder in &self.path {
@@ -161,30 +152,23 @@ impl SearchFolders {
             }
         }
         prefixes.extend(self.home.iter().map(|home| home.join(".local")));
-        prefixes
-            .iter()
-            .flat_map(|prefix| packages_in(prefix))
-            .collect()
+        prefixes.iter().flat_map(|prefix| packages_in(prefix)).collect()
     }
 }
 
 /// Absolute folder in an environment variable; `None` if it is unset or relative.
 fn folder_variable(name: &str) -> Option<PathBuf> {
-    env::var_os(name)
-        .map(PathBuf::from)
-        .filter(|path| path.is_absolute())
+    env::var_os(name).map(PathBuf::from).filter(|path| path.is_absolute())
 }
 
 /// Folders in an environment variable that lists several, such as `PATH`.
 fn path_variable(name: &str) -> Vec<PathBuf> {
-    env::var_os(name)
-        .map(|value| env::split_paths(&value).collect())
-        .unwrap_or_default()
+    env::var_os(name).map(|value| env::split_paths(&value).collect()).unwrap_or_default()
 }
 
 /// The `onnxruntime/capi` folders of the environment in which the program is installed, active or not. For the program
-/// `P/bin/darkqa-eval`, packages are in `P/lib/python3.12/site-packages` (on Windows, `P\Scripts` and `P\Lib\site-packages`), or in `P`
-/// after `pip install --target`.
+/// `P/bin/darkqa-eval`, packages are in `P/lib/python3.12/site-packages` (on Windows, `P\Scripts` and
+/// `P\Lib\site-packages`), or in `P` after `pip install --target`.
 fn packages_of_program(program: &Path) -> Vec<PathBuf> {
     let Some(prefix) = program.parent() else {
         return Vec::new();
@@ -213,8 +197,7 @@ fn packages_in(prefix: &Path) -> Vec<PathBuf> {
     roots
         .iter()
         .flat_map(|root| {
-            ["site-packages", "dist-packages"]
-                .map(|name| root.join(name).join("onnxruntime").join("capi"))
+            ["site-packages", "dist-packages"].map(|name| root.join(name).join("onnxruntime").join("capi"))
         })
         .filter(|folder| folder.is_dir())
         .collect()
@@ -238,11 +221,8 @@ fn libraries_in(folder: &Path) -> Vec<PathBuf> {
 
 /// Paths in a folder, sorted; empty if it cannot be read.
 fn sorted_entries(folder: &Path) -> Vec<PathBuf> {
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(folder)
-        .into_iter()
-        .flatten()
-        .filter_map(|e| Some(e.ok()?.path()))
-        .collect();
+    let mut paths: Vec<PathBuf> =
+        std::fs::read_dir(folder).into_iter().flatten().filter_map(|e| Some(e.ok()?.path())).collect();
     paths.sort();
     paths
 }
@@ -258,11 +238,7 @@ fn system_folders() -> Vec<PathBuf> {
             .iter()
             .flat_map(|folder| {
                 let arch = consts::ARCH;
-                [
-                    (*folder).to_owned(),
-                    format!("{folder}/{arch}-linux-gnu"),
-                    format!("{folder}64"),
-                ]
+                [(*folder).to_owned(), format!("{folder}/{arch}-linux-gnu"), format!("{folder}64")]
             })
             .collect(),
     };
@@ -280,11 +256,7 @@ mod tests {
     }
 
     fn paths(folders: &SearchFolders) -> Vec<PathBuf> {
-        folders
-            .candidates()
-            .into_iter()
-            .map(|(_, path)| path)
-            .collect()
+        folders.candidates().into_iter().map(|(_, path)| path).collect()
     }
 
     #[test]
@@ -333,33 +305,18 @@ mod tests {
         }
         touch(&root.join("base/bin/python3.12"));
         std::fs::create_dir_all(root.join("venv/bin")).unwrap();
-        std::os::unix::fs::symlink(
-            root.join("base/bin/python3.12"),
-            root.join("venv/bin/python"),
-        )
-        .unwrap();
-        let folders = SearchFolders {
-            path: vec![root.join("venv/bin")],
-            ..SearchFolders::default()
-        };
+        std::os::unix::fs::symlink(root.join("base/bin/python3.12"), root.join("venv/bin/python")).unwrap();
+        let folders = SearchFolders { path: vec![root.join("venv/bin")], ..SearchFolders::default() };
         assert_eq!(paths(&folders), expected);
     }
 
     #[test]
     fn packages_without_a_library_are_listed() {
         let root = tempfile::tempdir().unwrap();
-        let capi = root
-            .path()
-            .join("lib/python3.12/site-packages/onnxruntime/capi");
+        let capi = root.path().join("lib/python3.12/site-packages/onnxruntime/capi");
         touch(&capi.join("onnxruntime_pybind11_state.so"));
-        let folders = SearchFolders {
-            program: Some(root.path().join("bin")),
-            ..SearchFolders::default()
-        };
-        assert_eq!(
-            folders.packages_without_library(),
-            std::slice::from_ref(&capi)
-        );
+        let folders = SearchFolders { program: Some(root.path().join("bin")), ..SearchFolders::default() };
+        assert_eq!(folders.packages_without_library(), std::slice::from_ref(&capi));
         touch(&capi.join("libonnxruntime.so.1.19.0"));
         assert!(folders.packages_without_library().is_empty());
     }
@@ -370,10 +327,7 @@ mod tests {
         let library = root.path().join("libonnxruntime.so.1.31.1");
         touch(&library);
         std::os::unix::fs::symlink(&library, root.path().join("libonnxruntime.so.1")).unwrap();
-        let folders = SearchFolders {
-            system: vec![root.path().to_owned()],
-            ..SearchFolders::default()
-        };
+        let folders = SearchFolders { system: vec![root.path().to_owned()], ..SearchFolders::default() };
         assert_eq!(paths(&folders), [library]);
     }
 }

@@ -1,7 +1,7 @@
 //! Memory that the Linux control groups (cgroups) of this process still allow: [`unused_memory`].
 //!
-//! Batch systems and containers limit memory by a control group, and the kernel kills processes that exceed the limit. The limited group
-//! can be an ancestor of the process's own group, so all ancestors are checked.
+//! Batch systems and containers limit memory by a control group, and the kernel kills processes that exceed the limit.
+//! The limited group can be an ancestor of the process's own group, so all ancestors are checked.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -22,13 +22,7 @@ struct Layout {
 
 /// Layouts of version 2 and version 1.
 const LAYOUTS: [Layout; 2] = [
-    Layout {
-        controller: "",
-        folder: "",
-        limit: "memory.max",
-        used: "memory.current",
-        reclaimable: "inactive_file",
-    },
+    Layout { controller: "", folder: "", limit: "memory.max", used: "memory.current", reclaimable: "inactive_file" },
     Layout {
         controller: "memory",
         folder: "memory",
@@ -52,10 +46,8 @@ fn unused_by_groups(own: &str, mount: &Path) -> Option<u64> {
             let folder = mount.join(layout.folder);
             // In a container, the path may name groups outside it, and its own group is mounted at the top.
             let path = own_group(own, layout.controller).unwrap_or("/");
-            let relative: PathBuf = Path::new(path)
-                .components()
-                .filter(|part| matches!(part, Component::Normal(_)))
-                .collect();
+            let relative: PathBuf =
+                Path::new(path).components().filter(|part| matches!(part, Component::Normal(_))).collect();
             folder
                 .join(relative)
                 .ancestors()
@@ -71,10 +63,7 @@ fn own_group<'a>(own: &'a str, controller: &str) -> Option<&'a str> {
     own.lines().find_map(|line| {
         let (_, rest) = line.split_once(':')?;
         let (controllers, path) = rest.split_once(':')?;
-        controllers
-            .split(',')
-            .any(|one| one == controller)
-            .then_some(path)
+        controllers.split(',').any(|one| one == controller).then_some(path)
     })
 }
 
@@ -152,10 +141,7 @@ mod tests {
         let folder = groups(&[
             ("memory/job/memory.limit_in_bytes", "800"),
             ("memory/job/memory.usage_in_bytes", "500"),
-            (
-                "memory/job/memory.stat",
-                "inactive_file 1\ntotal_inactive_file 100\n",
-            ),
+            ("memory/job/memory.stat", "inactive_file 1\ntotal_inactive_file 100\n"),
             // Version 1 writes a missing limit as the largest number of pages.
             ("memory/memory.limit_in_bytes", "9223372036854771712"),
             ("memory/memory.usage_in_bytes", "999"),

@@ -1,15 +1,15 @@
 //! Estimate of the memory that a run needs: [`MemoryCost`].
 //!
-//! ONNX Runtime does not report how much memory a graph needs. So small images are enhanced first, and the growth of the process's memory
-//! between them gives the bytes per pixel, and the bytes per squared pixel count if attention over all pixels makes the growth quadratic.
-//! This needs Linux's `/proc`; on other systems, memory is not estimated.
+//! ONNX Runtime does not report how much memory a graph needs. So small images are enhanced first, and the growth of
+//! the process's memory between them gives the bytes per pixel, and the bytes per squared pixel count if attention over
+//! all pixels makes the growth quadratic. This needs Linux's `/proc`; on other systems, memory is not estimated.
 
 use std::fs;
 
 use super::control_group::unused_memory;
 
-/// Sides of the probe images, in pixels; chosen: attention over 64² pixels takes 67 MB of 32-bit floats, over 256² it would take 17 GB, and
-/// that probe is then skipped.
+/// Sides of the probe images, in pixels; chosen: attention over 64² pixels takes 67 MB of 32-bit floats, over 256² it
+/// would take 17 GB, and that probe is then skipped.
 pub(super) const PROBE_SIDES: [usize; 4] = [64, 128, 256, 512];
 
 /// Bytes of the input and output tensors per pixel: three 32-bit floats each.
@@ -18,8 +18,9 @@ const TENSOR_BYTES_PER_PIXEL: f64 = 24.0;
 /// Ratio of the growth between the last two probes to linear growth above which the growth counts as quadratic; chosen.
 const CURVATURE_RATIO: f64 = 1.25;
 
-/// Maximum growth, in bytes, that a probe may hide by reusing freed memory. The GNU C library returns larger blocks to the system at once
-/// (`DEFAULT_MMAP_THRESHOLD_MAX` on 64 bits). Measured: 22 MB for Zero-DCE and RUAS after an image of 1280 × 720.
+/// Maximum growth, in bytes, that a probe may hide by reusing freed memory. The GNU C library returns larger blocks to
+/// the system at once (`DEFAULT_MMAP_THRESHOLD_MAX` on 64 bits). Measured: 22 MB for Zero-DCE and RUAS after an image
+/// of 1280 × 720.
 const MAX_HIDDEN_BYTES: f64 = (32 << 20) as f64;
 
 /// Memory that a run needs as a function of its number of pixels n: `linear` · n + `square` · n² bytes.
@@ -32,48 +33,36 @@ pub(super) struct MemoryCost {
 impl MemoryCost {
     /// Cost of only the input and output tensors, a lower bound.
     pub(super) fn for_tensors() -> Self {
-        Self {
-            linear: TENSOR_BYTES_PER_PIXEL,
-            square: 0.0,
-        }
+        Self { linear: TENSOR_BYTES_PER_PIXEL, square: 0.0 }
     }
 
-    /// Cost from the pixels of the last three probes and the resident bytes after each; `None` if the memory did not grow, or for fewer
-    /// than two probes. With two probes, all growth counts as quadratic, because that is why a third one was skipped.
+    /// Cost from the pixels of the last three probes and the resident bytes after each; `None` if the memory did not
+    /// grow, or for fewer than two probes. With two probes, all growth counts as quadratic, because that is why a third
+    /// one was skipped.
     pub(super) fn from_probes(measured: &[(usize, u64)]) -> Option<Self> {
         let points: Vec<(f64, f64)> = measured[measured.len().saturating_sub(3)..]
             .iter()
             .map(|(pixels, bytes)| (*pixels as f64, *bytes as f64))
             .collect();
         match points[..] {
-            [a, b] if b.1 > a.1 => Some(Self {
-                linear: 0.0,
-                square: (b.1 - a.1) / (b.0 * b.0 - a.0 * a.0),
-            }),
+            [a, b] if b.1 > a.1 => Some(Self { linear: 0.0, square: (b.1 - a.1) / (b.0 * b.0 - a.0 * a.0) }),
             [a, b, c] if c.1 > b.1 => {
                 let (first, second) = ((b.1 - a.1).max(0.0), c.1 - b.1);
                 let linear = second / (c.0 - b.0);
-                if second
-                    <= CURVATURE_RATIO * (first + MAX_HIDDEN_BYTES) * (c.0 - b.0) / (b.0 - a.0)
-                {
-                    return Some(Self {
-                        linear,
-                        square: 0.0,
-                    });
+                if second <= CURVATURE_RATIO * (first + MAX_HIDDEN_BYTES) * (c.0 - b.0) / (b.0 - a.0) {
+                    return Some(Self { linear, square: 0.0 });
                 }
                 // Newton's divided differences of the parabola through the three probes.
                 let first = first / (b.0 - a.0);
                 let square = (linear - first) / (c.0 - a.0);
-                Some(Self {
-                    linear: (first - square * (a.0 + b.0)).max(0.0),
-                    square,
-                })
+                Some(Self { linear: (first - square * (a.0 + b.0)).max(0.0), square })
             }
             _ => None,
         }
     }
 
-    /// Bytes that a probe of `pixels` needs if all growth between the last two probes was quadratic; 0 for fewer than two probes.
+    /// Bytes that a probe of `pixels` needs if all growth between the last two probes was quadratic; 0 for fewer than
+    /// two probes.
     pub(super) fn worst_case_bytes(measured: &[(usize, u64)], pixels: usize) -> f64 {
         let last_two = &measured[measured.len().saturating_sub(2)..];
         match Self::from_probes(last_two) {
@@ -94,11 +83,7 @@ impl MemoryCost {
     pub(super) fn check_fit(self, pixels: usize, available: u64) -> Result<(), [f64; 2]> {
         const GIGABYTE: f64 = 1e9;
         let needed = self.bytes(pixels);
-        if needed <= available as f64 {
-            Ok(())
-        } else {
-            Err([needed / GIGABYTE, available as f64 / GIGABYTE])
-        }
+        if needed <= available as f64 { Ok(()) } else { Err([needed / GIGABYTE, available as f64 / GIGABYTE]) }
     }
 }
 
@@ -108,7 +93,8 @@ pub(crate) fn resident() -> Option<u64> {
     kilobytes(&status, "VmRSS:")
 }
 
-/// Memory that this process may still use, in bytes: the minimum of the machine's free memory and the unused memory of its control groups.
+/// Memory that this process may still use, in bytes: the minimum of the machine's free memory and the unused memory of
+/// its control groups.
 pub(crate) fn available() -> Option<u64> {
     let free = kilobytes(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable:")?;
     Some(unused_memory().map_or(free, |unused| unused.min(free)))
@@ -125,7 +111,8 @@ fn kilobytes(text: &str, name: &str) -> Option<u64> {
 mod tests {
     use super::*;
 
-    /// Pixels of each probe and the resident bytes after it, for a model of this cost of which `hidden` bytes reuse freed memory.
+    /// Pixels of each probe and the resident bytes after it, for a model of this cost of which `hidden` bytes reuse
+    /// freed memory.
     fn measured(hidden: f64, cost: impl Fn(f64) -> f64) -> Vec<(usize, u64)> {
         PROBE_SIDES
             .iter()
@@ -139,14 +126,8 @@ mod tests {
 
     #[test]
     fn cost_is_computed_from_growth() {
-        assert_eq!(
-            MemoryCost::from_probes(&[(64, 5), (128, 5), (256, 5)]),
-            None
-        );
-        assert_eq!(
-            MemoryCost::from_probes(&[(64, 7), (128, 6), (256, 5)]),
-            None
-        );
+        assert_eq!(MemoryCost::from_probes(&[(64, 5), (128, 5), (256, 5)]), None);
+        assert_eq!(MemoryCost::from_probes(&[(64, 7), (128, 6), (256, 5)]), None);
         assert_eq!(MemoryCost::from_probes(&[(64, 7)]), None);
         let cost = MemoryCost::from_probes(&measured(0.0, |pixels| 800.0 * pixels)).unwrap();
         assert_eq!(cost.check_fit(1_000_000, 801_000_000), Ok(()));
@@ -157,12 +138,7 @@ mod tests {
     #[test]
     fn reused_memory_does_not_make_linear_growth_quadratic() {
         // Zero-DCE after an image of 1280 × 720: sides in pixels, and memory in MiB.
-        let zero_dce = [
-            (64 * 64, 77 << 20),
-            (128 * 128, 79 << 20),
-            (256 * 256, 110 << 20),
-            (512 * 512, 344 << 20),
-        ];
+        let zero_dce = [(64 * 64, 77 << 20), (128 * 128, 79 << 20), (256 * 256, 110 << 20), (512 * 512, 344 << 20)];
         let cost = MemoryCost::from_probes(&zero_dce).unwrap();
         let [needed, _] = cost.check_fit(2560 * 1440, 1).unwrap_err();
         assert!((3.0..5.0).contains(&needed), "{needed}");
@@ -184,13 +160,8 @@ mod tests {
         let [needed, _] = cost.check_fit(640 * 480, 8_000_000_000).unwrap_err();
         assert!((needed - 377.5).abs() < 1.0, "{needed}");
         // Attention at a quarter of the image's size, with reused memory.
-        let coarse = measured(MAX_HIDDEN_BYTES, |pixels| {
-            500.0 * pixels + pixels * pixels / 64.0
-        });
-        let [needed, _] = MemoryCost::from_probes(&coarse)
-            .unwrap()
-            .check_fit(2560 * 1440, 1)
-            .unwrap_err();
+        let coarse = measured(MAX_HIDDEN_BYTES, |pixels| 500.0 * pixels + pixels * pixels / 64.0);
+        let [needed, _] = MemoryCost::from_probes(&coarse).unwrap().check_fit(2560 * 1440, 1).unwrap_err();
         assert!((200.0..250.0).contains(&needed), "{needed}");
         // From two probes, the third would need 17 GB; without it, the estimate is no smaller.
         let worst = MemoryCost::worst_case_bytes(&attention[..2], 256 * 256);
@@ -205,10 +176,7 @@ mod tests {
 
     #[test]
     fn memory_figures_of_the_system_are_parsed() {
-        assert_eq!(
-            kilobytes("A: 1 kB\nVmRSS:\t  12 kB\n", "VmRSS:"),
-            Some(12_288)
-        );
+        assert_eq!(kilobytes("A: 1 kB\nVmRSS:\t  12 kB\n", "VmRSS:"), Some(12_288));
         assert_eq!(kilobytes("VmRSS: much", "VmRSS:"), None);
         if cfg!(target_os = "linux") {
             let resident = resident().unwrap();

@@ -1,7 +1,7 @@
 //! Check that enough memory is free for a large run: [`MemoryCheck`].
 //!
-//! The estimate is based on the size of the input tensor, because a wrong multiple or fixed size in a sidecar can make it much larger than
-//! the image. The check precedes the allocation.
+//! The estimate is based on the size of the input tensor, because a wrong multiple or fixed size in a sidecar can make
+//! it much larger than the image. The check precedes the allocation.
 
 use super::memory::{self, MemoryCost, PROBE_SIDES};
 use crate::conventions::Locality;
@@ -31,7 +31,8 @@ impl MemoryCheck {
         Self(Estimate::Unknown)
     }
 
-    /// Checks a run on an image. The sizes of the input and the image are heights and widths in pixels. Small inputs always pass.
+    /// Checks a run on an image. The sizes of the input and the image are heights and widths in pixels. Small inputs
+    /// always pass.
     ///
     /// The inner error is a message with the needed memory, the free memory and a remedy.
     ///
@@ -69,17 +70,12 @@ impl MemoryCheck {
 }
 
 /// Message for an image on which ONNX Runtime could not allocate memory, with a remedy.
-pub(crate) fn out_of_memory(
-    failure: &RunFailure,
-    rule: SizeRule,
-    image_size: [usize; 2],
-) -> String {
+pub(crate) fn out_of_memory(failure: &RunFailure, rule: SizeRule, image_size: [usize; 2]) -> String {
     let RunFailure::NoMemory { fed, requested } = failure else {
         return failure.message();
     };
-    let requested = requested.map_or(String::new(), |bytes| {
-        format!("{} were needed at once, ", format_gigabytes(bytes))
-    });
+    let requested =
+        requested.map_or(String::new(), |bytes| format!("{} were needed at once, ", format_gigabytes(bytes)));
     let free = memory::available().map_or("too few GB".to_owned(), format_gigabytes);
     let (message, remedy) = (failure.message(), remedy(rule, *fed, image_size));
     format!("{message}: {requested}{free} are free; {remedy}")
@@ -104,9 +100,7 @@ fn remedy(rule: SizeRule, input_size: [usize; 2], image_size: [usize; 2]) -> Str
             format_size(image_size),
             rule.multiple
         ),
-        _ if !rule.takes_any_size() => {
-            "export it for a smaller size, or with dynamic_axes".to_owned()
-        }
+        _ if !rule.takes_any_size() => "export it for a smaller size, or with dynamic_axes".to_owned(),
         Some(Locality::Global) => SMALLER.to_owned(),
         Some(Locality::Exact(_)) => "--llie-options tile=256 needs a fraction of it".to_owned(),
         None => format!(
@@ -115,8 +109,8 @@ fn remedy(rule: SizeRule, input_size: [usize; 2], image_size: [usize; 2]) -> Str
     }
 }
 
-/// Measures the memory cost on small images of increasing size. Stops before a probe that could need more than half of the free memory,
-/// assuming quadratic growth.
+/// Measures the memory cost on small images of increasing size. Stops before a probe that could need more than half of
+/// the free memory, assuming quadratic growth.
 fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
     if graph.signature.height.is_some() || graph.signature.width.is_some() {
         return Ok(Estimate::Tensors);
@@ -166,9 +160,6 @@ mod tests {
         let side = 1 << 32;
         let rule = SizeRule::new([Some(side); 2], &ModelSidecar::default(), Padding::Zero);
         let remedy = remedy(rule, [side; 2], [480, 640]);
-        assert!(
-            remedy.starts_with("the image has only 640 × 480"),
-            "{remedy}"
-        );
+        assert!(remedy.starts_with("the image has only 640 × 480"), "{remedy}");
     }
 }

@@ -6,15 +6,17 @@ use std::time::Duration;
 
 use super::memory::{available, resident};
 
-/// Maximum memory of this process, in bytes, while an enhancer runs (`--llie-options max-memory`). Without Linux's `/proc`, memory is not
-/// limited.
+/// Maximum memory of this process, in bytes, while an enhancer runs (`--llie-options max-memory`). Without Linux's
+/// `/proc`, memory is not limited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryLimit(Option<u64>);
 
-/// Share of the memory free at the start that an enhancer may take by default; chosen, to leave the rest to other programs.
+/// Share of the memory free at the start that an enhancer may take by default; chosen, to leave the rest to other
+/// programs.
 const FREE_SHARE: f64 = 0.8;
 
-/// Interval between checks of the memory; chosen. A process can allocate about 1 GB in that time; a check takes about 20 µs.
+/// Interval between checks of the memory; chosen. A process can allocate about 1 GB in that time; a check takes about
+/// 20 µs.
 const POLL_INTERVAL: Duration = Duration::from_millis(100);
 
 const GIGABYTE: f64 = 1e9;
@@ -27,9 +29,7 @@ impl MemoryLimit {
     #[must_use]
     pub fn automatic() -> Self {
         match (resident(), available()) {
-            (Some(resident), Some(free)) => {
-                Self(Some(resident + (FREE_SHARE * free as f64) as u64))
-            }
+            (Some(resident), Some(free)) => Self(Some(resident + (FREE_SHARE * free as f64) as u64)),
             _ => Self::NONE,
         }
     }
@@ -62,9 +62,7 @@ impl FromStr for MemoryLimit {
     fn from_str(text: &str) -> Result<Self, String> {
         match text.parse::<f64>() {
             Ok(0.0) => Ok(Self::NONE),
-            Ok(number) if number > 0.0 && number.is_finite() => {
-                Ok(Self(Some((number * GIGABYTE) as u64)))
-            }
+            Ok(number) if number > 0.0 && number.is_finite() => Ok(Self(Some((number * GIGABYTE) as u64))),
             _ => Err("expected a number of GB (10⁹ bytes), or 0 for no limit".to_owned()),
         }
     }
@@ -76,11 +74,7 @@ mod tests {
 
     #[test]
     fn limits_are_gigabytes_and_zero_is_none() {
-        for (text, limit) in [
-            ("4", Some(4_000_000_000)),
-            ("0.5", Some(500_000_000)),
-            ("0", None),
-        ] {
+        for (text, limit) in [("4", Some(4_000_000_000)), ("0.5", Some(500_000_000)), ("0", None)] {
             let read: MemoryLimit = text.parse().unwrap();
             assert_eq!(read.0, limit);
             assert_eq!(read.to_string(), text);

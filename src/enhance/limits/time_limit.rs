@@ -10,11 +10,12 @@ use darkqa_base::types::flags::seconds;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeLimit(Option<Duration>);
 
-/// Number of images in a row that exceed a limit of time or memory after which the enhancer is not run any more; chosen.
+/// Number of images in a row that exceed a limit of time or memory after which the enhancer is not run any more;
+/// chosen.
 pub(crate) const MAX_CONSECUTIVE_OVERRUNS: usize = 3;
 
-/// Multiple of the time limit after which a stopped run counts as stuck; chosen. ONNX Runtime ends a run only between two nodes of its
-/// graph.
+/// Multiple of the time limit after which a stopped run counts as stuck; chosen. ONNX Runtime ends a run only between
+/// two nodes of its graph.
 pub(crate) const PATIENCE: u32 = 10;
 
 impl TimeLimit {
@@ -67,10 +68,7 @@ pub(crate) struct ImageClock {
 impl ImageClock {
     /// A clock at the start of an image.
     pub(crate) fn new(limit: TimeLimit) -> Self {
-        Self {
-            limit,
-            used: Duration::ZERO,
-        }
+        Self { limit, used: Duration::ZERO }
     }
 
     /// Remaining time; `None` without a limit.

@@ -1,12 +1,11 @@
 //! Computation of the enhanced image from the outputs of a run: [`Composition`].
 //!
-//! Most models return the image itself, which is decoded to bytes in one pass. For an expression of outputs, or a model of the luma,
-//! outputs are decoded to floats; then `image` is evaluated, the chroma added, and the result clamped and rounded.
+//! Most models return the image itself, which is decoded to bytes in one pass. For an expression of outputs, or a model
+//! of the luma, outputs are decoded to floats; then `image` is evaluated, the chroma added, and the result clamped and
+//! rounded.
 
 use super::output::INPUT;
-use super::output_decoding::{
-    Certainty, InvalidValues, OutputDecoding, TensorSamples, check_values,
-};
+use super::output_decoding::{Certainty, InvalidValues, OutputDecoding, TensorSamples, check_values};
 use crate::conventions::sidecar::ModelSidecar;
 use crate::conventions::{Channels, Rounding, Signature, TensorLayout, ValueRange};
 use crate::expressions::Expression;
@@ -53,16 +52,10 @@ impl WrongSize {
         let [_, height, width] = self.layout.axes();
         let sides = [height, width].map(|axis| usize::try_from(*self.dims.get(axis)?).ok());
         let given = match sides {
-            [Some(height), Some(width)] if self.dims.len() == self.layout.rank() => {
-                Some([height, width])
-            }
+            [Some(height), Some(width)] if self.dims.len() == self.layout.rank() => Some([height, width]),
             _ => None,
         };
-        RunFailure::WrongSize {
-            fed,
-            given,
-            dims: self.dims,
-        }
+        RunFailure::WrongSize { fed, given, dims: self.dims }
     }
 }
 
@@ -74,11 +67,8 @@ impl Composition {
     pub(crate) fn new(signature: &Signature, convention: &ModelSidecar) -> Result<Self, String> {
         let channels = convention.channels.unwrap_or_default();
         if let (Channels::Y, Some(image)) = (channels, &convention.image) {
-            let name_channels: Vec<usize> = image
-                .names()
-                .iter()
-                .map(|name| if name == INPUT { 3 } else { 1 })
-                .collect();
+            let name_channels: Vec<usize> =
+                image.names().iter().map(|name| if name == INPUT { 3 } else { 1 }).collect();
             if image.channels(&name_channels) != 1 {
                 return Err(format!(
                     "takes one channel (channels = \"y\"), but image = \"{image}\" has three; wrap the expression in mean(…) or max(…)"
@@ -113,12 +103,7 @@ impl Composition {
 
     /// True if the result depends on the degraded image.
     pub(crate) fn needs_dark(&self) -> bool {
-        self.channels == Channels::Y
-            || self
-                .image
-                .iter()
-                .flat_map(Expression::names)
-                .any(|name| name == INPUT)
+        self.channels == Channels::Y || self.image.iter().flat_map(Expression::names).any(|name| name == INPUT)
     }
 
     /// Assigns layouts to the outputs of a run on an input of this size.
@@ -134,24 +119,17 @@ impl Composition {
             .iter()
             .zip(outputs)
             .map(|(decoding, output)| {
-                let (layout, channels) =
-                    decoding
-                        .layout(&output.dims, size)
-                        .ok_or_else(|| WrongSize {
-                            layout: decoding.layout.unwrap_or(decoding.preferred),
-                            dims: output.dims.clone(),
-                        })?;
-                Ok(ImageTensor {
-                    samples: output.samples,
-                    layout,
-                    channels,
-                })
+                let (layout, channels) = decoding.layout(&output.dims, size).ok_or_else(|| WrongSize {
+                    layout: decoding.layout.unwrap_or(decoding.preferred),
+                    dims: output.dims.clone(),
+                })?;
+                Ok(ImageTensor { samples: output.samples, layout, channels })
             })
             .collect()
     }
 
-    /// Bytes of a part of the result. `size` is the size of the outputs; `dark` is the same part of the degraded image, if
-    /// [`Self::needs_dark`].
+    /// Bytes of a part of the result. `size` is the size of the outputs; `dark` is the same part of the degraded image,
+    /// if [`Self::needs_dark`].
     pub(crate) fn bytes(
         &self,
         outputs: &[ImageTensor<'_>],
@@ -160,9 +138,7 @@ impl Composition {
         dark: Option<&Planes>,
     ) -> Result<Vec<u8>, InvalidValues> {
         if self.is_plain() {
-            let ImageTensor {
-                samples, layout, ..
-            } = outputs[0];
+            let ImageTensor { samples, layout, .. } = outputs[0];
             return self.outputs[0].bytes(samples, layout, size, part);
         }
         let image = self.planes(outputs, size, part, dark)?;
@@ -190,14 +166,7 @@ impl Composition {
                     None => decoding.certainty,
                     Some(_) => Certainty::Known,
                 };
-                decoding.planes(
-                    output.samples,
-                    output.layout,
-                    output.channels,
-                    size,
-                    part,
-                    certainty,
-                )
+                decoding.planes(output.samples, output.layout, output.channels, size, part, certainty)
             })
             .collect::<Result<Vec<_>, _>>()?;
         let image = match &self.image {

@@ -6,16 +6,8 @@ use crate::expressions::{ChannelSlice, Expression};
 use crate::graphs::{Dim, Port, format_ports};
 
 /// Usual names of the enhanced image in models with several outputs.
-const IMAGE_NAMES: [&str; 8] = [
-    "enhanced",
-    "enhanced_image",
-    "enhance_image",
-    "enhance",
-    "output",
-    "output_image",
-    "result",
-    "image",
-];
+const IMAGE_NAMES: [&str; 8] =
+    ["enhanced", "enhanced_image", "enhance_image", "enhance", "output", "output_image", "result", "image"];
 
 /// Graph output that is the enhanced image, or an operand of its expression.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,8 +25,8 @@ pub(crate) struct Output {
 }
 
 impl Output {
-    /// Chooses the image among the outputs: the stated one, else the only candidate, else the one on which name and structure agree.
-    /// `fits` is true if an output can be an image with the given number of channels.
+    /// Chooses the image among the outputs: the stated one, else the only candidate, else the one on which name and
+    /// structure agree. `fits` is true if an output can be an image with the given number of channels.
     ///
     /// # Errors
     /// If no output or several could be the image; the message follows the file's name.
@@ -60,9 +52,7 @@ impl Output {
         let (index, reason) = match (images.as_slice(), stated) {
             ([only], None) => (*only, "the only output that can be the image"),
             // The index may refer to the authors' model, which can have more outputs than this export.
-            ([only], Some(OutputChoice::Index(_))) if outputs.len() == 1 => {
-                (*only, "the only output")
-            }
+            ([only], Some(OutputChoice::Index(_))) if outputs.len() == 1 => (*only, "the only output"),
             (_, Some(choice)) => {
                 let index = stated_output(outputs, choice, |port| fits(port, channels.count()))?;
                 (index, "stated")
@@ -76,13 +66,7 @@ impl Output {
             },
         };
         let port = outputs[index].clone();
-        Ok(Self {
-            layout: port.layout(channels.count()),
-            port,
-            channels: vec![channels.count()],
-            slice: None,
-            reason,
-        })
+        Ok(Self { layout: port.layout(channels.count()), port, channels: vec![channels.count()], slice: None, reason })
     }
 
     /// Outputs named by the expression of the image, in its order.
@@ -99,22 +83,17 @@ impl Output {
             Channels::Rgb => &[3, 1],
             Channels::Y => &[1],
         };
-        let known: Vec<&str> = outputs
-            .iter()
-            .map(|port| port.name.as_str())
-            .chain([INPUT])
-            .collect();
-        let slices: Vec<&str> = image
-            .names()
-            .iter()
-            .filter(|name| find_slice(outputs, name).is_some())
-            .map(String::as_str)
-            .collect();
+        let known: Vec<&str> = outputs.iter().map(|port| port.name.as_str()).chain([INPUT]).collect();
+        let slices: Vec<&str> =
+            image.names().iter().filter(|name| find_slice(outputs, name).is_some()).map(String::as_str).collect();
         let known_names = [&known[..], &slices].concat();
         image
             .check_names("image", &known_names)
             .map_err(|problem| format!("{problem}; outputs: {}", format_ports(outputs)))?;
-        let outputs: Vec<Self> = image.names().iter().filter(|name| *name != INPUT)
+        let outputs: Vec<Self> = image
+            .names()
+            .iter()
+            .filter(|name| *name != INPUT)
             .map(|name| {
                 if let Some((port, slice)) = find_slice(outputs, name) {
                     return Self::from_slice(port, slice, &fits);
@@ -151,22 +130,17 @@ impl Output {
     ///
     /// # Errors
     /// If the output has fewer channels, or another size than the input.
-    fn from_slice(
-        port: &Port,
-        slice: ChannelSlice,
-        fits: impl Fn(&Port, usize) -> bool,
-    ) -> Result<Self, String> {
-        let count = port
-            .channel_counts()
-            .into_iter()
-            .find(|count| *count >= slice.end && fits(port, *count))
-            .ok_or_else(|| {
-                format!(
-                    "gives {port}, which has no channels {} to {} (counted from 0) of the input's size",
-                    slice.first,
-                    slice.end - 1
-                )
-            })?;
+    fn from_slice(port: &Port, slice: ChannelSlice, fits: impl Fn(&Port, usize) -> bool) -> Result<Self, String> {
+        let count =
+            port.channel_counts().into_iter().find(|count| *count >= slice.end && fits(port, *count)).ok_or_else(
+                || {
+                    format!(
+                        "gives {port}, which has no channels {} to {} (counted from 0) of the input's size",
+                        slice.first,
+                        slice.end - 1
+                    )
+                },
+            )?;
         Ok(Self {
             layout: port.layout(count),
             port: port.clone(),
@@ -179,9 +153,8 @@ impl Output {
 
 /// Indices of the outputs that can be the image. Outputs without declared dimensions count only if there are no others.
 fn candidate_images(outputs: &[Port], fits: impl Fn(&Port) -> bool) -> Vec<usize> {
-    let (shaped, shapeless): (Vec<usize>, Vec<usize>) = (0..outputs.len())
-        .filter(|&i| fits(&outputs[i]))
-        .partition(|&i| !outputs[i].dims.is_empty());
+    let (shaped, shapeless): (Vec<usize>, Vec<usize>) =
+        (0..outputs.len()).filter(|&i| fits(&outputs[i])).partition(|&i| !outputs[i].dims.is_empty());
     if shaped.is_empty() { shapeless } else { shaped }
 }
 
@@ -197,9 +170,7 @@ fn find_slice<'a>(outputs: &'a [Port], name: &str) -> Option<(&'a Port, ChannelS
 
 /// A name as written in expressions, in backticks if needed.
 pub(crate) fn expression_name(name: &str) -> String {
-    if name
-        .chars()
-        .all(|c: char| c.is_ascii_alphanumeric() || c == '_')
+    if name.chars().all(|c: char| c.is_ascii_alphanumeric() || c == '_')
         && !name.starts_with(|c: char| c.is_ascii_digit())
     {
         name.to_owned()
@@ -214,17 +185,11 @@ pub(crate) fn light_map_line(term: &str) -> String {
 }
 
 /// Message for a model without an image output, with the line to add or the export to change.
-fn no_image_message(
-    outputs: &[Port],
-    channels: Channels,
-    fits: impl Fn(&Port, usize) -> bool,
-) -> String {
+fn no_image_message(outputs: &[Port], channels: Channels, fits: impl Fn(&Port, usize) -> bool) -> String {
     if channels == Channels::Rgb
         && let Some((port, count)) = outputs.iter().find_map(|port| {
-            let count = port
-                .channel_counts()
-                .into_iter()
-                .find(|count| *count > 1 && *count != 3 && fits(port, *count))?;
+            let count =
+                port.channel_counts().into_iter().find(|count| *count > 1 && *count != 3 && fits(port, *count))?;
             Some((port, count))
         })
     {
@@ -257,21 +222,16 @@ fn no_image_message(
     }
     if let [port] = outputs {
         let problem = match (&port.element, port.dims.len()) {
-            (ElementType::Other(_), _) => Some(
-                "not a tensor of numbers; export it so that it gives one image as float32"
-                    .to_owned(),
-            ),
+            (ElementType::Other(_), _) => {
+                Some("not a tensor of numbers; export it so that it gives one image as float32".to_owned())
+            }
             (element, _) if !element.is_output_type() => {
                 Some("an unsupported type; export it so that it gives float32 or uint8".to_owned())
             }
-            (_, 1 | 2) => Some(
-                "a vector, not an image; export it so that it gives [1, 3, height, width]"
-                    .to_owned(),
-            ),
-            (_, 5..) => Some(
-                "several frames at a time; export it for single images of [1, 3, height, width]"
-                    .to_owned(),
-            ),
+            (_, 1 | 2) => Some("a vector, not an image; export it so that it gives [1, 3, height, width]".to_owned()),
+            (_, 5..) => {
+                Some("several frames at a time; export it for single images of [1, 3, height, width]".to_owned())
+            }
             _ => None,
         };
         if let Some(problem) = problem {
@@ -282,10 +242,7 @@ fn no_image_message(
         Channels::Rgb => "an image",
         Channels::Y => "an image of one channel (channels = \"y\")",
     };
-    format!(
-        "has no output that is {what} of the input's size; outputs: {}",
-        format_ports(outputs)
-    )
+    format!("has no output that is {what} of the input's size; outputs: {}", format_ports(outputs))
 }
 
 /// Name of the degraded image in the expression `image`.
@@ -297,10 +254,7 @@ fn ambiguous_message(outputs: &[Port]) -> String {
     let presets = match presets.as_slice() {
         [] => String::new(),
         names => {
-            format!(
-                "; presets with such outputs: {} (--llie PRESET:FILE)",
-                names.join(", ")
-            )
+            format!("; presets with such outputs: {} (--llie PRESET:FILE)", names.join(", "))
         }
     };
     format!(
@@ -313,11 +267,7 @@ fn ambiguous_message(outputs: &[Port]) -> String {
 ///
 /// # Errors
 /// If the output does not exist or cannot be the image.
-fn stated_output(
-    outputs: &[Port],
-    choice: &OutputChoice,
-    fits: impl Fn(&Port) -> bool,
-) -> Result<usize, String> {
+fn stated_output(outputs: &[Port], choice: &OutputChoice, fits: impl Fn(&Port) -> bool) -> Result<usize, String> {
     let found = match choice {
         OutputChoice::Index(index) => (*index < outputs.len()).then_some(*index),
         OutputChoice::Name(name) => outputs.iter().position(|port| port.name == *name),
@@ -327,20 +277,14 @@ fn stated_output(
         Some(_) => "which is not an image",
         None => "which does not exist",
     };
-    Err(format!(
-        "MODEL.onnx.toml or the preset sets {choice}, {problem}; outputs: {}",
-        format_ports(outputs)
-    ))
+    Err(format!("MODEL.onnx.toml or the preset sets {choice}, {problem}; outputs: {}", format_ports(outputs)))
 }
 
 /// Index of the only candidate with one of [`IMAGE_NAMES`]; `None` if several have one.
 ///
 /// The name of the first output counts only if the others are named too; see [`Port::is_numbered`].
 fn index_by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
-    let mut matching = images
-        .iter()
-        .copied()
-        .filter(|i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str()));
+    let mut matching = images.iter().copied().filter(|i: &usize| IMAGE_NAMES.contains(&outputs[*i].name.as_str()));
     let only = matching.next().filter(|_| matching.next().is_none())?;
     let is_named_by_user = only > 0 || !outputs.iter().any(Port::is_numbered);
     is_named_by_user.then_some(only)
@@ -349,11 +293,9 @@ fn index_by_name(outputs: &[Port], images: &[usize]) -> Option<usize> {
 /// Index of the image among Zero-DCE's three outputs, whatever their names; `None` for other outputs.
 ///
 /// `enhance_net_nopool.forward` of <https://github.com/Li-Chongyi/Zero-DCE> returns the image after four curves, the
-/// image after all eight, and the 8 × 3 = 24 channels of the curves themselves. No other published model has this shape.
+/// image after all eight, and the 8 × 3 = 24 channels of the curves themselves. No other published model has this
+/// shape.
 fn zero_dce_index(outputs: &[Port]) -> Option<usize> {
-    let channels: Vec<Option<usize>> = outputs
-        .iter()
-        .map(|port| port.dims.get(1).and_then(Dim::known))
-        .collect();
+    let channels: Vec<Option<usize>> = outputs.iter().map(|port| port.dims.get(1).and_then(Dim::known)).collect();
     (channels == [Some(3), Some(3), Some(24)]).then_some(1)
 }

@@ -8,9 +8,7 @@ use half::f16;
 
 use super::output::Output;
 use crate::conventions::sidecar::ModelSidecar;
-use crate::conventions::{
-    ChannelOrder, ElementType, ImageInput, Rounding, TensorLayout, ValueRange,
-};
+use crate::conventions::{ChannelOrder, ElementType, ImageInput, Rounding, TensorLayout, ValueRange};
 use crate::expressions::ChannelSlice;
 use crate::planes::Planes;
 use crate::sizing::TileWindow;
@@ -28,7 +26,8 @@ pub(crate) struct OutputDecoding {
     pub(super) slice: Option<ChannelSlice>,
     pub(crate) color: ChannelOrder,
     pub(crate) range: ValueRange,
-    /// Means and standard deviations: each channel is multiplied by its deviation, then its mean is added. `None` for neither.
+    /// Means and standard deviations: each channel is multiplied by its deviation, then its mean is added. `None` for
+    /// neither.
     pub(crate) mean_and_std: Option<[[f32; 3]; 2]>,
     /// Whether `range` is known or must be checked against the values.
     pub(super) certainty: Certainty,
@@ -96,12 +95,7 @@ impl OutputDecoding {
                 (ValueRange::Bytes, Certainty::Known)
             }
             // An unstated range is assumed to be that of the input.
-            (None, _) => (
-                convention
-                    .range_in
-                    .unwrap_or(input.port.element.usual_range()),
-                Certainty::Assumed,
-            ),
+            (None, _) => (convention.range_in.unwrap_or(input.port.element.usual_range()), Certainty::Assumed),
         };
         Self {
             layout: convention.layout_out.or(output.layout),
@@ -109,10 +103,7 @@ impl OutputDecoding {
             channels: output.channels.clone(),
             slice: output.slice,
             mean_and_std,
-            color: convention
-                .color_out
-                .or(convention.color)
-                .unwrap_or_default(),
+            color: convention.color_out.or(convention.color).unwrap_or_default(),
             range,
             certainty,
             rounding: convention.rounding.unwrap_or_default(),
@@ -123,21 +114,14 @@ impl OutputDecoding {
     pub(super) fn layout(&self, dims: &[i64], size: [usize; 2]) -> Option<(TensorLayout, usize)> {
         let layouts: Vec<TensorLayout> = match self.layout {
             Some(layout) => vec![layout],
-            None => std::iter::once(self.preferred)
-                .chain(TensorLayout::ALL)
-                .collect(),
+            None => std::iter::once(self.preferred).chain(TensorLayout::ALL).collect(),
         };
-        self.channels
-            .iter()
-            .flat_map(|count| layouts.iter().map(move |layout| (*layout, *count)))
-            .find(|(layout, count)| {
+        self.channels.iter().flat_map(|count| layouts.iter().map(move |layout| (*layout, *count))).find(
+            |(layout, count)| {
                 let expected = layout.dims(size, *count);
-                expected.len() == dims.len()
-                    && expected
-                        .iter()
-                        .zip(dims)
-                        .all(|(a, b)| usize::try_from(*b) == Ok(*a))
-            })
+                expected.len() == dims.len() && expected.iter().zip(dims).all(|(a, b)| usize::try_from(*b) == Ok(*a))
+            },
+        )
     }
 
     /// Decodes a part of an output of three channels to packed RGB bytes; `size` is the size of the whole output.
@@ -163,8 +147,8 @@ impl OutputDecoding {
         }))
     }
 
-    /// Decodes a part of an output to planes in 0..1. The output has `all_channels` channels, and `size` is its whole size. `certainty`
-    /// overrides that of the decoding.
+    /// Decodes a part of an output to planes in 0..1. The output has `all_channels` channels, and `size` is its whole
+    /// size. `certainty` overrides that of the decoding.
     pub(super) fn planes(
         &self,
         samples: TensorSamples<'_>,
@@ -211,11 +195,7 @@ impl OutputDecoding {
         if samples.iter().any(|sample| sample.is_nan()) {
             return Err(InvalidValues::NanOutput);
         }
-        Ok(Planes {
-            height: part.size()[0],
-            width: part.size()[1],
-            samples,
-        })
+        Ok(Planes { height: part.size()[0], width: part.size()[1], samples })
     }
 
     /// Packed RGB bytes of a part of an output, each computed from its sample by `byte`.
@@ -253,13 +233,9 @@ impl OutputDecoding {
 
 /// Refuses NaN, and values that do not fit the assumed range.
 ///
-/// Models that do not clamp their output overshoot a little. So the range counts as wrong only if more than one sample in 20 is far
-/// outside.
-pub(super) fn check_values(
-    values: &[f32],
-    range: ValueRange,
-    certainty: Certainty,
-) -> Result<(), InvalidValues> {
+/// Models that do not clamp their output overshoot a little. So the range counts as wrong only if more than one sample
+/// in 20 is far outside.
+pub(super) fn check_values(values: &[f32], range: ValueRange, certainty: Certainty) -> Result<(), InvalidValues> {
     let (mut nans, mut below, mut above) = (0_usize, 0_usize, 0_usize);
     let mut max = f32::NEG_INFINITY;
     for value in values {
@@ -278,11 +254,7 @@ pub(super) fn check_values(
         (Certainty::Assumed, ValueRange::Bytes) if max <= 1.5 => ValueRange::Unit,
         _ => return Ok(()),
     };
-    Err(InvalidValues::OutOfRange {
-        min: values.iter().copied().fold(f32::INFINITY, f32::min),
-        max,
-        likely,
-    })
+    Err(InvalidValues::OutOfRange { min: values.iter().copied().fold(f32::INFINITY, f32::min), max, likely })
 }
 
 /// Nearest code to a value in 0..255; halves are rounded up.

@@ -7,15 +7,17 @@ use darkqa_base::types::Rgb;
 const WHITE: f64 = 254.0;
 /// Least share of white pixels in a burnt-out image; chosen.
 const MIN_WHITE: f64 = 0.5;
-/// Least share of pixels that are white but were clearly darker than the brightest ones; chosen. A white page is white again when it is
-/// enhanced, and has no detail to lose.
+/// Least share of pixels that are white but were clearly darker than the brightest ones; chosen. A white page is white
+/// again when it is enhanced, and has no detail to lose.
 const MIN_LOST: f64 = 0.25;
-/// Ratio to the brightest pixels of the degraded image below which a pixel is clearly darker, in codes; chosen above usual noise.
+/// Ratio to the brightest pixels of the degraded image below which a pixel is clearly darker, in codes; chosen above
+/// usual noise.
 const DARKER: f64 = 0.8;
 /// Share of the pixels that count as the brightest.
 const BRIGHTEST_SHARE: f64 = 0.01;
 
-/// Share of the white pixels of an enhanced image that is burnt out; `None` if it is not. The images have the same size.
+/// Share of the white pixels of an enhanced image that is burnt out; `None` if it is not. The images have the same
+/// size.
 #[must_use]
 pub fn burnt_out([degraded, enhanced]: [&Rgb; 2]) -> Option<f64> {
     let pixels = enhanced.samples().len() / 3;
@@ -30,23 +32,18 @@ pub fn burnt_out([degraded, enhanced]: [&Rgb; 2]) -> Option<f64> {
     let mut sorted = before.clone();
     let (_, brightest, _) = sorted.select_nth_unstable_by(rank.min(pixels - 1), f64::total_cmp);
     let limit = DARKER * *brightest;
-    let lost = before
-        .iter()
-        .zip(&is_white)
-        .filter(|(luma, is_white)| **is_white && **luma < limit)
-        .count();
+    let lost = before.iter().zip(&is_white).filter(|(luma, is_white)| **is_white && **luma < limit).count();
     (lost as f64 >= MIN_LOST * pixels as f64).then_some(share)
 }
 
 /// Luma of each pixel, in codes.
 fn lumas(image: &Rgb) -> impl Iterator<Item = f64> {
-    image.samples().as_chunks::<3>().0.iter().map(|pixel| {
-        pixel
-            .iter()
-            .zip(LUMA)
-            .map(|(code, weight)| weight * f64::from(*code))
-            .sum()
-    })
+    image
+        .samples()
+        .as_chunks::<3>()
+        .0
+        .iter()
+        .map(|pixel| pixel.iter().zip(LUMA).map(|(code, weight)| weight * f64::from(*code)).sum())
 }
 
 #[cfg(test)]
@@ -81,13 +78,7 @@ mod tests {
     /// Noise of 10 % around the code of white, with a few words in black.
     #[test]
     fn a_white_page_is_not_burnt_out() {
-        let dark = grey(|pixel| {
-            if pixel % 10 == 0 {
-                10
-            } else {
-                (122 + pixel * 7 % 28) as u8
-            }
-        });
+        let dark = grey(|pixel| if pixel % 10 == 0 { 10 } else { (122 + pixel * 7 % 28) as u8 });
         let page = grey(|pixel| if pixel % 10 == 0 { 20 } else { 255 });
         assert_eq!(burnt_out([&dark, &page]), None);
     }

@@ -1,6 +1,7 @@
 //! Examination of a model with an unknown convention: [`Enhancer::examine`].
 //!
-//! The model runs on a few dark frames with each possible convention. If exactly one convention gives plausible images, it is proposed.
+//! The model runs on a few dark frames with each possible convention. If exactly one convention gives plausible images,
+//! it is proposed.
 
 mod proposal;
 
@@ -86,24 +87,14 @@ impl Enhancer {
                 "fails at 144 × 96, 160 × 120 and 128 × 128; {ADD} the sizes that it takes: `multiple = N` or `fixed = [WIDTH, HEIGHT]`"
             )));
         };
-        let Trials {
-            frames,
-            probes: [probe, swapped],
-        } = trials;
+        let Trials { frames, probes: [probe, swapped] } = trials;
         let mut others = self.other_outputs(&frames, probe.best())?;
-        let plausible: Vec<String> = others
-            .iter()
-            .filter(|output| output.problem.is_none())
-            .map(|output| output.title.clone())
-            .collect();
+        let plausible: Vec<String> =
+            others.iter().filter(|output| output.problem.is_none()).map(|output| output.title.clone()).collect();
         let stated = self.stated_pair();
         let mut found = match (image, stated) {
-            (ImageOutput::Unknown, _) => {
-                Proposal::for_unknown_output(&self.output_title(), &probe, &plausible)
-            }
-            (ImageOutput::Known, Some(pair)) if probe.plausible().contains(&pair) => {
-                Proposal::for_stated(pair)
-            }
+            (ImageOutput::Unknown, _) => Proposal::for_unknown_output(&self.output_title(), &probe, &plausible),
+            (ImageOutput::Known, Some(pair)) if probe.plausible().contains(&pair) => Proposal::for_stated(pair),
             (ImageOutput::Known, _) => propose(&probe, stated, &swapped, order),
         };
         if !found.lines.is_empty() {
@@ -123,9 +114,7 @@ impl Enhancer {
                         Some(OutputKind::Map) => {
                             " Its output is nearly as bright for a black image as for a white one, like a light map; the page shows the expressions that may be the image."
                         }
-                        None => {
-                            " The image may be made of input and output; the page shows the plausible expressions."
-                        }
+                        None => " The image may be made of input and output; the page shows the plausible expressions.",
                     };
                 }
                 others.extend(expressions);
@@ -135,10 +124,7 @@ impl Enhancer {
             Ok(summary) => summary,
             Err(problem) if probe.plausible().contains(&probe.usual) => {
                 found.settled = Settled::No;
-                let _ = write!(
-                    found.conclusion,
-                    " But not all images can be enhanced: {problem}"
-                );
+                let _ = write!(found.conclusion, " But not all images can be enhanced: {problem}");
                 problem.to_string()
             }
             // Caused by the present ranges, which the proposal replaces.
@@ -171,17 +157,16 @@ impl Enhancer {
         swapped(stated.color_out.or(stated.color).unwrap_or_default())
     }
 
-    /// Runs the model on dark frames with all value ranges, in the present channel order of the output and in the other.
+    /// Runs the model on dark frames with all value ranges, in the present channel order of the output and in the
+    /// other.
     fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<Trials<2>>> {
         let stated = self.convention().clone();
-        let swapped = ModelSidecar {
-            color_out: Some(self.other_order()),
-            ..stated.clone()
-        };
+        let swapped = ModelSidecar { color_out: Some(self.other_order()), ..stated.clone() };
         self.trials(dark, [&stated, &swapped], [None; 2])
     }
 
-    /// Sentence with the only sidecar lines that make the images of dark frames plausible; `None` if no or several sets of lines do.
+    /// Sentence with the only sidecar lines that make the images of dark frames plausible; `None` if no or several sets
+    /// of lines do.
     pub(super) fn better_lines(&self, dark: &[Rgb]) -> Result<Option<String>> {
         let Some(trials) = self.trials_of_all(dark)? else {
             return Ok(None);
@@ -192,11 +177,7 @@ impl Enhancer {
             probe.leave_out_mixed();
         }
         let found = propose(&probe, self.stated_pair(), &swapped, self.other_order());
-        let lines: Vec<String> = found
-            .lines
-            .iter()
-            .map(|line| format!("`{}`", line.line))
-            .collect();
+        let lines: Vec<String> = found.lines.iter().map(|line| format!("`{}`", line.line)).collect();
         Ok((!lines.is_empty()).then(|| {
             format!(
                 "{} If the model's code does that, {ADD}, replacing the present values: {}",
@@ -214,10 +195,7 @@ impl Enhancer {
     /// The stated ranges of input and output; `None` if one of them is not stated.
     fn stated_pair(&self) -> Option<RangePair> {
         let [input, output] = self.stated_ranges();
-        Some(RangePair {
-            input: ValueScale::Range(input?),
-            output: ValueScale::Range(output?),
-        })
+        Some(RangePair { input: ValueScale::Range(input?), output: ValueScale::Range(output?) })
     }
 
     /// Runs the model on one frame of each size, to find the sizes that it accepts. Returns a summary of the sizes.
@@ -247,9 +225,7 @@ impl Enhancer {
         Ok(trials
             .into_iter()
             .filter(|trial| trial.pair.is_clean())
-            .map(|ExpressionTrial { text, pair, .. }| {
-                column(&pair, format!("image = \"{text}\", {}", pair.ranges))
-            })
+            .map(|ExpressionTrial { text, pair, .. }| column(&pair, format!("image = \"{text}\", {}", pair.ranges)))
             .collect())
     }
 
@@ -263,9 +239,7 @@ impl Enhancer {
                 image: None,
                 ..self.convention().clone()
             };
-            let convention = convention
-                .with_input_scale(ranges.input)
-                .with_output_scale(ranges.output);
+            let convention = convention.with_input_scale(ranges.input).with_output_scale(ranges.output);
             // Outputs that cannot be an image, such as curves, are left out.
             let Ok(graph) = self.graph().with_convention(convention) else {
                 continue;
@@ -287,8 +261,8 @@ fn swapped(order: ChannelOrder) -> ChannelOrder {
     }
 }
 
-/// Conventions to draw: the plausible ones and the one that a run would use (`stated`), or all if none is plausible. `output` is a prefix
-/// of the titles that names the output.
+/// Conventions to draw: the plausible ones and the one that a run would use (`stated`), or all if none is plausible.
+/// `output` is a prefix of the titles that names the output.
 fn conventions_to_draw(
     output: &str,
     probe: &Probe,
@@ -302,30 +276,18 @@ fn conventions_to_draw(
         Some(title) if stated == Some(ranges) => title.clone(),
         _ => format!("{output}{ranges}"),
     });
-    let swapped = columns(swapped, |ranges| {
-        format!("{output}{ranges}, {order} in the output")
-    });
+    let swapped = columns(swapped, |ranges| format!("{output}{ranges}, {order} in the output"));
     // Implausible images in the other channel order would only distract.
-    shown.extend(
-        swapped
-            .into_iter()
-            .filter(|column| column.problem.is_none()),
-    );
+    shown.extend(swapped.into_iter().filter(|column| column.problem.is_none()));
     shown.extend(others);
     if shown.iter().any(|column| column.problem.is_none()) {
-        shown.retain(|column| {
-            column.problem.is_none() || stated_title.as_ref() == Some(&column.title)
-        });
+        shown.retain(|column| column.problem.is_none() || stated_title.as_ref() == Some(&column.title));
     }
     shown
 }
 
 fn columns(probe: &Probe, title: impl Fn(RangePair) -> String) -> Vec<ExaminedConvention> {
-    probe
-        .pairs
-        .iter()
-        .map(|pair| column(pair, title(pair.ranges)))
-        .collect()
+    probe.pairs.iter().map(|pair| column(pair, title(pair.ranges))).collect()
 }
 
 fn column(pair: &PairTrial, title: String) -> ExaminedConvention {

@@ -5,13 +5,15 @@ use std::ops::Range;
 use super::plausible::UnclampedImage;
 use darkqa_base::types::Rgb;
 
-/// Height and width, in pixels, of the black and white test image if the model accepts any size; equal to the first size of the probe.
+/// Height and width, in pixels, of the black and white test image if the model accepts any size; equal to the first
+/// size of the probe.
 pub(super) const SIZE: [usize; 2] = [96, 144];
 
 /// Mean output of a model for black and for white, in codes of 0..255.
 ///
-/// With the right value ranges, a low-light enhancer keeps black nearly black and white nearly white. Measured on 9 trained models: the
-/// distances add up to at most 20 codes (RUAS); with wrong ranges that still give plausible images, mostly to 100 and more.
+/// With the right value ranges, a low-light enhancer keeps black nearly black and white nearly white. Measured on 9
+/// trained models: the distances add up to at most 20 codes (RUAS); with wrong ranges that still give plausible images,
+/// mostly to 100 and more.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Endpoints {
     pub(super) black: f64,
@@ -64,8 +66,8 @@ fn mean(channels: [f64; 3]) -> f64 {
     channels.iter().sum::<f64>() / 3.0
 }
 
-/// An image with a black left half and a white right half. Both are in one image, because some models stretch an image to its darkest and
-/// brightest pixels.
+/// An image with a black left half and a white right half. Both are in one image, because some models stretch an image
+/// to its darkest and brightest pixels.
 pub(super) fn black_and_white([height, width]: [usize; 2]) -> Rgb {
     let mut image = Rgb::black(height, width);
     for row in image.samples_mut().chunks_exact_mut(3 * width) {
@@ -81,11 +83,7 @@ mod tests {
     #[test]
     fn black_and_white_have_their_own_codes() {
         let codes = UnclampedImage::from_rgb(&black_and_white([96, 144]));
-        let expected = Endpoints {
-            black: 0.0,
-            white: 255.0,
-            distance: 0.0,
-        };
+        let expected = Endpoints { black: 0.0, white: 255.0, distance: 0.0 };
         assert_eq!(Endpoints::from_codes(&codes), expected);
     }
 
@@ -93,10 +91,7 @@ mod tests {
     fn smallest_images_have_finite_endpoints() {
         for size in [[1, 1], [1, 2], [2, 1]] {
             let codes = UnclampedImage::from_rgb(&black_and_white(size));
-            assert!(
-                Endpoints::from_codes(&codes).distance.is_finite(),
-                "{size:?}"
-            );
+            assert!(Endpoints::from_codes(&codes).distance.is_finite(), "{size:?}");
         }
     }
 }

@@ -11,11 +11,12 @@ use crate::outputs::{expression_name, light_map_line};
 use darkqa_base::error::Result;
 use darkqa_base::types::{Flaw, Rgb};
 
-/// Threshold in codes, chosen. An output up to it for white may be a residual, and one whose difference between white and black is up to
-/// it may be a map. Models that return the image itself exceed 230.
+/// Threshold in codes, chosen. An output up to it for white may be a residual, and one whose difference between white
+/// and black is up to it may be a map. Models that return the image itself exceed 230.
 const MIN_CONTRAST: f64 = 64.0;
 
-/// Expressions that may give the image, with the kind of output that they suit. `OUTPUT` is the placeholder of the output's name.
+/// Expressions that may give the image, with the kind of output that they suit. `OUTPUT` is the placeholder of the
+/// output's name.
 const EXPRESSIONS: [(&str, &str); 5] = [
     ("input + OUTPUT", "a residual"),
     ("input - OUTPUT", "a residual"),
@@ -26,16 +27,7 @@ const EXPRESSIONS: [(&str, &str); 5] = [
 ];
 
 /// Parts of the names of outputs that are not the image but are combined with the input.
-const NAMES: [&str; 8] = [
-    "illu",
-    "light_map",
-    "lightmap",
-    "gain",
-    "curve",
-    "residual",
-    "noise",
-    "mask",
-];
+const NAMES: [&str; 8] = ["illu", "light_map", "lightmap", "gain", "curve", "residual", "noise", "mask"];
 
 /// Kind of an output that is not the image itself.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +62,8 @@ pub(super) struct ExpressionTrial {
 }
 
 impl Enhancer {
-    /// Trials of [`EXPRESSIONS`], in 0..1 where no range is stated; empty if the image is an expression already, or if the model fails.
+    /// Trials of [`EXPRESSIONS`], in 0..1 where no range is stated; empty if the image is an expression already, or if
+    /// the model fails.
     ///
     /// # Errors
     /// If the runtime fails.
@@ -78,17 +71,13 @@ impl Enhancer {
         if !self.reads_plain_image() {
             return Ok(Vec::new());
         }
-        let ranges = self
-            .stated_ranges()
-            .map(|range| range.or(Some(ValueRange::Unit)));
+        let ranges = self.stated_ranges().map(|range| range.or(Some(ValueRange::Unit)));
         let name = expression_name(&self.graph().signature.outputs[0].port.name);
         let texts = EXPRESSIONS.map(|(text, _)| text.replace("OUTPUT", &name));
         let mut conventions = texts.clone().map(|_| self.convention().clone());
         for (convention, text) in conventions.iter_mut().zip(&texts) {
             convention.output = None;
-            let image = text
-                .parse()
-                .map_err(|problem: String| self.error(problem))?;
+            let image = text.parse().map_err(|problem: String| self.error(problem))?;
             convention.image = Some(image);
         }
         let conventions = conventions.each_ref();
@@ -96,11 +85,7 @@ impl Enhancer {
             return Ok(Vec::new());
         };
         let mut trials = Vec::new();
-        for (((probe, convention), text), (_, kind)) in probes
-            .into_iter()
-            .zip(conventions)
-            .zip(texts)
-            .zip(EXPRESSIONS)
+        for (((probe, convention), text), (_, kind)) in probes.into_iter().zip(conventions).zip(texts).zip(EXPRESSIONS)
         {
             let Probe { pairs, .. } = probe;
             for mut pair in pairs {
@@ -122,19 +107,13 @@ impl Enhancer {
         let mut found = self.expression_trials(dark)?;
         found.retain(|trial| trial.pair.is_clean() && trial.pair.is_near());
         found.sort_by(|a, b| a.pair.distance().total_cmp(&b.pair.distance()));
-        let lines: Vec<String> = found
-            .iter()
-            .map(|trial| format!("`image = \"{}\"` (if it is {})", trial.text, trial.kind))
-            .collect();
+        let lines: Vec<String> =
+            found.iter().map(|trial| format!("`image = \"{}\"` (if it is {})", trial.text, trial.kind)).collect();
         Ok((!lines.is_empty()).then(|| {
             format!(
                 "Its output may not be the image itself; {ADD} the line that the model's code uses: {}{}",
                 lines.join(" or "),
-                if flaw == Flaw::Grey {
-                    "; if it is the enhanced luma, export it joined with the colours"
-                } else {
-                    ""
-                }
+                if flaw == Flaw::Grey { "; if it is the enhanced luma, export it joined with the colours" } else { "" }
             )
         }))
     }

@@ -11,7 +11,8 @@ use darkqa_base::error::Result;
 use darkqa_base::types::EnhancerName;
 use darkqa_base::types::manifests::{ConventionLine, ProbeNote, ProbeOutcome};
 
-/// Results of opening an enhancer and probing it on dark frames: the content of its usage record before the first image.
+/// Results of opening an enhancer and probing it on dark frames: the content of its usage record before the first
+/// image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
     /// Rows of the table of the model's input and output convention.
@@ -89,7 +90,8 @@ impl Enhancer {
         }
     }
 
-    /// The enhancer with the findings of an earlier probe instead of a new one, and with a usage record that it continues.
+    /// The enhancer with the findings of an earlier probe instead of a new one, and with a usage record that it
+    /// continues.
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.

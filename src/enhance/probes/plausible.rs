@@ -1,8 +1,9 @@
 //! Plausibility of an enhanced image, compared with the dark one: [`judge`].
 //!
-//! The rules detect outputs that are decoded in a wrong way: another range, the wrong output, swapped colours or dimensions. They do not
-//! judge the quality of an enhancement. Their thresholds were set on 9 trained models with 25 dark images each, so that none of these
-//! models is flagged; `src/docs/enhance.md` lists the faults that they find and miss.
+//! The rules detect outputs that are decoded in a wrong way: another range, the wrong output, swapped colours or
+//! dimensions. They do not judge the quality of an enhancement. Their thresholds were set on 9 trained models with 25
+//! dark images each, so that none of these models is flagged; `src/docs/enhance.md` lists the faults that they find and
+//! miss.
 
 use std::fmt;
 
@@ -12,18 +13,22 @@ use crate::conventions::LUMA;
 use crate::planes::Planes;
 use darkqa_base::types::{Flaw, Rgb};
 
-/// Maximum mean luma, in codes, of a degraded image whose enhancement is judged; measured. On brighter images the rules flag good models.
+/// Maximum mean luma, in codes, of a degraded image whose enhancement is judged; measured. On brighter images the rules
+/// flag good models.
 pub const DARK: f64 = 64.0;
 /// Maximum longer side, in pixels, of the images that are judged: that of the images on which the thresholds were set.
 const JUDGED_SIDE: usize = 160;
 /// Share of the pixels that count as the darkest.
 const DARKEST_SHARE: f64 = 0.01;
-/// Factor by which the ratio of the darkest pixels to the mean must exceed that of the dark frame for a haze; chosen. Dimming hardly
-/// changes the ratio, because the curve of the codes is nearly a power, and noise changes it less than this factor.
+/// Factor by which the ratio of the darkest pixels to the mean must exceed that of the dark frame for a haze; chosen.
+/// Dimming hardly changes the ratio, because the curve of the codes is nearly a power, and noise changes it less than
+/// this factor.
 const HAZE_RATIO: f64 = 1.5;
-/// Mean difference between the channels of blocks, in codes, above which a dark frame is coloured; chosen above the effect of noise.
+/// Mean difference between the channels of blocks, in codes, above which a dark frame is coloured; chosen above the
+/// effect of noise.
 const MIN_COLOUR: f64 = 1.0;
-/// Mean difference between the channels of blocks, in codes, below which an output is grey; chosen so that only equal channels pass.
+/// Mean difference between the channels of blocks, in codes, below which an output is grey; chosen so that only equal
+/// channels pass.
 const MAX_GREY: f64 = 0.1;
 /// Side of the blocks whose means are compared, in pixels; chosen, to average out noise.
 const BLOCK: usize = 4;
@@ -80,11 +85,7 @@ pub(crate) struct UnclampedImage {
 impl UnclampedImage {
     /// An image of NaN, for an output whose values cannot be decoded.
     pub(crate) fn not_a_number([height, width]: [usize; 2]) -> Self {
-        Self {
-            height,
-            width,
-            samples: vec![f32::NAN; height * width * 3],
-        }
+        Self { height, width, samples: vec![f32::NAN; height * width * 3] }
     }
 
     /// The codes of an 8-bit image.
@@ -92,16 +93,12 @@ impl UnclampedImage {
         Self {
             height: image.height(),
             width: image.width(),
-            samples: image
-                .samples()
-                .iter()
-                .map(|byte| f32::from(*byte))
-                .collect(),
+            samples: image.samples().iter().map(|byte| f32::from(*byte)).collect(),
         }
     }
 
-    /// The codes of an 8-bit image, downscaled by an integer factor to a longer side of at most [`JUDGED_SIDE`] pixels. Each sample is the
-    /// mean of a square; incomplete squares at the right and bottom are left out.
+    /// The codes of an 8-bit image, downscaled by an integer factor to a longer side of at most [`JUDGED_SIDE`] pixels.
+    /// Each sample is the mean of a square; incomplete squares at the right and bottom are left out.
     pub(super) fn downscaled(image: &Rgb) -> Self {
         let longer = image.height().max(image.width());
         let factor = longer.div_ceil(JUDGED_SIDE);
@@ -110,12 +107,7 @@ impl UnclampedImage {
             return Self::from_rgb(image);
         }
         let mut samples = vec![0.0; height * width * 3];
-        for (y, line) in image
-            .samples()
-            .chunks_exact(3 * image.width())
-            .take(height * factor)
-            .enumerate()
-        {
+        for (y, line) in image.samples().chunks_exact(3 * image.width()).take(height * factor).enumerate() {
             let sums = &mut samples[y / factor * width * 3..][..width * 3];
             let squares = line.chunks_exact(3 * factor);
             for (sum, square) in sums.chunks_exact_mut(3).zip(squares) {
@@ -130,11 +122,7 @@ impl UnclampedImage {
         for sum in &mut samples {
             *sum /= pixels;
         }
-        Self {
-            height,
-            width,
-            samples,
-        }
+        Self { height, width, samples }
     }
 
     /// The codes of a planar RGB image.
@@ -144,9 +132,7 @@ impl UnclampedImage {
             height: planes.height,
             width: planes.width,
             samples: (0..pixels)
-                .flat_map(|pixel| {
-                    [0, 1, 2].map(|channel| 255.0 * planes.samples[channel * pixels + pixel])
-                })
+                .flat_map(|pixel| [0, 1, 2].map(|channel| 255.0 * planes.samples[channel * pixels + pixel]))
                 .collect(),
         }
     }
@@ -165,10 +151,7 @@ impl UnclampedImage {
     /// Statistics of the brightness and of the clamped samples.
     pub(super) fn facts(&self) -> Facts {
         let luma = self.luma().samples;
-        let clipped = self
-            .samples
-            .iter()
-            .filter(|code| !(0.0..=255.0).contains(*code));
+        let clipped = self.samples.iter().filter(|code| !(0.0..=255.0).contains(*code));
         Facts {
             brightness: mean(&luma),
             darkest: percentile(&luma, 0.01),
@@ -178,35 +161,25 @@ impl UnclampedImage {
     }
 
     fn luma(&self) -> Plane {
-        let luma = self.samples.chunks_exact(3).map(|pixel| {
-            pixel
-                .iter()
-                .zip(LUMA)
-                .map(|(code, weight)| weight * f64::from(code.clamp(0.0, 255.0)))
-                .sum()
-        });
-        Plane {
-            width: self.width,
-            samples: luma.collect(),
-        }
+        let luma = self
+            .samples
+            .chunks_exact(3)
+            .map(|pixel| pixel.iter().zip(LUMA).map(|(code, weight)| weight * f64::from(code.clamp(0.0, 255.0))).sum());
+        Plane { width: self.width, samples: luma.collect() }
     }
 
     /// Means of red, green and blue of each block, in codes.
     fn channel_blocks(&self) -> [Vec<f64>; 3] {
         [0, 1, 2].map(|channel| {
-            let samples = self
-                .samples
-                .iter()
-                .skip(channel)
-                .step_by(3)
-                .map(|code| f64::from(code.clamp(0.0, 255.0)))
-                .collect();
+            let samples =
+                self.samples.iter().skip(channel).step_by(3).map(|code| f64::from(code.clamp(0.0, 255.0))).collect();
             let width = self.width;
             Plane { width, samples }.blocks().samples
         })
     }
 
-    /// Difference between red and blue of each block, relative to its brightness. The 3 codes added to the divisor suppress black blocks.
+    /// Difference between red and blue of each block, relative to its brightness. The 3 codes added to the divisor
+    /// suppress black blocks.
     fn warmth(&self) -> Vec<f64> {
         let [red, green, blue] = self.channel_blocks();
         red.iter()
@@ -251,17 +224,15 @@ pub fn brightness(image: &Rgb) -> f64 {
         }
     }
     let pixels = (image.height() * image.width()) as f64;
-    sums.iter()
-        .zip(LUMA)
-        .map(|(sum, weight)| weight * *sum as f64)
-        .sum::<f64>()
-        / pixels
+    sums.iter().zip(LUMA).map(|(sum, weight)| weight * *sum as f64).sum::<f64>() / pixels
 }
 
-/// Maximum range of brightness, in codes, of an image that shows nothing, without its darkest and brightest 1 %; chosen.
+/// Maximum range of brightness, in codes, of an image that shows nothing, without its darkest and brightest 1 %;
+/// chosen.
 const MAX_EMPTY_RANGE: f64 = 1.0;
 
-/// True if an image shows nothing, such as a black photograph: the right output for it has no content either, so it tests no enhancer.
+/// True if an image shows nothing, such as a black photograph: the right output for it has no content either, so it
+/// tests no enhancer.
 pub fn shows_nothing(image: &Rgb) -> bool {
     let luma = UnclampedImage::downscaled(image).luma().samples;
     percentile(&luma, 1.0 - DARKEST_SHARE) - percentile(&luma, DARKEST_SHARE) <= MAX_EMPTY_RANGE
@@ -285,11 +256,7 @@ pub(super) fn judge(dark: &UnclampedImage, output: &UnclampedImage) -> Option<Ve
     let (was, is) = (mean(&before.samples), mean(&after.samples));
     if is - was < 2.0 {
         let figure = is - was;
-        return if is < was && is < 8.0 {
-            impossible(Flaw::Unlit, figure)
-        } else {
-            doubtful(Flaw::Unlit, figure)
-        };
+        return if is < was && is < 8.0 { impossible(Flaw::Unlit, figure) } else { doubtful(Flaw::Unlit, figure) };
     }
     let bright = after.samples.iter().filter(|luma| **luma >= 254.0).count() as f64;
     let white = bright / after.samples.len() as f64;
@@ -320,29 +287,15 @@ pub(super) fn judge(dark: &UnclampedImage, output: &UnclampedImage) -> Option<Ve
 }
 
 /// The verdict on an impossible output, always `Some`.
-#[expect(
-    clippy::unnecessary_wraps,
-    reason = "returned by rules that may find nothing"
-)]
+#[expect(clippy::unnecessary_wraps, reason = "returned by rules that may find nothing")]
 fn impossible(flaw: Flaw, figure: f64) -> Option<Verdict> {
-    Some(Verdict {
-        flaw,
-        gravity: Gravity::Impossible,
-        figure,
-    })
+    Some(Verdict { flaw, gravity: Gravity::Impossible, figure })
 }
 
 /// The verdict on a doubtful output, always `Some`.
-#[expect(
-    clippy::unnecessary_wraps,
-    reason = "returned by rules that may find nothing"
-)]
+#[expect(clippy::unnecessary_wraps, reason = "returned by rules that may find nothing")]
 fn doubtful(flaw: Flaw, figure: f64) -> Option<Verdict> {
-    Some(Verdict {
-        flaw,
-        gravity: Gravity::Doubtful,
-        figure,
-    })
+    Some(Verdict { flaw, gravity: Gravity::Doubtful, figure })
 }
 
 /// Share of the values that satisfy a condition.
@@ -366,12 +319,8 @@ fn structure(before: &Plane, after: &Plane) -> Option<Verdict> {
     let (was, is) = (before.steps(), after.steps());
     let sizes: Vec<f64> = was.iter().map(|step| step.abs()).collect();
     let strong = percentile(&sizes, 0.75);
-    let agreement: Vec<f64> = was
-        .iter()
-        .zip(&is)
-        .filter(|(was, _)| was.abs() >= strong)
-        .map(|(was, is)| sign(*was) * sign(*is))
-        .collect();
+    let agreement: Vec<f64> =
+        was.iter().zip(&is).filter(|(was, _)| was.abs() >= strong).map(|(was, is)| sign(*was) * sign(*is)).collect();
     let agreement = mean(&agreement);
     if agreement < 0.35 {
         return impossible(Flaw::Shuffled, agreement);
@@ -391,15 +340,13 @@ struct Plane {
 }
 
 impl Plane {
-    /// Means of blocks of [`BLOCK`] × [`BLOCK`] pixels, without incomplete blocks. An image smaller than a block is returned unchanged.
+    /// Means of blocks of [`BLOCK`] × [`BLOCK`] pixels, without incomplete blocks. An image smaller than a block is
+    /// returned unchanged.
     fn blocks(&self) -> Self {
         let height = self.samples.len() / self.width;
         let [rows, columns] = [height, self.width].map(|side| side / BLOCK);
         if rows == 0 || columns == 0 {
-            return Self {
-                width: self.width,
-                samples: self.samples.clone(),
-            };
+            return Self { width: self.width, samples: self.samples.clone() };
         }
         let mut samples = vec![0.0; rows * columns];
         for (y, line) in self.samples.chunks_exact(self.width).enumerate() {
@@ -410,20 +357,15 @@ impl Plane {
                 *sum += block.iter().sum::<f64>() / (BLOCK * BLOCK) as f64;
             }
         }
-        Self {
-            width: columns,
-            samples,
-        }
+        Self { width: columns, samples }
     }
 
     /// Differences between vertical neighbours, then those between horizontal neighbours.
     fn steps(&self) -> Vec<f64> {
         let below = self.samples.get(self.width..).unwrap_or_default();
         let down = self.samples.iter().zip(below).map(|(a, b)| b - a);
-        let right = self
-            .samples
-            .chunks_exact(self.width)
-            .flat_map(|line| line.windows(2).map(|pair| pair[1] - pair[0]));
+        let right =
+            self.samples.chunks_exact(self.width).flat_map(|line| line.windows(2).map(|pair| pair[1] - pair[0]));
         down.chain(right).collect()
     }
 
@@ -460,11 +402,7 @@ fn correlation(a: &[f64], b: &[f64]) -> f64 {
         variance_a += a * a;
         variance_b += b * b;
     }
-    if variance_a * variance_b > 0.0 {
-        covariance / (variance_a * variance_b).sqrt()
-    } else {
-        0.0
-    }
+    if variance_a * variance_b > 0.0 { covariance / (variance_a * variance_b).sqrt() } else { 0.0 }
 }
 
 /// Quantile for a share of the values, linearly interpolated (numpy's default).

@@ -1,7 +1,7 @@
 //! Plausibility of a model's images of a few dark frames, by value ranges: [`Probe`].
 //!
-//! A graph does not declare its value ranges. So every pair of ranges that sidecar, preset and element types allow is tried. A pair is
-//! implausible if at least half of the frames have a flaw.
+//! A graph does not declare its value ranges. So every pair of ranges that sidecar, preset and element types allow is
+//! tried. A pair is implausible if at least half of the frames have a flaw.
 
 use std::fmt;
 
@@ -16,13 +16,13 @@ use darkqa_base::types::Flaw;
 pub const FRAMES: usize = 6;
 
 /// Message that no range explains a flaw, with the ranges that were tried.
-const NONE_FITS: &str =
-    "No usual value range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP)";
+const NONE_FITS: &str = "No usual value range fits (0..1, 0..255, -1..1, -0.5..0.5, mean and std of ImageNet or CLIP)";
 
 /// Placeholder in remedies for the name of the output that is read.
 pub(super) const OUTPUT: &str = "OUTPUT";
 
-/// Difference in [`PairTrial::distance`], in codes, by which the best pair must beat the second to be advised alone. Chosen.
+/// Difference in [`PairTrial::distance`], in codes, by which the best pair must beat the second to be advised alone.
+/// Chosen.
 const CLEAR_MARGIN: f64 = 25.0;
 
 /// A model's images of the dark frames, with one pair of ranges.
@@ -38,18 +38,9 @@ pub(super) struct PairTrial {
 }
 
 impl PairTrial {
-    pub(super) fn new(
-        ranges: RangePair,
-        dark: &[UnclampedImage],
-        made: Vec<UnclampedImage>,
-    ) -> Self {
+    pub(super) fn new(ranges: RangePair, dark: &[UnclampedImage], made: Vec<UnclampedImage>) -> Self {
         let verdicts = dark.iter().zip(&made).map(|(dark, made)| judge(dark, made));
-        Self {
-            ranges,
-            verdicts: verdicts.collect(),
-            made,
-            endpoints: None,
-        }
+        Self { ranges, verdicts: verdicts.collect(), made, endpoints: None }
     }
 
     /// True if no frame has a flaw.
@@ -59,8 +50,7 @@ impl PairTrial {
 
     /// Distance of the outputs for black and white from black and white, in codes; infinite if it was not measured.
     pub(super) fn distance(&self) -> f64 {
-        self.endpoints
-            .map_or(f64::INFINITY, |endpoints| endpoints.distance)
+        self.endpoints.map_or(f64::INFINITY, |endpoints| endpoints.distance)
     }
 
     /// True if black stays nearly black and white nearly white.
@@ -75,41 +65,27 @@ impl PairTrial {
             Some(Endpoints { black, white, .. }) => format!(
                 "{} (black becomes {black:.0} of 255, white {white:.0}{})",
                 self.ranges,
-                if self.is_near() {
-                    ""
-                } else {
-                    ", so it may be another range"
-                }
+                if self.is_near() { "" } else { ", so it may be another range" }
             ),
         }
     }
 
     /// Verdict on the pair: the most frequent flaw, if at least half of the frames have one.
     pub(super) fn verdict(&self) -> Option<FlawedFrames> {
-        self.most_frequent_flaw()
-            .filter(|seen| 2 * seen.flawed >= seen.frames)
+        self.most_frequent_flaw().filter(|seen| 2 * seen.flawed >= seen.frames)
     }
 
     /// The most frequent flaw; `None` if no frame has one.
     fn most_frequent_flaw(&self) -> Option<FlawedFrames> {
         let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
         // Reversed, because `max_by_key` returns the last of equally frequent flaws and the first is wanted.
-        let example = flawed.iter().rev().max_by_key(|verdict| {
-            flawed
-                .iter()
-                .filter(|other| other.flaw == verdict.flaw)
-                .count()
-        })?;
-        let impossible = flawed
+        let example = flawed
             .iter()
-            .filter(|verdict| verdict.gravity == Gravity::Impossible)
-            .count();
+            .rev()
+            .max_by_key(|verdict| flawed.iter().filter(|other| other.flaw == verdict.flaw).count())?;
+        let impossible = flawed.iter().filter(|verdict| verdict.gravity == Gravity::Impossible).count();
         Some(FlawedFrames {
-            gravity: if 2 * impossible >= self.verdicts.len().max(1) {
-                Gravity::Impossible
-            } else {
-                Gravity::Doubtful
-            },
+            gravity: if 2 * impossible >= self.verdicts.len().max(1) { Gravity::Impossible } else { Gravity::Doubtful },
             example: *example,
             flawed: flawed.len(),
             frames: self.verdicts.len(),
@@ -130,16 +106,8 @@ pub(super) struct FlawedFrames {
 impl fmt::Display for FlawedFrames {
     /// Writes the verdict, to follow the file's name.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            example,
-            flawed,
-            frames,
-            ..
-        } = self;
-        write!(
-            f,
-            "on {flawed} of {frames} dark frames its images {example}"
-        )
+        let Self { example, flawed, frames, .. } = self;
+        write!(f, "on {flawed} of {frames} dark frames its images {example}")
     }
 }
 
@@ -183,11 +151,7 @@ pub(super) enum Conclusion {
 impl Probe {
     /// Pairs with which the images are plausible.
     pub(super) fn plausible(&self) -> Vec<RangePair> {
-        self.pairs
-            .iter()
-            .filter(|pair| pair.verdict().is_none())
-            .map(|pair| pair.ranges)
-            .collect()
+        self.pairs.iter().filter(|pair| pair.verdict().is_none()).map(|pair| pair.ranges).collect()
     }
 
     /// Conclusion from all trials.
@@ -205,16 +169,12 @@ impl Probe {
         match (self.ranges, seen) {
             (StatedRanges::Both, None) => Conclusion::Plausible,
             (_, None) => Conclusion::Assumed,
-            (StatedRanges::Both, Some(seen)) if seen.gravity == Gravity::Doubtful => {
-                Conclusion::Doubtful(seen)
-            }
+            (StatedRanges::Both, Some(seen)) if seen.gravity == Gravity::Doubtful => Conclusion::Doubtful(seen),
             (StatedRanges::Both, Some(seen)) => Conclusion::Implausible(seen),
             (_, Some(seen)) => match (clear_first(&advised), advised.as_slice()) {
                 (Some(first), _) => Conclusion::Other(first.ranges, seen),
                 (None, []) => Conclusion::Implausible(seen),
-                (None, several) => {
-                    Conclusion::Several(several.iter().map(|pair| pair.ranges).collect(), seen)
-                }
+                (None, several) => Conclusion::Several(several.iter().map(|pair| pair.ranges).collect(), seen),
             },
         }
     }
@@ -226,41 +186,30 @@ impl Probe {
 
     /// Pairs that may be advised instead of the usual one: those without a flaw on any frame.
     fn advised(&self) -> Vec<&PairTrial> {
-        self.pairs
-            .iter()
-            .filter(|pair| pair.ranges != self.usual && pair.is_clean())
-            .collect()
+        self.pairs.iter().filter(|pair| pair.ranges != self.usual && pair.is_clean()).collect()
     }
 
     /// The plausible pair that preserves black and white clearly best; `None` without such a pair.
     pub(super) fn likeliest(&self) -> Option<RangePair> {
-        let plausible: Vec<&PairTrial> = self
-            .pairs
-            .iter()
-            .filter(|pair| pair.verdict().is_none())
-            .collect();
+        let plausible: Vec<&PairTrial> = self.pairs.iter().filter(|pair| pair.verdict().is_none()).collect();
         clear_first(&plausible).map(|pair| pair.ranges)
     }
 
-    /// Sorts the pairs by how well they preserve black and white, and removes normalised pairs that do not preserve them.
+    /// Sorts the pairs by how well they preserve black and white, and removes normalised pairs that do not preserve
+    /// them.
     pub(super) fn rank(&mut self) {
-        self.pairs
-            .retain(|pair| pair.ranges.is_plain() || pair.is_near());
-        self.pairs
-            .sort_by(|a, b| a.distance().total_cmp(&b.distance()));
+        self.pairs.retain(|pair| pair.ranges.is_plain() || pair.is_near());
+        self.pairs.sort_by(|a, b| a.distance().total_cmp(&b.distance()));
     }
 
     /// Removes pairs that are plausible on most frames, but not on all.
     pub(super) fn leave_out_mixed(&mut self) {
-        self.pairs
-            .retain(|pair| pair.is_clean() || pair.verdict().is_some());
+        self.pairs.retain(|pair| pair.is_clean() || pair.verdict().is_some());
     }
 
     /// True if the only flaw in the usual ranges is that images are not brighter, and ranges are not stated.
     fn is_dim(&self, seen: &FlawedFrames) -> bool {
-        self.ranges != StatedRanges::Both
-            && seen.example.flaw == Flaw::Unlit
-            && seen.gravity == Gravity::Doubtful
+        self.ranges != StatedRanges::Both && seen.example.flaw == Flaw::Unlit && seen.gravity == Gravity::Doubtful
     }
 
     /// The first plausible pair, else the usual one.
@@ -268,7 +217,8 @@ impl Probe {
         self.plausible().first().copied().unwrap_or(self.usual)
     }
 
-    /// Message about the flaw and the sidecar lines that would repair it, to follow the file's name; `None` if the images are plausible.
+    /// Message about the flaw and the sidecar lines that would repair it, to follow the file's name; `None` if the
+    /// images are plausible.
     pub(super) fn problem(&self) -> Option<String> {
         Some(match self.conclusion() {
             Conclusion::Plausible | Conclusion::Assumed => return None,
@@ -283,10 +233,7 @@ impl Probe {
                 pair.stated()
             ),
             Conclusion::Several(pairs, seen) => {
-                let list: Vec<String> = pairs
-                    .iter()
-                    .map(|pair| self.pair_description(*pair))
-                    .collect();
+                let list: Vec<String> = pairs.iter().map(|pair| self.pair_description(*pair)).collect();
                 format!(
                     "{seen}. {}With other value ranges they are plausible ({}); {ADD} those of the model's code, such as {}",
                     self.advice_for_dim(&seen),
@@ -309,19 +256,15 @@ impl Probe {
 
     /// Description of a pair of ranges, see [`PairTrial::description`].
     fn pair_description(&self, ranges: RangePair) -> String {
-        self.pairs
-            .iter()
-            .find(|pair| pair.ranges == ranges)
-            .map_or_else(|| ranges.to_string(), PairTrial::description)
+        self.pairs.iter().find(|pair| pair.ranges == ranges).map_or_else(|| ranges.to_string(), PairTrial::description)
     }
 
     /// Remedy for a flaw that no other range explains.
     fn remedy(&self, seen: &FlawedFrames) -> String {
         match (seen.example.flaw, self.ranges) {
-            (Flaw::Unlit, StatedRanges::Neither | StatedRanges::One) => format!(
-                "If its images should be this dim, {ADD}: {}",
-                self.usual.stated()
-            ),
+            (Flaw::Unlit, StatedRanges::Neither | StatedRanges::One) => {
+                format!("If its images should be this dim, {ADD}: {}", self.usual.stated())
+            }
             (Flaw::White | Flaw::Haze, StatedRanges::Neither | StatedRanges::One) => {
                 format!(
                     "{NONE_FITS}; {ADD} `range_in`, `mean`, `std`, `range_out`, `mean_out` and `std_out` of the model's code"
@@ -381,44 +324,24 @@ mod tests {
     use super::*;
     use crate::conventions::{Normalisation, ValueRange, ValueScale};
 
-    const UNIT: RangePair = RangePair {
-        input: ValueScale::Range(ValueRange::Unit),
-        output: ValueScale::Range(ValueRange::Unit),
-    };
-    const BYTES: RangePair = RangePair {
-        input: ValueScale::Range(ValueRange::Bytes),
-        output: ValueScale::Range(ValueRange::Bytes),
-    };
+    const UNIT: RangePair =
+        RangePair { input: ValueScale::Range(ValueRange::Unit), output: ValueScale::Range(ValueRange::Unit) };
+    const BYTES: RangePair =
+        RangePair { input: ValueScale::Range(ValueRange::Bytes), output: ValueScale::Range(ValueRange::Bytes) };
 
     /// A pair with these verdicts on the frames.
     fn pair(ranges: RangePair, verdicts: &[Option<Verdict>]) -> PairTrial {
-        PairTrial {
-            ranges,
-            made: Vec::new(),
-            verdicts: verdicts.to_vec(),
-            endpoints: None,
-        }
+        PairTrial { ranges, made: Vec::new(), verdicts: verdicts.to_vec(), endpoints: None }
     }
 
     /// A plausible pair with this distance of black and white, in codes.
     fn pair_at_distance(ranges: RangePair, distance: f64) -> PairTrial {
-        let endpoints = Endpoints {
-            black: distance,
-            white: 255.0,
-            distance,
-        };
-        PairTrial {
-            endpoints: Some(endpoints),
-            ..pair(ranges, &[None; 6])
-        }
+        let endpoints = Endpoints { black: distance, white: 255.0, distance };
+        PairTrial { endpoints: Some(endpoints), ..pair(ranges, &[None; 6]) }
     }
 
     fn probe(ranges: StatedRanges, pairs: Vec<PairTrial>) -> Probe {
-        Probe {
-            ranges,
-            usual: UNIT,
-            pairs,
-        }
+        Probe { ranges, usual: UNIT, pairs }
     }
 
     /// Conclusion from these pairs after ranking.
@@ -428,29 +351,14 @@ mod tests {
         probe.conclusion()
     }
 
-    const FLAT: Option<Verdict> = Some(Verdict {
-        flaw: Flaw::Flat,
-        gravity: Gravity::Impossible,
-        figure: 0.0,
-    });
-    const WHITE: Option<Verdict> = Some(Verdict {
-        flaw: Flaw::White,
-        gravity: Gravity::Doubtful,
-        figure: 0.0,
-    });
-    const UNLIT: Option<Verdict> = Some(Verdict {
-        flaw: Flaw::Unlit,
-        gravity: Gravity::Doubtful,
-        figure: 0.0,
-    });
+    const FLAT: Option<Verdict> = Some(Verdict { flaw: Flaw::Flat, gravity: Gravity::Impossible, figure: 0.0 });
+    const WHITE: Option<Verdict> = Some(Verdict { flaw: Flaw::White, gravity: Gravity::Doubtful, figure: 0.0 });
+    const UNLIT: Option<Verdict> = Some(Verdict { flaw: Flaw::Unlit, gravity: Gravity::Doubtful, figure: 0.0 });
 
     #[test]
     fn usual_ranges_are_assumed_if_they_are_plausible() {
         for bytes in [None, FLAT] {
-            let usual = probe(
-                StatedRanges::Neither,
-                vec![pair(UNIT, &[None; 6]), pair(BYTES, &[bytes; 6])],
-            );
+            let usual = probe(StatedRanges::Neither, vec![pair(UNIT, &[None; 6]), pair(BYTES, &[bytes; 6])]);
             assert_eq!(usual.conclusion(), Conclusion::Assumed);
             assert_eq!(usual.problem(), None);
         }
@@ -458,20 +366,11 @@ mod tests {
 
     #[test]
     fn another_pair_is_advised_if_the_usual_one_is_implausible() {
-        let other = probe(
-            StatedRanges::Neither,
-            vec![pair(UNIT, &[FLAT; 6]), pair(BYTES, &[None; 6])],
-        );
+        let other = probe(StatedRanges::Neither, vec![pair(UNIT, &[FLAT; 6]), pair(BYTES, &[None; 6])]);
         assert!(matches!(other.conclusion(), Conclusion::Other(BYTES, _)));
         let problem = other.problem().unwrap();
-        assert!(
-            problem.contains("on 6 of 6 dark frames its images are flat"),
-            "{problem}"
-        );
-        assert!(
-            problem.contains("`range_in = \"0..255\"` and `range_out = \"0..255\"`"),
-            "{problem}"
-        );
+        assert!(problem.contains("on 6 of 6 dark frames its images are flat"), "{problem}");
+        assert!(problem.contains("`range_in = \"0..255\"` and `range_out = \"0..255\"`"), "{problem}");
     }
 
     #[test]
@@ -485,20 +384,14 @@ mod tests {
         assert_eq!(alone.conclusion(), Conclusion::Assumed);
         flaws[2] = UNLIT;
         let dim = vec![pair(UNIT, &flaws), pair(BYTES, &[None; 6])];
-        assert_eq!(
-            probe(StatedRanges::Neither, dim).conclusion(),
-            Conclusion::Assumed
-        );
+        assert_eq!(probe(StatedRanges::Neither, dim).conclusion(), Conclusion::Assumed);
     }
 
     #[test]
     fn a_pair_with_a_flaw_on_one_frame_is_not_advised() {
         let mut flaws = [None; 6];
         flaws[2] = WHITE;
-        let dim = probe(
-            StatedRanges::Neither,
-            vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &flaws)],
-        );
+        let dim = probe(StatedRanges::Neither, vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &flaws)]);
         let problem = dim.problem().unwrap();
         assert!(!problem.contains("0..255"), "{problem}");
         assert!(problem.contains("`range_in = \"0..1\"`"), "{problem}");
@@ -506,22 +399,15 @@ mod tests {
 
     #[test]
     fn the_usual_ranges_are_named_first_if_the_images_are_dim() {
-        let dim = probe(
-            StatedRanges::Neither,
-            vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &[None; 6])],
-        );
+        let dim = probe(StatedRanges::Neither, vec![pair(UNIT, &[UNLIT; 6]), pair(BYTES, &[None; 6])]);
         let problem = dim.problem().unwrap();
-        let [usual, other] = ["range_in = \"0..1\"", "range_in = \"0..255\""]
-            .map(|line| problem.find(line).unwrap());
+        let [usual, other] = ["range_in = \"0..1\"", "range_in = \"0..255\""].map(|line| problem.find(line).unwrap());
         assert!(usual < other, "{problem}");
     }
 
     #[test]
     fn black_and_white_choose_among_plausible_pairs() {
-        let signed = RangePair {
-            input: UNIT.input,
-            output: ValueScale::Range(ValueRange::Signed),
-        };
+        let signed = RangePair { input: UNIT.input, output: ValueScale::Range(ValueRange::Signed) };
         let [clear, close, far] = [(2.0, 120.0), (2.0, 9.0), (90.0, 200.0)].map(|distances| {
             ranked_conclusion(vec![
                 pair(UNIT, &[FLAT; 6]),
@@ -536,26 +422,16 @@ mod tests {
 
     #[test]
     fn a_normalised_pair_needs_black_and_white() {
-        let clip = RangePair {
-            input: ValueScale::Normalised(Normalisation::Clip),
-            output: UNIT.output,
-        };
-        let [near, far] = [10.0, 60.0].map(|distance| {
-            ranked_conclusion(vec![
-                pair(UNIT, &[FLAT; 6]),
-                pair_at_distance(clip, distance),
-            ])
-        });
+        let clip = RangePair { input: ValueScale::Normalised(Normalisation::Clip), output: UNIT.output };
+        let [near, far] = [10.0, 60.0]
+            .map(|distance| ranked_conclusion(vec![pair(UNIT, &[FLAT; 6]), pair_at_distance(clip, distance)]));
         assert!(matches!(near, Conclusion::Other(pair, _) if pair == clip));
         assert!(matches!(far, Conclusion::Implausible(_)));
     }
 
     #[test]
     fn no_plausible_pair_names_the_flaw_of_the_usual_one() {
-        let none = probe(
-            StatedRanges::Neither,
-            vec![pair(UNIT, &[WHITE; 6]), pair(BYTES, &[FLAT; 6])],
-        );
+        let none = probe(StatedRanges::Neither, vec![pair(UNIT, &[WHITE; 6]), pair(BYTES, &[FLAT; 6])]);
         let Conclusion::Implausible(seen) = none.conclusion() else {
             panic!("{:?}", none.conclusion());
         };
@@ -576,10 +452,7 @@ mod tests {
     fn stated_ranges_may_be_doubtful_but_not_impossible() {
         let doubtful = probe(StatedRanges::Both, vec![pair(UNIT, &[WHITE; 6])]);
         assert!(matches!(doubtful.conclusion(), Conclusion::Doubtful(_)));
-        let mixed = probe(
-            StatedRanges::Both,
-            vec![pair(UNIT, &[WHITE, WHITE, WHITE, FLAT, FLAT, FLAT])],
-        );
+        let mixed = probe(StatedRanges::Both, vec![pair(UNIT, &[WHITE, WHITE, WHITE, FLAT, FLAT, FLAT])]);
         assert!(matches!(mixed.conclusion(), Conclusion::Implausible(_)));
     }
 }

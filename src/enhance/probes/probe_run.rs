@@ -17,7 +17,8 @@ use darkqa_base::error::Result;
 use darkqa_base::types::manifests::{ProbeNote, ProbeOutcome};
 use darkqa_base::types::{Flaw, Rgb};
 
-/// Sizes of probe frames, tried in this order; longer and shorter side in pixels. Most multiples that models need divide one of them.
+/// Sizes of probe frames, tried in this order; longer and shorter side in pixels. Most multiples that models need
+/// divide one of them.
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
 
 /// Results of a model on dark frames.
@@ -32,7 +33,8 @@ impl Enhancer {
     /// Runs the model on dark frames, and chooses the value ranges that are not stated.
     ///
     /// # Errors
-    /// If the images are implausible or the ranges ambiguous, unless implausible images are accepted. The message proposes sidecar lines.
+    /// If the images are implausible or the ranges ambiguous, unless implausible images are accepted. The message
+    /// proposes sidecar lines.
     pub fn probe(&mut self, dark: &[Rgb], implausible: Implausible) -> Result<()> {
         if dark.is_empty() {
             let name = self.name();
@@ -45,10 +47,7 @@ impl Enhancer {
             self.enhance(frame)?;
             trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         }
-        let Some(Trials {
-            probes: [probe], ..
-        }) = trials
-        else {
+        let Some(Trials { probes: [probe], .. }) = trials else {
             warn_not_probed(self.name());
             return Ok(());
         };
@@ -67,9 +66,7 @@ impl Enhancer {
         }
         let no_image = match &problem {
             Some(_) => None,
-            None => self
-                .remark_on_endpoints(probe.usual)?
-                .or_else(|| self.remark_on_name()),
+            None => self.remark_on_endpoints(probe.usual)?.or_else(|| self.remark_on_name()),
         };
         if let Some(remark) = &no_image {
             self.remark(remark);
@@ -87,14 +84,12 @@ impl Enhancer {
         self.set_probe_result(note)
     }
 
-    /// Message about the flaw of a probe's images, with a remedy; `None` if they are plausible. Without a preset, corrected sidecar lines
-    /// are searched by trial.
+    /// Message about the flaw of a probe's images, with a remedy; `None` if they are plausible. Without a preset,
+    /// corrected sidecar lines are searched by trial.
     fn problem(&self, probe: &Probe, dark: &[Rgb]) -> Result<Option<String>> {
         let problem = match probe.conclusion() {
             // A preset's convention comes from the authors' code, so no other one is proposed.
-            Conclusion::Implausible(seen) | Conclusion::Doubtful(seen)
-                if !self.follows_preset() =>
-            {
+            Conclusion::Implausible(seen) | Conclusion::Doubtful(seen) if !self.follows_preset() => {
                 let better = match (self.better_lines(dark)?, seen.example.flaw) {
                     // Noise, such as the output of random weights, is neither a residual nor a map.
                     (None, Flaw::Shuffled) => None,
@@ -112,13 +107,8 @@ impl Enhancer {
         let unread = self
             .graph()
             .unread_images()
-            .map_or(String::new(), |unread| {
-                format!(". Perhaps another output is needed: {unread}")
-            });
-        Ok(Some(sidecar::insert_sidecar_name(
-            &(problem + &unread),
-            self.path(),
-        )))
+            .map_or(String::new(), |unread| format!(". Perhaps another output is needed: {unread}"));
+        Ok(Some(sidecar::insert_sidecar_name(&(problem + &unread), self.path())))
     }
 
     /// The present image output, as a term of an expression.
@@ -129,7 +119,8 @@ impl Enhancer {
         }
     }
 
-    /// Enhances the image of a frame and condition (`place`), judges the result, and returns it with its contribution to the usage record.
+    /// Enhances the image of a frame and condition (`place`), judges the result, and returns it with its contribution
+    /// to the usage record.
     ///
     /// # Errors
     /// As [`Self::enhance`], and if most images of dark frames so far are implausible.
@@ -156,27 +147,18 @@ impl Enhancer {
     ///
     /// # Errors
     /// If most images of dark frames so far are implausible.
-    pub fn judge_stored(
-        &self,
-        used: &ImageUse,
-        place: [&dyn ToString; 2],
-        implausible: Implausible,
-    ) -> Result<()> {
+    pub fn judge_stored(&self, used: &ImageUse, place: [&dyn ToString; 2], implausible: Implausible) -> Result<()> {
         used.record(&self.usage(), self.path(), place, implausible)
     }
 
-    fn judge(
-        &self,
-        seen: &Judgement,
-        place: [&dyn ToString; 2],
-        implausible: Implausible,
-    ) -> Result<()> {
+    fn judge(&self, seen: &Judgement, place: [&dyn ToString; 2], implausible: Implausible) -> Result<()> {
         seen.record(&self.usage(), self.path(), place, implausible)
     }
 
-    /// Runs the model on dark frames in each of these conventions, which differ only in the decoding of the output, with each pair of
-    /// ranges that the stated ones allow. If the usual pair is implausible, normalised pairs are tried, too, and all are ranked by the
-    /// outputs for black and white. Returns `None` if the model fails at all sizes of the probe.
+    /// Runs the model on dark frames in each of these conventions, which differ only in the decoding of the output,
+    /// with each pair of ranges that the stated ones allow. If the usual pair is implausible, normalised pairs are
+    /// tried, too, and all are ranked by the outputs for black and white. Returns `None` if the model fails at all
+    /// sizes of the probe.
     pub(super) fn trials<const N: usize>(
         &self,
         dark: &[Rgb],
@@ -190,27 +172,21 @@ impl Enhancer {
             _ => StatedRanges::One,
         };
         for size in SIZES {
-            let frames: Vec<Rgb> = dark
-                .iter()
-                .map(|frame| self.probe_image(frame, size))
-                .collect::<Result<_>>()?;
+            let frames: Vec<Rgb> = dark.iter().map(|frame| self.probe_image(frame, size)).collect::<Result<_>>()?;
             let plain = RangePair::plain(input, output);
             // A failure in one range does not predict failure in the others at this size.
             let Some(pairs) = self.pair_trials(&frames, conventions, &plain)? else {
                 continue;
             };
-            let mut probes = pairs.map(|pairs| Probe {
-                ranges,
-                usual,
-                pairs,
-            });
+            let mut probes = pairs.map(|pairs| Probe { ranges, usual, pairs });
             let usual_pair = probes[0].usual_pair();
             if usual_pair.is_none_or(|pair| pair.verdict().is_some()) {
                 if !self.is_dim(&probes[0], conventions[0])? {
                     let [inputs, outputs] = self.scales_to_try(input, output);
                     let pairs = RangePair::normalised(&inputs, &outputs);
                     for fed_alike in pairs.chunk_by(|a, b| a.input == b.input) {
-                        // The plain ranges have shown that this size works, so a failure here is no reason to try another.
+                        // The plain ranges have shown that this size works, so a failure here is no reason to try
+                        // another.
                         let more = self.pair_trials(&frames, conventions, fed_alike)?;
                         for (probe, pairs) in probes.iter_mut().zip(more.into_iter().flatten()) {
                             probe.pairs.extend(pairs);
@@ -236,8 +212,8 @@ impl Enhancer {
         Ok(endpoints.is_some_and(Endpoints::are_near))
     }
 
-    /// Trials of the frames in each of these conventions with each pair of ranges. The model runs once for each frame and input range.
-    /// Returns `None` if it fails on a frame.
+    /// Trials of the frames in each of these conventions with each pair of ranges. The model runs once for each frame
+    /// and input range. Returns `None` if it fails on a frame.
     fn pair_trials<const N: usize>(
         &self,
         frames: &[Rgb],
@@ -249,11 +225,7 @@ impl Enhancer {
         for fed_alike in ranges.chunk_by(|a, b| a.input == b.input) {
             let graphs: Vec<Graph> = conventions
                 .iter()
-                .flat_map(|convention| {
-                    fed_alike
-                        .iter()
-                        .map(|ranges| self.read_by(convention, *ranges))
-                })
+                .flat_map(|convention| fed_alike.iter().map(|ranges| self.read_by(convention, *ranges)))
                 .collect::<Result<_>>()?;
             let Some(made) = run_frames(&graphs, frames)? else {
                 return Ok(None);
@@ -278,13 +250,10 @@ impl Enhancer {
         Ok(())
     }
 
-    /// Warns that the value ranges are assumed. If the output seems to be the image, the message proposes lines that confirm them.
+    /// Warns that the value ranges are assumed. If the output seems to be the image, the message proposes lines that
+    /// confirm them.
     fn warn_ranges_assumed(&self, usual: RangePair, is_image: bool) {
-        let lines = if is_image {
-            format!(". To confirm, {ADD}: {}", usual.stated())
-        } else {
-            String::new()
-        };
+        let lines = if is_image { format!(". To confirm, {ADD}: {}", usual.stated()) } else { String::new() };
         let words = format!(
             "value ranges of {usual} assumed, because nothing sets them; its images of dark frames are plausible{lines}"
         );
@@ -292,15 +261,12 @@ impl Enhancer {
         tracing::warn!("{}: {words}", self.name());
     }
 
-    /// Outputs for black and white in a convention with these ranges; `None` if the model fails or its output is not finite.
+    /// Outputs for black and white in a convention with these ranges; `None` if the model fails or its output is not
+    /// finite.
     ///
     /// # Errors
     /// If the runtime fails.
-    pub(super) fn endpoints(
-        &self,
-        convention: &ModelSidecar,
-        ranges: RangePair,
-    ) -> Result<Option<Endpoints>> {
+    pub(super) fn endpoints(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Option<Endpoints>> {
         let graph = self.read_by(convention, ranges)?;
         let image = black_and_white(self.probe_size(endpoints::SIZE));
         let made = run_frames(&[graph], &[image])?;
@@ -311,26 +277,17 @@ impl Enhancer {
 
     /// The model's graph in a convention with these ranges.
     pub(super) fn read_by(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Graph> {
-        let convention = convention
-            .clone()
-            .with_input_scale(ranges.input)
-            .with_output_scale(ranges.output);
+        let convention = convention.clone().with_input_scale(ranges.input).with_output_scale(ranges.output);
         let graph = self.graph().with_convention(convention);
         graph.map_err(|problem| self.error(problem))
     }
 
     /// A frame resized to a size of the probe, or to the model's fixed size.
     pub(super) fn probe_image(&self, frame: &Rgb, [longer, shorter]: [usize; 2]) -> Result<Rgb> {
-        let size = if frame.height() > frame.width() {
-            [longer, shorter]
-        } else {
-            [shorter, longer]
-        };
+        let size = if frame.height() > frame.width() { [longer, shorter] } else { [shorter, longer] };
         let [height, width] = self.probe_size(size);
         let planes = Planes::from_rgb(frame).resized(height, width);
         let planes = planes.map_err(|problem| self.error(problem))?;
-        planes
-            .to_rgb(Rounding::Round)
-            .ok_or_else(|| self.error("a frame of the probe has no pixel"))
+        planes.to_rgb(Rounding::Round).ok_or_else(|| self.error("a frame of the probe has no pixel"))
     }
 }

@@ -27,32 +27,19 @@ impl RangePair {
 
     /// True if neither side is normalised.
     pub(super) fn is_plain(self) -> bool {
-        matches!(
-            self,
-            Self {
-                input: ValueScale::Range(_),
-                output: ValueScale::Range(_)
-            }
-        )
+        matches!(self, Self { input: ValueScale::Range(_), output: ValueScale::Range(_) })
     }
 
     /// Sidecar lines that state the pair.
     pub(super) fn lines(self) -> Vec<String> {
         let mut lines = scale_lines(self.input, ["range_in", "mean", "std"]);
-        lines.extend(scale_lines(
-            self.output,
-            ["range_out", "mean_out", "std_out"],
-        ));
+        lines.extend(scale_lines(self.output, ["range_out", "mean_out", "std_out"]));
         lines
     }
 
     /// The lines of [`Self::lines`], joined for a sentence.
     pub(super) fn stated(self) -> String {
-        self.lines()
-            .into_iter()
-            .map(|line| format!("`{line}`"))
-            .collect::<Vec<_>>()
-            .join(" and ")
+        self.lines().into_iter().map(|line| format!("`{line}`")).collect::<Vec<_>>().join(" and ")
     }
 }
 
@@ -72,24 +59,14 @@ fn scales(stated: Option<ValueRange>, all: &[ValueScale]) -> Vec<ValueScale> {
 
 /// Each input scale with each output scale, grouped by input.
 fn pairs(inputs: &[ValueScale], outputs: &[ValueScale]) -> Vec<RangePair> {
-    inputs
-        .iter()
-        .flat_map(|&input| {
-            outputs
-                .iter()
-                .map(move |&output| RangePair { input, output })
-        })
-        .collect()
+    inputs.iter().flat_map(|&input| outputs.iter().map(move |&output| RangePair { input, output })).collect()
 }
 
 /// Sidecar lines for one side, with its keys for range, mean and deviation.
 fn scale_lines(scale: ValueScale, [range, mean, std]: [&str; 3]) -> Vec<String> {
     match scale.mean_and_std() {
         None => vec![format!("{range} = \"{}\"", scale.range())],
-        Some([means, deviations]) => vec![
-            format!("{mean} = {means:?}"),
-            format!("{std} = {deviations:?}"),
-        ],
+        Some([means, deviations]) => vec![format!("{mean} = {means:?}"), format!("{std} = {deviations:?}")],
     }
 }
 
@@ -106,16 +83,9 @@ mod tests {
         };
         assert_eq!(
             imagenet.lines(),
-            [
-                "mean = [0.485, 0.456, 0.406]",
-                "std = [0.229, 0.224, 0.225]",
-                "range_out = \"0..1\""
-            ]
+            ["mean = [0.485, 0.456, 0.406]", "std = [0.229, 0.224, 0.225]", "range_out = \"0..1\""]
         );
-        let centred = RangePair {
-            output: ValueScale::Normalised(Normalisation::Centred),
-            ..imagenet
-        };
+        let centred = RangePair { output: ValueScale::Normalised(Normalisation::Centred), ..imagenet };
         assert_eq!(centred.lines()[2], "mean_out = [0.5, 0.5, 0.5]");
     }
 

@@ -5,12 +5,9 @@ use crate::graphs::{Graph, RunResult};
 use darkqa_base::error::Result;
 use darkqa_base::types::Rgb;
 
-/// Runs a model on frames, and decodes the outputs by the conventions of several graphs with the same input encoding. Returns the outputs
-/// by graph and frame; `None` if the model fails on a frame.
-pub(super) fn run_frames(
-    graphs: &[Graph],
-    frames: &[Rgb],
-) -> Result<Option<Vec<Vec<UnclampedImage>>>> {
+/// Runs a model on frames, and decodes the outputs by the conventions of several graphs with the same input encoding.
+/// Returns the outputs by graph and frame; `None` if the model fails on a frame.
+pub(super) fn run_frames(graphs: &[Graph], frames: &[Rgb]) -> Result<Option<Vec<Vec<UnclampedImage>>>> {
     let mut all = vec![Vec::with_capacity(frames.len()); graphs.len()];
     let Some(graph) = graphs.first() else {
         return Ok(Some(all));

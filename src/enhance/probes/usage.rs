@@ -1,5 +1,5 @@
-//! Record of an enhancer's convention and counts in a run, shared by all threads ([`Usage`]), and the reaction to implausible images
-//! ([`Implausible`]).
+//! Record of an enhancer's convention and counts in a run, shared by all threads ([`Usage`]), and the reaction to
+//! implausible images ([`Implausible`]).
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -46,10 +46,7 @@ impl Judgement {
         if brightness(degraded) > DARK || shows_nothing(degraded) {
             Self::Bright
         } else {
-            Self::Dark(judge(
-                &UnclampedImage::downscaled(degraded),
-                &UnclampedImage::downscaled(made),
-            ))
+            Self::Dark(judge(&UnclampedImage::downscaled(degraded), &UnclampedImage::downscaled(made)))
         }
     }
 }
@@ -66,7 +63,8 @@ pub struct ImageUse {
 }
 
 impl ImageUse {
-    /// Records an image of a frame and condition (`place`) from another run or process, as if the enhancer in the file `model` made it now.
+    /// Records an image of a frame and condition (`place`) from another run or process, as if the enhancer in the file
+    /// `model` made it now.
     ///
     /// # Errors
     /// If most of its images of dark frames so far are implausible.
@@ -85,12 +83,7 @@ impl ImageUse {
 
 impl ImageUse {
     /// Counts the image of a frame and condition (`place`) if it is burnt out, unless images are not judged.
-    pub(super) fn count_burnt_out(
-        &self,
-        usage: &Usage,
-        place: [&dyn ToString; 2],
-        implausible: Implausible,
-    ) {
+    pub(super) fn count_burnt_out(&self, usage: &Usage, place: [&dyn ToString; 2], implausible: Implausible) {
         if let Some(white) = self.white
             && implausible != Implausible::NotLookedFor
         {
@@ -229,7 +222,8 @@ impl Usage {
         self.with(|state| change(&mut state.note));
     }
 
-    /// Counts a burnt-out image with its percentage of white pixels. An image of the same frame and condition counts once.
+    /// Counts a burnt-out image with its percentage of white pixels. An image of the same frame and condition counts
+    /// once.
     fn count_burnt_out(&self, white: u8, [frame, condition]: [&dyn ToString; 2]) {
         let place = [frame, condition].map(ToString::to_string);
         let key = Digest::from_parts(place.iter().map(String::as_bytes));
@@ -263,20 +257,14 @@ impl Usage {
             return Ok(());
         }
         let [frame, condition] = place;
-        let flawed = verdict.map(|verdict| FlawedImage {
-            frame,
-            condition,
-            flaw: verdict.flaw,
-        });
+        let flawed = verdict.map(|verdict| FlawedImage { frame, condition, flaw: verdict.flaw });
         self.with(|state| {
             state.note.judged.count(flawed);
             let impossible = verdict.filter(|verdict| verdict.gravity == Gravity::Impossible);
             state.impossible += usize::from(impossible.is_some());
             let judged = state.note.judged.images;
             match (impossible, implausible) {
-                (Some(example), Implausible::Refused)
-                    if judged >= MIN_JUDGED && 2 * state.impossible > judged =>
-                {
+                (Some(example), Implausible::Refused) if judged >= MIN_JUDGED && 2 * state.impossible > judged => {
                     Err(format!(
                         "{} of its {judged} images of dark frames are implausible; they {example}",
                         state.impossible
@@ -306,11 +294,7 @@ mod tests {
     }
 
     fn judged(usage: &Usage, frame: usize, made: &Rgb, how: Implausible) -> Result<(), String> {
-        usage.judge(
-            &Judgement::on([&squares(1.0), made]),
-            [&frame, &"L3+ev+m"],
-            how,
-        )
+        usage.judge(&Judgement::on([&squares(1.0), made]), [&frame, &"L3+ev+m"], how)
     }
 
     #[test]
@@ -337,9 +321,7 @@ mod tests {
             judged(&usage, frame, &flat, Implausible::Used).unwrap();
         }
         let again = Judgement::on([&squares(1.0), &flat]);
-        usage
-            .judge(&again, [&0, &"L4+ev+m"], Implausible::Used)
-            .unwrap();
+        usage.judge(&again, [&0, &"L4+ev+m"], Implausible::Used).unwrap();
         let judged = usage.note().judged;
         assert_eq!((judged.images, judged.flaws()), (3, 3));
         assert_eq!(judged.examples.len(), 3);
@@ -359,15 +341,11 @@ mod tests {
             (&good, 2, Implausible::Used),
             (&burnt, 3, Implausible::NotLookedFor),
         ] {
-            used.record(&usage, Path::new("m.onnx"), [&frame, &"L1+ev+m"], how)
-                .unwrap();
+            used.record(&usage, Path::new("m.onnx"), [&frame, &"L1+ev+m"], how).unwrap();
         }
         let note = usage.note();
         let found = &note.burnt_out["L1+ev+m"];
-        assert_eq!(
-            (found.images, found.percents, &*found.example),
-            (2, 200, "0")
-        );
+        assert_eq!((found.images, found.percents, &*found.example), (2, 200, "0"));
         let stored = serde_json::to_value(&good).unwrap();
         assert_eq!(stored.get("white"), None);
     }
@@ -387,9 +365,7 @@ mod tests {
         let made = Rgb::black(96, 96);
         let seen = Judgement::on([&bright, &made]);
         assert_eq!(seen, Judgement::Bright);
-        usage
-            .judge(&seen, [&"frame", &"L0"], Implausible::Refused)
-            .unwrap();
+        usage.judge(&seen, [&"frame", &"L0"], Implausible::Refused).unwrap();
         assert_eq!(usage.note().judged.images, 0);
     }
 }

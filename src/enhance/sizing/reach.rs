@@ -1,8 +1,9 @@
 //! Measurement of a model's receptive field ([`Reach`]), and of the context and alignment of its tiles ([`Context`]).
 //!
-//! One pixel in the middle of a trial image is changed by one code. The distance of the farthest output sample that changes is the reach:
-//! 7 pixels for Zero-DCE, as its seven 3 × 3 convolutions imply. A global mean changes too little with one pixel (2 · 10⁻⁷ for
-//! BrightsightNet at 512 × 512). So a quarter of the image is inverted, too, and changes far from that quarter also count.
+//! One pixel in the middle of a trial image is changed by one code. The distance of the farthest output sample that
+//! changes is the reach: 7 pixels for Zero-DCE, as its seven 3 × 3 convolutions imply. A global mean changes too little
+//! with one pixel (2 · 10⁻⁷ for BrightsightNet at 512 × 512). So a quarter of the image is inverted, too, and changes
+//! far from that quarter also count.
 
 use super::size_plan::SizeRule;
 use super::texture::{CODES, texture};
@@ -12,7 +13,8 @@ use crate::planes::Planes;
 use darkqa_base::error;
 use darkqa_base::types::Rgb;
 
-/// Minimum change of an output in 0..1 that counts; above rounding errors of 32-bit floats, below a thousandth of a code. Chosen.
+/// Minimum change of an output in 0..1 that counts; above rounding errors of 32-bit floats, below a thousandth of a
+/// code. Chosen.
 const MIN_CHANGE: f32 = 1e-6;
 
 /// Minimum context of a tile, in pixels, if the tile has room for it: slightly more than most models need. Chosen.
@@ -21,10 +23,12 @@ const MIN_CONTEXT: usize = 8;
 /// Side, in pixels, of the trial image for models that accept any size; chosen.
 pub(crate) const FREE_SIDE: usize = 128;
 
-/// Multiples of pixels at which tiles may have to start, in ascending order, for networks that halve an image up to five times.
+/// Multiples of pixels at which tiles may have to start, in ascending order, for networks that halve an image up to
+/// five times.
 const ALIGNMENTS: [usize; 16] = [1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32];
 
-/// Maximum difference of outputs in 0..1 that count as equal: a tenth of a code. Chosen above the rounding of sums in another order.
+/// Maximum difference of outputs in 0..1 that count as equal: a tenth of a code. Chosen above the rounding of sums in
+/// another order.
 const MAX_EQUAL: f32 = 4e-4;
 
 /// Context and alignment of a model's tiles, measured once if they are not stated.
@@ -37,17 +41,12 @@ pub(crate) struct Context {
 
 impl Context {
     /// Context in pixels, stated or measured. The inner error explains why the model counts as global.
-    pub(crate) fn measure(
-        &mut self,
-        graph: &Graph,
-        rule: SizeRule,
-    ) -> error::Result<Result<usize, String>> {
+    pub(crate) fn measure(&mut self, graph: &Graph, rule: SizeRule) -> error::Result<Result<usize, String>> {
         match rule.tile {
             Some(Locality::Exact(context)) => return Ok(Ok(context)),
             Some(Locality::Global) => {
                 return Ok(Err(
-                    "it needs the whole image (tile = \"none\" in MODEL.onnx.toml or the preset)"
-                        .to_owned(),
+                    "it needs the whole image (tile = \"none\" in MODEL.onnx.toml or the preset)".to_owned()
                 ));
             }
             None => {}
@@ -61,10 +60,7 @@ impl Context {
         let reach = self.reach.clone().unwrap_or_else(|| Err(String::new()));
         Ok(reach.and_then(|reach| {
             reach.context(size).ok_or_else(|| {
-                format!(
-                    "a pixel depends on others {} pixels away, which is more than a quarter of the size",
-                    reach.0
-                )
+                format!("a pixel depends on others {} pixels away, which is more than a quarter of the size", reach.0)
             })
         }))
     }
@@ -80,8 +76,8 @@ impl Context {
         self.alignment.is_none()
     }
 
-    /// Multiple at which tiles of this height and width must start to give the same result as the whole image: 2 to the power of the
-    /// number of pooling layers. 1 if none is found; the comparison of seams then detects wrong tiles.
+    /// Multiple at which tiles of this height and width must start to give the same result as the whole image: 2 to the
+    /// power of the number of pooling layers. 1 if none is found; the comparison of seams then detects wrong tiles.
     pub(crate) fn measure_alignment(
         &mut self,
         graph: &Graph,
@@ -99,8 +95,8 @@ impl Context {
     }
 }
 
-/// Smallest of [`ALIGNMENTS`] by which the input can be shifted without changing the output, except within the context of the edges; `None`
-/// without one.
+/// Smallest of [`ALIGNMENTS`] by which the input can be shifted without changing the output, except within the context
+/// of the edges; `None` without one.
 fn find_alignment(graph: &Graph, tile: [usize; 2], context: usize) -> error::Result<Option<usize>> {
     let largest = ALIGNMENTS[ALIGNMENTS.len() - 1];
     let scene = texture(tile.map(|side| side + largest), &CODES[0]);
@@ -129,7 +125,8 @@ fn crop(scene: &Rgb, [height, width]: [usize; 2], start: usize) -> Planes {
     Planes::from_rgb(&part)
 }
 
-/// True if the output of an image and that of the shifted image agree where both are farther than `margin` from their edges.
+/// True if the output of an image and that of the shifted image agree where both are farther than `margin` from their
+/// edges.
 fn same_interior(still: &Planes, moved: &Planes, shift: usize, margin: usize) -> bool {
     let (height, width) = (still.height, still.width);
     let rows = margin..(height - shift.min(height)).saturating_sub(margin);
@@ -184,8 +181,8 @@ impl Reach {
         Ok(Ok(Self(farthest)))
     }
 
-    /// Context for tiles of this height and width, in pixels; `None` if the reach exceeds a quarter of a side, so that the model counts as
-    /// global.
+    /// Context for tiles of this height and width, in pixels; `None` if the reach exceeds a quarter of a side, so that
+    /// the model counts as global.
     fn context(self, tile: [usize; 2]) -> Option<usize> {
         let quarter = tile[0].min(tile[1]) / 4;
         (self.0 <= quarter).then(|| self.0.max(MIN_CONTEXT.min(quarter)))
@@ -200,9 +197,7 @@ fn run_trial(graph: &Graph, planes: &Planes) -> error::Result<Result<Planes, Str
         RunResult::Failed(failure) => failure.message(),
         RunResult::Unusable(_) => "gave values outside its range".to_owned(),
     };
-    Ok(Err(format!(
-        "the context that a pixel needs cannot be measured: the model {why}"
-    )))
+    Ok(Err(format!("the context that a pixel needs cannot be measured: the model {why}")))
 }
 
 /// Inverts the codes of an image in the rectangle from this row and column to the bottom right corner.
@@ -224,7 +219,8 @@ fn farthest_moved(before: &Planes, after: &Planes, middle: [usize; 2]) -> usize 
         .unwrap_or(0)
 }
 
-/// Maximum distance, along a side, between the changed samples and the rectangle from `corner` to the bottom right; 0 if all are within it.
+/// Maximum distance, along a side, between the changed samples and the rectangle from `corner` to the bottom right; 0
+/// if all are within it.
 fn farthest_from_corner(before: &Planes, after: &Planes, corner: [usize; 2]) -> usize {
     changed_pixels(before, after, MAX_EQUAL)
         .map(|[y, x]| {
@@ -236,22 +232,14 @@ fn farthest_from_corner(before: &Planes, after: &Planes, corner: [usize; 2]) -> 
 }
 
 /// Rows and columns of the samples that differ by more than `limit`; NaN does not count as different.
-fn changed_pixels<'a>(
-    before: &'a Planes,
-    after: &'a Planes,
-    limit: f32,
-) -> impl Iterator<Item = [usize; 2]> + 'a {
+fn changed_pixels<'a>(before: &'a Planes, after: &'a Planes, limit: f32) -> impl Iterator<Item = [usize; 2]> + 'a {
     let (pixels, width) = (before.height * before.width, before.width);
-    before
-        .samples
-        .iter()
-        .zip(&after.samples)
-        .enumerate()
-        .filter(move |(_, (a, b))| (*a - *b).abs() > limit)
-        .map(move |(index, _)| {
+    before.samples.iter().zip(&after.samples).enumerate().filter(move |(_, (a, b))| (*a - *b).abs() > limit).map(
+        move |(index, _)| {
             let pixel = index % pixels;
             [pixel / width, pixel % width]
-        })
+        },
+    )
 }
 
 #[cfg(test)]
@@ -260,18 +248,15 @@ mod tests {
 
     /// An image of 5 × 7 pixels.
     fn small_planes(samples: Vec<f32>) -> Planes {
-        Planes {
-            height: 5,
-            width: 7,
-            samples,
-        }
+        Planes { height: 5, width: 7, samples }
     }
 
     #[test]
     fn farthest_changed_sample_counts() {
         let before = small_planes(vec![0.5; 105]);
         let mut moved = before.samples.clone();
-        // A change within rounding errors; one in the second plane at row 4, column 1; one in the third at row 2, column 4.
+        // A change within rounding errors; one in the second plane at row 4, column 1; one in the third at row 2,
+        // column 4.
         moved[0] += 5e-7;
         moved[35 + 4 * 7 + 1] += 0.1;
         moved[70 + 2 * 7 + 4] -= 0.1;
@@ -281,10 +266,7 @@ mod tests {
         let mut moved = before.samples.clone();
         moved[7 + 1] += 0.01;
         moved[4 * 7 + 6] += 0.01;
-        assert_eq!(
-            farthest_from_corner(&before, &small_planes(moved), [2, 3]),
-            2
-        );
+        assert_eq!(farthest_from_corner(&before, &small_planes(moved), [2, 3]), 2);
     }
 
     #[test]
@@ -300,9 +282,7 @@ mod tests {
         Planes {
             height: 12,
             width: 12,
-            samples: (0..144)
-                .map(|i| ((i / 12 + shift) * 7 % 5 + (i % 12 + shift) * 3 % 11) as f32)
-                .collect(),
+            samples: (0..144).map(|i| ((i / 12 + shift) * 7 % 5 + (i % 12 + shift) * 3 % 11) as f32).collect(),
         }
     }
 
@@ -311,10 +291,7 @@ mod tests {
         let still = shifted_pattern(0);
         assert!(same_interior(&still, &shifted_pattern(2), 2, 3));
         assert!(!same_interior(&still, &shifted_pattern(3), 2, 3));
-        assert!(
-            !same_interior(&still, &shifted_pattern(2), 2, 6),
-            "nothing is compared"
-        );
+        assert!(!same_interior(&still, &shifted_pattern(2), 2, 6), "nothing is compared");
     }
 
     #[test]

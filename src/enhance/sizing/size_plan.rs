@@ -1,9 +1,10 @@
 //! Plan for feeding an image to a model that does not accept its size, by padding and tiling: [`SizePlan`].
 //!
-//! Each side is planned on its own. A side equal to the model's fixed size is fed unchanged; a smaller one is padded at the right or
-//! bottom and cropped afterwards; a larger one is cut into tiles of exactly that size, the first and last of which touch the image's
-//! edges. The result equals that of the whole image only if a pixel depends only on the pixels around it. Measured with Zero-DCE at 512 ×
-//! 512: a mean difference of 0.006 codes of 255, compared with 5.4 for resizing the image and the result.
+//! Each side is planned on its own. A side equal to the model's fixed size is fed unchanged; a smaller one is padded at
+//! the right or bottom and cropped afterwards; a larger one is cut into tiles of exactly that size, the first and last
+//! of which touch the image's edges. The result equals that of the whole image only if a pixel depends only on the
+//! pixels around it. Measured with Zero-DCE at 512 × 512: a mean difference of 0.006 codes of 255, compared with 5.4
+//! for resizing the image and the result.
 
 use std::num::NonZeroUsize;
 
@@ -12,11 +13,14 @@ use crate::conventions::sidecar::{ADD, ModelSidecar};
 use crate::conventions::{Locality, Padding};
 use crate::failure::format_size;
 
-/// Side of a tile with `--llie-options tile=auto`, in pixels; measured: as fast as the whole image, with a twelfth of its memory.
+/// Side of a tile with `--llie-options tile=auto`, in pixels; measured: as fast as the whole image, with a twelfth of
+/// its memory.
 const TILE: usize = 256;
-/// Maximum area, in pixels, of an image that `--llie-options tile=auto` does not cut and whose memory is not checked; chosen.
+/// Maximum area, in pixels, of an image that `--llie-options tile=auto` does not cut and whose memory is not checked;
+/// chosen.
 pub(crate) const MAX_WHOLE: usize = 1280 * 720;
-/// Context of tiles, in pixels, with `--llie-options tile=N` if neither sidecar nor preset states the exact context; chosen.
+/// Context of tiles, in pixels, with `--llie-options tile=N` if neither sidecar nor preset states the exact context;
+/// chosen.
 const CONTEXT: usize = 32;
 
 /// Sizes that a model accepts, as far as graph, sidecar, preset and trials show.
@@ -69,20 +73,15 @@ impl SizeRule {
         whole != size && whole != self.padded(size)
     }
 
-    /// True if the image is enhanced in overlapping parts instead of being padded; the parts may differ where they overlap.
+    /// True if the image is enhanced in overlapping parts instead of being padded; the parts may differ where they
+    /// overlap.
     fn is_cropped(self, size: [usize; 2]) -> bool {
-        self.pad == Padding::Crop
-            && self.takes_any_size()
-            && size.iter().any(|side| side % self.multiple != 0)
+        self.pad == Padding::Crop && self.takes_any_size() && size.iter().any(|side| side % self.multiple != 0)
     }
 
-    /// Size to which an image with a side above `max_side` is reduced, of the same aspect ratio and in the model's multiples. `None` if the
-    /// image is not reduced.
-    pub(crate) fn reduced_size(
-        self,
-        size: [usize; 2],
-        max_side: Option<NonZeroUsize>,
-    ) -> Option<[usize; 2]> {
+    /// Size to which an image with a side above `max_side` is reduced, of the same aspect ratio and in the model's
+    /// multiples. `None` if the image is not reduced.
+    pub(crate) fn reduced_size(self, size: [usize; 2], max_side: Option<NonZeroUsize>) -> Option<[usize; 2]> {
         let max_side = max_side?.get();
         let longest = size[0].max(size[1]);
         if longest <= max_side || !self.takes_any_size() {
@@ -125,12 +124,7 @@ pub(crate) enum PlanError {
 
 impl SizePlan {
     /// The plan for an image of this size. `context`, in pixels, is used for a model with a fixed size.
-    pub(crate) fn new(
-        size: [usize; 2],
-        rule: SizeRule,
-        tiling: Tiling,
-        context: usize,
-    ) -> Result<Self, PlanError> {
+    pub(crate) fn new(size: [usize; 2], rule: SizeRule, tiling: Tiling, context: usize) -> Result<Self, PlanError> {
         let geometry = if rule.is_cropped(size) {
             crop_geometry(size, rule)?
         } else if rule.takes_any_size() {
@@ -138,16 +132,11 @@ impl SizePlan {
         } else {
             fixed_geometry(size, rule, context)
         };
-        let tiles = TilePlan::new(geometry)
-            .ok_or_else(|| PlanError::Other(no_room_for_context(geometry)))?;
+        let tiles = TilePlan::new(geometry).ok_or_else(|| PlanError::Other(no_room_for_context(geometry)))?;
         Ok(Self {
             geometry,
             tiles,
-            seams: if rule.is_cropped(size) {
-                SeamRule::MayDiffer
-            } else {
-                SeamRule::MustHold
-            },
+            seams: if rule.is_cropped(size) { SeamRule::MayDiffer } else { SeamRule::MustHold },
         })
     }
 
@@ -167,20 +156,11 @@ fn crop_geometry(size: [usize; 2], rule: SizeRule) -> Result<TileGeometry, PlanE
             format_size(size)
         )));
     }
-    Ok(TileGeometry {
-        area: size,
-        tile,
-        context: 0,
-        multiple: 1,
-    })
+    Ok(TileGeometry { area: size, tile, context: 0, multiple: 1 })
 }
 
 /// Tiles for a model that accepts any size, by `--llie-options tile` and the stated locality.
-fn tile_geometry(
-    size: [usize; 2],
-    rule: SizeRule,
-    tiling: Tiling,
-) -> Result<TileGeometry, PlanError> {
+fn tile_geometry(size: [usize; 2], rule: SizeRule, tiling: Tiling) -> Result<TileGeometry, PlanError> {
     let area = rule.padded(size);
     let exact = match rule.tile {
         Some(Locality::Exact(context)) => Some(context),
@@ -192,17 +172,10 @@ fn tile_geometry(
             return Err(PlanError::TileFlag(side.to_string()));
         }
         (Tiling::Side(side), _) => square_tile(side.get(), rule.multiple),
-        (Tiling::Auto, Some(_)) if size[0] * size[1] > MAX_WHOLE => {
-            square_tile(TILE.max(4 * context), rule.multiple)
-        }
+        (Tiling::Auto, Some(_)) if size[0] * size[1] > MAX_WHOLE => square_tile(TILE.max(4 * context), rule.multiple),
         (Tiling::Auto | Tiling::Whole, _) => area,
     };
-    Ok(TileGeometry {
-        area,
-        tile,
-        context,
-        multiple: rule.multiple,
-    })
+    Ok(TileGeometry { area, tile, context, multiple: rule.multiple })
 }
 
 /// Height and width of a square tile, rounded down to a multiple.
@@ -214,18 +187,9 @@ fn square_tile(side: usize, multiple: usize) -> [usize; 2] {
 fn fixed_geometry(size: [usize; 2], rule: SizeRule, context: usize) -> TileGeometry {
     let tile = rule.run_size(size);
     // Tiles start at the stated multiples, if their size is a multiple, too.
-    let multiple = if tile.iter().all(|side| side % rule.multiple == 0) {
-        rule.multiple
-    } else {
-        1
-    };
+    let multiple = if tile.iter().all(|side| side % rule.multiple == 0) { rule.multiple } else { 1 };
     let area = [0, 1].map(|side| tile[side].max(size[side].next_multiple_of(multiple)));
-    TileGeometry {
-        area,
-        tile,
-        context,
-        multiple,
-    }
+    TileGeometry { area, tile, context, multiple }
 }
 
 fn no_room_for_context(geometry: TileGeometry) -> String {
@@ -238,9 +202,7 @@ fn no_room_for_context(geometry: TileGeometry) -> String {
 
 /// Message about an image of another size for a model with a fixed size that is not local.
 pub(crate) fn not_local(rule: SizeRule, size: [usize; 2], why: &str) -> String {
-    let [height, width] = rule
-        .fixed
-        .map(|side: Option<usize>| side.map_or("any".to_owned(), |side| side.to_string()));
+    let [height, width] = rule.fixed.map(|side: Option<usize>| side.map_or("any".to_owned(), |side| side.to_string()));
     format!(
         "takes only images of {width} × {height}, but the image has {}; padding or tiling would change it, because {why}. Export it for any size: `torch.onnx.export(..., input_names=[\"input\"], output_names=[\"output\"], dynamic_axes={{\"input\": {{2: \"h\", 3: \"w\"}}, \"output\": {{2: \"h\", 3: \"w\"}}}})`, or for images of {}; or resize each image and back with --llie-options resize, which blurs it and changes its brightness by some codes of 255",
         format_size(size),
@@ -249,12 +211,7 @@ pub(crate) fn not_local(rule: SizeRule, size: [usize; 2], why: &str) -> String {
 }
 
 /// Message about tiles of an image of this size that differ where they overlap.
-pub(crate) fn seams_differ(
-    rule: SizeRule,
-    size: [usize; 2],
-    plan: &SizePlan,
-    seam: Seam,
-) -> String {
+pub(crate) fn seams_differ(rule: SizeRule, size: [usize; 2], plan: &SizePlan, seam: Seam) -> String {
     let differ = format!(
         "its {} tiles differ by up to {} codes at their seams, in {} of {} samples, so a pixel depends on more than {} pixels around it",
         plan.tiles.count(),
@@ -275,57 +232,31 @@ pub(crate) fn seams_differ(
 mod tests {
     use super::*;
 
-    const RULE: SizeRule = SizeRule {
-        fixed: [None; 2],
-        multiple: 1,
-        least_fill: 0,
-        pad: Padding::Reflect,
-        tile: None,
-    };
+    const RULE: SizeRule = SizeRule { fixed: [None; 2], multiple: 1, least_fill: 0, pad: Padding::Reflect, tile: None };
 
     fn fixed(size: [usize; 2]) -> SizeRule {
-        SizeRule {
-            fixed: size.map(Some),
-            ..RULE
-        }
+        SizeRule { fixed: size.map(Some), ..RULE }
     }
 
     #[test]
     fn each_side_is_padded_or_cut_on_its_own() {
         // Height smaller, width larger, as an image of 250 × 110 for a model of 200 × 152.
         let plan = SizePlan::new([110, 250], fixed([152, 200]), Tiling::Auto, 8).unwrap();
-        assert_eq!(
-            (plan.geometry.area, plan.run_size()),
-            ([152, 250], [152, 200])
-        );
+        assert_eq!((plan.geometry.area, plan.run_size()), ([152, 250], [152, 200]));
         assert_eq!(plan.tiles.count(), 2);
-        let starts: Vec<_> = plan
-            .tiles
-            .tiles()
-            .map(|(_, column)| column.input_start)
-            .collect();
+        let starts: Vec<_> = plan.tiles.tiles().map(|(_, column)| column.input_start).collect();
         assert_eq!(starts, [0, 50]);
         let equal = SizePlan::new([152, 200], fixed([152, 200]), Tiling::Auto, 8).unwrap();
         assert_eq!((equal.geometry.area, equal.tiles.count()), ([152, 200], 1));
         // One side is free.
-        let half = SizeRule {
-            fixed: [Some(64), None],
-            multiple: 8,
-            ..RULE
-        };
+        let half = SizeRule { fixed: [Some(64), None], multiple: 8, ..RULE };
         let plan = SizePlan::new([60, 99], half, Tiling::Auto, 8).unwrap();
-        assert_eq!(
-            (plan.geometry.area, plan.run_size()),
-            ([64, 104], [64, 104])
-        );
+        assert_eq!((plan.geometry.area, plan.run_size()), ([64, 104], [64, 104]));
     }
 
     #[test]
     fn padding_to_the_stated_multiple_needs_no_local_model() {
-        let eights = SizeRule {
-            multiple: 8,
-            ..fixed([96, 96])
-        };
+        let eights = SizeRule { multiple: 8, ..fixed([96, 96]) };
         assert!(!eights.needs_locality([96, 96]) && !eights.needs_locality([90, 95]));
         for size in [[80, 96], [96, 97], [104, 96]] {
             assert!(eights.needs_locality(size), "{size:?}");
@@ -335,11 +266,7 @@ mod tests {
 
     #[test]
     fn one_row_and_column_are_always_padded_if_stated() {
-        let always = SizeRule {
-            multiple: 16,
-            least_fill: 1,
-            ..RULE
-        };
+        let always = SizeRule { multiple: 16, least_fill: 1, ..RULE };
         for (size, area) in [([32, 30], [48, 32]), ([31, 47], [32, 48])] {
             let plan = SizePlan::new(size, always, Tiling::Auto, 0).unwrap();
             assert_eq!(plan.geometry.area, area);
@@ -349,13 +276,8 @@ mod tests {
     #[test]
     fn tiles_without_room_for_their_context_are_refused() {
         let refused = SizePlan::new([100, 100], fixed([20, 20]), Tiling::Auto, 8);
-        assert!(
-            matches!(refused, Err(PlanError::Other(problem)) if problem.contains("leave nothing"))
-        );
-        let global = SizeRule {
-            tile: Some(Locality::Global),
-            ..RULE
-        };
+        assert!(matches!(refused, Err(PlanError::Other(problem)) if problem.contains("leave nothing")));
+        let global = SizeRule { tile: Some(Locality::Global), ..RULE };
         let tile = Tiling::Side(NonZeroUsize::new(64).unwrap());
         let refused = SizePlan::new([100, 100], global, tile, 8);
         assert!(matches!(refused, Err(PlanError::TileFlag(_))));
@@ -363,10 +285,7 @@ mod tests {
 
     #[test]
     fn images_are_reduced_to_multiples() {
-        let eights = SizeRule {
-            multiple: 8,
-            ..RULE
-        };
+        let eights = SizeRule { multiple: 8, ..RULE };
         let most = NonZeroUsize::new(40);
         assert_eq!(eights.reduced_size([64, 100], most), Some([24, 40]));
         assert_eq!(eights.reduced_size([24, 40], most), None);

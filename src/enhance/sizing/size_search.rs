@@ -8,9 +8,7 @@ use crate::graphs::{Graph, RunResult};
 use darkqa_base::error::Result;
 
 /// Multiples that are tried, in this order, for networks that halve an image repeatedly, and for patches of 14 pixels.
-pub(crate) const MULTIPLES: [usize; 17] = [
-    1, 4, 8, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 96, 112, 128,
-];
+pub(crate) const MULTIPLES: [usize; 17] = [1, 4, 8, 12, 14, 16, 20, 24, 28, 32, 40, 48, 56, 64, 96, 112, 128];
 
 /// Minimum side of a trial image, in pixels; chosen for networks that halve the image five times.
 const MIN_SIDE: usize = 64;
@@ -62,10 +60,7 @@ enum SearchState {
 impl SizeSearch {
     /// A search that also tries these heights and widths.
     pub(crate) fn new(traced: Vec<[usize; 2]>) -> Self {
-        Self {
-            traced,
-            state: SearchState::Open,
-        }
+        Self { traced, state: SearchState::Open }
     }
 
     /// Result of the search; `None` before the search or without a result.
@@ -104,7 +99,8 @@ impl SizeSearch {
 
 /// First of [`MULTIPLES`] at which the model runs; `None` if it runs at none of them.
 ///
-/// Each multiple is tried at a size that is not a multiple of any larger one, so that success is evidence for this multiple.
+/// Each multiple is tried at a size that is not a multiple of any larger one, so that success is evidence for this
+/// multiple.
 fn find_multiple(graph: &Graph) -> Result<Option<usize>> {
     for multiple in MULTIPLES {
         match run_trial(graph, trial_size(multiple))? {
@@ -139,9 +135,7 @@ fn run_trial(graph: &Graph, size: [usize; 2]) -> Result<TrialOutcome> {
     let result = graph.probe(&texture(size, &CODES[1]), window)?;
     Ok(match result {
         RunResult::Output(()) | RunResult::Unusable(_) => TrialOutcome::Runs,
-        RunResult::Failed(RunFailure::TimedOut(_) | RunFailure::MemoryExceeded(_)) => {
-            TrialOutcome::OverLimit
-        }
+        RunResult::Failed(RunFailure::TimedOut(_) | RunFailure::MemoryExceeded(_)) => TrialOutcome::OverLimit,
         RunResult::Failed(_) => TrialOutcome::Fails,
     })
 }
@@ -152,16 +146,8 @@ pub(crate) fn sizes_not_found(failure: &RunFailure, search: &SizeSearch) -> Stri
     if !failure.may_depend_on_size() {
         return words;
     }
-    let traced = if search.traced.is_empty() {
-        ""
-    } else {
-        ", and the sizes in its constants"
-    };
-    let tried = MULTIPLES[1..]
-        .iter()
-        .map(ToString::to_string)
-        .collect::<Vec<_>>()
-        .join(", ");
+    let traced = if search.traced.is_empty() { "" } else { ", and the sizes in its constants" };
+    let tried = MULTIPLES[1..].iter().map(ToString::to_string).collect::<Vec<_>>().join(", ");
     // The message about an output of another size has its own advice.
     let advice = if matches!(failure, RunFailure::WrongSize { .. }) {
         ""
@@ -179,10 +165,7 @@ mod tests {
     fn trial_sizes_are_not_multiples_of_larger_ones() {
         for (index, multiple) in MULTIPLES.into_iter().enumerate() {
             let size = trial_size(multiple);
-            assert!(
-                size.iter()
-                    .all(|side| *side >= MIN_SIDE && side % multiple == 0)
-            );
+            assert!(size.iter().all(|side| *side >= MIN_SIDE && side % multiple == 0));
             for larger in &MULTIPLES[index + 1..] {
                 let fits = size.iter().all(|side| side % larger == 0);
                 assert!(!fits, "{size:?} is a multiple of {larger}");

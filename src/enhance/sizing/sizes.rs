@@ -17,13 +17,7 @@ pub(crate) fn count_image(log: &mut SizeLog, rule: SizeRule) {
 }
 
 /// Counts an image of height and width `size` that was enhanced by a plan: whole, padded or in tiles.
-pub(crate) fn count_planned(
-    log: &mut SizeLog,
-    size: [usize; 2],
-    rule: SizeRule,
-    plan: &SizePlan,
-    seam: Seam,
-) {
+pub(crate) fn count_planned(log: &mut SizeLog, size: [usize; 2], rule: SizeRule, plan: &SizePlan, seam: Seam) {
     count_image(log, rule);
     let (is_padded, is_tiled) = (plan.geometry.area != size, plan.tiles.count() > 1);
     log.whole += usize::from(!is_padded && !is_tiled);

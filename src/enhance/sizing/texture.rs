@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use darkqa_base::types::Rgb;
 
-/// Ranges of codes of the trial images: as dark as an underexposed photograph, the whole range, and nearly black for models whose gates
-/// saturate on brighter images. Code 0 is left out, because some models divide by it.
+/// Ranges of codes of the trial images: as dark as an underexposed photograph, the whole range, and nearly black for
+/// models whose gates saturate on brighter images. Code 0 is left out, because some models divide by it.
 pub(crate) const CODES: [RangeInclusive<u8>; 3] = [4..=40, 4..=251, 1..=12];
 
 /// An image of pseudorandom samples within a range of codes; deterministic.
@@ -30,9 +30,6 @@ mod tests {
         let image = texture([40, 60], &CODES[0]);
         assert_eq!(image, texture([40, 60], &CODES[0]));
         let codes = image.samples();
-        assert_eq!(
-            (codes.iter().min(), codes.iter().max()),
-            (Some(&4), Some(&40))
-        );
+        assert_eq!((codes.iter().min(), codes.iter().max()), (Some(&4), Some(&40)));
     }
 }

@@ -1,8 +1,10 @@
-//! Division of an image into tiles ([`TilePlan`], [`TileWindow`]), and the image made of their results ([`TiledImage`]).
+//! Division of an image into tiles ([`TilePlan`], [`TileWindow`]), and the image made of their results
+//! ([`TiledImage`]).
 //!
-//! Each tile is enhanced with some context around it, and only its middle is used (like Real-ESRGAN's `tile_pad`), without blending. The
-//! result is exact if pixels depend on nothing beyond the context. To check this, the used parts of neighbours overlap by a few pixels
-//! ([`GUARD`] on either side); if these differ, pixels depend on more than the context.
+//! Each tile is enhanced with some context around it, and only its middle is used (like Real-ESRGAN's `tile_pad`),
+//! without blending. The result is exact if pixels depend on nothing beyond the context. To check this, the used parts
+//! of neighbours overlap by a few pixels ([`GUARD`] on either side); if these differ, pixels depend on more than the
+//! context.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -28,12 +30,7 @@ pub(crate) struct TileWindow {
 impl TileWindow {
     /// The whole of an image of this height and width.
     pub(crate) fn whole([height, width]: [usize; 2]) -> Self {
-        Self {
-            left: 0,
-            top: 0,
-            right: width,
-            bottom: height,
-        }
+        Self { left: 0, top: 0, right: width, bottom: height }
     }
 
     /// Height and width in pixels.
@@ -71,10 +68,7 @@ impl FromStr for Tiling {
         match text {
             "auto" => Ok(Self::Auto),
             "whole" => Ok(Self::Whole),
-            side => side
-                .parse()
-                .map(Self::Side)
-                .map_err(|_| "expected a side in pixels, whole or auto".to_owned()),
+            side => side.parse().map(Self::Side).map_err(|_| "expected a side in pixels, whole or auto".to_owned()),
         }
     }
 }
@@ -91,12 +85,7 @@ pub(crate) struct TileSpan {
 impl TileWindow {
     /// Part of the image that is fed to the model for a tile.
     pub(crate) fn for_input(row: TileSpan, column: TileSpan) -> Self {
-        Self {
-            left: column.input_start,
-            top: row.input_start,
-            right: column.input_end,
-            bottom: row.input_end,
-        }
+        Self { left: column.input_start, top: row.input_start, right: column.input_end, bottom: row.input_end }
     }
 
     /// Part of a tile's output that is used, relative to its input.
@@ -133,12 +122,7 @@ pub(crate) struct TileGeometry {
 impl TilePlan {
     /// The tiles of an area; `None` if a tile is not larger than its context.
     pub(super) fn new(geometry: TileGeometry) -> Option<Self> {
-        let TileGeometry {
-            area,
-            tile,
-            context,
-            multiple,
-        } = geometry;
+        let TileGeometry { area, tile, context, multiple } = geometry;
         Some(Self {
             rows: spans(area[0], tile[0], context, multiple)?,
             columns: spans(area[1], tile[1], context, multiple)?,
@@ -147,9 +131,7 @@ impl TilePlan {
 
     /// Tiles row by row, each as its vertical and horizontal extent.
     pub(crate) fn tiles(&self) -> impl Iterator<Item = (TileSpan, TileSpan)> {
-        self.rows
-            .iter()
-            .flat_map(|row| self.columns.iter().map(|column| (*row, *column)))
+        self.rows.iter().flat_map(|row| self.columns.iter().map(|column| (*row, *column)))
     }
 
     /// Number of tiles in rows and columns.
@@ -158,8 +140,8 @@ impl TilePlan {
     }
 }
 
-/// Tiles along one side, all of the same length and within the image. Each edge of a tile is an edge of the image, or is separated from
-/// the used part by the context. `None` if the context leaves no used part.
+/// Tiles along one side, all of the same length and within the image. Each edge of a tile is an edge of the image, or
+/// is separated from the used part by the context. `None` if the context leaves no used part.
 fn spans(length: usize, tile: usize, context: usize, multiple: usize) -> Option<Vec<TileSpan>> {
     let tile = tile.min(length);
     let step = tile.checked_sub(2 * (context + GUARD));
@@ -216,12 +198,7 @@ impl Seam {
 
 impl TiledImage {
     pub(crate) fn new([height, width]: [usize; 2]) -> Self {
-        Self {
-            rgb: Rgb::black(height, width),
-            above_end: 0,
-            left_end: 0,
-            seam: Seam::default(),
-        }
+        Self { rgb: Rgb::black(height, width), above_end: 0, left_end: 0, seam: Seam::default() }
     }
 
     /// Adds the output of a tile and compares the overlap with earlier tiles; tiles must come row by row.
@@ -301,12 +278,7 @@ mod tests {
 
     /// Assembles an image from tiles. With `shift`, the codes depend on the tile's position, so that seams differ.
     fn assemble(shift: usize) -> (Rgb, Seam) {
-        let geometry = TileGeometry {
-            area: [37, 50],
-            tile: [20, 20],
-            context: 3,
-            multiple: 1,
-        };
+        let geometry = TileGeometry { area: [37, 50], tile: [20, 20], context: 3, multiple: 1 };
         let mut canvas = TiledImage::new([37, 50]);
         for (row, column) in TilePlan::new(geometry).unwrap().tiles() {
             let mut bytes = Vec::new();

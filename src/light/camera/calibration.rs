@@ -16,8 +16,8 @@ const PRESETS: [(&str, &str); 5] = [
     ("canon-eos-700d", include_str!("canon-eos-700d.toml")),
 ];
 
-/// Noise calibration of a camera sensor (Wei et al., "Physics-based noise modeling for extreme low-light photography", ELD), with the
-/// ranges of gain and amplification ratio for random draws.
+/// Noise calibration of a camera sensor (Wei et al., "Physics-based noise modeling for extreme low-light photography",
+/// ELD), with the ranges of gain and amplification ratio for random draws.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub struct Calibration {
@@ -41,7 +41,8 @@ pub struct Calibration {
     pub steps: Vec<GainStep>,
 }
 
-/// Log-linear fit of a noise parameter σ to the gain: ln σ = slope · ln K + intercept + deviation · z, with z standard normal.
+/// Log-linear fit of a noise parameter σ to the gain: ln σ = slope · ln K + intercept + deviation · z, with z standard
+/// normal.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LogFit {
@@ -100,14 +101,9 @@ impl Calibration {
     pub fn parse(text: &str, place: impl Display) -> Result<Self> {
         let calibration: Self = toml::from_str(text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(text, &e);
-            Error::data(
-                format_args!("{place}, line {line}"),
-                format_args!("not a calibration: {problem}"),
-            )
+            Error::data(format_args!("{place}, line {line}"), format_args!("not a calibration: {problem}"))
         })?;
-        calibration
-            .check()
-            .map_err(|problem| Error::data(place, problem))?;
+        calibration.check().map_err(|problem| Error::data(place, problem))?;
         Ok(calibration)
     }
 
@@ -117,11 +113,7 @@ impl Calibration {
     /// If the calibration cannot be written as TOML.
     pub fn to_toml(&self, comments: &[String]) -> Result<String> {
         let keys = toml::to_string(self).map_err(|e| Error::data(&self.name, e))?;
-        Ok(comments
-            .iter()
-            .flat_map(|line| ["# ", line, "\n"])
-            .chain([keys.as_str()])
-            .collect())
+        Ok(comments.iter().flat_map(|line| ["# ", line, "\n"]).chain([keys.as_str()]).collect())
     }
 
     /// Checks all values against their limits; the error names the key.
@@ -129,10 +121,7 @@ impl Calibration {
         check_limits("adu-range", self.adu_range, [1.0, 1e6])?;
         check_range("gain", self.gain, GAINS)?;
         check_range("ratio", self.ratio, RATIOS)?;
-        for (key, fit) in [
-            ("read-scale", self.read_scale),
-            ("row-deviation", self.row_deviation),
-        ] {
+        for (key, fit) in [("read-scale", self.read_scale), ("row-deviation", self.row_deviation)] {
             check_limits(&format!("{key}.slope"), fit.slope, [-10.0, 10.0])?;
             check_limits(&format!("{key}.intercept"), fit.intercept, [-20.0, 20.0])?;
             check_limits(&format!("{key}.deviation"), fit.deviation, [0.0, 5.0])?;
@@ -190,9 +179,9 @@ impl Calibration {
 
     /// Noise parameters at the system gain `gain`, which is in ADU per electron.
     ///
-    /// `scatter` contains the standard normal draws z for σ_TL and σ_r. `choices`, uniform in (0, 1), select a shape and an
-    /// offset set from the step with the nearest gain, each with equal probability. The author of the calibration recommends
-    /// measurements near the gain only: offsets measured at ISO 25600 do not apply at K = 0.1.
+    /// `scatter` contains the standard normal draws z for σ_TL and σ_r. `choices`, uniform in (0, 1), select a shape
+    /// and an offset set from the step with the nearest gain, each with equal probability. The author of the
+    /// calibration recommends measurements near the gain only: offsets measured at ISO 25600 do not apply at K = 0.1.
     #[must_use]
     pub fn noise_at(&self, gain: f64, scatter: [f64; 2], choices: [f64; 2]) -> SensorNoise {
         let step = &self.steps[self.nearest_step(gain)];
@@ -205,7 +194,8 @@ impl Calibration {
         }
     }
 
-    /// Index of the step with the nearest gain on a log scale, at most the step nearest to the upper end of the gain range.
+    /// Index of the step with the nearest gain on a log scale, at most the step nearest to the upper end of the gain
+    /// range.
     fn nearest_step(&self, gain: f64) -> usize {
         let [step, last_step] = [gain, self.gain[1]].map(|gain| match self.first_gain {
             Some(first) => {
@@ -221,10 +211,7 @@ impl Calibration {
     fn nearest_listed_step(&self, gain: f64) -> usize {
         self.steps
             .iter()
-            .map(|step| {
-                step.gain
-                    .map_or(f64::INFINITY, |own| libm::log(own / gain).abs())
-            })
+            .map(|step| step.gain.map_or(f64::INFINITY, |own| libm::log(own / gain).abs()))
             .enumerate()
             .min_by(|a, b| a.1.total_cmp(&b.1))
             .map_or(0, |(index, _)| index)
@@ -232,11 +219,7 @@ impl Calibration {
 }
 
 /// Checks that a range is within limits and not reversed; the error names the key.
-fn check_range(
-    key: &str,
-    [low, high]: [f64; 2],
-    limits: [f64; 2],
-) -> std::result::Result<(), String> {
+fn check_range(key: &str, [low, high]: [f64; 2], limits: [f64; 2]) -> std::result::Result<(), String> {
     check_limits(key, low, limits)?;
     check_limits(key, high, limits)?;
     if low > high {
@@ -250,9 +233,7 @@ fn check_limits(key: &str, value: f64, [low, high]: [f64; 2]) -> std::result::Re
     if value >= low && value <= high {
         Ok(())
     } else {
-        Err(format!(
-            "{key}: {value} is not a number from {low} to {high}"
-        ))
+        Err(format!("{key}: {value} is not a number from {low} to {high}"))
     }
 }
 

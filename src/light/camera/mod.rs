@@ -21,7 +21,8 @@ use darkqa_base::types::Digest;
 /// Distribution that each frame's camera is drawn from.
 ///
 /// The default is the paper's: a Sony A7S2 with its gain K log-uniform in [0.1, 6.0] and its amplification ratio r
-/// uniform in [100, 300]. Either may be pinned. The other parameters of a state are drawn as before, except functions of K.
+/// uniform in [100, 300]. Either may be pinned. The other parameters of a state are drawn as before, except functions
+/// of K.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraModel {
     calibration: Arc<Calibration>,
@@ -51,8 +52,7 @@ impl Default for CameraModel {
 /// Writes the name and digest of the calibration instead of its many numbers.
 impl Serialize for CameraModel {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
-        let calibration =
-            serde_json::to_vec(&*self.calibration).map_err(serde::ser::Error::custom)?;
+        let calibration = serde_json::to_vec(&*self.calibration).map_err(serde::ser::Error::custom)?;
         let mut fields = serializer.serialize_struct("CameraModel", 5)?;
         fields.serialize_field("name", &self.calibration.name)?;
         fields.serialize_field("calibration", &Digest::from_bytes(&calibration).to_string())?;
@@ -67,12 +67,7 @@ impl CameraModel {
     /// Cameras of a calibration, drawn for each frame, without pinned gain and ratio.
     #[must_use]
     pub fn new(calibration: Calibration) -> Self {
-        Self {
-            calibration: Arc::new(calibration),
-            sampling: Sampling::Drawn,
-            gain: None,
-            ratio: None,
-        }
+        Self { calibration: Arc::new(calibration), sampling: Sampling::Drawn, gain: None, ratio: None }
     }
 
     /// Cameras of a built-in calibration by its name.
@@ -82,10 +77,7 @@ impl CameraModel {
     pub fn preset(name: &str) -> Result<Self> {
         Calibration::preset(name).map(Self::new).ok_or_else(|| {
             let names: Vec<_> = Calibration::names().collect();
-            let problem = format!(
-                "{name:?} is not one of {}, and not a TOML file of a calibration",
-                names.join(", ")
-            );
+            let problem = format!("{name:?} is not one of {}, and not a TOML file of a calibration", names.join(", "));
             Error::usage("--noise camera", problem)
         })
     }
@@ -113,11 +105,7 @@ impl CameraModel {
     /// The same cameras without pinned gain and ratio.
     #[must_use]
     pub fn unpinned(&self) -> Self {
-        Self {
-            gain: None,
-            ratio: None,
-            ..self.clone()
-        }
+        Self { gain: None, ratio: None, ..self.clone() }
     }
 
     /// Name of the calibration.
@@ -153,8 +141,7 @@ impl CameraModel {
     pub fn set_gain_range(&mut self, range: [f64; 2]) -> Result<()> {
         let [low, high] = range;
         check_range("--noise gain", high, [low, GAINS[1]])?;
-        Arc::make_mut(&mut self.calibration).gain =
-            [check_range("--noise gain", low, GAINS)?, high];
+        Arc::make_mut(&mut self.calibration).gain = [check_range("--noise gain", low, GAINS)?, high];
         Ok(())
     }
 
@@ -172,10 +159,7 @@ fn check_range(flag: &str, value: f64, [low, high]: [f64; 2]) -> Result<f64> {
     if value >= low && value <= high {
         Ok(value)
     } else {
-        Err(Error::usage(
-            flag,
-            format_args!("{value} is not a number from {low} to {high}"),
-        ))
+        Err(Error::usage(flag, format_args!("{value} is not a number from {low} to {high}")))
     }
 }
 
@@ -226,8 +210,7 @@ impl CameraState {
         let system_gain = model.gain.unwrap_or(min_gain * libm::exp(log_gain));
         let noise = calibration.noise_at(
             system_gain,
-            [StateNumber::ReadScale, StateNumber::RowDeviation]
-                .map(|number| draws.words(number).normal()),
+            [StateNumber::ReadScale, StateNumber::RowDeviation].map(|number| draws.words(number).normal()),
             [StateNumber::ReadShape, StateNumber::Bias].map(|number| draws.uniform(number)),
         );
         let [low, high] = calibration.ratio;
@@ -236,9 +219,7 @@ impl CameraState {
             red_gain: draws.between(StateNumber::RedGain, 1.9, 2.4),
             blue_gain: draws.between(StateNumber::BlueGain, 1.5, 1.9),
             system_gain,
-            ratio: model
-                .ratio
-                .unwrap_or_else(|| draws.between(StateNumber::Ratio, low, high)),
+            ratio: model.ratio.unwrap_or_else(|| draws.between(StateNumber::Ratio, low, high)),
             ..Self::new(weights, &noise, calibration)
         }
     }
@@ -280,7 +261,8 @@ impl CameraState {
     }
 }
 
-/// Addresses of the random numbers of a state in the camera's stream. They are fixed, so that no number depends on other draws.
+/// Addresses of the random numbers of a state in the camera's stream. They are fixed, so that no number depends on
+/// other draws.
 #[derive(Debug, Clone, Copy)]
 enum StateNumber {
     FirstWeight,
@@ -299,12 +281,7 @@ enum StateNumber {
 }
 
 impl StateNumber {
-    const WEIGHTS: [Self; 4] = [
-        Self::FirstWeight,
-        Self::SecondWeight,
-        Self::ThirdWeight,
-        Self::FourthWeight,
-    ];
+    const WEIGHTS: [Self; 4] = [Self::FirstWeight, Self::SecondWeight, Self::ThirdWeight, Self::FourthWeight];
 }
 
 /// The camera's random stream, addressed by [`StateNumber`].
@@ -324,7 +301,8 @@ impl CameraStream {
         low + self.uniform(number) * (high - low)
     }
 
-    /// A draw of N(0.8, 0.1), truncated at three standard deviations, because its inverse, the brightness gain, would be unbounded.
+    /// A draw of N(0.8, 0.1), truncated at three standard deviations, because its inverse, the brightness gain, would
+    /// be unbounded.
     fn truncated_normal(self, number: StateNumber) -> f64 {
         let mut words = self.words(number);
         loop {

@@ -36,10 +36,7 @@ fn every_calibrated_camera_stays_in_its_ranges() {
         let model = CameraModel::preset(name).unwrap();
         let [low, high] = model.calibration.gain;
         for state in states(&model, 200) {
-            assert!(
-                state.system_gain >= low && state.system_gain <= high,
-                "{name}"
-            );
+            assert!(state.system_gain >= low && state.system_gain <= high, "{name}");
             assert!((100.0..=300.0).contains(&state.ratio), "{name}");
             assert!(state.read_scale > 0.0 && state.read_scale < 500.0, "{name}");
         }
@@ -57,7 +54,8 @@ fn states(model: &CameraModel, n: usize) -> Vec<CameraState> {
         .collect()
 }
 
-/// The Kolmogorov–Smirnov statistic: largest distance between the empirical distribution function and `cdf`, in units of 1/√n.
+/// The Kolmogorov–Smirnov statistic: largest distance between the empirical distribution function and `cdf`, in units
+/// of 1/√n.
 fn kolmogorov(mut sample: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
     sample.sort_by(f64::total_cmp);
     let n = sample.len() as f64;
@@ -95,14 +93,9 @@ fn numbers_have_their_distributions() {
     }
     let inverse_gains = all.iter().map(|s| 1.0 / s.rgb_gain).collect();
     let tail = normal_cdf(-3.0);
-    let distance = kolmogorov(inverse_gains, |inverse| {
-        (normal_cdf((inverse - 0.8) / 0.1) - tail) / (1.0 - 2.0 * tail)
-    });
+    let distance = kolmogorov(inverse_gains, |inverse| (normal_cdf((inverse - 0.8) / 0.1) - tail) / (1.0 - 2.0 * tail));
     assert!(distance < 1.95, "1/rgb: {distance}");
-    assert!(
-        all.iter()
-            .all(|s| (0.5..=1.1).contains(&(1.0 / s.rgb_gain)))
-    );
+    assert!(all.iter().all(|s| (0.5..=1.1).contains(&(1.0 / s.rgb_gain))));
     assert!(all.iter().all(|s| (0.1..=6.0).contains(&s.system_gain)));
 }
 
@@ -112,13 +105,7 @@ fn pinned_numbers_do_not_change_others() {
     pinned.pin_ratio(42.0).unwrap();
     let (free, fixed) = (states(&CameraModel::default(), 20), states(&pinned, 20));
     for (free, fixed) in free.into_iter().zip(fixed) {
-        assert_eq!(
-            CameraState {
-                ratio: 42.0,
-                ..free
-            },
-            fixed
-        );
+        assert_eq!(CameraState { ratio: 42.0, ..free }, fixed);
     }
     pinned.pin_gain(6.0).unwrap();
     for state in states(&pinned, 20) {
@@ -129,11 +116,10 @@ fn pinned_numbers_do_not_change_others() {
 
 #[test]
 fn frames_and_seeds_have_different_cameras() {
-    let [first, same, other_seed, other_frame] =
-        [(1, "a"), (1, "a"), (2, "a"), (1, "b")].map(|(seed, frame)| {
-            let key = NoiseKey::new(seed, &FrameId(frame.to_owned()));
-            CameraState::draw(&key, &CameraModel::default())
-        });
+    let [first, same, other_seed, other_frame] = [(1, "a"), (1, "a"), (2, "a"), (1, "b")].map(|(seed, frame)| {
+        let key = NoiseKey::new(seed, &FrameId(frame.to_owned()));
+        CameraState::draw(&key, &CameraModel::default())
+    });
     assert_eq!(first, same);
     assert_ne!(first, other_seed);
     assert_ne!(first, other_frame);

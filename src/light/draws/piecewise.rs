@@ -11,8 +11,9 @@ const OCTAVES: usize = 32;
 
 /// Piecewise linear table of a function: 32 octaves of the argument, 128 pieces per octave.
 ///
-/// The pieces of an octave have equal width, so that pieces are narrower for smaller arguments, and logarithms and powers have
-/// the same relative accuracy everywhere. The error of a piece is at most f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a logarithm.
+/// The pieces of an octave have equal width, so that pieces are narrower for smaller arguments, and logarithms and
+/// powers have the same relative accuracy everywhere. The error of a piece is at most f″(x) x² / 8 · 2⁻¹⁴: 8·10⁻⁶ for a
+/// logarithm.
 #[derive(Debug, Clone)]
 pub(crate) struct Piecewise {
     /// Upper bits of the lower end of the domain, where the first piece begins.
@@ -30,17 +31,12 @@ impl Piecewise {
         let mut value = function(piece_start(base, 0));
         for (index, piece) in pieces.iter_mut().enumerate() {
             let next = function(piece_start(base, index + 1));
-            *piece = [
-                value as f32,
-                ((next - value) / f64::from(1 << WITHIN)) as f32,
-            ];
+            *piece = [value as f32, ((next - value) / f64::from(1 << WITHIN)) as f32];
             value = next;
         }
         Self {
             first: ((exponent + 127) as u32) << PIECES.ilog2(),
-            pieces: pieces
-                .try_into()
-                .unwrap_or_else(|_| unreachable!("the length is OCTAVES * PIECES")),
+            pieces: pieces.try_into().unwrap_or_else(|_| unreachable!("the length is OCTAVES * PIECES")),
         }
     }
 

@@ -1,9 +1,10 @@
 //! Poisson-distributed numbers, each from two words of 32 random bits: [`lanes`].
 //!
-//! A mean below 48 is split into a multiple of ½ and a rest, because the sum of Poisson numbers of both parts is a Poisson number of
-//! the mean. The number of the multiple is looked up in Walker's alias table; the number of the rest is found by inversion. From 48 on,
-//! the quantile function is approximated by an expansion about the normal quantile. Below 48 the distribution is exact to 2⁻³². At 48 the
-//! total variation error is 5·10⁻⁶, and smaller for larger means (a χ² test would detect it after 10⁹ draws).
+//! A mean below 48 is split into a multiple of ½ and a rest, because the sum of Poisson numbers of both parts is a
+//! Poisson number of the mean. The number of the multiple is looked up in Walker's alias table; the number of the rest
+//! is found by inversion. From 48 on, the quantile function is approximated by an expansion about the normal quantile.
+//! Below 48 the distribution is exact to 2⁻³². At 48 the total variation error is 5·10⁻⁶, and smaller for larger means
+//! (a χ² test would detect it after 10⁹ draws).
 
 use std::sync::LazyLock;
 
@@ -54,16 +55,11 @@ fn split(means: &Lanes<f32>, [words, rest_words]: [&Lanes<u32>; 2]) -> Lanes<f32
     let mut rests = [0.0; LANES];
     let mut entries = [0; LANES];
     for i in 0..LANES {
-        let mean = if means[i] < EXPANDED_FROM {
-            means[i]
-        } else {
-            0.0
-        };
+        let mean = if means[i] < EXPANDED_FROM { means[i] } else { 0.0 };
         // The largest multiple of ½ up to the mean. On a tie it may be ½ less, which is correct too.
         let twice = (2.0 * mean - 0.5) + ROUND;
         rests[i] = mean - 0.5 * (twice - ROUND);
-        entries[i] =
-            ((twice.to_bits() & (TABLES as u32 - 1)) << SLOT_BITS) | (words[i] >> POSITION_BITS);
+        entries[i] = ((twice.to_bits() & (TABLES as u32 - 1)) << SLOT_BITS) | (words[i] >> POSITION_BITS);
     }
     for entry in &mut entries {
         *entry = tables[*entry as usize % (TABLES * SLOTS)];
@@ -74,11 +70,7 @@ fn split(means: &Lanes<f32>, [words, rest_words]: [&Lanes<u32>; 2]) -> Lanes<f32
         let position = words[i] & ((1 << POSITION_BITS) - 1);
         let slot = words[i] >> POSITION_BITS;
         let alias = entries[i] & (SLOTS as u32 - 1);
-        let number = if position < entries[i] >> SLOT_BITS {
-            slot
-        } else {
-            alias
-        };
+        let number = if position < entries[i] >> SLOT_BITS { slot } else { alias };
         let rest = rests[i];
         let uniform = upper_uniform(rest_words[i]);
         numbers[i] = number.cast_signed() as f32
@@ -109,13 +101,13 @@ fn upper_uniform(word: u32) -> f32 {
     ((word >> 1).cast_signed() as f32 + 0.5) * (1.0 / 2_147_483_648.0)
 }
 
-/// P(N ≥ 1) of a mean x ≤ ½: the sum over j of (−1)^(j−k) C(j − 1, k − 1) x^j / j! with k = 1, to a relative error of 10⁻⁶.
+/// P(N ≥ 1) of a mean x ≤ ½: the sum over j of (−1)^(j−k) C(j − 1, k − 1) x^j / j! with k = 1, to a relative error of
+/// 10⁻⁶.
 #[inline(always)]
 fn at_least_1(x: f32) -> f32 {
     x * (1.0
         + x * (-1.0 / 2.0
-            + x * (1.0 / 6.0
-                + x * (-1.0 / 24.0 + x * (1.0 / 120.0 + x * (-1.0 / 720.0 + x * (1.0 / 5040.0)))))))
+            + x * (1.0 / 6.0 + x * (-1.0 / 24.0 + x * (1.0 / 120.0 + x * (-1.0 / 720.0 + x * (1.0 / 5040.0)))))))
 }
 
 /// P(N ≥ 2): the same sum with k = 2.
@@ -124,9 +116,7 @@ fn at_least_2(x: f32) -> f32 {
     x * x
         * (1.0 / 2.0
             + x * (-1.0 / 3.0
-                + x * (1.0 / 8.0
-                    + x * (-1.0 / 30.0
-                        + x * (1.0 / 144.0 + x * (-1.0 / 840.0 + x * (1.0 / 5760.0)))))))
+                + x * (1.0 / 8.0 + x * (-1.0 / 30.0 + x * (1.0 / 144.0 + x * (-1.0 / 840.0 + x * (1.0 / 5760.0)))))))
 }
 
 /// P(N ≥ 3): the same sum with k = 3.
@@ -135,8 +125,7 @@ fn at_least_3(x: f32) -> f32 {
     x * x
         * x
         * (1.0 / 6.0
-            + x * (-1.0 / 8.0
-                + x * (1.0 / 20.0 + x * (-1.0 / 72.0 + x * (1.0 / 336.0 + x * (-1.0 / 1920.0))))))
+            + x * (-1.0 / 8.0 + x * (1.0 / 20.0 + x * (-1.0 / 72.0 + x * (1.0 / 336.0 + x * (-1.0 / 1920.0))))))
 }
 
 /// Upper bound of P(N ≥ 4): x⁴ / 4!.
@@ -173,11 +162,7 @@ fn expanded(means: &Lanes<f32>, words: &Lanes<u32>) -> Lanes<f32> {
     let normal = NORMAL.lanes(words);
     let mut numbers = [0.0; LANES];
     for i in 0..LANES {
-        let mean = if means[i] >= EXPANDED_FROM {
-            means[i]
-        } else {
-            EXPANDED_FROM
-        };
+        let mean = if means[i] >= EXPANDED_FROM { means[i] } else { EXPANDED_FROM };
         let (w, root) = (normal[i], mean.sqrt());
         let square = w * w;
         let correction = (square + 2.0) * (1.0 / 6.0) - w * (square + 2.0) / (72.0 * root)
@@ -189,8 +174,9 @@ fn expanded(means: &Lanes<f32>, words: &Lanes<u32>) -> Lanes<f32> {
     numbers
 }
 
-/// Alias tables by multiple of ½: slots of equal width for the numbers 0 to 127. The lower part of a slot yields its own number, the
-/// upper part another number, the alias. An entry consists of the width of the lower part and 7 bits of the alias.
+/// Alias tables by multiple of ½: slots of equal width for the numbers 0 to 127. The lower part of a slot yields its
+/// own number, the upper part another number, the alias. An entry consists of the width of the lower part and 7 bits of
+/// the alias.
 static ALIAS_TABLES: LazyLock<Vec<u32>> = LazyLock::new(|| {
     let mut tables = vec![0; TABLES * SLOTS];
     for (index, table) in tables.as_chunks_mut::<SLOTS>().0.iter_mut().enumerate() {
@@ -201,7 +187,8 @@ static ALIAS_TABLES: LazyLock<Vec<u32>> = LazyLock::new(|| {
     tables
 });
 
-/// Walker's alias table for a mean, built by Vose's method in integers. Probabilities are multiples of 2⁻³² whose sum is 1.
+/// Walker's alias table for a mean, built by Vose's method in integers. Probabilities are multiples of 2⁻³² whose sum
+/// is 1.
 fn alias_table(mean: f64) -> [u32; SLOTS] {
     const WIDTH: u64 = 1 << POSITION_BITS;
     let mut probability = libm::exp(-mean);
@@ -218,8 +205,7 @@ fn alias_table(mean: f64) -> [u32; SLOTS] {
 
     // Initially all slots are full: each yields only its own number, so its alias is itself.
     let mut table: [u32; SLOTS] = std::array::from_fn(|slot| slot as u32);
-    let (mut small, mut large): (Vec<_>, Vec<_>) =
-        (0..SLOTS).partition(|slot| parts[*slot] < WIDTH);
+    let (mut small, mut large): (Vec<_>, Vec<_>) = (0..SLOTS).partition(|slot| parts[*slot] < WIDTH);
     while let (Some(slot), Some(donor)) = (small.pop(), large.last().copied()) {
         table[slot] = ((parts[slot] as u32) << SLOT_BITS) | donor as u32;
         parts[donor] -= WIDTH - parts[slot];

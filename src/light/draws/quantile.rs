@@ -9,7 +9,8 @@ use super::piecewise::Piecewise;
 /// Largest single-precision number below 2^31.
 const MAX_POSITION: f32 = 2_147_483_520.0;
 
-/// Tabulated quantile function with Q(1 − u) = −Q(u). The table covers the lower half, u = (m + ½) · 2⁻³² for m from 0 to 2^31 − 1.
+/// Tabulated quantile function with Q(1 − u) = −Q(u). The table covers the lower half, u = (m + ½) · 2⁻³² for m from 0
+/// to 2^31 − 1.
 #[derive(Debug, Clone)]
 pub struct Quantile(Piecewise);
 
@@ -17,8 +18,8 @@ pub struct Quantile(Piecewise);
 const MAX_CACHED_TABLES: usize = 16;
 
 thread_local! {
-    /// Cached tables with the bits of their shape λ, in order of insertion. The cache is per thread, because after a fork a shared one
-    /// could stay locked.
+    /// Cached tables with the bits of their shape λ, in order of insertion. The cache is per thread, because after a
+    /// fork a shared one could stay locked.
     static TUKEY_LAMBDA: RefCell<Vec<(u64, Arc<Quantile>)>> = const { RefCell::new(Vec::new()) };
 }
 
@@ -39,7 +40,8 @@ impl Quantile {
         Self::new(|u| tukey_lambda(u, shape))
     }
 
-    /// [`Self::tukey_lambda`] from the cache of this thread. Making a table takes a twentieth of the time of a small image.
+    /// [`Self::tukey_lambda`] from the cache of this thread. Making a table takes a twentieth of the time of a small
+    /// image.
     pub(crate) fn cached_tukey_lambda(shape: f64) -> Arc<Self> {
         let bits = shape.to_bits();
         TUKEY_LAMBDA.with_borrow_mut(|tables| {
@@ -82,11 +84,7 @@ impl Quantile {
 #[inline(always)]
 fn position(word: u32) -> f32 {
     let position = (word & 0x7FFF_FFFF).cast_signed() as f32 + 0.5;
-    if position < MAX_POSITION {
-        position
-    } else {
-        MAX_POSITION
-    }
+    if position < MAX_POSITION { position } else { MAX_POSITION }
 }
 
 /// Negates a quantile of the lower half if the highest bit of a word is set.
@@ -102,14 +100,11 @@ fn signed(lower: f32, word: u32) -> f32 {
 #[must_use]
 pub fn tukey_lambda(u: f64, shape: f64) -> f64 {
     let (below, above) = (libm::log(u), libm::log1p(-u));
-    if shape == 0.0 {
-        below - above
-    } else {
-        (libm::expm1(shape * below) - libm::expm1(shape * above)) / shape
-    }
+    if shape == 0.0 { below - above } else { (libm::expm1(shape * below) - libm::expm1(shape * above)) / shape }
 }
 
-/// The quantile function of the standard normal distribution on (0, ½], by Newton's method on its distribution function.
+/// The quantile function of the standard normal distribution on (0, ½], by Newton's method on its distribution
+/// function.
 fn standard_normal(u: f64) -> f64 {
     // ln Φ is concave: from the left of the root, Newton's method never overshoots and converges quadratically.
     let mut z = -(-2.0 * libm::log(u)).sqrt();
@@ -138,22 +133,11 @@ mod tests {
     #[test]
     fn tukey_lambda_follows_the_closed_form() {
         let u = [1e-5, 1e-3, 0.01, 0.25, 0.5, 0.75, 0.99, 0.999, 1.0 - 1e-5];
-        for shape in [
-            -1.0 / 7.0,
-            -0.042857,
-            0.042857,
-            0.114286,
-            1.0 / 7.0,
-            1.0,
-            2.0,
-        ] {
+        for shape in [-1.0 / 7.0, -0.042857, 0.042857, 0.114286, 1.0 / 7.0, 1.0, 2.0] {
             for u in u {
                 let expected = (f64::powf(u, shape) - f64::powf(1.0 - u, shape)) / shape;
                 let found = tukey_lambda(u, shape);
-                assert!(
-                    (found - expected).abs() < 1e-12 * expected.abs().max(1.0),
-                    "λ {shape}, u {u}"
-                );
+                assert!((found - expected).abs() < 1e-12 * expected.abs().max(1.0), "λ {shape}, u {u}");
             }
         }
         for u in u {
@@ -191,12 +175,8 @@ mod tests {
                 for step in 0..1000_u64 {
                     let place = ((1 << octave) * (1000 + step) / 1000) as u32;
                     let expected = function((f64::from(place) + 0.5) * f64::exp2(-32.0));
-                    let [lower, upper] =
-                        [place, place | 1 << 31].map(|word| f64::from(table.at(word)));
-                    assert!(
-                        (lower - expected).abs() < 1e-5 + 3e-6 * expected.abs(),
-                        "{place}: {lower}, {expected}"
-                    );
+                    let [lower, upper] = [place, place | 1 << 31].map(|word| f64::from(table.at(word)));
+                    assert!((lower - expected).abs() < 1e-5 + 3e-6 * expected.abs(), "{place}: {lower}, {expected}");
                     assert!((lower + upper).abs() < f64::EPSILON);
                 }
             }

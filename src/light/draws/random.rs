@@ -1,8 +1,8 @@
 //! Counter-based random numbers: [`NoiseKey`], [`Stream`], [`Site`].
 //!
-//! A draw is a pure function of (seed, frame, component, sensor row, sensor column, index of the draw), so that it does not depend
-//! on threads or order. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers:
-//! as easy as 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
+//! A draw is a pure function of (seed, frame, component, sensor row, sensor column, index of the draw), so that it does
+//! not depend on threads or order. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as
+//! 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
 
 use std::convert::Infallible;
 use std::f64::consts::PI;
@@ -27,34 +27,24 @@ impl NoiseKey {
     /// The key of a frame for a seed.
     #[must_use]
     pub fn new(seed: u64, frame: &FrameId) -> Self {
-        let parts: [&[u8]; 3] = [
-            b"darkqa-eval noise",
-            &seed.to_le_bytes(),
-            frame.0.as_bytes(),
-        ];
+        let parts: [&[u8]; 3] = [b"darkqa-eval noise", &seed.to_le_bytes(), frame.0.as_bytes()];
         let noise = Digest::from_parts(parts);
-        Self {
-            noise,
-            camera: noise,
-        }
+        Self { noise, camera: noise }
     }
 
     /// Replaces the camera's state by that of a walk; the noise of the frame stays.
     #[must_use]
     pub fn with_camera_of(self, walk: &Self) -> Self {
-        Self {
-            camera: walk.camera,
-            ..self
-        }
+        Self { camera: walk.camera, ..self }
     }
 
-    /// The key of the same frame at one severity, whose noise is independent of other severities. It is derived from the label, such as
-    /// `L3` or `E3.3`.
+    /// The key of the same frame at one severity, whose noise is independent of other severities. It is derived from
+    /// the label, such as `L3` or `E3.3`.
     #[must_use]
     pub fn at(&self, severity: Severity) -> Self {
         let level = Kind::Sensor.label(severity);
-        let [noise, camera] = [self.noise, self.camera]
-            .map(|digest| Digest::from_parts([digest.as_bytes(), level.as_bytes()]));
+        let [noise, camera] =
+            [self.noise, self.camera].map(|digest| Digest::from_parts([digest.as_bytes(), level.as_bytes()]));
         Self { noise, camera }
     }
 
@@ -133,10 +123,7 @@ impl Site {
     #[must_use]
     pub fn new(row: usize, column: usize) -> Self {
         debug_assert!(row >> 32 == 0 && column >> 32 == 0);
-        Self {
-            row: row as u32,
-            column: column as u32,
-        }
+        Self { row: row as u32, column: column as u32 }
     }
 }
 
@@ -156,11 +143,7 @@ impl Stream {
     #[inline(always)]
     #[must_use]
     pub fn field(self, first: Site) -> RandomField {
-        let mut field = RandomField {
-            shot: [[0; LANES]; 2],
-            read: [0; LANES],
-            quantisation: [0; LANES],
-        };
+        let mut field = RandomField { shot: [[0; LANES]; 2], read: [0; LANES], quantisation: [0; LANES] };
         for lane in 0..LANES {
             let column = first.column.wrapping_add(2 * lane as u32);
             let site = Site { column, ..first };
@@ -176,11 +159,7 @@ impl Stream {
     /// A generator of the words of one site, for the distributions of `rand`.
     #[must_use]
     pub fn at(self, site: Site) -> SiteWords {
-        SiteWords {
-            stream: self,
-            site,
-            next: 0,
-        }
+        SiteWords { stream: self, site, next: 0 }
     }
 }
 
@@ -249,16 +228,8 @@ mod tests {
     #[test]
     fn philox_gives_the_known_answers() {
         let cases = [
-            (
-                [0; 4],
-                [0; 2],
-                [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8],
-            ),
-            (
-                [u32::MAX; 4],
-                [u32::MAX; 2],
-                [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd],
-            ),
+            ([0; 4], [0; 2], [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]),
+            ([u32::MAX; 4], [u32::MAX; 2], [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]),
             (
                 [0x243f_6a88, 0x85a3_08d3, 0x1319_8a2e, 0x0370_7344],
                 [0xa409_3822, 0x299f_31d0],
@@ -270,8 +241,8 @@ mod tests {
         }
     }
 
-    /// Uniform numbers are the middles of 2^52 equal cells of (0, 1), so that both u and 1 − u are exact. With 53 bits, the largest
-    /// number would round to 1, where the quantile functions are infinite.
+    /// Uniform numbers are the middles of 2^52 equal cells of (0, 1), so that both u and 1 − u are exact. With 53 bits,
+    /// the largest number would round to 1, where the quantile functions are infinite.
     #[test]
     fn unit_numbers_are_the_middles_of_cells() {
         let stream = key(5, "frame").stream(Component::Camera);
@@ -295,7 +266,8 @@ mod tests {
         assert_ne!(first, key(7, "a").stream(Component::Row));
     }
 
-    /// Each bit is 1 for half of the sites, and words of neighbouring sites, rows, draws or uses differ in half of their bits (5 sigma).
+    /// Each bit is 1 for half of the sites, and words of neighbouring sites, rows, draws or uses differ in half of
+    /// their bits (5 sigma).
     #[test]
     fn bits_are_balanced_and_neighbours_independent() {
         let stream = key(1, "frame").stream(Component::RandomField);
@@ -360,15 +332,9 @@ mod tests {
             cells[left * CELLS + right] += 1;
         }
         let expected = f64::from(n as u32) / cells.len() as f64;
-        let chi: f64 = cells
-            .iter()
-            .map(|c| (f64::from(*c) - expected).powi(2) / expected)
-            .sum();
+        let chi: f64 = cells.iter().map(|c| (f64::from(*c) - expected).powi(2) / expected).sum();
         let freedom = (cells.len() - 1) as f64;
-        assert!(
-            (chi - freedom).abs() < 5.0 * (2.0 * freedom).sqrt(),
-            "{chi}"
-        );
+        assert!((chi - freedom).abs() < 5.0 * (2.0 * freedom).sqrt(), "{chi}");
     }
 
     #[test]
@@ -385,11 +351,7 @@ mod tests {
             }
         }
         // The variances of the four sample moments are 1, 2, 15 and 96 over n.
-        for (moment, (mean, variance)) in
-            moments
-                .iter()
-                .zip([(0.0, 1.0), (1.0, 2.0), (0.0, 15.0), (3.0, 96.0)])
-        {
+        for (moment, (mean, variance)) in moments.iter().zip([(0.0, 1.0), (1.0, 2.0), (0.0, 15.0), (3.0, 96.0)]) {
             let bound = 5.0 * f64::sqrt(variance / n as f64);
             assert!((moment - mean).abs() < bound, "{moment} against {mean}");
         }

@@ -1,8 +1,9 @@
 //! Motion blur in linear light: [`blur`] returns light, [`blurred_codes`] 8-bit codes.
 //!
-//! Each sample is the weighted mean of the light along the [path](Streak); edge pixels are repeated beyond the edges. Rows are
-//! independent of each other. For a path along a row, all inner weights are equal, and their sum is combined from sums of 1, 2, 4 …
-//! pixels, which takes few additions at any length. For other paths, the weighted pixels are added in the order of their offsets.
+//! Each sample is the weighted mean of the light along the [path](Streak); edge pixels are repeated beyond the edges.
+//! Rows are independent of each other. For a path along a row, all inner weights are equal, and their sum is combined
+//! from sums of 1, 2, 4 … pixels, which takes few additions at any length. For other paths, the weighted pixels are
+//! added in the order of their offsets.
 
 use rayon::prelude::*;
 
@@ -23,10 +24,9 @@ pub fn blur(clean: Clean<'_>, streak: Streak) -> Light {
     let blur = Blur::new(clean, streak, Isa::best());
     let mut blurred = Light::black(clean.height(), clean.width());
     let rows = blurred.samples_mut().par_chunks_mut(3 * clean.width());
-    rows.enumerate()
-        .for_each_init(Scratch::default, |scratch, (row, light)| {
-            blur.row(row, scratch, light);
-        });
+    rows.enumerate().for_each_init(Scratch::default, |scratch, (row, light)| {
+        blur.row(row, scratch, light);
+    });
     blurred
 }
 
@@ -41,17 +41,13 @@ pub fn blurred_codes<'a>(clean: impl Into<Clean<'a>>, streak: Streak) -> Rgb {
     let isa = Isa::best();
     let blur = Blur::new(clean, streak, isa);
     let width = 3 * clean.width();
-    blurred
-        .samples_mut()
-        .par_chunks_mut(width)
-        .enumerate()
-        .for_each_init(
-            || (Scratch::default(), vec![0.0; width]),
-            |(scratch, light), (row, codes)| {
-                blur.row(row, scratch, light);
-                encode(light, codes, isa);
-            },
-        );
+    blurred.samples_mut().par_chunks_mut(width).enumerate().for_each_init(
+        || (Scratch::default(), vec![0.0; width]),
+        |(scratch, light), (row, codes)| {
+            blur.row(row, scratch, light);
+            encode(light, codes, isa);
+        },
+    );
     blurred
 }
 
@@ -107,20 +103,12 @@ impl RowWeights {
             return None;
         }
         // The right half of the symmetric weights, from the middle.
-        let half: Vec<f64> = taps[taps.len() / 2..]
-            .iter()
-            .map(|tap| tap.weight)
-            .collect();
-        let inner = half
-            .iter()
-            .take_while(|weight| (*weight - half[0]).abs() < 1e-12)
-            .count();
+        let half: Vec<f64> = taps[taps.len() / 2..].iter().map(|tap| tap.weight).collect();
+        let inner = half.iter().take_while(|weight| (*weight - half[0]).abs() < 1e-12).count();
         Some(Self {
             equal: 2 * inner - 1,
             weight: half[0] as f32,
-            pairs: (inner..half.len())
-                .map(|distance| (distance, half[distance] as f32))
-                .collect(),
+            pairs: (inner..half.len()).map(|distance| (distance, half[distance] as f32)).collect(),
         })
     }
 }
@@ -137,47 +125,33 @@ struct Scratch {
 impl Blur {
     fn new(clean: Clean<'_>, streak: Streak, isa: Isa) -> Self {
         let taps = streak.taps();
-        let margin = taps
-            .iter()
-            .map(|tap| tap.offset[0].unsigned_abs())
-            .max()
-            .unwrap_or_default();
+        let margin = taps.iter().map(|tap| tap.offset[0].unsigned_abs()).max().unwrap_or_default();
         let (height, width) = (clean.height(), clean.width());
         let stride = 3 * (width + 2 * margin);
         // Kernels read whole lanes, which may extend beyond the last row.
         let mut light = vec![0.0; height * stride + 2 * LANES];
-        light[..height * stride]
-            .par_chunks_mut(stride)
-            .enumerate()
-            .for_each(|(row, padded)| {
-                let samples = row * 3 * width..(row + 1) * 3 * width;
-                let inside = &mut padded[3 * margin..3 * (margin + width)];
-                match clean {
-                    Clean::Codes(codes) => {
-                        let shown = display_light();
-                        for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
-                            *light = shown[usize::from(*code)];
-                        }
-                    }
-                    Clean::Rgb16Image(codes) => {
-                        for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
-                            *light = curve::gamma_expand(f64::from(*code) / 65_535.0) as f32;
-                        }
-                    }
-                    Clean::Light(light) | Clean::Scene(light) => {
-                        inside.copy_from_slice(&light.samples()[samples]);
+        light[..height * stride].par_chunks_mut(stride).enumerate().for_each(|(row, padded)| {
+            let samples = row * 3 * width..(row + 1) * 3 * width;
+            let inside = &mut padded[3 * margin..3 * (margin + width)];
+            match clean {
+                Clean::Codes(codes) => {
+                    let shown = display_light();
+                    for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
+                        *light = shown[usize::from(*code)];
                     }
                 }
-                repeat_edges(padded, margin);
-            });
-        Self {
-            light,
-            height,
-            stride,
-            margin,
-            weights: Weights::from_streak(streak),
-            isa,
-        }
+                Clean::Rgb16Image(codes) => {
+                    for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
+                        *light = curve::gamma_expand(f64::from(*code) / 65_535.0) as f32;
+                    }
+                }
+                Clean::Light(light) | Clean::Scene(light) => {
+                    inside.copy_from_slice(&light.samples()[samples]);
+                }
+            }
+            repeat_edges(padded, margin);
+        });
+        Self { light, height, stride, margin, weights: Weights::from_streak(streak), isa }
     }
 
     /// Writes a row of blurred light.
@@ -191,11 +165,7 @@ impl Blur {
                     let column = self.margin.saturating_add_signed(right);
                     (row * self.stride + 3 * column, tap.weight as f32)
                 }));
-                self.isa.run(EachTap {
-                    light: &self.light,
-                    starts: &scratch.starts,
-                    blurred,
-                });
+                self.isa.run(EachTap { light: &self.light, starts: &scratch.starts, blurred });
             }
             Weights::Row(weights) => {
                 scratch.sums.resize(self.stride + 2 * LANES, 0.0);
@@ -265,12 +235,9 @@ struct AlongRow<'a> {
 impl Kernel for AlongRow<'_> {
     #[inline(always)]
     fn run(self) {
-        let RowWeights {
-            equal,
-            weight,
-            pairs,
-        } = self.weights;
-        // The sums start at the leftmost of the equal pixels. A sum of `size` pixels is stored at the position of its first pixel.
+        let RowWeights { equal, weight, pairs } = self.weights;
+        // The sums start at the leftmost of the equal pixels. A sum of `size` pixels is stored at the position of its
+        // first pixel.
         let first = 3 * (self.margin - equal / 2);
         let mut needed = self.blurred.len() + 3 * (equal - 1);
         self.sums[..needed].copy_from_slice(&self.light[first..first + needed]);

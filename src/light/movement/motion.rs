@@ -43,25 +43,20 @@ pub struct FrameView {
 impl Default for Motion {
     /// Slow pan of a robot with a wide-angle lens; chosen.
     fn default() -> Self {
-        Self {
-            speed: 30.0,
-            hfov: 79.0,
-            angle: MotionAngle::Degrees(0.0),
-        }
+        Self { speed: 30.0, hfov: 79.0, angle: MotionAngle::Degrees(0.0) }
     }
 }
 
 impl Motion {
-    /// Streak of the centre of a frame during an exposure. Its length in pixels is focal length · angular speed · `seconds`.
+    /// Streak of the centre of a frame during an exposure. Its length in pixels is focal length · angular speed ·
+    /// `seconds`.
     ///
     /// This is the small-angle limit at the centre of the image, and an approximation elsewhere.
     ///
     /// # Errors
     /// If the streak is longer than 256 pixels.
     pub fn streak(&self, seconds: f64, view: FrameView, key: &NoiseKey) -> Result<Streak> {
-        let focal = view
-            .focal
-            .unwrap_or_else(|| view.width as f64 / 2.0 / libm::tan(self.hfov.to_radians() / 2.0));
+        let focal = view.focal.unwrap_or_else(|| view.width as f64 / 2.0 / libm::tan(self.hfov.to_radians() / 2.0));
         let angle = match self.angle {
             MotionAngle::Degrees(angle) => angle,
             MotionAngle::Random => {
@@ -142,30 +137,22 @@ mod tests {
         NoiseKey::new(seed, &FrameId(frame.to_owned()))
     }
 
-    const VIEW: FrameView = FrameView {
-        width: 640,
-        focal: None,
-    };
+    const VIEW: FrameView = FrameView { width: 640, focal: None };
 
     fn parse(text: &str) -> Motion {
         text.parse().unwrap()
     }
 
     fn length(motion: &str, seconds: f64, view: FrameView) -> f64 {
-        parse(motion)
-            .streak(seconds, view, &key(0, "a"))
-            .unwrap()
-            .length()
+        parse(motion).streak(seconds, view, &key(0, "a")).unwrap().length()
     }
 
     fn random_angle(seed: u64, frame: &str) -> f64 {
-        parse("angle=random")
-            .streak(0.01, VIEW, &key(seed, frame))
-            .unwrap()
-            .angle()
+        parse("angle=random").streak(0.01, VIEW, &key(seed, frame)).unwrap().angle()
     }
 
-    /// At 30 °/s and a 79° field of view, a streak in a 640-pixel-wide image is 1.69 pixels long after 1/120 s and 6.78 after 1/30 s.
+    /// At 30 °/s and a 79° field of view, a streak in a 640-pixel-wide image is 1.69 pixels long after 1/120 s and 6.78
+    /// after 1/30 s.
     #[test]
     fn streak_length_is_focal_length_times_angle() {
         let default = "speed=30";
@@ -173,10 +160,7 @@ mod tests {
         assert!((length(default, 1.0 / 30.0, VIEW) - 6.776).abs() < 1e-3);
         assert!(length("speed=0", 1.0, VIEW).abs() < 1e-12);
         // With a known focal length, the field of view has no effect.
-        let known = FrameView {
-            focal: Some(600.0),
-            ..VIEW
-        };
+        let known = FrameView { focal: Some(600.0), ..VIEW };
         for motion in [default, "hfov=20", "hfov=150"] {
             let expected = 600.0 * 30_f64.to_radians() / 30.0;
             assert!((length(motion, 1.0 / 30.0, known) - expected).abs() < 1e-9);
@@ -188,14 +172,9 @@ mod tests {
 
     #[test]
     fn a_random_direction_depends_on_seed_and_frame() {
-        let fixed = parse("angle=-30.5")
-            .streak(0.01, VIEW, &key(0, "a"))
-            .unwrap();
+        let fixed = parse("angle=-30.5").streak(0.01, VIEW, &key(0, "a")).unwrap();
         assert!((fixed.angle() + 30.5).abs() < 1e-12);
-        assert_eq!(
-            random_angle(0, "a").to_bits(),
-            random_angle(0, "a").to_bits()
-        );
+        assert_eq!(random_angle(0, "a").to_bits(), random_angle(0, "a").to_bits());
         assert!((random_angle(0, "a") - random_angle(0, "b")).abs() > 1e-6);
         assert!((random_angle(0, "a") - random_angle(1, "a")).abs() > 1e-6);
         // Uniform over a half turn: the standard error of the mean of 400 angles is 2.6°.
@@ -214,18 +193,9 @@ mod tests {
         assert_eq!(parse("angle=90").to_string(), "speed=30,hfov=79,angle=90");
         for (wrong, part) in [
             ("sped=3", "did you mean speed?"),
-            (
-                "speed=-1",
-                "speed=-1: a number from 0 to 10000 expected (degrees per second)",
-            ),
-            (
-                "hfov=0",
-                "hfov=0: a number from 1 to 179 expected (degrees)",
-            ),
-            (
-                "angle=up",
-                "angle=up: a number of degrees from -360 to 360, or random, expected",
-            ),
+            ("speed=-1", "speed=-1: a number from 0 to 10000 expected (degrees per second)"),
+            ("hfov=0", "hfov=0: a number from 1 to 179 expected (degrees)"),
+            ("angle=up", "angle=up: a number of degrees from -360 to 360, or random, expected"),
             ("angle=361", "angle=361"),
         ] {
             let error = wrong.parse::<Motion>().unwrap_err();

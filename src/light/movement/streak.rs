@@ -1,9 +1,9 @@
 //! Path of an image on the sensor during an exposure ([`Streak`]), and the weights of its motion blur ([`Tap`]).
 //!
-//! The camera turns at constant speed, so that the centre of the image moves uniformly on a straight line. Each point of the path is
-//! distributed bilinearly over its four neighbours: a pixel at offset (i, j) has the weight
-//! w(i, j) = ∫₀¹ Λ(x(s) − i) · Λ(y(s) − j) ds, with Λ(t) = max(0, 1 − |t|), x(s) = ℓ cos θ (s − ½) and
-//! y(s) = ℓ sin θ (s − ½). The weights sum to 1, have the mean 0 and are symmetric, so that neither colours nor edges shift.
+//! The camera turns at constant speed, so that the centre of the image moves uniformly on a straight line. Each point
+//! of the path is distributed bilinearly over its four neighbours: a pixel at offset (i, j) has the weight w(i, j) =
+//! ∫₀¹ Λ(x(s) − i) · Λ(y(s) − j) ds, with Λ(t) = max(0, 1 − |t|), x(s) = ℓ cos θ (s − ½) and y(s) = ℓ sin θ (s − ½).
+//! The weights sum to 1, have the mean 0 and are symmetric, so that neither colours nor edges shift.
 
 use std::collections::BTreeMap;
 
@@ -11,8 +11,8 @@ use serde::{Deserialize, Serialize};
 
 use darkqa_base::error::{Error, Result};
 
-/// Maximum length of a path, in pixels; chosen. At a width of 4096 pixels, a rotation of 30°/s stays below it at all exposure times of the
-/// ladder (174 pixels in 1/7.5 s), and images with longer paths show only streaks.
+/// Maximum length of a path, in pixels; chosen. At a width of 4096 pixels, a rotation of 30°/s stays below it at all
+/// exposure times of the ladder (174 pixels in 1/7.5 s), and images with longer paths show only streaks.
 const MAX_LENGTH: f64 = 256.0;
 
 /// Smaller weights and extents of a path along an axis are rounding errors and ignored.
@@ -39,10 +39,7 @@ pub struct Tap {
 
 impl Streak {
     /// The path without motion.
-    pub const STILL: Self = Self {
-        length: 0.0,
-        angle: 0.0,
-    };
+    pub const STILL: Self = Self { length: 0.0, angle: 0.0 };
 
     /// A path of this length in pixels, in this direction in degrees.
     ///
@@ -82,8 +79,8 @@ impl Streak {
 
     /// The weights of the neighbours, in the order of their offsets.
     ///
-    /// Between two points where x or y is a whole number, the weight is a quadratic polynomial of s, for which three Gauss points are
-    /// exact.
+    /// Between two points where x or y is a whole number, the weight is a quadratic polynomial of s, for which three
+    /// Gauss points are exact.
     #[must_use]
     pub fn taps(self) -> Vec<Tap> {
         let radians = self.angle.to_radians();
@@ -107,25 +104,15 @@ impl Streak {
 }
 
 /// Nodes in (−1, 1) and weights of the Gauss–Legendre rule with three points: ±√(3/5) and 0, with 5/18 and 8/18.
-const GAUSS: [(f64, f64); 3] = [
-    (-0.774_596_669_241_483_4, 5.0 / 18.0),
-    (0.0, 8.0 / 18.0),
-    (0.774_596_669_241_483_4, 5.0 / 18.0),
-];
+const GAUSS: [(f64, f64); 3] =
+    [(-0.774_596_669_241_483_4, 5.0 / 18.0), (0.0, 8.0 / 18.0), (0.774_596_669_241_483_4, 5.0 / 18.0)];
 
 /// The values of s at which x or y is a whole number, and both ends 0 and 1, in ascending order.
 fn breakpoints(extent: [f64; 2]) -> Vec<f64> {
     let mut breakpoints = vec![0.0, 1.0];
-    for extent in extent
-        .into_iter()
-        .filter(|extent| extent.abs() > NEGLIGIBLE)
-    {
+    for extent in extent.into_iter().filter(|extent| extent.abs() > NEGLIGIBLE) {
         let reach = (extent.abs() / 2.0).floor() as i32;
-        breakpoints.extend(
-            (-reach..=reach)
-                .map(|whole| f64::from(whole) / extent + 0.5)
-                .map(|s| s.clamp(0.0, 1.0)),
-        );
+        breakpoints.extend((-reach..=reach).map(|whole| f64::from(whole) / extent + 0.5).map(|s| s.clamp(0.0, 1.0)));
     }
     breakpoints.sort_by(f64::total_cmp);
     breakpoints.dedup();
@@ -137,10 +124,7 @@ fn distribute_bilinearly([x, y]: [f64; 2], mut add: impl FnMut([isize; 2], f64))
     let (column, row) = (x.floor(), y.floor());
     for (right, across) in [(0, 1.0 - (x - column)), (1, x - column)] {
         for (down, along) in [(0, 1.0 - (y - row)), (1, y - row)] {
-            add(
-                [column as isize + right, row as isize + down],
-                across * along,
-            );
+            add([column as isize + right, row as isize + down], across * along);
         }
     }
 }
@@ -150,12 +134,7 @@ mod tests {
     use super::*;
 
     fn taps(length: f64, angle: f64) -> BTreeMap<[isize; 2], f64> {
-        Streak::new(length, angle)
-            .unwrap()
-            .taps()
-            .into_iter()
-            .map(|tap| (tap.offset, tap.weight))
-            .collect()
+        Streak::new(length, angle).unwrap().taps().into_iter().map(|tap| (tap.offset, tap.weight)).collect()
     }
 
     /// Lengths and directions: short and long, along the axes, between them, and beyond a quarter turn.
@@ -184,11 +163,7 @@ mod tests {
         for (length, expected) in cases {
             for (angle, axis) in [(0.0, 0), (90.0, 1), (180.0, 0)] {
                 let found = taps(length, angle);
-                assert_eq!(
-                    found.len(),
-                    expected.len(),
-                    "{length} at {angle}: {found:?}"
-                );
+                assert_eq!(found.len(), expected.len(), "{length} at {angle}: {found:?}");
                 let first = -(expected.len().cast_signed() / 2);
                 for (at, expected) in (first..).zip(expected) {
                     let mut offset = [0; 2];
@@ -204,11 +179,7 @@ mod tests {
     fn weights_of_a_slanted_path_are_exact() {
         let found = taps(5.5, 30.0);
         assert_eq!(found.len(), 19);
-        for (offset, expected) in [
-            ([-2, -1], 0.141302),
-            ([-1, -1], 0.120435),
-            ([-3, -2], 0.004609),
-        ] {
+        for (offset, expected) in [([-2, -1], 0.141302), ([-1, -1], 0.120435), ([-3, -2], 0.004609)] {
             let off: f64 = found[&offset] - expected;
             assert!(off.abs() < 1e-6, "{offset:?}: {off}");
         }
@@ -242,12 +213,9 @@ mod tests {
             let radians = angle.to_radians();
             for step in 0..STEPS {
                 let along = length * ((step as f64 + 0.5) / STEPS as f64 - 0.5);
-                distribute_bilinearly(
-                    [radians.cos() * along, radians.sin() * along],
-                    |at, weight| {
-                        *sums.entry(at).or_default() += weight / STEPS as f64;
-                    },
-                );
+                distribute_bilinearly([radians.cos() * along, radians.sin() * along], |at, weight| {
+                    *sums.entry(at).or_default() += weight / STEPS as f64;
+                });
             }
             let found = taps(length, angle);
             for (offset, expected) in sums {
@@ -260,11 +228,7 @@ mod tests {
     #[test]
     fn an_impossible_path_is_refused() {
         for (length, angle, part) in [
-            (
-                256.01,
-                0.0,
-                "256.01 pixels during the exposure; at most 256",
-            ),
+            (256.01, 0.0, "256.01 pixels during the exposure; at most 256"),
             (-1.0, 0.0, "at most 256"),
             (f64::NAN, 0.0, "at most 256"),
             (1.0, f64::INFINITY, "not a direction"),

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use darkqa_base::types::degradations::{Axis, Kind};
 use darkqa_base::types::{Degradation, FrameId, ProfileName, Severity};
 use darkqa_light::{
-    AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView, Motion,
-    NoiseKey, NoiseProfile, Streak, Synthesis,
+    AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView, Motion, NoiseKey,
+    NoiseProfile, Streak, Synthesis,
 };
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -29,23 +29,17 @@ pub(crate) struct Settings {
 
 /// Converts a `str` argument.
 fn text(name: &str, expected: &str, given: &Bound<'_, PyAny>) -> PyResult<String> {
-    let text = given
-        .cast::<PyString>()
-        .map_err(|_| wrong_type(name, expected, given))?;
-    let text = text.to_str().map_err(|_| {
-        PyValueError::new_err(format!("{name}: text with a lone surrogate is no Unicode"))
-    })?;
+    let text = given.cast::<PyString>().map_err(|_| wrong_type(name, expected, given))?;
+    let text = text
+        .to_str()
+        .map_err(|_| PyValueError::new_err(format!("{name}: text with a lone surrogate is no Unicode")))?;
     Ok(text.to_owned())
 }
 
 /// Converts a number of EV; refuses `bool` and `str`.
 fn number(name: &str, given: &Bound<'_, PyAny>) -> PyResult<f64> {
     let is_refused = given.is_instance_of::<PyBool>() || given.is_instance_of::<PyString>();
-    given
-        .extract()
-        .ok()
-        .filter(|_| !is_refused)
-        .ok_or_else(|| wrong_type(name, "a number of EV", given))
+    given.extract().ok().filter(|_| !is_refused).ok_or_else(|| wrong_type(name, "a number of EV", given))
 }
 
 impl Settings {
@@ -59,33 +53,25 @@ impl Settings {
             None => Kind::Sensor,
             Some(given) => {
                 let word = text("variant", "a str", given)?;
-                Kind::from_word(&word)
-                    .ok_or_else(|| one_of("variant", &word, &Kind::ALL.map(Kind::word)))?
+                Kind::from_word(&word).ok_or_else(|| one_of("variant", &word, &Kind::ALL.map(Kind::word)))?
             }
         };
         let reading = match profile {
             None => NoiseProfile::Paper,
             Some(given) => {
                 let word = text("profile", "a str", given)?;
-                NoiseProfile::ALL
-                    .into_iter()
-                    .find(|reading| reading.name().as_str() == word)
-                    .ok_or_else(|| {
-                        let names = NoiseProfile::ALL.map(NoiseProfile::name);
-                        one_of("profile", &word, &names.each_ref().map(ProfileName::as_str))
-                    })?
+                NoiseProfile::ALL.into_iter().find(|reading| reading.name().as_str() == word).ok_or_else(|| {
+                    let names = NoiseProfile::ALL.map(NoiseProfile::name);
+                    one_of("profile", &word, &names.each_ref().map(ProfileName::as_str))
+                })?
             }
         };
         let camera = match camera {
             None => CameraModel::default(),
             Some(given) => {
                 let expected = "a str or os.PathLike";
-                let path: PathBuf = given
-                    .extract()
-                    .map_err(|_| wrong_type("camera", expected, given))?;
-                let name = path
-                    .to_str()
-                    .ok_or_else(|| PyValueError::new_err("camera: no Unicode"))?;
+                let path: PathBuf = given.extract().map_err(|_| wrong_type("camera", expected, given))?;
+                let name = path.to_str().ok_or_else(|| PyValueError::new_err("camera: no Unicode"))?;
                 CameraModel::open(name).map_err(|problem| value_error(&problem))?
             }
         };
@@ -102,15 +88,9 @@ impl Settings {
     }
 
     /// Level from the arguments `level` and `ev`, of which only one may be given; L3 by default.
-    pub(crate) fn level(
-        &self,
-        level: Option<&Bound<'_, PyAny>>,
-        ev: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<Level> {
+    pub(crate) fn level(&self, level: Option<&Bound<'_, PyAny>>, ev: Option<&Bound<'_, PyAny>>) -> PyResult<Level> {
         match (level, ev) {
-            (Some(_), Some(_)) => Err(PyValueError::new_err(
-                "level, ev: one of them expected, got both",
-            )),
+            (Some(_), Some(_)) => Err(PyValueError::new_err("level, ev: one of them expected, got both")),
             (None, Some(ev)) => self.level_from_ev("ev", ev),
             (Some(level), None) => self.level_from_str("level", level),
             (None, None) => self.level_from_label("level", "L3"),
@@ -120,12 +100,7 @@ impl Settings {
     /// Levels of a ladder; L1 to L5 by default.
     pub(crate) fn levels(&self, levels: Option<&Bound<'_, PyAny>>) -> PyResult<Vec<Level>> {
         let Some(levels) = levels else {
-            return Ok(self
-                .kind
-                .ladder()
-                .iter()
-                .map(|severity| Level(Some(*severity)))
-                .collect());
+            return Ok(self.kind.ladder().iter().map(|severity| Level(Some(*severity))).collect());
         };
         let expected = "a list of str and numbers of EV";
         if levels.is_instance_of::<PyString>() {
@@ -154,11 +129,8 @@ impl Settings {
     /// Level from the `str` argument `name`.
     fn level_from_str(&self, name: &str, given: &Bound<'_, PyAny>) -> PyResult<Level> {
         let is_number = given.is_instance_of::<PyFloat>() || given.is_instance_of::<PyInt>();
-        let expected = if is_number {
-            "a str such as \"L3\" (a number of EV is the argument ev)"
-        } else {
-            "a str such as \"L3\""
-        };
+        let expected =
+            if is_number { "a str such as \"L3\" (a number of EV is the argument ev)" } else { "a str such as \"L3\"" };
         self.level_from_label(name, &text(name, expected, given)?)
     }
 
@@ -188,10 +160,8 @@ impl Settings {
     fn level_from_ev(&self, name: &str, given: &Bound<'_, PyAny>) -> PyResult<Level> {
         let drop_ev = number(name, given)?;
         if self.kind.axis() != Axis::LIGHT {
-            let problem = format!(
-                "{name}: variant {:?} has exposure times; pass a level such as T33.33",
-                self.kind.word()
-            );
+            let problem =
+                format!("{name}: variant {:?} has exposure times; pass a level such as T33.33", self.kind.word());
             return Err(PyValueError::new_err(problem));
         }
         let largest = self.kind.max_severity().value();
@@ -201,9 +171,7 @@ impl Settings {
             )));
         }
         let hundredths = (100.0 * drop_ev).round() as u16;
-        Ok(Level(
-            (hundredths > 0).then(|| Severity::from_hundredths(hundredths)),
-        ))
+        Ok(Level((hundredths > 0).then(|| Severity::from_hundredths(hundredths))))
     }
 
     /// Width of the images in pixels, which affects only motion blur.
@@ -219,35 +187,20 @@ impl Settings {
     }
 
     /// Degradation of a frame with this key and width in pixels.
-    pub(crate) fn applied(
-        &self,
-        severity: Severity,
-        width: usize,
-        key: &NoiseKey,
-    ) -> PyResult<AppliedDegradation> {
+    pub(crate) fn applied(&self, severity: Severity, width: usize, key: &NoiseKey) -> PyResult<AppliedDegradation> {
         let reading = self.kind.has_profiles().then(|| self.synthesis.name());
         let view = FrameView { width, focal: None };
         let motion = Motion::default();
         Degradation::new(self.kind, severity, reading)
-            .and_then(|how| {
-                AppliedDegradation::new(&how, &self.synthesis, &self.auto, &motion, view, key)
-            })
+            .and_then(|how| AppliedDegradation::new(&how, &self.synthesis, &self.auto, &motion, view, key))
             .map_err(|problem| value_error(&problem))
     }
 
-    /// Capture state of a frame with this key and width in pixels. At L0 it has no sensor, because the image is unchanged.
-    pub(crate) fn state(
-        &self,
-        level: Level,
-        width: usize,
-        key: &NoiseKey,
-    ) -> PyResult<CaptureState> {
+    /// Capture state of a frame with this key and width in pixels. At L0 it has no sensor, because the image is
+    /// unchanged.
+    pub(crate) fn state(&self, level: Level, width: usize, key: &NoiseKey) -> PyResult<CaptureState> {
         let Some(severity) = level.0 else {
-            return Ok(CaptureState {
-                drop_ev: 0.0,
-                streak: Streak::STILL,
-                sensor: None,
-            });
+            return Ok(CaptureState { drop_ev: 0.0, streak: Streak::STILL, sensor: None });
         };
         let applied = self.applied(severity, width, key)?;
         Ok(CaptureState::new(&applied, key))
@@ -266,17 +219,11 @@ fn one_of(name: &str, given: &str, accepted: &[&str]) -> PyErr {
 }
 
 /// Converts a `bool` of Python or NumPy.
-pub(crate) fn switch(
-    name: &str,
-    given: Option<&Bound<'_, PyAny>>,
-    default: bool,
-) -> PyResult<bool> {
+pub(crate) fn switch(name: &str, given: Option<&Bound<'_, PyAny>>, default: bool) -> PyResult<bool> {
     let Some(given) = given else {
         return Ok(default);
     };
-    given
-        .extract()
-        .map_err(|_| wrong_type(name, "a bool", given))
+    given.extract().map_err(|_| wrong_type(name, "a bool", given))
 }
 
 /// Maximum number of threads; chosen.
@@ -295,18 +242,12 @@ fn integer(name: &str, given: &Bound<'_, PyAny>, [low, high]: [u64; 2]) -> PyRes
     if given.is_instance_of::<PyBool>() {
         return Err(wrong_type(name, "an int", given));
     }
-    let index = given
-        .call_method0("__index__")
-        .map_err(|_| wrong_type(name, "an int", given))?;
+    let index = given.call_method0("__index__").map_err(|_| wrong_type(name, "an int", given))?;
     index
         .extract()
         .ok()
         .filter(|number: &u64| (low..=high).contains(number))
-        .ok_or_else(|| {
-            PyValueError::new_err(format!(
-                "{name}: an int from {low} to {high} expected, got {index}"
-            ))
-        })
+        .ok_or_else(|| PyValueError::new_err(format!("{name}: an int from {low} to {high} expected, got {index}")))
 }
 
 /// Key of one image; empty by default.
@@ -321,12 +262,9 @@ pub(crate) fn noise_key(seed: u64, key: &str) -> NoiseKey {
     NoiseKey::new(seed, &FrameId(key.to_owned()))
 }
 
-/// Noise keys of the images of a batch, from a list of N keys, or from one key to which `/i` is added for image i of a batch.
-pub(crate) fn noise_keys(
-    seed: u64,
-    given: Option<&Bound<'_, PyAny>>,
-    batch: &Batch,
-) -> PyResult<Vec<NoiseKey>> {
+/// Noise keys of the images of a batch, from a list of N keys, or from one key to which `/i` is added for image i of a
+/// batch.
+pub(crate) fn noise_keys(seed: u64, given: Option<&Bound<'_, PyAny>>, batch: &Batch) -> PyResult<Vec<NoiseKey>> {
     let is_text = given.is_none_or(PyAnyMethods::is_instance_of::<PyString>);
     let Some(given) = given.filter(|_| !is_text) else {
         return Ok(numbered_keys(seed, &key(given)?, batch));
@@ -357,8 +295,6 @@ pub(crate) fn noise_keys(
 pub(crate) fn numbered_keys(seed: u64, key: &str, batch: &Batch) -> Vec<NoiseKey> {
     match batch.count() {
         None => vec![noise_key(seed, key)],
-        Some(count) => (0..count)
-            .map(|index| noise_key(seed, &format!("{key}/{index}")))
-            .collect(),
+        Some(count) => (0..count).map(|index| noise_key(seed, &format!("{key}/{index}"))).collect(),
     }
 }

@@ -3,8 +3,7 @@
 use darkqa_base::types::Rgb;
 use darkqa_base::types::images::Sample;
 use numpy::{
-    Element, IxDyn, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray,
-    PyUntypedArrayMethods,
+    Element, IxDyn, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -38,14 +37,11 @@ impl Batch {
     /// # Errors
     /// `TypeError` if `image` is not an array of `uint8`, `ValueError` if it has another shape, no pixels or too many.
     pub(crate) fn read(image: &Bound<'_, PyAny>) -> PyResult<Self> {
-        let untyped = image
-            .cast::<PyUntypedArray>()
-            .map_err(|_| wrong_type("image", "a numpy.ndarray of dtype uint8", image))?;
+        let untyped =
+            image.cast::<PyUntypedArray>().map_err(|_| wrong_type("image", "a numpy.ndarray of dtype uint8", image))?;
         let array = image.cast::<PyArrayDyn<u8>>().map_err(|_| {
             let dtype = untyped.dtype();
-            PyTypeError::new_err(format!(
-                "image: dtype uint8 (sRGB codes from 0 to 255) expected, got {dtype}"
-            ))
+            PyTypeError::new_err(format!("image: dtype uint8 (sRGB codes from 0 to 255) expected, got {dtype}"))
         })?;
         let shape = untyped.shape();
         let (count, height, width) = match *shape {
@@ -56,9 +52,8 @@ impl Batch {
         if height == 0 || width == 0 {
             return Err(wrong_shape(shape, " with at least one pixel"));
         }
-        let array = array
-            .try_readonly()
-            .map_err(|_| PyValueError::new_err("image: another call is writing to this array"))?;
+        let array =
+            array.try_readonly().map_err(|_| PyValueError::new_err("image: another call is writing to this array"))?;
         if height.saturating_mul(width) > MAX_PIXELS {
             return Err(wrong_shape(shape, " with at most 2**28 pixels"));
         }
@@ -68,16 +63,10 @@ impl Batch {
         let images = samples(&array)
             .chunks_exact(size)
             .map(|samples| {
-                Rgb::new(height, width, samples.to_vec())
-                    .map_err(|problem| PyValueError::new_err(problem.to_string()))
+                Rgb::new(height, width, samples.to_vec()).map_err(|problem| PyValueError::new_err(problem.to_string()))
             })
             .collect::<PyResult<_>>()?;
-        Ok(Self {
-            images,
-            count,
-            height,
-            width,
-        })
+        Ok(Self { images, count, height, width })
     }
 
     /// Number of images; `None` for a single image without a batch axis.
@@ -94,8 +83,8 @@ impl Batch {
     }
 }
 
-/// Checks that the memory for `images` images of `bytes` bytes each can be allocated, because an allocation that fails later would end the
-/// interpreter.
+/// Checks that the memory for `images` images of `bytes` bytes each can be allocated, because an allocation that fails
+/// later would end the interpreter.
 ///
 /// # Errors
 /// `MemoryError` if the allocation fails.
@@ -118,10 +107,7 @@ fn samples<'a>(array: &'a PyReadonlyArrayDyn<'_, u8>) -> std::borrow::Cow<'a, [u
 
 fn wrong_shape(shape: &[usize], further: &str) -> PyErr {
     let got: Vec<String> = shape.iter().map(ToString::to_string).collect();
-    PyValueError::new_err(format!(
-        "image: shape (H, W, 3) or (N, H, W, 3){further} expected, got ({})",
-        got.join(", ")
-    ))
+    PyValueError::new_err(format!("image: shape (H, W, 3) or (N, H, W, 3){further} expected, got ({})", got.join(", ")))
 }
 
 /// New array of this shape.

@@ -13,7 +13,8 @@ pub(crate) fn wrong_type(name: &str, expected: &str, given: &Bound<'_, PyAny>) -
     PyTypeError::new_err(format!("{name}: {expected} expected, got {given}"))
 }
 
-/// `ValueError` with the message of an error of the synthesis. The program's flag at its start becomes the argument's name.
+/// `ValueError` with the message of an error of the synthesis. The program's flag at its start becomes the argument's
+/// name.
 pub(crate) fn value_error(error: &Error) -> PyErr {
     let text = error.to_string();
     PyValueError::new_err(text.strip_prefix("--").unwrap_or(&text).to_owned())

@@ -53,7 +53,8 @@ fn cameras() -> Vec<&'static str> {
 /// variant: "ev" (less light alone), "noise" (with sensor noise), "auto" (automatic exposure), "motion" (motion blur).
 /// profile: "paper", "eld", "level" or "physical", the way the noise follows the light.
 /// camera: a name of cameras(), or the path of a TOML file of a calibration; None for the first of cameras().
-/// seed, key: the same seed and key give the same image. Key is the name of a frame in `darkqa-eval synthesize`. A batch
+/// seed, key: the same seed and key give the same image. Key is the name of a frame in `darkqa-eval synthesize`. A
+/// batch
 ///     takes a list of N keys; with one str, image i has the key f"{key}/{i}".
 /// noise: False for the noise-free image at the same exposure, a training target.
 /// linear: True for float32 linear light before it is rounded to 8-bit codes; white is 1.
@@ -85,21 +86,14 @@ fn degrade<'py>(
     let threads = arguments::threads(threads)?;
     let batch = Batch::read(image)?;
     let keys = noise_keys(settings.seed, key, &batch)?;
-    let states = keys
-        .iter()
-        .map(|key| settings.state(level, batch.width, key))
-        .collect::<PyResult<Vec<_>>>()?;
+    let states = keys.iter().map(|key| settings.state(level, batch.width, key)).collect::<PyResult<Vec<_>>>()?;
     if is_linear {
         output(py, &batch, &[], threads, |index, clean| {
-            states[index]
-                .light(clean.into(), &keys[index], noise)
-                .into_samples()
+            states[index].light(clean.into(), &keys[index], noise).into_samples()
         })
     } else {
         output(py, &batch, &[], threads, |index, clean| {
-            states[index]
-                .image(clean.into(), &keys[index], noise)
-                .into_samples()
+            states[index].image(clean.into(), &keys[index], noise).into_samples()
         })
     }
 }
@@ -136,41 +130,26 @@ fn ladder<'py>(
     let keys = noise_keys(settings.seed, key, &batch)?;
     let mut states: Vec<Vec<CaptureState>> = Vec::new();
     for key in &keys {
-        let states_of_key = levels
-            .iter()
-            .map(|level| settings.state(*level, batch.width, key))
-            .collect::<PyResult<_>>()?;
+        let states_of_key =
+            levels.iter().map(|level| settings.state(*level, batch.width, key)).collect::<PyResult<_>>()?;
         states.push(states_of_key);
     }
     let shape = [levels.len()];
     if is_linear {
         return output(py, &batch, &shape, threads, |index, clean| {
-            join_samples(
-                states[index]
-                    .iter()
-                    .map(|state| state.light(clean.into(), &keys[index], noise)),
-            )
+            join_samples(states[index].iter().map(|state| state.light(clean.into(), &keys[index], noise)))
         });
     }
     output(py, &batch, &shape, threads, |index, clean| {
         if noise == NoiseTerms::All {
             return degrade_to_levels(&settings, &levels, clean, &keys[index]);
         }
-        join_samples(
-            states[index]
-                .iter()
-                .map(|state| state.image(clean.into(), &keys[index], noise)),
-        )
+        join_samples(states[index].iter().map(|state| state.image(clean.into(), &keys[index], noise)))
     })
 }
 
 /// Samples of one frame at several levels with all noise terms, which share intermediate results.
-fn degrade_to_levels(
-    settings: &Settings,
-    levels: &[Level],
-    clean: &Rgb,
-    key: &NoiseKey,
-) -> Vec<u8> {
+fn degrade_to_levels(settings: &Settings, levels: &[Level], clean: &Rgb, key: &NoiseKey) -> Vec<u8> {
     if settings.kind == Kind::Sensor {
         let mut samples = vec![0; levels.len() * clean.samples().len()];
         let (mut severities, mut images) = (Vec::new(), Vec::new());
@@ -188,9 +167,7 @@ fn degrade_to_levels(
     }
     let mut exposures = Exposures::default();
     join_samples(levels.iter().map(|level| {
-        let applied = level
-            .0
-            .map(|severity| settings.applied(severity, clean.width(), key));
+        let applied = level.0.map(|severity| settings.applied(severity, clean.width(), key));
         match applied {
             Some(Ok(applied)) => exposures.degrade(clean.into(), &applied, key),
             // No level fails here, because the capture states of all levels were computed before.
@@ -201,8 +178,9 @@ fn degrade_to_levels(
 
 /// Return the numbers that decide an image of degrade(): exposure drop, motion and the state of the sensor.
 ///
-/// The dictionary holds int, float, str, and lists of float, so that it can be written as JSON. replay() makes the image
-/// again from it. `width` is the width of the image in pixels, which the motion of the variants "auto" and "motion" needs.
+/// The dictionary holds int, float, str, and lists of float, so that it can be written as JSON. replay() makes the
+/// image again from it. `width` is the width of the image in pixels, which the motion of the variants "auto" and
+/// "motion" needs.
 #[pyfunction]
 #[pyo3(
     signature = (level = None, variant = None, profile = None, camera = None, seed = None, key = None, *, ev = None, width = None),
@@ -226,18 +204,11 @@ fn sensor_state<'py>(
     let width = settings.width(width)?;
     let noise_key = arguments::noise_key(settings.seed, &key);
     let capture = settings.state(level, width, &noise_key)?;
-    state::to_dict(
-        py,
-        &state::Replay {
-            kind: settings.kind,
-            seed: settings.seed,
-            key,
-            capture,
-        },
-    )
+    state::to_dict(py, &state::Replay { kind: settings.kind, seed: settings.seed, key, capture })
 }
 
-/// Return an image, or a batch of images, with the numbers of a dictionary of sensor_state(), which may have been changed.
+/// Return an image, or a batch of images, with the numbers of a dictionary of sensor_state(), which may have been
+/// changed.
 ///
 /// All images of a batch have the same camera; image i of a batch has the noise of the key f"{key}/{i}".
 #[pyfunction]
@@ -253,9 +224,7 @@ fn replay<'py>(
     threads: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = image.py();
-    let state = state
-        .cast::<PyDict>()
-        .map_err(|_| errors::wrong_type("state", "a dict of sensor_state()", state))?;
+    let state = state.cast::<PyDict>().map_err(|_| errors::wrong_type("state", "a dict of sensor_state()", state))?;
     let replay = state::from_dict(state)?;
     let noise = terms(arguments::switch("noise", noise, true)?);
     let is_linear = arguments::switch("linear", linear, false)?;
@@ -264,29 +233,18 @@ fn replay<'py>(
     let keys = numbered_keys(replay.seed, &replay.key, &batch);
     let capture = &replay.capture;
     if is_linear {
-        output(py, &batch, &[], threads, |index, clean| {
-            capture
-                .light(clean.into(), &keys[index], noise)
-                .into_samples()
-        })
+        output(py, &batch, &[], threads, |index, clean| capture.light(clean.into(), &keys[index], noise).into_samples())
     } else {
-        output(py, &batch, &[], threads, |index, clean| {
-            capture
-                .image(clean.into(), &keys[index], noise)
-                .into_samples()
-        })
+        output(py, &batch, &[], threads, |index, clean| capture.image(clean.into(), &keys[index], noise).into_samples())
     }
 }
 
 fn terms(noise: bool) -> NoiseTerms {
-    if noise {
-        NoiseTerms::All
-    } else {
-        NoiseTerms::None
-    }
+    if noise { NoiseTerms::All } else { NoiseTerms::None }
 }
 
-/// Array of the samples that `make` computes from the index and pixels of each image of a batch. For `levels` see [`Batch::output_shape`].
+/// Array of the samples that `make` computes from the index and pixels of each image of a batch. For `levels` see
+/// [`Batch::output_shape`].
 fn output<'py, T: Output>(
     py: Python<'py>,
     batch: &Batch,
@@ -296,9 +254,7 @@ fn output<'py, T: Output>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let shape = batch.output_shape(levels);
     // Three copies at most: single images, the images of each frame joined, and all frames joined.
-    let bytes = shape
-        .iter()
-        .fold(size_of::<T>(), |product, n| product.saturating_mul(*n));
+    let bytes = shape.iter().fold(size_of::<T>(), |product, n| product.saturating_mul(*n));
     arrays::require_memory(3, bytes)?;
     let pool = pools::pool(py, threads)?;
     let samples: Vec<T> = py.detach(|| {
@@ -320,8 +276,5 @@ fn output<'py, T: Output>(
 
 /// Concatenated samples of images of one size.
 fn join_samples<T: Output>(images: impl Iterator<Item = Image<T>>) -> Vec<T> {
-    images
-        .map(Image::into_samples)
-        .collect::<Vec<Vec<T>>>()
-        .concat()
+    images.map(Image::into_samples).collect::<Vec<Vec<T>>>().concat()
 }

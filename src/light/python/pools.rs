@@ -1,8 +1,8 @@
 //! Thread pools: [`pool`].
 //!
-//! The threads of a pool do not survive a fork. So each process, such as a worker of a `DataLoader`, starts its own pools when they are
-//! first needed. The table of pools, and the tables that the synthesis computes once, are filled only while the GIL is held. `os.fork`
-//! holds the GIL, too, so a forked process never inherits a locked mutex.
+//! The threads of a pool do not survive a fork. So each process, such as a worker of a `DataLoader`, starts its own
+//! pools when they are first needed. The table of pools, and the tables that the synthesis computes once, are filled
+//! only while the GIL is held. `os.fork` holds the GIL, too, so a forked process never inherits a locked mutex.
 
 use std::collections::HashMap;
 use std::process;
@@ -11,8 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{Degradation, FrameId, Rgb, Severity};
 use darkqa_light::{
-    AppliedDegradation, AutoExposure, CaptureState, FrameView, Motion, NoiseKey, NoiseTerms,
-    Synthesis,
+    AppliedDegradation, AutoExposure, CaptureState, FrameView, Motion, NoiseKey, NoiseTerms, Synthesis,
 };
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
@@ -39,9 +38,7 @@ pub(crate) fn pool(_attached: Python<'_>, threads: usize) -> PyResult<Arc<Thread
         .num_threads(threads)
         .thread_name(|index| format!("darkqa-light-{index}"))
         .build()
-        .map_err(|problem| {
-            PyRuntimeError::new_err(format!("threads: {threads} cannot be started: {problem}"))
-        })?;
+        .map_err(|problem| PyRuntimeError::new_err(format!("threads: {threads} cannot be started: {problem}")))?;
     if is_first {
         pool.install(fill_tables);
     }
@@ -55,14 +52,10 @@ fn fill_tables() {
     let clean = Rgb::black(4, 4);
     let key = NoiseKey::new(0, &FrameId(String::new()));
     let (auto, motion) = (AutoExposure::default(), Motion::default());
-    let view = FrameView {
-        width: 640,
-        focal: None,
-    };
+    let view = FrameView { width: 640, focal: None };
     for kind in Kind::ALL {
-        let applied = Degradation::new(kind, Severity::L3, None).and_then(|how| {
-            AppliedDegradation::new(&how, &Synthesis::default(), &auto, &motion, view, &key)
-        });
+        let applied = Degradation::new(kind, Severity::L3, None)
+            .and_then(|how| AppliedDegradation::new(&how, &Synthesis::default(), &auto, &motion, view, &key));
         if let Ok(applied) = applied {
             let state = CaptureState::new(&applied, &key);
             drop(state.image((&clean).into(), &key, NoiseTerms::All));

@@ -20,12 +20,7 @@ pub(crate) struct Replay {
 
 /// Converts a replay to a flat dictionary of JSON values.
 pub(crate) fn to_dict<'py>(py: Python<'py>, replay: &Replay) -> PyResult<Bound<'py, PyAny>> {
-    let Replay {
-        kind,
-        seed,
-        key,
-        capture,
-    } = replay;
+    let Replay { kind, seed, key, capture } = replay;
     let mut fields = json!({
         "version": version(*kind),
         "variant": kind.word(),
@@ -43,8 +38,7 @@ pub(crate) fn to_dict<'py>(py: Python<'py>, replay: &Replay) -> PyResult<Bound<'
             fields.extend(camera);
         }
     }
-    py.import("json")?
-        .call_method1("loads", (fields.to_string(),))
+    py.import("json")?.call_method1("loads", (fields.to_string(),))
 }
 
 /// Parses the dictionary of a replay.
@@ -88,34 +82,19 @@ pub(crate) fn from_dict(state: &Bound<'_, PyDict>) -> PyResult<Replay> {
         None
     };
     if let Some(name) = fields.keys().next() {
-        return Err(PyValueError::new_err(format!(
-            "state: unknown key {name:?} for variant {word:?}"
-        )));
+        return Err(PyValueError::new_err(format!("state: unknown key {name:?} for variant {word:?}")));
     }
-    let capture = CaptureState {
-        drop_ev,
-        streak,
-        sensor,
-    };
+    let capture = CaptureState { drop_ev, streak, sensor };
     capture.check().map_err(|problem| value_error(&problem))?;
-    Ok(Replay {
-        kind,
-        seed,
-        key,
-        capture,
-    })
+    Ok(Replay { kind, seed, key, capture })
 }
 
 /// Removes a key and parses its value.
 fn take<T: DeserializeOwned>(fields: &mut Map<String, Value>, name: &str) -> PyResult<T> {
-    let value = fields
-        .remove(name)
-        .ok_or_else(|| PyValueError::new_err(format!("state: missing key {name:?}")))?;
-    serde_json::from_value(value)
-        .map_err(|problem| PyValueError::new_err(format!("state: {name}: {problem}")))
+    let value = fields.remove(name).ok_or_else(|| PyValueError::new_err(format!("state: missing key {name:?}")))?;
+    serde_json::from_value(value).map_err(|problem| PyValueError::new_err(format!("state: {name}: {problem}")))
 }
 
 fn parse<T: DeserializeOwned>(value: Value) -> PyResult<T> {
-    serde_json::from_value(value)
-        .map_err(|problem| PyValueError::new_err(format!("state: {problem}")))
+    serde_json::from_value(value).map_err(|problem| PyValueError::new_err(format!("state: {problem}")))
 }

@@ -30,8 +30,8 @@ impl Plane {
 
 /// RAW image of even height and even width; black is 0, white is 1.
 ///
-/// Each row is stored plane by plane, the even columns before the odd ones. A plane is padded to whole batches of lanes, plus one sample
-/// for the neighbour beyond the edge.
+/// Each row is stored plane by plane, the even columns before the odd ones. A plane is padded to whole batches of
+/// lanes, plus one sample for the neighbour beyond the edge.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Bayer {
     height: usize,
@@ -44,11 +44,7 @@ impl Bayer {
     #[must_use]
     pub fn covering(height: usize, width: usize) -> Self {
         let [height, width] = [height, width].map(|size| size.max(1).next_multiple_of(2));
-        Self {
-            height,
-            width,
-            samples: vec![0.0; height * 2 * stride(width)],
-        }
+        Self { height, width, samples: vec![0.0; height * 2 * stride(width)] }
     }
 
     /// Height in sensor rows.
@@ -81,9 +77,7 @@ impl Bayer {
     pub(super) fn sites(&self, row: usize) -> Sites<'_> {
         let stride = stride(self.width);
         let (even, odd) = self.samples[row * 2 * stride..][..2 * stride].split_at(stride);
-        Sites {
-            planes: [even, odd],
-        }
+        Sites { planes: [even, odd] }
     }
 
     /// Write access to all rows, as a parallel iterator.
@@ -96,10 +90,7 @@ impl Bayer {
     /// Write access to one row.
     pub(super) fn line_mut(&mut self, row: usize) -> RawRow<'_> {
         let (width, size) = (self.width, 2 * stride(self.width));
-        RawRow {
-            width,
-            samples: &mut self.samples[row * size..][..size],
-        }
+        RawRow { width, samples: &mut self.samples[row * size..][..size] }
     }
 }
 
@@ -127,10 +118,7 @@ impl RawRow<'_> {
     /// The planes of the even and the odd columns, in whole batches of lanes; samples beyond the width are never used.
     pub fn planes(&mut self) -> [&mut [Lanes<f32>]; 2] {
         let (even, odd) = self.samples.split_at_mut(stride(self.width));
-        [
-            even.as_chunks_mut().0,
-            odd.split_at_mut(1).1.as_chunks_mut().0,
-        ]
+        [even.as_chunks_mut().0, odd.split_at_mut(1).1.as_chunks_mut().0]
     }
 
     /// Repeats the last site of each plane beyond the edge. Must be called after the last change of the row.
@@ -144,19 +132,14 @@ impl RawRow<'_> {
 /// Colours of the even and the odd columns of a batch, channel by channel.
 pub(super) type Colours = [[Lanes<f32>; 3]; 2];
 
-/// Demosaics batch `index` of a row bilinearly, from the rows above, here and below. Planes repeat their last site beyond the edges.
+/// Demosaics batch `index` of a row bilinearly, from the rows above, here and below. Planes repeat their last site
+/// beyond the edges.
 #[inline(always)]
-pub(super) fn demosaic(
-    [above, here, below]: [Sites<'_>; 3],
-    row: usize,
-    index: usize,
-    colours: &mut Colours,
-) {
+pub(super) fn demosaic([above, here, below]: [Sites<'_>; 3], row: usize, index: usize, colours: &mut Colours) {
     let [even, odd] = colours;
     let [o_left, o] = here.odd(index);
     let [e, e_right] = here.even(index);
-    let ([above_e, above_e_right], [below_e, below_e_right]) =
-        (above.even(index), below.even(index));
+    let ([above_e, above_e_right], [below_e, below_e_right]) = (above.even(index), below.even(index));
     let ([above_o_left, above_o], [below_o_left, below_o]) = (above.odd(index), below.odd(index));
     if row.is_multiple_of(2) {
         even[0].copy_from_slice(e);
@@ -180,20 +163,14 @@ impl<'a> Sites<'a> {
     #[inline(always)]
     fn even(self, index: usize) -> [&'a Lanes<f32>; 2] {
         let plane = self.planes[0];
-        [
-            &plane.as_chunks().0[index],
-            &plane[1..].as_chunks().0[index],
-        ]
+        [&plane.as_chunks().0[index], &plane[1..].as_chunks().0[index]]
     }
 
     /// Lanes of the left neighbours of the odd columns in the plane, and lanes of the odd columns.
     #[inline(always)]
     fn odd(self, index: usize) -> [&'a Lanes<f32>; 2] {
         let plane = self.planes[1];
-        [
-            &plane.as_chunks().0[index],
-            &plane[1..].as_chunks().0[index],
-        ]
+        [&plane.as_chunks().0[index], &plane[1..].as_chunks().0[index]]
     }
 }
 
@@ -205,13 +182,7 @@ fn mean_of_two(a: &Lanes<f32>, b: &Lanes<f32>, mean: &mut Lanes<f32>) {
 }
 
 #[inline(always)]
-fn mean_of_four(
-    a: &Lanes<f32>,
-    b: &Lanes<f32>,
-    c: &Lanes<f32>,
-    d: &Lanes<f32>,
-    mean: &mut Lanes<f32>,
-) {
+fn mean_of_four(a: &Lanes<f32>, b: &Lanes<f32>, c: &Lanes<f32>, d: &Lanes<f32>, mean: &mut Lanes<f32>) {
     for i in 0..LANES {
         mean[i] = (a[i] + b[i] + c[i] + d[i]) * 0.25;
     }
@@ -238,11 +209,7 @@ mod tests {
         let last = bayer.height() - 1;
         (0..bayer.height())
             .map(|row: usize| {
-                let around = [
-                    if row == 0 { 1 } else { row - 1 },
-                    row,
-                    if row == last { row - 1 } else { row + 1 },
-                ];
+                let around = [if row == 0 { 1 } else { row - 1 }, row, if row == last { row - 1 } else { row + 1 }];
                 (0..bayer.width())
                     .map(|column: usize| {
                         let site = column / 2;
@@ -291,16 +258,13 @@ mod tests {
                 Plane::B => 0.75,
             });
             for pixel in demosaic_all(&colours).iter().flatten() {
-                assert_eq!(
-                    pixel.map(f32::to_bits),
-                    [0.25f32, 0.5, 0.75].map(f32::to_bits)
-                );
+                assert_eq!(pixel.map(f32::to_bits), [0.25f32, 0.5, 0.75].map(f32::to_bits));
             }
         }
     }
 
-    /// Reference: each channel of a pixel is the mean of the nearest sites of that colour. Beyond an edge, the last site of the
-    /// plane is repeated.
+    /// Reference: each channel of a pixel is the mean of the nearest sites of that colour. Beyond an edge, the last
+    /// site of the plane is repeated.
     #[test]
     fn pixels_are_means_of_their_neighbours() {
         let (height, width) = (6, 132);
@@ -317,10 +281,7 @@ mod tests {
                             if down * down + right * right == distance
                                 && channel(parity[0] as usize, parity[1] as usize) == colour
                             {
-                                sum[0] += test_sample(
-                                    clamp_in_plane(y, height),
-                                    clamp_in_plane(x, width),
-                                );
+                                sum[0] += test_sample(clamp_in_plane(y, height), clamp_in_plane(x, width));
                                 sum[1] += 1.0;
                             }
                         }

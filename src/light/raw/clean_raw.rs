@@ -13,7 +13,8 @@ use crate::draws::NoiseKey;
 use crate::noise_profile::{Amplify, Tone};
 use darkqa_base::types::images::Isa;
 
-/// Noise-free RAW image of a frame by one camera. Saves the conversion of the pixels if only the noise changes, not the colours.
+/// Noise-free RAW image of a frame by one camera. Saves the conversion of the pixels if only the noise changes, not the
+/// colours.
 #[derive(Debug)]
 pub struct CleanRaw {
     raw: Bayer,
@@ -38,18 +39,12 @@ impl CleanRaw {
         }
     }
 
-    /// Adds all noise terms of `state` and returns the negative. Colour matrix and gains are those of the camera of this image, not of
-    /// `state`.
+    /// Adds all noise terms of `state` and returns the negative. Colour matrix and gains are those of the camera of
+    /// this image, not of `state`.
     ///
     /// Equals [`Negative::with_state`] if `state` has the same colours.
     #[must_use]
-    pub fn negative(
-        &self,
-        key: &NoiseKey,
-        state: &CameraState,
-        amplify: Amplify,
-        tone: Tone,
-    ) -> Negative {
+    pub fn negative(&self, key: &NoiseKey, state: &CameraState, amplify: Amplify, tone: Tone) -> Negative {
         let isa = Isa::best();
         let noise = Noise::new(state, key, amplify, &Term::ALL, isa);
         let developer = Developer::new(&self.camera, tone, isa);
@@ -58,14 +53,11 @@ impl CleanRaw {
             None => developer,
         };
         let mut balanced = self.raw.clone();
-        balanced
-            .lines_mut()
-            .enumerate()
-            .for_each(|(row, mut line)| {
-                noise.apply(row, &mut line);
-                developer.balance(row, &mut line);
-                line.repeat_edges();
-            });
+        balanced.lines_mut().enumerate().for_each(|(row, mut line)| {
+            noise.apply(row, &mut line);
+            developer.balance(row, &mut line);
+            line.repeat_edges();
+        });
         Negative::from_balanced(developer, balanced, self.size)
     }
 }
@@ -87,16 +79,11 @@ mod tests {
             let raw = CleanRaw::new(clean, median(), 3.0);
             let mut images = Vec::new();
             for (gain, tone) in [(0.1, Tone::None), (6.0, Tone::BeforeEv)] {
-                let state = CameraState {
-                    system_gain: gain,
-                    read_scale: 2.0 * gain,
-                    ..median()
-                };
+                let state = CameraState { system_gain: gain, read_scale: 2.0 * gain, ..median() };
                 let found = raw.negative(&key, &state, Amplify::All, tone);
                 let found = found.develop_by(3.0);
                 let terms = &Term::ALL;
-                let whole =
-                    Negative::with_state(clean, &key, &state, Amplify::All, tone, terms, 3.0);
+                let whole = Negative::with_state(clean, &key, &state, Amplify::All, tone, terms, 3.0);
                 assert_eq!(found, whole.develop_by(3.0), "K {gain}");
                 images.push(found);
             }

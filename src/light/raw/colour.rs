@@ -5,36 +5,18 @@ pub(crate) type Matrix = [[f64; 3]; 3];
 
 /// XYZ → camera, for the four cameras of the Darmstadt Noise Dataset (Brooks et al. 2019, `random_ccm`).
 const XYZ_TO_CAMERA: [Matrix; 4] = [
-    [
-        [1.0234, -0.2969, -0.2266],
-        [-0.5625, 1.6328, -0.0469],
-        [-0.0703, 0.2188, 0.6406],
-    ],
-    [
-        [0.4913, -0.0541, -0.0202],
-        [-0.6130, 1.3513, 0.2906],
-        [-0.1564, 0.2151, 0.7183],
-    ],
-    [
-        [0.8380, -0.2630, -0.0639],
-        [-0.2887, 1.0725, 0.2496],
-        [-0.0627, 0.1427, 0.5438],
-    ],
-    [
-        [0.6596, -0.2079, -0.0562],
-        [-0.4782, 1.3016, 0.1933],
-        [-0.0970, 0.1581, 0.5181],
-    ],
+    [[1.0234, -0.2969, -0.2266], [-0.5625, 1.6328, -0.0469], [-0.0703, 0.2188, 0.6406]],
+    [[0.4913, -0.0541, -0.0202], [-0.6130, 1.3513, 0.2906], [-0.1564, 0.2151, 0.7183]],
+    [[0.8380, -0.2630, -0.0639], [-0.2887, 1.0725, 0.2496], [-0.0627, 0.1427, 0.5438]],
+    [[0.6596, -0.2079, -0.0562], [-0.4782, 1.3016, 0.1933], [-0.0970, 0.1581, 0.5181]],
 ];
 
 /// Linear sRGB → XYZ, D65 (Brooks et al. 2019, `random_ccm`).
-const SRGB_TO_XYZ: Matrix = [
-    [0.4124564, 0.3575761, 0.1804375],
-    [0.2126729, 0.7151522, 0.0721750],
-    [0.0193339, 0.1191920, 0.9503041],
-];
+const SRGB_TO_XYZ: Matrix =
+    [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]];
 
-/// Linear sRGB → camera, for a weighted mean of the four cameras. The rows sum to 1, so that grey stays grey (Brooks et al. 2019).
+/// Linear sRGB → camera, for a weighted mean of the four cameras. The rows sum to 1, so that grey stays grey (Brooks et
+/// al. 2019).
 ///
 /// `weights` must be non-negative and not all zero; their sum does not matter.
 #[must_use]
@@ -54,7 +36,8 @@ pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
     })
 }
 
-/// Inverse of a matrix, by cofactors. A zero determinant is not checked: the matrices of [`rgb_to_camera`] are far from singular.
+/// Inverse of a matrix, by cofactors. A zero determinant is not checked: the matrices of [`rgb_to_camera`] are far from
+/// singular.
 #[must_use]
 pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
     let [a, b, c] = *matrix;
@@ -64,18 +47,12 @@ pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
 }
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
-    [
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    ]
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 fn product(left: &Matrix, right: &Matrix) -> Matrix {
     left.map(|row| {
-        std::array::from_fn(|column| {
-            row[0] * right[0][column] + row[1] * right[1][column] + row[2] * right[2][column]
-        })
+        std::array::from_fn(|column| row[0] * right[0][column] + row[1] * right[1][column] + row[2] * right[2][column])
     })
 }
 
@@ -83,12 +60,8 @@ fn product(left: &Matrix, right: &Matrix) -> Matrix {
 mod tests {
     use super::*;
 
-    const MIXES: [[f64; 4]; 4] = [
-        [1.0, 1.0, 1.0, 1.0],
-        [0.9, 0.001, 0.3, 0.2],
-        [0.0, 1.0, 0.0, 0.0],
-        [0.2, 0.1, 0.0, 7.0],
-    ];
+    const MIXES: [[f64; 4]; 4] =
+        [[1.0, 1.0, 1.0, 1.0], [0.9, 0.001, 0.3, 0.2], [0.0, 1.0, 0.0, 0.0], [0.2, 0.1, 0.0, 7.0]];
 
     #[test]
     fn grey_stays_grey() {
@@ -128,10 +101,7 @@ mod tests {
         for (weights, expected) in [([3.0; 4], mean), ([1.0, 2.0, 3.0, 4.0], uneven)] {
             let found = rgb_to_camera(weights);
             for (found, expected) in found.iter().flatten().zip(expected.iter().flatten()) {
-                assert!(
-                    (found - expected).abs() < 1e-9,
-                    "{found} against {expected}"
-                );
+                assert!((found - expected).abs() < 1e-9, "{found} against {expected}");
             }
         }
     }

@@ -1,13 +1,13 @@
 //! RAW → sRGB: the simple image processing of the paper ([`Developer`]).
 //!
-//! Two steps are not in the list of the paper. First, the brightness gain is applied again: the paper names only white balance, but calls
-//! the processing "an inverse operation of unprocessing", which divides by this gain. Second, light is clipped to [0, 1] before
-//! demosaicing and after the matrix, as in the code of Brooks et al. 2019 (`process.py`), so that negative noise becomes black. The module
-//! `departures` measures both effects.
+//! Two steps are not in the list of the paper. First, the brightness gain is applied again: the paper names only white
+//! balance, but calls the processing "an inverse operation of unprocessing", which divides by this gain. Second, light
+//! is clipped to [0, 1] before demosaicing and after the matrix, as in the code of Brooks et al. 2019 (`process.py`),
+//! so that negative noise becomes black. The module `departures` measures both effects.
 //!
 //! The steps: white balance and brightness gains, clip; bilinear demosaic; camera → sRGB, clip; exposure drop; gamma
-//! compression; 8 bit. Because (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), the drop is applied as a factor after the
-//! gamma compression, and all steps before it are shared by all levels.
+//! compression; 8 bit. Because (2^−ΔEV · x)^(1/2.2) is 2^(−ΔEV/2.2) · x^(1/2.2), the drop is applied as a factor after
+//! the gamma compression, and all steps before it are shared by all levels.
 
 use std::sync::LazyLock;
 
@@ -36,11 +36,7 @@ const ROUND: f32 = 8_388_608.0;
 /// The light of a display value in [0, 1].
 #[inline(always)]
 fn expand(light: &Piecewise, display: f32) -> f32 {
-    light.at(if display > DARKEST_DISPLAY {
-        display
-    } else {
-        DARKEST_DISPLAY
-    })
+    light.at(if display > DARKEST_DISPLAY { display } else { DARKEST_DISPLAY })
 }
 
 /// Image processing of one camera, prepared for any row.
@@ -61,8 +57,7 @@ pub(crate) struct Developer {
 impl Developer {
     pub(crate) fn new(state: &CameraState, tone: Tone, isa: Isa) -> Self {
         Self {
-            gains: [state.red_gain, 1.0, 1.0, state.blue_gain]
-                .map(|balance| (balance * state.rgb_gain) as f32),
+            gains: [state.red_gain, 1.0, 1.0, state.blue_gain].map(|balance| (balance * state.rgb_gain) as f32),
             matrix: state.camera_to_rgb.map(|row| row.map(|value| value as f32)),
             tone,
             headroom_ev: 0.0,
@@ -71,19 +66,14 @@ impl Developer {
         }
     }
 
-    /// Prepares for linear scene light and a sensor that saturates this many EV above white. Display values are then in units of the
-    /// saturation, and no tone curve is applied before the drop.
+    /// Prepares for linear scene light and a sensor that saturates this many EV above white. Display values are then in
+    /// units of the saturation, and no tone curve is applied before the drop.
     pub(super) fn for_linear_light(self, headroom_ev: f64) -> Self {
         let tone = match self.tone {
             Tone::BeforeEv => Tone::None,
             tone => tone,
         };
-        Self {
-            tone,
-            headroom_ev,
-            headroom: libm::exp2(headroom_ev) as f32,
-            ..self
-        }
+        Self { tone, headroom_ev, headroom: libm::exp2(headroom_ev) as f32, ..self }
     }
 
     /// The factor of an exposure drop on display values.
@@ -91,56 +81,35 @@ impl Developer {
         curve::display_factor(drop_ev - self.headroom_ev) as f32
     }
 
-    /// Multiplies a sensor row by the white-balance and brightness gains and clips it between 0 and the sensor's saturation.
+    /// Multiplies a sensor row by the white-balance and brightness gains and clips it between 0 and the sensor's
+    /// saturation.
     pub(crate) fn balance(&self, row: usize, line: &mut RawRow<'_>) {
         for (parity, samples) in line.planes().into_iter().enumerate() {
             let gain = self.gains[Plane::at(row, parity) as usize];
-            self.isa.run(WhiteBalance {
-                gain,
-                most: self.headroom,
-                samples,
-            });
+            self.isa.run(WhiteBalance { gain, most: self.headroom, samples });
         }
     }
 
-    /// Writes the display values in [0, 1] of a row of pixels before the exposure drop, as red, green, blue of each pixel.
-    /// `values` may be shorter than the row.
+    /// Writes the display values in [0, 1] of a row of pixels before the exposure drop, as red, green, blue of each
+    /// pixel. `values` may be shorter than the row.
     ///
-    /// `row` is an index into `balanced`. The first and last row are mirrored; if `balanced` is a part of an image, it must
-    /// also contain the rows next to those asked for.
+    /// `row` is an index into `balanced`. The first and last row are mirrored; if `balanced` is a part of an image, it
+    /// must also contain the rows next to those asked for.
     pub(crate) fn display(&self, balanced: &Bayer, row: usize, values: &mut [f32]) {
         let last = balanced.height() - 1;
-        let rows = [
-            if row == 0 { 1 } else { row - 1 },
-            row,
-            if row == last { row - 1 } else { row + 1 },
-        ];
-        self.isa.run(Display {
-            developer: self,
-            rows: rows.map(|row| balanced.sites(row)),
-            row,
-            values,
-        });
+        let rows = [if row == 0 { 1 } else { row - 1 }, row, if row == last { row - 1 } else { row + 1 }];
+        self.isa.run(Display { developer: self, rows: rows.map(|row| balanced.sites(row)), row, values });
     }
 
     /// Writes the 8-bit codes of display values after an exposure drop with this [`Developer::factor`].
     pub(crate) fn encode(&self, display: &[f32], factor: f32, codes: &mut [u8]) {
-        self.isa.run(Encode {
-            display,
-            factor,
-            tone: self.tone,
-            codes,
-        });
+        self.isa.run(Encode { display, factor, tone: self.tone, codes });
     }
 
-    /// Writes the linear light of display values after an exposure drop. [`Developer::encode`] writes the same as rounded codes.
+    /// Writes the linear light of display values after an exposure drop. [`Developer::encode`] writes the same as
+    /// rounded codes.
     pub(super) fn expand(&self, display: &[f32], factor: f32, light: &mut [f32]) {
-        self.isa.run(Expand {
-            display,
-            factor,
-            tone: self.tone,
-            light,
-        });
+        self.isa.run(Expand { display, factor, tone: self.tone, light });
     }
 }
 
@@ -156,11 +125,7 @@ impl Kernel for WhiteBalance<'_> {
         for sample in self.samples.as_flattened_mut() {
             let balanced = *sample * self.gain;
             let balanced = if balanced > 0.0 { balanced } else { 0.0 };
-            *sample = if balanced < self.most {
-                balanced
-            } else {
-                self.most
-            };
+            *sample = if balanced < self.most { balanced } else { self.most };
         }
     }
 }
@@ -208,8 +173,8 @@ impl Kernel for Display<'_> {
 }
 
 impl Developer {
-    /// Converts camera colours to linear sRGB in units of the sensor's saturation, clipped to [`DARKEST`] to 1. `scale` is 1 / that
-    /// unit.
+    /// Converts camera colours to linear sRGB in units of the sensor's saturation, clipped to [`DARKEST`] to 1. `scale`
+    /// is 1 / that unit.
     #[inline(always)]
     fn to_linear_srgb(&self, colours: &mut bayer::Colours, scale: f32) {
         let [red, green, blue] = self.matrix;
@@ -340,10 +305,7 @@ mod tests {
             developer(Tone::None).balance(row, &mut line);
             line.repeat_edges();
         }
-        let expected = [
-            [0.1 * 2.15 * 1.25, 0.1 * 1.25, 0.0, 0.0],
-            [0.1 * 1.25, 0.1 * 1.7 * 1.25, 1.0, 1.0],
-        ];
+        let expected = [[0.1 * 2.15 * 1.25, 0.1 * 1.25, 0.0, 0.0], [0.1 * 1.25, 0.1 * 1.7 * 1.25, 1.0, 1.0]];
         for (row, expected) in expected.iter().enumerate() {
             for (column, expected) in expected.iter().enumerate() {
                 let found = raw.sample(row, column);

@@ -1,4 +1,5 @@
-//! Noisy RAW image of a frame, which can be developed at any level ([`Negative`]), and development of several levels at once ([`ladder`]).
+//! Noisy RAW image of a frame, which can be developed at any level ([`Negative`]), and development of several levels at
+//! once ([`ladder`]).
 
 use rayon::prelude::*;
 
@@ -13,12 +14,12 @@ use crate::noise_profile::{Amplify, Coupling, Draws, Synthesis, Tone};
 use darkqa_base::types::images::{Isa, Sample};
 use darkqa_base::types::{Image, Rgb, Severity};
 
-/// Rows per band; a band is processed from RAW to codes within the cache of a core. Chosen, so that images of 480, 720, 1080 or 1440 rows
-/// have an even number of bands, which two threads share equally.
+/// Rows per band; a band is processed from RAW to codes within the cache of a core. Chosen, so that images of 480, 720,
+/// 1080 or 1440 rows have an even number of bands, which two threads share equally.
 const BAND: usize = 30;
 
-/// Noisy RAW image of a frame. All levels developed from it share the drawn camera and noise, and differ only in light. The distribution
-/// of each level is the same as with separate draws.
+/// Noisy RAW image of a frame. All levels developed from it share the drawn camera and noise, and differ only in light.
+/// The distribution of each level is the same as with separate draws.
 #[derive(Debug)]
 pub struct Negative {
     developer: Developer,
@@ -32,23 +33,15 @@ pub struct Negative {
 impl Negative {
     /// Makes the negative of `clean` for a level, with camera and noise drawn from the key.
     #[must_use]
-    pub fn new<'a>(
-        clean: impl Into<Clean<'a>>,
-        key: &NoiseKey,
-        synthesis: &Synthesis,
-        severity: Severity,
-    ) -> Self {
+    pub fn new<'a>(clean: impl Into<Clean<'a>>, key: &NoiseKey, synthesis: &Synthesis, severity: Severity) -> Self {
         let clean = clean.into();
         let capture = Capture::new(key, synthesis, severity, Isa::best())
             .for_clean(clean, synthesis.headroom_ev(severity.value()));
-        Self {
-            only_level: (!synthesis.shares_negative()).then_some(severity),
-            ..Self::from_capture(clean, capture)
-        }
+        Self { only_level: (!synthesis.shares_negative()).then_some(severity), ..Self::from_capture(clean, capture) }
     }
 
-    /// Makes the negative of `clean` for a camera in the given state with the given noise terms, for all levels. `headroom_ev` is that of
-    /// the noise profile ([`Synthesis::headroom_ev`]); it only affects linear scene light.
+    /// Makes the negative of `clean` for a camera in the given state with the given noise terms, for all levels.
+    /// `headroom_ev` is that of the noise profile ([`Synthesis::headroom_ev`]); it only affects linear scene light.
     #[must_use]
     pub fn with_state<'a>(
         clean: impl Into<Clean<'a>>,
@@ -66,21 +59,13 @@ impl Negative {
 
     /// The negative of a noisy, white-balanced RAW image that covers `size`, for all levels.
     pub(super) fn from_balanced(developer: Developer, balanced: Bayer, size: [usize; 2]) -> Self {
-        Self {
-            developer,
-            balanced,
-            only_level: None,
-            size,
-        }
+        Self { developer, balanced, only_level: None, size }
     }
 
     fn from_capture(clean: Clean<'_>, capture: Capture) -> Self {
         let (height, width) = (clean.height(), clean.width());
         let mut balanced = Bayer::covering(height, width);
-        balanced
-            .lines_mut()
-            .enumerate()
-            .for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
+        balanced.lines_mut().enumerate().for_each(|(row, mut line)| capture.capture_row(clean, row, &mut line));
         Self::from_balanced(capture.developer, balanced, [height, width])
     }
 
@@ -102,17 +87,13 @@ impl Negative {
         let [height, width] = self.size;
         let factor = self.developer.factor(drop_ev);
         let mut degraded = Rgb::black(height, width);
-        degraded
-            .samples_mut()
-            .par_chunks_mut(3 * width)
-            .enumerate()
-            .for_each_init(
-                || vec![0.0; 3 * width],
-                |display, (row, codes)| {
-                    self.developer.display(&self.balanced, row, display);
-                    self.developer.encode(display, factor, codes);
-                },
-            );
+        degraded.samples_mut().par_chunks_mut(3 * width).enumerate().for_each_init(
+            || vec![0.0; 3 * width],
+            |display, (row, codes)| {
+                self.developer.display(&self.balanced, row, display);
+                self.developer.encode(display, factor, codes);
+            },
+        );
         degraded
     }
 }
@@ -148,20 +129,15 @@ pub fn ladder<'a>(
 
 /// Makes the image of a frame after an exposure drop, with the noise of the camera drawn from the key.
 #[must_use]
-pub(crate) fn develop_by(
-    clean: Clean<'_>,
-    key: &NoiseKey,
-    synthesis: &Synthesis,
-    drop_ev: f64,
-) -> Rgb {
+pub(crate) fn develop_by(clean: Clean<'_>, key: &NoiseKey, synthesis: &Synthesis, drop_ev: f64) -> Rgb {
     let state = synthesis.state_after_drop(key, drop_ev);
     let Synthesis { amplify, tone, .. } = *synthesis;
     let headroom = synthesis.headroom_ev(drop_ev);
     develop_with_state(clean, key, &state, amplify, tone, [drop_ev, headroom])
 }
 
-/// Makes the image of a frame after an exposure drop, with the noise of a camera in the given state. The last argument is the drop and
-/// the headroom of the noise profile ([`Synthesis::headroom_ev`]), in EV.
+/// Makes the image of a frame after an exposure drop, with the noise of a camera in the given state. The last argument
+/// is the drop and the headroom of the noise profile ([`Synthesis::headroom_ev`]), in EV.
 #[must_use]
 pub fn develop_with_state(
     clean: Clean<'_>,
@@ -171,8 +147,7 @@ pub fn develop_with_state(
     tone: Tone,
     [drop_ev, headroom_ev]: [f64; 2],
 ) -> Rgb {
-    let capture = Capture::from_state(key, state, amplify, tone, &Term::ALL, Isa::best())
-        .for_clean(clean, headroom_ev);
+    let capture = Capture::from_state(key, state, amplify, tone, &Term::ALL, Isa::best()).for_clean(clean, headroom_ev);
     let mut image = Rgb::black(clean.height(), clean.width());
     capture.develop(clean, &[drop_ev], &mut [image.samples_mut()]);
     image
@@ -217,12 +192,7 @@ impl Capture {
     }
 
     /// Makes the image of a frame after an exposure drop. Drop and headroom of the noise profile are in EV.
-    pub(crate) fn image<T: OutputSample>(
-        self,
-        clean: Clean<'_>,
-        drop_ev: f64,
-        headroom_ev: f64,
-    ) -> Image<T> {
+    pub(crate) fn image<T: OutputSample>(self, clean: Clean<'_>, drop_ev: f64, headroom_ev: f64) -> Image<T> {
         let mut image = Image::black(clean.height(), clean.width());
         let capture = self.for_clean(clean, headroom_ev);
         capture.develop(clean, &[drop_ev], &mut [image.samples_mut()]);
@@ -244,9 +214,9 @@ impl Capture {
         }
     }
 
-    /// Adapts the exposure to the pixel format of a frame. For codes and display light the sensor saturates at white. For linear scene
-    /// light it saturates `headroom_ev` EV above white, and the tone curve before the drop is omitted, because it would only undo the
-    /// inverse tone curve of codes.
+    /// Adapts the exposure to the pixel format of a frame. For codes and display light the sensor saturates at white.
+    /// For linear scene light it saturates `headroom_ev` EV above white, and the tone curve before the drop is omitted,
+    /// because it would only undo the inverse tone curve of codes.
     fn for_clean(self, clean: Clean<'_>, headroom_ev: f64) -> Self {
         if !matches!(clean, Clean::Scene(_)) {
             return self;
@@ -266,13 +236,11 @@ impl Capture {
         line.repeat_edges();
     }
 
-    /// Develops the frame after each of these exposure drops, band by band. `images[i]` receives the samples of the image for `drops[i]`.
+    /// Develops the frame after each of these exposure drops, band by band. `images[i]` receives the samples of the
+    /// image for `drops[i]`.
     fn develop<T: OutputSample>(&self, clean: Clean<'_>, drops: &[f64], images: &mut [&mut [T]]) {
         let (height, width) = (clean.height(), clean.width());
-        let factors: Vec<f32> = drops
-            .iter()
-            .map(|drop_ev| self.developer.factor(*drop_ev))
-            .collect();
+        let factors: Vec<f32> = drops.iter().map(|drop_ev| self.developer.factor(*drop_ev)).collect();
         let mut bands: Vec<Vec<&mut [T]>> = Vec::new();
         bands.resize_with(height.div_ceil(BAND), Vec::new);
         for image in &mut images[..drops.len()] {
@@ -282,7 +250,8 @@ impl Capture {
                 band.push(part);
             }
         }
-        // A band has two more rows on each side, except at the edges of the image. Two, so that it starts with a row of red sites.
+        // A band has two more rows on each side, except at the edges of the image. Two, so that it starts with a row of
+        // red sites.
         bands.into_par_iter().enumerate().for_each_init(
             || (Bayer::covering(BAND + 4, width), vec![0.0; 3 * width]),
             |(raw, display), (band, mut parts)| {
@@ -321,10 +290,7 @@ impl Synthesis {
         let drawn = CameraState::draw(key, &self.camera);
         match self.coupling {
             Coupling::Independent => drawn,
-            Coupling::Photon => CameraState {
-                ratio: libm::exp2(drop_ev.max(0.0)),
-                ..drawn
-            },
+            Coupling::Photon => CameraState { ratio: libm::exp2(drop_ev.max(0.0)), ..drawn },
         }
     }
 
@@ -358,23 +324,14 @@ mod tests {
         let sets = Isa::available();
         let clean = clean();
         let key = NoiseKey::new(9, &FrameId("isa".to_owned()));
-        let choices = [
-            (Amplify::ShotOnly, Tone::None),
-            (Amplify::All, Tone::BeforeEv),
-            (Amplify::All, Tone::AfterEv),
-        ];
+        let choices = [(Amplify::ShotOnly, Tone::None), (Amplify::All, Tone::BeforeEv), (Amplify::All, Tone::AfterEv)];
         for (gain, ratio) in [(0.1, 100.0), (6.0, 300.0), (0.05, 4.0), (0.01, 1.0)] {
             let drawn = CameraState::draw(&key, &crate::CameraModel::default());
-            let state = CameraState {
-                system_gain: gain,
-                ratio,
-                ..drawn
-            };
+            let state = CameraState { system_gain: gain, ratio, ..drawn };
             for (amplify, tone) in choices {
                 let mut baseline = None;
                 for isa in [Isa::Baseline].iter().chain(&sets) {
-                    let capture =
-                        Capture::from_state(&key, &state, amplify, tone, &Term::ALL, *isa);
+                    let capture = Capture::from_state(&key, &state, amplify, tone, &Term::ALL, *isa);
                     let mut images = Severity::LADDER.map(|_| Rgb::black(40, 150));
                     let drops = Severity::LADDER.map(Severity::value);
                     let mut samples = images.each_mut().map(Rgb::samples_mut);

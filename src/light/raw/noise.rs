@@ -1,10 +1,12 @@
 //! Sensor noise in four terms: [`shot`], [`read`], [`row`] and [`quantisation`]; [`add`] combines them.
 //!
-//! The terms work in ADU on the sites of one Bayer plane in one sensor row, and draw from the random bits of those sites.
+//! The terms work in ADU on the sites of one Bayer plane in one sensor row, and draw from the random bits of those
+//! sites.
 //!
-//! In the paper, the ratio r applies only to the shot noise ("reduce the signal by r, add Poisson noise, amplify back by r"): read, row and
-//! quantisation noise are added to the amplified signal. In ELD, all four terms are added to the attenuated signal. [`Amplify`] selects one
-//! of the two. In the first, the three terms add less than 0.1 codes to an image (measured in `departures`).
+//! In the paper, the ratio r applies only to the shot noise ("reduce the signal by r, add Poisson noise, amplify back
+//! by r"): read, row and quantisation noise are added to the amplified signal. In ELD, all four terms are added to the
+//! attenuated signal. [`Amplify`] selects one of the two. In the first, the three terms add less than 0.1 codes to an
+//! image (measured in `departures`).
 
 use std::sync::Arc;
 
@@ -34,7 +36,8 @@ impl Term {
     pub const ALL: [Self; 4] = [Self::Shot, Self::Read, Self::Row, Self::Quantisation];
 }
 
-/// Adds the given terms to a RAW image (DarkQA, N₄ ∘ N₃ ∘ N₂ ∘ N₁). Leaving out a term does not change the others' draws.
+/// Adds the given terms to a RAW image (DarkQA, N₄ ∘ N₃ ∘ N₂ ∘ N₁). Leaving out a term does not change the others'
+/// draws.
 pub fn add(raw: &mut Bayer, state: &CameraState, key: &NoiseKey, amplify: Amplify, terms: &[Term]) {
     let noise = Noise::new(state, key, amplify, terms, Isa::best());
     raw.lines_mut().enumerate().for_each(|(row, mut line)| {
@@ -66,8 +69,8 @@ pub fn read(adu: &mut Lanes<f32>, scale: f32, shape: &Quantile, offset: f32, wor
 
 /// Row noise: one number of N(0, σ_r²) for a whole sensor row, that is, for both of its planes (Wei et al. 2021).
 ///
-/// The paper states "each row" of a RAW image of H/2 × W/2 × 4 samples. Because circuits read out sensor rows, the two sensor rows in each
-/// such row get separate numbers.
+/// The paper states "each row" of a RAW image of H/2 × W/2 × 4 samples. Because circuits read out sensor rows, the two
+/// sensor rows in each such row get separate numbers.
 #[must_use]
 pub fn row(deviation: f64, stream: Stream, row: usize) -> f32 {
     (deviation * stream.at(Site::new(row, 0)).normal()) as f32
@@ -102,29 +105,19 @@ pub(super) struct Noise {
 }
 
 impl Noise {
-    pub(super) fn new(
-        state: &CameraState,
-        key: &NoiseKey,
-        amplify: Amplify,
-        terms: &[Term],
-        isa: Isa,
-    ) -> Self {
+    pub(super) fn new(state: &CameraState, key: &NoiseKey, amplify: Amplify, terms: &[Term], isa: Isa) -> Self {
         Self {
             amplify,
             attenuated: (state.adu_range / state.ratio) as f32,
             ratio: state.ratio as f32,
             adu_range: state.adu_range as f32,
-            shot: terms
-                .contains(&Term::Shot)
-                .then_some(state.system_gain as f32),
+            shot: terms.contains(&Term::Shot).then_some(state.system_gain as f32),
             read: terms.contains(&Term::Read).then(|| {
                 let shape = Quantile::cached_tukey_lambda(state.read_shape);
                 (state.read_scale as f32, shape)
             }),
             bias: state.bias.map(|offset| offset as f32),
-            row: terms
-                .contains(&Term::Row)
-                .then(|| (state.row_deviation, key.stream(Component::Row))),
+            row: terms.contains(&Term::Row).then(|| (state.row_deviation, key.stream(Component::Row))),
             quantisation: terms.contains(&Term::Quantisation),
             field: key.stream(Component::RandomField),
             isa,
@@ -165,8 +158,7 @@ impl Kernel for PlaneRow<'_> {
         let [row, first] = self.site;
         for (index, samples) in self.samples.iter_mut().enumerate() {
             let site = Site::new(row, first + 2 * LANES * index);
-            self.noise
-                .apply_to_lanes(samples, site, self.offset, self.row_offset);
+            self.noise.apply_to_lanes(samples, site, self.offset, self.row_offset);
         }
     }
 }
@@ -224,18 +216,12 @@ mod tests {
             }
         });
         add(&mut raw, state, &key(), amplify, terms);
-        (0..8)
-            .map(|row| (0..12).map(|column| raw.sample(row, column)).collect())
-            .collect()
+        (0..8).map(|row| (0..12).map(|column| raw.sample(row, column)).collect()).collect()
     }
 
     #[test]
     fn read_noise_offsets_each_plane() {
-        let state = CameraState {
-            read_scale: 0.0,
-            bias: [100.0, 200.0, 300.0, 400.0],
-            ..median()
-        };
+        let state = CameraState { read_scale: 0.0, bias: [100.0, 200.0, 300.0, 400.0], ..median() };
         let rows = noisy(&state, Amplify::ShotOnly, &[Term::Read]);
         let range = state.adu_range as f32;
         for (row, offsets) in [(0, [100.0, 200.0]), (1, [300.0, 400.0])] {
@@ -260,12 +246,9 @@ mod tests {
     fn leaving_out_a_term_does_not_change_the_others() {
         for amplify in [Amplify::ShotOnly, Amplify::All] {
             for term in Term::ALL {
-                let others: Vec<Term> = Term::ALL
-                    .into_iter()
-                    .filter(|other| *other != term)
-                    .collect();
-                let [all, others, alone, none] = [&Term::ALL[..], &others, &[term], &[]]
-                    .map(|terms| noisy(&median(), amplify, terms).concat());
+                let others: Vec<Term> = Term::ALL.into_iter().filter(|other| *other != term).collect();
+                let [all, others, alone, none] =
+                    [&Term::ALL[..], &others, &[term], &[]].map(|terms| noisy(&median(), amplify, terms).concat());
                 for i in 0..all.len() {
                     let off = (all[i] - others[i]) - (alone[i] - none[i]);
                     assert!(off.abs() < 1e-6, "{term:?}");
@@ -274,21 +257,19 @@ mod tests {
         }
     }
 
-    /// With [`Amplify::All`], the terms after the shot noise are r times larger than with [`Amplify::ShotOnly`]; the shot noise is the
-    /// same.
+    /// With [`Amplify::All`], the terms after the shot noise are r times larger than with [`Amplify::ShotOnly`]; the
+    /// shot noise is the same.
     #[test]
     fn the_ratio_amplifies_the_chosen_terms() {
         let state = median();
         let after = [Term::Read, Term::Row, Term::Quantisation];
         let clean = noisy(&state, Amplify::All, &[]).concat();
-        let [shot_only, all] = [Amplify::ShotOnly, Amplify::All]
-            .map(|amplify| noisy(&state, amplify, &after).concat());
+        let [shot_only, all] = [Amplify::ShotOnly, Amplify::All].map(|amplify| noisy(&state, amplify, &after).concat());
         for ((clean, shot_only), all) in clean.iter().zip(&shot_only).zip(&all) {
             let ratio = state.ratio as f32;
             assert!(((shot_only - clean) * ratio - (all - clean)).abs() < 2e-4);
         }
-        let shot = [Amplify::ShotOnly, Amplify::All]
-            .map(|amplify| noisy(&state, amplify, &[Term::Shot]).concat());
+        let shot = [Amplify::ShotOnly, Amplify::All].map(|amplify| noisy(&state, amplify, &[Term::Shot]).concat());
         for (a, b) in shot[0].iter().zip(&shot[1]) {
             assert!((a - b).abs() < 1e-6);
         }

@@ -20,11 +20,7 @@ pub fn unprocess<'a>(clean: impl Into<Clean<'a>>, state: &CameraState) -> Bayer 
 }
 
 /// [`unprocess`] for a sensor that saturates this many EV above white; the headroom only affects linear scene light.
-pub fn unprocess_with_headroom<'a>(
-    clean: impl Into<Clean<'a>>,
-    state: &CameraState,
-    headroom_ev: f64,
-) -> Bayer {
+pub fn unprocess_with_headroom<'a>(clean: impl Into<Clean<'a>>, state: &CameraState, headroom_ev: f64) -> Bayer {
     let clean = clean.into();
     let headroom = libm::exp2(headroom_ev) as f32;
     let unprocess = Unprocess::new(state, Isa::best()).with_headroom(headroom);
@@ -53,9 +49,7 @@ trait ToSceneLight {
 
 /// Light of each 8-bit code in front of the camera.
 static LINEAR_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|code| {
-        curve::gamma_expand(curve::inverse_smoothstep(code as f64 / 255.0)) as f32
-    })
+    std::array::from_fn(|code| curve::gamma_expand(curve::inverse_smoothstep(code as f64 / 255.0)) as f32)
 });
 
 /// Codes of 8 bits.
@@ -71,13 +65,9 @@ impl ToSceneLight for &[f32; 256] {
 /// Light of each 16-bit code in front of the camera.
 static LINEAR_LIGHT_16: LazyLock<Box<[f32; 65_536]>> = LazyLock::new(|| {
     let light: Vec<f32> = (0..=u16::MAX)
-        .map(|code| {
-            curve::gamma_expand(curve::inverse_smoothstep(f64::from(code) / 65_535.0)) as f32
-        })
+        .map(|code| curve::gamma_expand(curve::inverse_smoothstep(f64::from(code) / 65_535.0)) as f32)
         .collect();
-    light
-        .try_into()
-        .unwrap_or_else(|_| unreachable!("there are 65 536 codes"))
+    light.try_into().unwrap_or_else(|_| unreachable!("there are 65 536 codes"))
 });
 
 /// Codes of 16 bits.
@@ -129,9 +119,7 @@ impl InverseToneTable {
     fn new() -> Self {
         Self {
             dark: Piecewise::new(-31, |light| scene_light(zero_if_negligible(light))),
-            bright: Piecewise::new(-31, |distance| {
-                scene_light(1.0 - zero_if_negligible(distance))
-            }),
+            bright: Piecewise::new(-31, |distance| scene_light(1.0 - zero_if_negligible(distance))),
         }
     }
 }
@@ -154,11 +142,7 @@ impl ToSceneLight for &InverseToneTable {
     #[inline(always)]
     fn light(&self, light: f32) -> f32 {
         let at_least = |x: f32| if x > MIN_LIGHT { x } else { MIN_LIGHT };
-        if light < 0.5 {
-            self.dark.at(at_least(light))
-        } else {
-            self.bright.at(at_least(1.0 - light))
-        }
+        if light < 0.5 { self.dark.at(at_least(light)) } else { self.bright.at(at_least(1.0 - light)) }
     }
 }
 
@@ -198,11 +182,7 @@ impl Unprocess {
                 inverse_gain: (1.0 / (balance * state.rgb_gain)) as f32,
             }
         });
-        Self {
-            filters,
-            headroom: 1.0,
-            isa,
-        }
+        Self { filters, headroom: 1.0, isa }
     }
 
     /// Sets the scene light at which the sensor saturates; 1 is white.
@@ -226,9 +206,7 @@ impl Unprocess {
                 self.fill_from(&*INVERSE_TONE, &light.samples()[samples], row, line);
             }
             Clean::Scene(light) => {
-                let scene = LinearScene {
-                    headroom: self.headroom,
-                };
+                let scene = LinearScene { headroom: self.headroom };
                 self.fill_from(scene, &light.samples()[samples], row, line);
             }
         }
@@ -236,13 +214,7 @@ impl Unprocess {
 
     /// Fills a sensor row from the samples of a row of pixels.
     #[expect(clippy::needless_pass_by_value, reason = "a reference or one number")]
-    fn fill_from<U: ToSceneLight>(
-        &self,
-        to_light: U,
-        row_of_pixels: &[U::Sample],
-        row: usize,
-        line: &mut RawRow<'_>,
-    ) {
+    fn fill_from<U: ToSceneLight>(&self, to_light: U, row_of_pixels: &[U::Sample], row: usize, line: &mut RawRow<'_>) {
         let pixels = row_of_pixels.as_chunks::<3>().0;
         for (parity, samples) in line.planes().into_iter().enumerate() {
             self.isa.run(PlaneRow {
@@ -296,8 +268,8 @@ impl<U: ToSceneLight> Kernel for PlaneRow<'_, U> {
 impl Filter {
     /// Samples of colours in linear sRGB: white balance and brightness are undone, and the result is clipped to [0, 1].
     ///
-    /// Highlights are preserved: between a grey of 0.9 and 1 the gain goes to 1, so that white stays white (Brooks et al.
-    /// 2019, `safe_invert_gains`).
+    /// Highlights are preserved: between a grey of 0.9 and 1 the gain goes to 1, so that white stays white (Brooks et
+    /// al. 2019, `safe_invert_gains`).
     #[inline(always)]
     fn samples(&self, [red, green, blue]: &[Lanes<f32>; 3]) -> Lanes<f32> {
         let mut samples = [0.0; LANES];
@@ -307,11 +279,7 @@ impl Filter {
             let highlight = if above > 0.0 { above } else { 0.0 };
             let mask = highlight * highlight;
             let faded = mask + (1.0 - mask) * self.inverse_gain;
-            let gain = if faded > self.inverse_gain {
-                faded
-            } else {
-                self.inverse_gain
-            };
+            let gain = if faded > self.inverse_gain { faded } else { self.inverse_gain };
             let sample = product(self.channel) * gain;
             let sample = if sample > 0.0 { sample } else { 0.0 };
             samples[i] = if sample < 1.0 { sample } else { 1.0 };
@@ -319,7 +287,8 @@ impl Filter {
         samples
     }
 
-    /// [`Self::samples`] without preserved highlights, for light that may be brighter than white; clipped to [0, `headroom`].
+    /// [`Self::samples`] without preserved highlights, for light that may be brighter than white; clipped to [0,
+    /// `headroom`].
     #[inline(always)]
     fn plain_samples(&self, [red, green, blue]: &[Lanes<f32>; 3], headroom: f32) -> Lanes<f32> {
         let mut samples = [0.0; LANES];
@@ -388,14 +357,7 @@ mod tests {
 
     /// Every code, in the channels of 16 × 16 pixels in three orders.
     fn codes() -> Rgb {
-        Rgb::new(
-            16,
-            16,
-            (0..256)
-                .flat_map(|i: u32| [i as u8, (i * 101) as u8, 255 - i as u8])
-                .collect(),
-        )
-        .unwrap()
+        Rgb::new(16, 16, (0..256).flat_map(|i: u32| [i as u8, (i * 101) as u8, 255 - i as u8]).collect()).unwrap()
     }
 
     /// Display light of a code plus `more` codes.
@@ -404,11 +366,7 @@ mod tests {
     }
 
     fn light(image: &Rgb, more: f64) -> Light {
-        let samples = image
-            .samples()
-            .iter()
-            .map(|code| display_light(*code, more))
-            .collect();
+        let samples = image.samples().iter().map(|code| display_light(*code, more)).collect();
         Light::new(image.height(), image.width(), samples).unwrap()
     }
 
@@ -444,10 +402,7 @@ mod tests {
             let found = table.light(at);
             let off = (f64::from(found) - expected).abs();
             // Light below the smallest one is black.
-            assert!(
-                at <= 2.0 * MIN_LIGHT || off < 1e-7 + 4e-6 * expected,
-                "{at}: {off}"
-            );
+            assert!(at <= 2.0 * MIN_LIGHT || off < 1e-7 + 4e-6 * expected, "{at}: {off}");
             assert!(found >= last, "{at}");
             last = found;
         }

@@ -1,7 +1,8 @@
 //! Colours that PNG files and videos state by the numbers of ITU-T H.273: [`CodePoints`].
 //!
-//! Codes of video are taken as they are displayed: as sRGB codes. Cameras and players treat the curve of BT.709 as that of the camera, not
-//! as the inverse of a display's, and the same frame saved as JPEG, which states no curve, has the same codes.
+//! Codes of video are taken as they are displayed: as sRGB codes. Cameras and players treat the curve of BT.709 as that
+//! of the camera, not as the inverse of a display's, and the same frame saved as JPEG, which states no curve, has the
+//! same codes.
 
 use std::sync::Arc;
 
@@ -23,8 +24,8 @@ pub(crate) struct CodePoints {
 enum StatedPrimaries {
     /// None.
     Unspecified,
-    /// Those of BT.709 or of standard-definition television. The latter are taken as those of BT.709, as players do: files are often
-    /// tagged so by the size of the picture alone.
+    /// Those of BT.709 or of standard-definition television. The latter are taken as those of BT.709, as players do:
+    /// files are often tagged so by the size of the picture alone.
     Television,
     /// Others, with their name.
     Other(&'static str, Primaries),
@@ -52,51 +53,33 @@ impl CodePoints {
     /// If the codes cannot be converted. The error names the reason, without a remedy.
     pub(crate) fn meaning(self, depth: CodeDepth) -> Result<Meaning, String> {
         let (primaries, transfer) = (self.stated_primaries()?, self.stated_transfer()?);
-        let space = |name, curve, given, handling| {
-            Ok(Meaning::Other(Arc::new(rgb_space(
-                name, curve, &given, handling,
-            ))))
-        };
+        let space =
+            |name, curve, given, handling| Ok(Meaning::Other(Arc::new(rgb_space(name, curve, &given, handling))));
         let (name, given) = match primaries {
             StatedPrimaries::Unspecified | StatedPrimaries::Television => (None, Primaries::SRGB),
             StatedPrimaries::Other(name, given) => (Some(name), given),
         };
         match (transfer, name) {
-            (StatedTransfer::Pq | StatedTransfer::Hlg, _) => {
-                Ok(Meaning::Other(Arc::new(hdr(transfer, primaries))))
-            }
+            (StatedTransfer::Pq | StatedTransfer::Hlg, _) => Ok(Meaning::Other(Arc::new(hdr(transfer, primaries)))),
             (StatedTransfer::Linear, None) if depth == CodeDepth::Sixteen => Ok(Meaning::Linear),
-            (StatedTransfer::Linear, None) => {
-                Err("the codes are linear light in 8 bits; 16 bits expected".to_owned())
+            (StatedTransfer::Linear, None) => Err("the codes are linear light in 8 bits; 16 bits expected".to_owned()),
+            (StatedTransfer::Linear, Some(name)) => {
+                Err(format!("the codes are linear light with {name} primaries; those of sRGB expected"))
             }
-            (StatedTransfer::Linear, Some(name)) => Err(format!(
-                "the codes are linear light with {name} primaries; those of sRGB expected"
-            )),
             (StatedTransfer::Gamma28, name) => {
                 let name = name.map_or("gamma 2.8".to_owned(), |name| format!("gamma 2.8, {name}"));
-                space(
-                    name,
-                    ToneCurve::Gamma(2.8),
-                    given,
-                    ColourHandling::Converted,
-                )
+                space(name, ToneCurve::Gamma(2.8), given, ColourHandling::Converted)
             }
             (_, None) => Ok(Meaning::Srgb),
-            (StatedTransfer::Unspecified, Some(name)) => Err(format!(
-                "the primaries are {name}, but no transfer is stated: the codes may be HDR"
-            )),
-            (StatedTransfer::Srgb, Some(name)) => space(
-                name.to_owned(),
-                ToneCurve::Srgb,
-                given,
-                ColourHandling::Converted,
-            ),
-            (StatedTransfer::Video, Some(name)) => space(
-                name.to_owned(),
-                ToneCurve::Srgb,
-                given,
-                ColourHandling::Video,
-            ),
+            (StatedTransfer::Unspecified, Some(name)) => {
+                Err(format!("the primaries are {name}, but no transfer is stated: the codes may be HDR"))
+            }
+            (StatedTransfer::Srgb, Some(name)) => {
+                space(name.to_owned(), ToneCurve::Srgb, given, ColourHandling::Converted)
+            }
+            (StatedTransfer::Video, Some(name)) => {
+                space(name.to_owned(), ToneCurve::Srgb, given, ColourHandling::Video)
+            }
         }
     }
 
@@ -111,9 +94,7 @@ impl CodePoints {
             12 => StatedPrimaries::Other("Display P3", Primaries::DISPLAY_P3),
             10 => return Err("the codes are XYZ (SMPTE ST 428)".to_owned()),
             other => {
-                return Err(format!(
-                    "the primaries have the unknown number {other} of H.273"
-                ));
+                return Err(format!("the primaries have the unknown number {other} of H.273"));
             }
         })
     }
@@ -131,15 +112,14 @@ impl CodePoints {
             9 | 10 => return Err("the codes are logarithmic".to_owned()),
             17 => return Err("the codes are those of digital cinema (SMPTE ST 428)".to_owned()),
             other => {
-                return Err(format!(
-                    "the transfer has the unknown number {other} of H.273"
-                ));
+                return Err(format!("the transfer has the unknown number {other} of H.273"));
             }
         })
     }
 }
 
-/// The colour space of PQ or HLG codes (BT.2100). Without stated primaries, they are those of BT.2020, the only ones of BT.2100.
+/// The colour space of PQ or HLG codes (BT.2100). Without stated primaries, they are those of BT.2020, the only ones of
+/// BT.2100.
 fn hdr(transfer: StatedTransfer, primaries: StatedPrimaries) -> ColourSpace {
     let (name, given) = match primaries {
         StatedPrimaries::Unspecified => ("BT.2020", Primaries::BT2020),
@@ -156,24 +136,17 @@ fn hdr(transfer: StatedTransfer, primaries: StatedPrimaries) -> ColourSpace {
     space
 }
 
-/// The number in H.273 of the primaries that a PNG file states: x and y of white, red, green and blue, in units of 0.00001. `None` if they
-/// are not among those with a number.
+/// The number in H.273 of the primaries that a PNG file states: x and y of white, red, green and blue, in units of
+/// 0.00001. `None` if they are not among those with a number.
 pub(super) fn primaries_number(stated: [u32; 8]) -> Option<u8> {
     /// Tolerance, because encoders round primaries differently (chosen).
     const TOLERANCE: u32 = 100;
     NUMBERED
         .iter()
         .find(|(_, primaries)| {
-            let Primaries {
-                red,
-                green,
-                blue,
-                white,
-            } = primaries;
+            let Primaries { red, green, blue, white } = primaries;
             let numbers = [white, red, green, blue].into_iter().flatten();
-            numbers.zip(stated).all(|(number, stated)| {
-                ((number * 1e5).round() as u32).abs_diff(stated) <= TOLERANCE
-            })
+            numbers.zip(stated).all(|(number, stated)| ((number * 1e5).round() as u32).abs_diff(stated) <= TOLERANCE)
         })
         .map(|(number, _)| *number)
 }
@@ -196,11 +169,7 @@ mod tests {
     use super::*;
 
     fn meaning(primaries: u8, transfer: u8) -> Result<Meaning, String> {
-        CodePoints {
-            primaries,
-            transfer,
-        }
-        .meaning(CodeDepth::Sixteen)
+        CodePoints { primaries, transfer }.meaning(CodeDepth::Sixteen)
     }
 
     /// The 16-bit sRGB codes of one colour.
@@ -230,8 +199,7 @@ mod tests {
     /// BT.2020 of sRGB's red, green and blue in linear light (BT.2087, inverse), and the same by the curve of sRGB.
     #[test]
     fn wide_primaries_are_converted() {
-        let red = [0.627_404, 0.069_097, 0.016_391]
-            .map(|light: f64| 1.055 * light.powf(1.0 / 2.4) - 0.055);
+        let red = [0.627_404, 0.069_097, 0.016_391].map(|light: f64| 1.055 * light.powf(1.0 / 2.4) - 0.055);
         for (transfer, handling) in [
             (1, ColourHandling::Video),
             (14, ColourHandling::Video),
@@ -240,9 +208,7 @@ mod tests {
             (4, ColourHandling::Converted),
         ] {
             assert_near(converted(9, transfer, red), [255.0, 0.0, 0.0]);
-            let Ok(Meaning::Other(space)) = meaning(9, transfer) else {
-                panic!("{transfer}")
-            };
+            let Ok(Meaning::Other(space)) = meaning(9, transfer) else { panic!("{transfer}") };
             assert_eq!(space.handling, handling);
         }
         for primaries in [4, 8, 9, 11, 12] {
@@ -251,7 +217,8 @@ mod tests {
         }
     }
 
-    /// Levels of BT.2408-7, table 1: diffuse white of 203 cd/m² is 58 % in PQ and 75 % in HLG; a grey card of 18 % (26 cd/m²) is 38 %.
+    /// Levels of BT.2408-7, table 1: diffuse white of 203 cd/m² is 58 % in PQ and 75 % in HLG; a grey card of 18 % (26
+    /// cd/m²) is 38 %.
     #[test]
     fn hdr_has_the_reference_levels() {
         let grey = 255.0 * (1.055 * (26.0_f64 / 203.0).powf(1.0 / 2.4) - 0.055);
@@ -260,10 +227,7 @@ mod tests {
                 assert_near(converted(primaries, transfer, [white; 3]), [255.0; 3]);
                 assert_near(converted(primaries, transfer, [0.0; 3]), [0.0; 3]);
                 let [found, ..] = converted(primaries, transfer, [card; 3]);
-                assert!(
-                    (found - grey).abs() < 1.5,
-                    "{transfer}: {found}, not {grey}"
-                );
+                assert!((found - grey).abs() < 1.5, "{transfer}: {found}, not {grey}");
                 // Highlights are clipped, and codes below white are not.
                 assert_near(converted(primaries, transfer, [1.0; 3]), [255.0; 3]);
                 let [below, ..] = converted(primaries, transfer, [white - 0.02; 3]);
@@ -283,10 +247,7 @@ mod tests {
     fn linear_light_needs_16_bits_and_the_primaries_of_srgb() {
         assert!(matches!(meaning(1, 8), Ok(Meaning::Linear)));
         assert!(meaning(9, 8).unwrap_err().contains("BT.2020"));
-        let linear = CodePoints {
-            primaries: 1,
-            transfer: 8,
-        };
+        let linear = CodePoints { primaries: 1, transfer: 8 };
         assert!(linear.meaning(CodeDepth::Eight).is_err());
     }
 
@@ -306,19 +267,10 @@ mod tests {
 
     #[test]
     fn primaries_of_png_have_numbers() {
-        let bt2020 = [
-            31_270, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600,
-        ];
+        let bt2020 = [31_270, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600];
         assert_eq!(primaries_number(bt2020), Some(9));
-        let smpte = [
-            31_270, 32_900, 63_000, 34_000, 31_000, 59_500, 15_500, 7_000,
-        ];
+        let smpte = [31_270, 32_900, 63_000, 34_000, 31_000, 59_500, 15_500, 7_000];
         assert_eq!(primaries_number(smpte), Some(6));
-        assert_eq!(
-            primaries_number([
-                31_270, 32_900, 64_000, 33_000, 21_000, 71_000, 15_000, 6_000
-            ]),
-            None
-        );
+        assert_eq!(primaries_number([31_270, 32_900, 64_000, 33_000, 21_000, 71_000, 15_000, 6_000]), None);
     }
 }

@@ -4,11 +4,12 @@ use super::curve::{ToneCurve, WHITE_NITS, interpolate};
 use super::primaries::{Matrix, times};
 use super::srgb::{EIGHT, SIXTEEN, SrgbCodes};
 
-/// Conversion of RGB colours to sRGB: a tone curve per channel to linear light, a matrix to the primaries of sRGB, and the sRGB curve.
-/// White stays white, and colours outside the gamut of sRGB are clipped (relative colorimetric), as is light above white in HDR.
+/// Conversion of RGB colours to sRGB: a tone curve per channel to linear light, a matrix to the primaries of sRGB, and
+/// the sRGB curve. White stays white, and colours outside the gamut of sRGB are clipped (relative colorimetric), as is
+/// light above white in HDR.
 ///
-/// Computed in double precision, because a library that uses the vector instructions of the machine gives codes that differ by one between
-/// machines.
+/// Computed in double precision, because a library that uses the vector instructions of the machine gives codes that
+/// differ by one between machines.
 #[derive(Debug)]
 pub(crate) struct Conversion {
     curves: [ToneCurve; 3],
@@ -17,14 +18,14 @@ pub(crate) struct Conversion {
     pub(super) ootf: Option<Ootf>,
 }
 
-/// The opto-optical transfer of HLG: from the light of the scene to that of the nominal display with a peak of 1000 cd/m² (BT.2100-2,
-/// table 5).
+/// The opto-optical transfer of HLG: from the light of the scene to that of the nominal display with a peak of 1000
+/// cd/m² (BT.2100-2, table 5).
 #[derive(Debug)]
 pub(crate) struct Ootf {
     /// Shares of the channels in the luminance.
     luminance: [f64; 3],
-    /// Gain for equally spaced square roots of the luminance from 0 to 1. The square root spaces dark values as densely as the eye sees
-    /// them; interpolation changes light by less than a millionth of white.
+    /// Gain for equally spaced square roots of the luminance from 0 to 1. The square root spaces dark values as densely
+    /// as the eye sees them; interpolation changes light by less than a millionth of white.
     gains: Vec<f64>,
 }
 
@@ -64,21 +65,14 @@ impl Ootf {
 
 impl Conversion {
     pub(super) fn new(curves: [ToneCurve; 3], matrix: Matrix) -> Self {
-        Self {
-            curves,
-            matrix,
-            ootf: None,
-        }
+        Self { curves, matrix, ootf: None }
     }
 
     /// True if the conversion changes each of 17 × 17 × 17 evenly spaced colours by at most one 8-bit code.
     pub(super) fn is_identity(&self) -> bool {
         let grid: Vec<f64> = (0..17).map(|i| f64::from(i) / 16.0).collect();
-        let light: Vec<Vec<f64>> = self
-            .curves
-            .iter()
-            .map(|curve| grid.iter().map(|value| curve.light(*value)).collect())
-            .collect();
+        let light: Vec<Vec<f64>> =
+            self.curves.iter().map(|curve| grid.iter().map(|value| curve.light(*value)).collect()).collect();
         (0..17 * 17 * 17).all(|i| {
             let point = [i / 289, i / 17 % 17, i % 17];
             let lights = [0, 1, 2].map(|channel| light[channel][point[channel]]);
@@ -128,11 +122,9 @@ impl Conversion {
 
     /// The linear light of each code from 0 to `max`, per channel.
     pub(crate) fn tables(&self, max: u32) -> [Vec<f64>; 3] {
-        self.curves.each_ref().map(|curve| {
-            (0..=max)
-                .map(|code| curve.light(f64::from(code) / f64::from(max)))
-                .collect()
-        })
+        self.curves
+            .each_ref()
+            .map(|curve| (0..=max).map(|code| curve.light(f64::from(code) / f64::from(max))).collect())
     }
 
     /// The 8-bit sRGB codes of one pixel, from the light of its codes, and whether a channel is above white.
@@ -162,10 +154,7 @@ mod tests {
             let scene = f64::from(step) / 100_000.0;
             let [_, found, _] = ootf.displayed([scene; 3]);
             let expected = scene * Ootf::gain(scene);
-            assert!(
-                (found - expected).abs() < 1e-6,
-                "{scene}: {found}, not {expected}"
-            );
+            assert!((found - expected).abs() < 1e-6, "{scene}: {found}, not {expected}");
         }
     }
 }

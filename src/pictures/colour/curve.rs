@@ -36,12 +36,7 @@ impl ToneCurve {
                 // An unsigned fixed-point number with 8 integer and 8 fractional bits.
                 [gamma] => return Ok(Self::Gamma(f64::from(gamma) / 256.0)),
                 _ => {
-                    return Ok(Self::Table(
-                        table
-                            .iter()
-                            .map(|value| f64::from(*value) / 65_535.0)
-                            .collect(),
-                    ));
+                    return Ok(Self::Table(table.iter().map(|value| f64::from(*value) / 65_535.0).collect()));
                 }
             },
             ToneReprCurve::Parametric(numbers) => numbers,
@@ -82,13 +77,13 @@ impl ToneCurve {
 }
 
 impl ToneCurve {
-    /// True for a curve that profiles of BT.709 have: the inverse of the camera's curve, or the gamma of 1.961 that approximates it. Its
-    /// codes differ from that curve by at most one 8-bit sRGB code (chosen).
+    /// True for a curve that profiles of BT.709 have: the inverse of the camera's curve, or the gamma of 1.961 that
+    /// approximates it. Its codes differ from that curve by at most one 8-bit sRGB code (chosen).
     pub(super) fn is_video(&self) -> bool {
         let is_near = |other: fn(f64) -> f64| {
             (0..=64).map(|i| f64::from(i) / 64.0).all(|value| {
-                let [found, expected] = [self.light(value), other(value)]
-                    .map(|light| f64::from(srgb::SIXTEEN.encode(light)) / 257.0);
+                let [found, expected] =
+                    [self.light(value), other(value)].map(|light| f64::from(srgb::SIXTEEN.encode(light)) / 257.0);
                 (found - expected).abs() <= 1.0
             })
         };
@@ -112,22 +107,14 @@ fn hlg(value: f64) -> f64 {
     const A: f64 = 0.178_832_77;
     const B: f64 = 0.284_668_92;
     const C: f64 = 0.559_910_73;
-    if value <= 0.5 {
-        value * value / 3.0
-    } else {
-        (libm::exp((value - C) / A) + B) / 12.0
-    }
+    if value <= 0.5 { value * value / 3.0 } else { (libm::exp((value - C) / A) + B) / 12.0 }
 }
 
 /// Linear light of a value by the inverse of the curve of BT.709-6, item 1.2.
 fn bt709(value: f64) -> f64 {
     const ALPHA: f64 = 1.099_296_826_809_44;
     const BETA: f64 = 0.018_053_968_510_807;
-    if value < 4.5 * BETA {
-        value / 4.5
-    } else {
-        libm::pow((value + ALPHA - 1.0) / ALPHA, 1.0 / 0.45)
-    }
+    if value < 4.5 * BETA { value / 4.5 } else { libm::pow((value + ALPHA - 1.0) / ALPHA, 1.0 / 0.45) }
 }
 
 /// Interpolates linearly between at least two equally spaced values, at a position in [0, 1].
@@ -170,10 +157,7 @@ mod tests {
             (segments(&[2.0, 1.0, 0.0, 0.5, 0.4, 0.01, 0.02]), 0.5, 0.26),
         ] {
             let found = ToneCurve::from_profile(&curve).unwrap().light(at);
-            assert!(
-                (found - expected).abs() < 1e-7,
-                "{curve:?} at {at}: {found}"
-            );
+            assert!((found - expected).abs() < 1e-7, "{curve:?} at {at}: {found}");
         }
         for (curve, at) in [(segments(&[-1.0]), 0.0), (segments(&[2.0, 9.0, 0.0]), 1.0)] {
             let clipped = ToneCurve::from_profile(&curve).unwrap().light(at);
@@ -202,10 +186,7 @@ mod tests {
             (table(&[461]), false),
             (table(&[563]), false),
             (table(&[512]), false),
-            (
-                segments(&[2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045]),
-                false,
-            ),
+            (segments(&[2.4, 1.0 / 1.055, 0.055 / 1.055, 1.0 / 12.92, 0.04045]), false),
         ] {
             let found = ToneCurve::from_profile(&curve).unwrap();
             assert_eq!(found.is_video(), expected, "{curve:?}");
@@ -215,24 +196,10 @@ mod tests {
     /// PQ: SMPTE ST 2084, 0.508078 for 100 cd/m². HLG: half the signal is a twelfth of the peak.
     #[test]
     fn hdr_curves_have_the_values_of_their_standards() {
-        for (value, nits) in [
-            (0.0, 0.0),
-            (0.508_078, 100.0),
-            (0.751_827, 1000.0),
-            (1.0, 10_000.0),
-        ] {
-            assert!(
-                (pq(value) - nits).abs() <= nits * 1e-4,
-                "{value}: {}",
-                pq(value)
-            );
+        for (value, nits) in [(0.0, 0.0), (0.508_078, 100.0), (0.751_827, 1000.0), (1.0, 10_000.0)] {
+            assert!((pq(value) - nits).abs() <= nits * 1e-4, "{value}: {}", pq(value));
         }
-        for (value, light) in [
-            (0.0, 0.0),
-            (0.5, 1.0 / 12.0),
-            (0.500_001, 1.0 / 12.0),
-            (1.0, 1.0),
-        ] {
+        for (value, light) in [(0.0, 0.0), (0.5, 1.0 / 12.0), (0.500_001, 1.0 / 12.0), (1.0, 1.0)] {
             assert!((hlg(value) - light).abs() < 1e-5, "{value}: {}", hlg(value));
         }
     }

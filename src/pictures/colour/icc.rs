@@ -16,7 +16,8 @@ pub(super) struct Profile {
     pub(super) conversion: Conversion,
     /// True for a grey profile.
     pub(super) is_grey: bool,
-    /// True if the profile has the curve of video cameras. It is replaced by that of sRGB, because codes of video are taken as displayed.
+    /// True if the profile has the curve of video cameras. It is replaced by that of sRGB, because codes of video are
+    /// taken as displayed.
     pub(super) is_video: bool,
 }
 
@@ -34,14 +35,11 @@ impl Profile {
             b"Lab " => return Err("the ICC profile is for Lab".to_owned()),
             space => {
                 let space = readable(&String::from_utf8_lossy(space));
-                return Err(format!(
-                    "the ICC profile is for colours of the kind {space:?}"
-                ));
+                return Err(format!("the ICC profile is for colours of the kind {space:?}"));
             }
         }
         if header.has_tables {
-            let problem =
-                "the ICC profile converts colours by tables (A2B), not by curves and a matrix";
+            let problem = "the ICC profile converts colours by tables (A2B), not by curves and a matrix";
             return Err(problem.to_owned());
         }
         if &header.connection != b"XYZ " {
@@ -59,11 +57,7 @@ impl Profile {
                 tone_curve(&name, profile.green_trc.as_ref())?,
                 tone_curve(&name, profile.blue_trc.as_ref())?,
             ];
-            let [r, g, b] = [
-                profile.red_colorant,
-                profile.green_colorant,
-                profile.blue_colorant,
-            ];
+            let [r, g, b] = [profile.red_colorant, profile.green_colorant, profile.blue_colorant];
             let matrix = [[r.x, g.x, b.x], [r.y, g.y, b.y], [r.z, g.z, b.z]];
             (curves, xyz_to_srgb(matrix))
         };
@@ -72,17 +66,8 @@ impl Profile {
             return Err(missing(&name, "matrix"));
         }
         let is_video = curves.iter().all(ToneCurve::is_video);
-        let curves = if is_video {
-            [ToneCurve::Srgb, ToneCurve::Srgb, ToneCurve::Srgb]
-        } else {
-            curves
-        };
-        Ok(Self {
-            name,
-            conversion: Conversion::new(curves, matrix),
-            is_grey,
-            is_video,
-        })
+        let curves = if is_video { [ToneCurve::Srgb, ToneCurve::Srgb, ToneCurve::Srgb] } else { curves };
+        Ok(Self { name, conversion: Conversion::new(curves, matrix), is_grey, is_video })
     }
 }
 
@@ -104,10 +89,7 @@ impl InkProfile {
             return Err("the image is CMYK, but its ICC profile is not for CMYK".to_owned());
         }
         let profile = parse(bytes)?;
-        Ok(Self {
-            name: profile_name(&profile),
-            profile,
-        })
+        Ok(Self { name: profile_name(&profile), profile })
     }
 }
 
@@ -122,8 +104,7 @@ fn tone_curve(name: &str, curve: Option<&ToneReprCurve>) -> Result<ToneCurve, St
 }
 
 fn parse(bytes: &[u8]) -> Result<ColorProfile, String> {
-    ColorProfile::new_from_slice(bytes)
-        .map_err(|e| format!("the ICC profile is broken: {}", readable(&e.to_string())))
+    ColorProfile::new_from_slice(bytes).map_err(|e| format!("the ICC profile is broken: {}", readable(&e.to_string())))
 }
 
 /// The code points of H.273 in a profile for RGB (ICC.1:2022, section 9.2.17): primaries, transfer, matrix and range.
@@ -161,17 +142,8 @@ impl Header {
         let has_tables = (0..tags.min(bytes.len() / 12))
             .map_while(|tag| four_bytes(bytes, 132 + 12 * tag))
             .into_iter()
-            .any(|tag| {
-                [
-                    b"A2B0", b"A2B1", b"A2B2", b"D2B0", b"D2B1", b"D2B2", b"D2B3",
-                ]
-                .contains(&&tag)
-            });
-        Some(Self {
-            space: four_bytes(bytes, 16)?,
-            connection: four_bytes(bytes, 20)?,
-            has_tables,
-        })
+            .any(|tag| [b"A2B0", b"A2B1", b"A2B2", b"D2B0", b"D2B1", b"D2B2", b"D2B3"].contains(&&tag));
+        Some(Self { space: four_bytes(bytes, 16)?, connection: four_bytes(bytes, 20)?, has_tables })
     }
 }
 
@@ -185,9 +157,7 @@ fn profile_name(profile: &ColorProfile) -> String {
         None => "",
         Some(ProfileText::PlainString(text)) => text,
         Some(ProfileText::Localizable(texts)) => texts.first().map_or("", |text| &text.value),
-        Some(ProfileText::Description(text)) if text.ascii_string.is_empty() => {
-            &text.unicode_string
-        }
+        Some(ProfileText::Description(text)) if text.ascii_string.is_empty() => &text.unicode_string,
         Some(ProfileText::Description(text)) => &text.ascii_string,
     };
     match readable(text) {
@@ -198,10 +168,6 @@ fn profile_name(profile: &ColorProfile) -> String {
 
 /// The printable characters of a text, cut to [`MAX_NAME`] characters.
 fn readable(text: &str) -> String {
-    let text: String = text
-        .chars()
-        .filter(|character| !character.is_control())
-        .take(MAX_NAME)
-        .collect();
+    let text: String = text.chars().filter(|character| !character.is_control()).take(MAX_NAME).collect();
     text.trim().to_owned()
 }

@@ -17,7 +17,8 @@ const WITHOUT_PROFILE: &str = "CMYK without a profile";
 /// Conversion of an image from CMYK to sRGB.
 #[derive(Debug, Clone)]
 pub(crate) enum Inks {
-    /// Converts by a formula: each coloured ink absorbs its share of red, green or blue, and black absorbs its share of all three.
+    /// Converts by a formula: each coloured ink absorbs its share of red, green or blue, and black absorbs its share of
+    /// all three.
     Formula(ColourNote),
     /// Converts by the table of an ICC profile.
     Profile(Arc<CmykProfile>),
@@ -41,20 +42,14 @@ impl Inks {
             (ColourTag::Profile(profile), ColourRule::Convert | ColourRule::Clip) => {
                 cached_profile(profile).map(Self::Profile)
             }
-            (ColourTag::Profile(_), ColourRule::Ignore) => {
-                Ok(Self::formula("CMYK, whose profile is ignored"))
-            }
+            (ColourTag::Profile(_), ColourRule::Ignore) => Ok(Self::formula("CMYK, whose profile is ignored")),
             _ => Ok(Self::formula(WITHOUT_PROFILE)),
         }
     }
 
     /// Converts by the formula. `from` is the name of the colours in the note.
     fn formula(from: &str) -> Self {
-        Self::Formula(ColourNote {
-            from: from.to_owned(),
-            profile: None,
-            handling: ColourHandling::Converted,
-        })
+        Self::Formula(ColourNote { from: from.to_owned(), profile: None, handling: ColourHandling::Converted })
     }
 
     /// Note about the conversion.
@@ -73,10 +68,7 @@ impl Inks {
     pub(crate) fn srgb(&self, inks: &[u8]) -> Vec<u8> {
         let (pixels, _) = inks.as_chunks::<4>();
         match self {
-            Self::Formula(_) => pixels
-                .iter()
-                .flat_map(|inks| srgb_by_formula(*inks))
-                .collect(),
+            Self::Formula(_) => pixels.iter().flat_map(|inks| srgb_by_formula(*inks)).collect(),
             Self::Profile(profile) => {
                 // Consecutive pixels with the same inks are converted once.
                 let (mut last_inks, mut last_srgb) = ([0; 4], profile.table.srgb([0; 4]));
@@ -95,8 +87,8 @@ impl Inks {
     }
 }
 
-/// Converts inks of unknown colour to sRGB codes (PostScript Language Reference, third edition, section 7.2.4, with products in place
-/// of sums, as in programs that use libjpeg).
+/// Converts inks of unknown colour to sRGB codes (PostScript Language Reference, third edition, section 7.2.4, with
+/// products in place of sums, as in programs that use libjpeg).
 fn srgb_by_formula([cyan, magenta, yellow, black]: [u8; 4]) -> [u8; 3] {
     [cyan, magenta, yellow].map(|ink| {
         let light = u32::from(255 - ink) * u32::from(255 - black);
@@ -106,20 +98,14 @@ fn srgb_by_formula([cyan, magenta, yellow, black]: [u8; 4]) -> [u8; 3] {
 
 /// Reads a profile. The most recent [`CACHED_PROFILES`] profiles are cached by their digests.
 fn cached_profile(profile: &[u8]) -> Result<Arc<CmykProfile>, String> {
-    static CACHE: LazyLock<Recent<Digest, Arc<CmykProfile>>> =
-        LazyLock::new(|| Recent::new(CACHED_PROFILES));
+    static CACHE: LazyLock<Recent<Digest, Arc<CmykProfile>>> = LazyLock::new(|| Recent::new(CACHED_PROFILES));
     if profile.len() > MAX_PROFILE_BYTES {
         return Err(profile_too_large());
     }
     let digest = Digest::from_bytes(profile);
     CACHE.get(&digest, || {
-        let (name, table) =
-            name_and_table(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
-        Ok(Arc::new(CmykProfile {
-            table,
-            name,
-            digest,
-        }))
+        let (name, table) = name_and_table(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
+        Ok(Arc::new(CmykProfile { table, name, digest }))
     })
 }
 
@@ -160,10 +146,7 @@ mod tests {
         profile[16..20].copy_from_slice(b"RGB ");
         let tag = ColourTag::Profile(profile);
         let problem = Inks::new(&tag, ColourRule::Convert).unwrap_err();
-        assert!(
-            problem.contains("not for CMYK") && problem.contains("--decode colour=ignore"),
-            "{problem}"
-        );
+        assert!(problem.contains("not for CMYK") && problem.contains("--decode colour=ignore"), "{problem}");
         let ignored = Inks::new(&tag, ColourRule::Ignore).unwrap();
         assert_eq!(ignored.srgb(&[0, 0, 0, 255]), [0, 0, 0]);
     }

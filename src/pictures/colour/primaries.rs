@@ -10,11 +10,7 @@ pub(super) const IDENTITY: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0
 pub(super) const D50: [f64; 3] = [0.9642, 1.0, 0.8249];
 
 /// Matrix of the Bradford chromatic adaptation, from XYZ to cone responses (Lam 1985).
-const BRADFORD: Matrix = [
-    [0.8951, 0.2664, -0.1614],
-    [-0.7502, 1.7135, 0.0367],
-    [0.0389, -0.0685, 1.0296],
-];
+const BRADFORD: Matrix = [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]];
 
 /// CIE 1931 x and y of the primaries and of white.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,72 +28,38 @@ impl Primaries {
     }
 
     /// Primaries of sRGB and BT.709 (IEC 61966-2-1).
-    pub(crate) const SRGB: Self = Self {
-        red: [0.64, 0.33],
-        green: [0.30, 0.60],
-        blue: [0.15, 0.06],
-        white: [0.3127, 0.3290],
-    };
+    pub(crate) const SRGB: Self =
+        Self { red: [0.64, 0.33], green: [0.30, 0.60], blue: [0.15, 0.06], white: [0.3127, 0.3290] };
 
     /// Primaries of Display P3 (SMPTE EG 432-1).
-    pub(super) const DISPLAY_P3: Self = Self {
-        red: [0.680, 0.320],
-        green: [0.265, 0.690],
-        blue: [0.150, 0.060],
-        white: [0.3127, 0.3290],
-    };
+    pub(super) const DISPLAY_P3: Self =
+        Self { red: [0.680, 0.320], green: [0.265, 0.690], blue: [0.150, 0.060], white: [0.3127, 0.3290] };
 
     /// Primaries of BT.2020, table 3.
-    pub(super) const BT2020: Self = Self {
-        red: [0.708, 0.292],
-        green: [0.170, 0.797],
-        blue: [0.131, 0.046],
-        white: [0.3127, 0.3290],
-    };
+    pub(super) const BT2020: Self =
+        Self { red: [0.708, 0.292], green: [0.170, 0.797], blue: [0.131, 0.046], white: [0.3127, 0.3290] };
 
     /// Primaries of digital cinema (SMPTE RP 431-2).
-    pub(super) const DCI_P3: Self = Self {
-        white: [0.314, 0.351],
-        ..Self::DISPLAY_P3
-    };
+    pub(super) const DCI_P3: Self = Self { white: [0.314, 0.351], ..Self::DISPLAY_P3 };
 
     /// Primaries of NTSC of 1953 (BT.470, system M), with illuminant C.
-    pub(super) const BT470_M: Self = Self {
-        red: [0.67, 0.33],
-        green: [0.21, 0.71],
-        blue: [0.14, 0.08],
-        white: [0.310, 0.316],
-    };
+    pub(super) const BT470_M: Self =
+        Self { red: [0.67, 0.33], green: [0.21, 0.71], blue: [0.14, 0.08], white: [0.310, 0.316] };
 
     /// Primaries of PAL and SECAM (BT.470, systems B and G; BT.601 of 625 lines).
-    pub(super) const BT470_BG: Self = Self {
-        green: [0.29, 0.60],
-        ..Self::SRGB
-    };
+    pub(super) const BT470_BG: Self = Self { green: [0.29, 0.60], ..Self::SRGB };
 
     /// Primaries of NTSC (SMPTE 170M and 240M; BT.601 of 525 lines).
-    pub(super) const SMPTE_170M: Self = Self {
-        red: [0.630, 0.340],
-        green: [0.310, 0.595],
-        blue: [0.155, 0.070],
-        white: [0.3127, 0.3290],
-    };
+    pub(super) const SMPTE_170M: Self =
+        Self { red: [0.630, 0.340], green: [0.310, 0.595], blue: [0.155, 0.070], white: [0.3127, 0.3290] };
 
     /// Primaries of film with illuminant C (H.273, table 2, number 8).
-    pub(super) const FILM: Self = Self {
-        red: [0.681, 0.319],
-        green: [0.243, 0.692],
-        blue: [0.145, 0.049],
-        white: [0.310, 0.316],
-    };
+    pub(super) const FILM: Self =
+        Self { red: [0.681, 0.319], green: [0.243, 0.692], blue: [0.145, 0.049], white: [0.310, 0.316] };
 
     /// Primaries of EBU Tech. 3213 (H.273, table 2, number 22).
-    pub(super) const EBU_3213: Self = Self {
-        red: [0.630, 0.340],
-        green: [0.295, 0.605],
-        blue: [0.155, 0.077],
-        white: [0.3127, 0.3290],
-    };
+    pub(super) const EBU_3213: Self =
+        Self { red: [0.630, 0.340], green: [0.295, 0.605], blue: [0.155, 0.077], white: [0.3127, 0.3290] };
 
     /// Shares of red, green and blue in the luminance of white.
     pub(super) fn luminance(self) -> [f64; 3] {
@@ -176,11 +138,7 @@ mod tests {
     /// The values that profiles of sRGB state (sRGB2014.icc of the ICC).
     #[test]
     fn srgb_has_the_colorants_of_its_profiles() {
-        let expected = [
-            [0.43607, 0.38515, 0.14307],
-            [0.22249, 0.71687, 0.06061],
-            [0.01392, 0.09708, 0.71410],
-        ];
+        let expected = [[0.43607, 0.38515, 0.14307], [0.22249, 0.71687, 0.06061], [0.01392, 0.09708, 0.71410]];
         assert_close(Primaries::SRGB.to_xyz(), expected, 3e-4);
         assert_close(xyz_to_srgb(Primaries::SRGB.to_xyz()), IDENTITY, 1e-12);
     }
@@ -199,11 +157,7 @@ mod tests {
     /// BT.2087-0, table 2 (inverse), and BT.2020-2, table 4.
     #[test]
     fn bt2020_has_the_matrix_and_luminance_of_its_standards() {
-        let expected = [
-            [1.660_5, -0.587_6, -0.072_8],
-            [-0.124_6, 1.132_9, -0.008_3],
-            [-0.018_2, -0.100_6, 1.118_7],
-        ];
+        let expected = [[1.660_5, -0.587_6, -0.072_8], [-0.124_6, 1.132_9, -0.008_3], [-0.018_2, -0.100_6, 1.118_7]];
         assert_close(Primaries::BT2020.to_srgb(), expected, 1e-4);
         let shares = Primaries::BT2020.luminance();
         for (share, expected) in shares.iter().zip([0.2627, 0.6780, 0.0593]) {

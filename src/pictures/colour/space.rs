@@ -8,8 +8,7 @@ use super::primaries::Primaries;
 use darkqa_base::types::{ColourHandling, ColourNote, Digest};
 
 /// Remedy for colours that cannot be converted.
-pub(super) const REMEDY: &str =
-    "convert it to sRGB first, or take its codes as sRGB with --decode colour=ignore";
+pub(super) const REMEDY: &str = "convert it to sRGB first, or take its codes as sRGB with --decode colour=ignore";
 
 /// Interpretation of the codes of an image.
 #[derive(Debug, Clone)]
@@ -47,20 +46,14 @@ impl ColourSpace {
     pub(crate) fn check(&self, is_grey: bool) -> Result<(), String> {
         if self.is_grey && !is_grey {
             let name = &self.name;
-            return Err(format!(
-                "the ICC profile {name:?} is for grey, but the image has colours; {REMEDY}"
-            ));
+            return Err(format!("the ICC profile {name:?} is for grey, but the image has colours; {REMEDY}"));
         }
         Ok(())
     }
 
     /// Note for images with this colour space and handling.
     pub(crate) fn note(&self, handling: ColourHandling) -> ColourNote {
-        ColourNote {
-            from: self.name.clone(),
-            profile: self.profile,
-            handling,
-        }
+        ColourNote { from: self.name.clone(), profile: self.profile, handling }
     }
 
     /// Name of the profile or of the standard.

@@ -4,11 +4,7 @@ use std::sync::LazyLock;
 
 /// Linear light of an sRGB value in [0, 1].
 pub(super) fn light(value: f64) -> f64 {
-    if value <= 0.04045 {
-        value / 12.92
-    } else {
-        libm::pow((value + 0.055) / 1.055, 2.4)
-    }
+    if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) }
 }
 
 /// Lookup table from linear light to the nearest sRGB code.
@@ -29,19 +25,14 @@ impl SrgbCodes {
     const BINS: usize = 4096;
 
     fn up_to(max: u32) -> Self {
-        let lower_limits: Vec<f64> = (1..=max)
-            .map(|code| light((f64::from(code) - 0.5) / f64::from(max)))
-            .collect();
+        let lower_limits: Vec<f64> = (1..=max).map(|code| light((f64::from(code) - 0.5) / f64::from(max))).collect();
         let first_codes = (0..=Self::BINS)
             .map(|bin| {
                 let darkest = bin as f64 / Self::BINS as f64;
                 lower_limits.partition_point(|limit| *limit <= darkest) as u32
             })
             .collect();
-        Self {
-            lower_limits,
-            first_codes,
-        }
+        Self { lower_limits, first_codes }
     }
 
     /// The code nearest to a value of light, which is clamped to [0, 1].

@@ -5,34 +5,19 @@ fn is_srgb(tag: &ColourTag) -> bool {
 }
 
 fn gamma(exponent: Option<u32>, primaries: Option<[u32; 8]>) -> ColourTag {
-    ColourTag::Gamma(Gamma {
-        exponent,
-        primaries,
-    })
+    ColourTag::Gamma(Gamma { exponent, primaries })
 }
 
-const SRGB: [u32; 8] = [
-    31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000,
-];
-const P3: [u32; 8] = [
-    31_270, 32_900, 68_000, 32_000, 26_500, 69_000, 15_000, 6_000,
-];
+const SRGB: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
+const P3: [u32; 8] = [31_270, 32_900, 68_000, 32_000, 26_500, 69_000, 15_000, 6_000];
 
-const ADOBE_RGB: [u32; 8] = [
-    31_270, 32_900, 64_000, 33_000, 21_000, 71_000, 15_000, 6_000,
-];
-const BT2020: [u32; 8] = [
-    31_270, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600,
-];
-const SMPTE_170M: [u32; 8] = [
-    31_270, 32_900, 63_000, 34_000, 31_000, 59_500, 15_500, 7_000,
-];
+const ADOBE_RGB: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 21_000, 71_000, 15_000, 6_000];
+const BT2020: [u32; 8] = [31_270, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600];
+const SMPTE_170M: [u32; 8] = [31_270, 32_900, 63_000, 34_000, 31_000, 59_500, 15_500, 7_000];
 
 #[test]
 fn gamma_and_primaries_of_srgb_are_srgb() {
-    let rounded = [
-        31_269, 32_899, 63_999, 33_001, 30_000, 60_000, 15_000, 5_999,
-    ];
+    let rounded = [31_269, 32_899, 63_999, 33_001, 30_000, 60_000, 15_000, 5_999];
     for (exponent, primaries) in [
         (Some(45_455), None),
         (Some(45_455), Some(SRGB)),
@@ -56,9 +41,7 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
         (None, Some(P3), "Display P3, but no transfer"),
         (None, Some(BT2020), "may be HDR"),
     ] {
-        let problem = gamma(exponent, primaries)
-            .meaning(CodeDepth::Eight)
-            .unwrap_err();
+        let problem = gamma(exponent, primaries).meaning(CodeDepth::Eight).unwrap_err();
         assert!(problem.contains(expected), "{problem}");
         assert!(problem.contains("--decode colour=ignore"), "{problem}");
     }
@@ -67,10 +50,7 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
 #[test]
 fn linear_light_needs_16_bits() {
     let linear = gamma(Some(100_000), Some(SRGB));
-    assert!(matches!(
-        linear.meaning(CodeDepth::Sixteen),
-        Ok(Meaning::Linear)
-    ));
+    assert!(matches!(linear.meaning(CodeDepth::Sixteen), Ok(Meaning::Linear)));
     assert!(linear.meaning(CodeDepth::Eight).is_err());
     let of_p3 = gamma(Some(100_000), Some(P3));
     assert!(of_p3.meaning(CodeDepth::Sixteen).is_err());
@@ -78,9 +58,7 @@ fn linear_light_needs_16_bits() {
 
 /// The name and handling of a colour space that is converted.
 fn space(tag: &ColourTag) -> (String, ColourHandling) {
-    let Ok(Meaning::Other(space)) = tag.meaning(CodeDepth::Eight) else {
-        panic!("{tag:?}")
-    };
+    let Ok(Meaning::Other(space)) = tag.meaning(CodeDepth::Eight) else { panic!("{tag:?}") };
     let note = space.note(space.handling);
     assert_eq!(note.profile, None);
     (note.from, note.handling)
@@ -88,13 +66,7 @@ fn space(tag: &ColourTag) -> (String, ColourHandling) {
 
 #[test]
 fn code_points_are_converted_or_refused_by_name() {
-    for points in [
-        [1, 13, 0, 1],
-        [1, 1, 0, 1],
-        [6, 6, 0, 1],
-        [5, 1, 0, 1],
-        [2, 2, 0, 1],
-    ] {
+    for points in [[1, 13, 0, 1], [1, 1, 0, 1], [6, 6, 0, 1], [5, 1, 0, 1], [2, 2, 0, 1]] {
         assert!(is_srgb(&ColourTag::CodePoints(points)), "{points:?}");
     }
     for (points, name, handling) in [
@@ -114,13 +86,8 @@ fn code_points_are_converted_or_refused_by_name() {
         ([9, 2, 0, 1], "may be HDR (cICP 9/2)"),
         ([1, 13, 1, 1], "1/13/1/1 (cICP)"),
     ] {
-        let problem = ColourTag::CodePoints(points)
-            .meaning(CodeDepth::Eight)
-            .unwrap_err();
-        assert!(
-            problem.contains(expected) && problem.contains("--decode colour=ignore"),
-            "{problem}"
-        );
+        let problem = ColourTag::CodePoints(points).meaning(CodeDepth::Eight).unwrap_err();
+        assert!(problem.contains(expected) && problem.contains("--decode colour=ignore"), "{problem}");
     }
 }
 
@@ -155,31 +122,18 @@ fn unsupported_profiles_are_refused_by_name() {
     for (profile, expected) in [
         (profile_header([b"CMYK", b"Lab ", b"A2B0"]), "for CMYK"),
         (profile_header([b"Lab ", b"XYZ ", b"desc"]), "for Lab"),
-        (
-            profile_header([b"HSV ", b"XYZ ", b"desc"]),
-            "of the kind \"HSV\"",
-        ),
-        (
-            profile_header([b"RGB ", b"XYZ ", b"A2B1"]),
-            "by tables (A2B)",
-        ),
-        (
-            profile_header([b"RGB ", b"Lab ", b"rXYZ"]),
-            "connection space of the ICC profile",
-        ),
+        (profile_header([b"HSV ", b"XYZ ", b"desc"]), "of the kind \"HSV\""),
+        (profile_header([b"RGB ", b"XYZ ", b"A2B1"]), "by tables (A2B)"),
+        (profile_header([b"RGB ", b"Lab ", b"rXYZ"]), "connection space of the ICC profile"),
         (profile_header([b"RGB ", b"XYZ ", b"rXYZ"]), "broken"),
         (vec![0; 100], "ends too early"),
     ] {
-        let problem = ColourTag::Profile(profile)
-            .meaning(CodeDepth::Eight)
-            .unwrap_err();
+        let problem = ColourTag::Profile(profile).meaning(CodeDepth::Eight).unwrap_err();
         assert!(problem.contains(expected), "{expected}: {problem}");
         assert!(problem.contains("ICC profile") && problem.contains("--decode colour=ignore"));
     }
     for chunk in [&b"no end of the name"[..], b"name\0", b"name\0\0no deflate"] {
-        let problem = ColourTag::DeflatedProfile(chunk.to_vec())
-            .meaning(CodeDepth::Eight)
-            .unwrap_err();
+        let problem = ColourTag::DeflatedProfile(chunk.to_vec()).meaning(CodeDepth::Eight).unwrap_err();
         assert!(problem.contains("cannot be decompressed"), "{problem}");
     }
 }
@@ -196,9 +150,5 @@ fn an_hdr_profile_counts_by_its_code_points() {
     assert_eq!(found.0, "PQ (HDR), BT.2020");
     // Other profiles count by their curves.
     assert!(with([1, 13, 0, 1]).meaning(CodeDepth::Eight).is_err());
-    assert!(
-        ColourTag::Profile(profile)
-            .meaning(CodeDepth::Eight)
-            .is_err()
-    );
+    assert!(ColourTag::Profile(profile).meaning(CodeDepth::Eight).is_err());
 }

@@ -49,14 +49,11 @@ impl FileWriter {
 
 /// Little-endian bytes of 64-bit numbers.
 fn u64_bytes(numbers: &[u64]) -> Vec<u8> {
-    numbers
-        .iter()
-        .flat_map(|number| number.to_le_bytes())
-        .collect()
+    numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// A file with one array of `size` (rows, columns) in storage of the given chunk size; contiguous without one. `class` and `bits` are the
-/// datatype fields of the numbers.
+/// A file with one array of `size` (rows, columns) in storage of the given chunk size; contiguous without one. `class`
+/// and `bits` are the datatype fields of the numbers.
 fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, u64)>) -> Vec<u8> {
     let width = data.len() as u64 / (size.0 * size.1);
     let mut writer = FileWriter::new();
@@ -80,14 +77,11 @@ fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, 
             for top in (0..size.0).step_by(height as usize) {
                 for left in (0..size.1).step_by(chunk_width as usize) {
                     let mut plain = vec![0; (height * chunk_width * width) as usize];
-                    for (row, column) in (0..height)
-                        .flat_map(|row| (0..chunk_width).map(move |column| (row, column)))
-                    {
+                    for (row, column) in (0..height).flat_map(|row| (0..chunk_width).map(move |column| (row, column))) {
                         if top + row < size.0 && left + column < size.1 {
                             let from = (((top + row) * size.1 + left + column) * width) as usize;
                             let to = ((row * chunk_width + column) * width) as usize;
-                            plain[to..to + width as usize]
-                                .copy_from_slice(&data[from..from + width as usize]);
+                            plain[to..to + width as usize].copy_from_slice(&data[from..from + width as usize]);
                         }
                     }
                     let count = plain.len() / width as usize;
@@ -95,8 +89,7 @@ fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, 
                         .flat_map(|byte| (0..count).map(move |number| (number, byte)))
                         .map(|(number, byte)| plain[number * width as usize + byte])
                         .collect();
-                    let mut deflated =
-                        flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
+                    let mut deflated = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::fast());
                     deflated.write_all(&shuffled).unwrap();
                     let stored = deflated.finish().unwrap();
                     let at = writer.append(&stored);
@@ -151,16 +144,11 @@ fn file(class: u8, bits: u8, size: (u64, u64), data: &[u8], chunk: Option<(u64, 
 fn contiguous_and_chunked_arrays_are_read() {
     let ids: Vec<i16> = (0..35).map(|number| number * 3 - 1).collect();
     let ids_bytes: Vec<u8> = ids.iter().flat_map(|id| id.to_le_bytes()).collect();
-    let halves: Vec<u8> = (0..35_u16)
-        .flat_map(|number| (0x3C00 + number).to_le_bytes())
-        .collect();
+    let halves: Vec<u8> = (0..35_u16).flat_map(|number| (0x3C00 + number).to_le_bytes()).collect();
     for chunk in [None, Some((2, 3)), Some((5, 7)), Some((8, 8))] {
         let array = Hdf5Array::parse(&file(0, 8, (5, 7), &ids_bytes, chunk), "dataset").unwrap();
         let found: Vec<i128> = array.numbers().unwrap().integers().unwrap().collect();
-        assert_eq!(
-            found,
-            ids.iter().map(|id| i128::from(*id)).collect::<Vec<i128>>()
-        );
+        assert_eq!(found, ids.iter().map(|id| i128::from(*id)).collect::<Vec<i128>>());
         assert_eq!(array.numbers().unwrap().size, (5, 7));
         let array = Hdf5Array::parse(&file(1, 0, (5, 7), &halves, chunk), "another name").unwrap();
         let found: Vec<f64> = array.numbers().unwrap().floats().unwrap().collect();
@@ -181,10 +169,7 @@ fn user_blocks_are_skipped() {
         }
         for length in [1, 256, 513, 1536] {
             let shifted = [vec![7; length], whole.clone()].concat();
-            assert_eq!(
-                Hdf5Array::parse(&shifted, "dataset"),
-                Err("not an HDF5 file".to_owned())
-            );
+            assert_eq!(Hdf5Array::parse(&shifted, "dataset"), Err("not an HDF5 file".to_owned()));
         }
     }
 }
@@ -193,18 +178,10 @@ fn user_blocks_are_skipped() {
 fn broken_files_are_refused_without_a_panic() {
     let ids: Vec<u8> = (0..70).collect();
     let whole = file(0, 8, (5, 7), &ids, Some((2, 3)));
-    assert!(
-        Hdf5Array::parse(b"PNG", "dataset")
-            .unwrap_err()
-            .contains("not an HDF5 file")
-    );
+    assert!(Hdf5Array::parse(b"PNG", "dataset").unwrap_err().contains("not an HDF5 file"));
     let mut latest = whole.clone();
     latest[8] = 2;
-    assert!(
-        Hdf5Array::parse(&latest, "dataset")
-            .unwrap_err()
-            .contains("latest")
-    );
+    assert!(Hdf5Array::parse(&latest, "dataset").unwrap_err().contains("latest"));
     for length in 0..whole.len() {
         let _ = Hdf5Array::parse(&whole[..length], "dataset");
     }

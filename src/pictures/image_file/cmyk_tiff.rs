@@ -5,8 +5,8 @@ use std::io::Cursor;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::{ColorType, TiffError};
 
-/// Decodes the amounts of cyan, magenta, yellow and black of each pixel, row by row: 0 for none, 255 for full (TIFF 6.0, section 16).
-/// `pixels` is the number of pixels in the image.
+/// Decodes the amounts of cyan, magenta, yellow and black of each pixel, row by row: 0 for none, 255 for full (TIFF
+/// 6.0, section 16). `pixels` is the number of pixels in the image.
 ///
 /// # Errors
 /// If the file is broken, or its compression is not supported.
@@ -15,9 +15,7 @@ pub(super) fn inks(file: &[u8], pixels: usize) -> Result<Vec<u8>, String> {
     limits.decoding_buffer_size = pixels.saturating_mul(4);
     // A strip is no larger than the image, with some room for poor compression.
     limits.intermediate_buffer_size = pixels.saturating_mul(8).max(1 << 20);
-    let mut decoder = Decoder::new(Cursor::new(file))
-        .map_err(decoding_error)?
-        .with_limits(limits);
+    let mut decoder = Decoder::new(Cursor::new(file)).map_err(decoding_error)?.with_limits(limits);
     match decoder.colortype().map_err(decoding_error)? {
         ColorType::CMYK(8) => {}
         other => return Err(format!("four inks of 8 bits expected, not {other:?}")),

@@ -46,14 +46,15 @@ impl ExrFile {
     /// Reads the headers.
     ///
     /// # Errors
-    /// If they are broken, no layer has the three colour channels as floats, or the image is larger than the rule allows.
+    /// If they are broken, no layer has the three colour channels as floats, or the image is larger than the rule
+    /// allows.
     pub(super) fn open(file: &[u8], rule: &DecodeRule) -> Result<Self, String> {
         let reader = block::read(Cursor::new(file), false).map_err(|e| unreadable(file, &e))?;
         let headers = reader.headers();
         let mut layers = (0..headers.len()).filter(|index| has_colours(&headers[*index]));
-        let layer = layers.next().ok_or(
-            "an OpenEXR image without a layer of the channels R, G and B; convert it to RGB first",
-        )?;
+        let layer = layers
+            .next()
+            .ok_or("an OpenEXR image without a layer of the channels R, G and B; convert it to RGB first")?;
         let header = &headers[layer];
         let (window, data) = (header.shared_attributes.display_window, header.layer_size);
         let size = (window.size.width(), window.size.height());
@@ -92,8 +93,7 @@ impl ExrFile {
                 move |collected: &mut CollectedLight, at, pixel: (f32, f32, f32, f32)| {
                     let (r, g, b, alpha) = pixel;
                     let at: Vec2<i32> = at.to_i32() + shift;
-                    let inside =
-                        (0..width as i32).contains(&at.x()) && (0..height as i32).contains(&at.y());
+                    let inside = (0..width as i32).contains(&at.x()) && (0..height as i32).contains(&at.y());
                     if inside {
                         let index = at.y() as usize * width + at.x() as usize;
                         collected.light[3 * index..][..3].copy_from_slice(&[r, g, b]);
@@ -104,12 +104,7 @@ impl ExrFile {
             .first_valid_layer()
             .all_attributes()
             .from_chunks(reader)
-            .map_err(|e| {
-                format!(
-                    "not a whole image: {}; copy or export it again",
-                    one_line(&e)
-                )
-            })?;
+            .map_err(|e| format!("not a whole image: {}; copy or export it again", one_line(&e)))?;
         let collected = image.layer_data.channel_data.pixels;
         if !collected.is_opaque {
             return Err("the image is transparent in places; flatten it first".to_owned());
@@ -138,10 +133,7 @@ struct CollectedLight {
 
 impl CollectedLight {
     fn new(pixels: usize) -> Self {
-        Self {
-            light: vec![0.0; 3 * pixels],
-            is_opaque: true,
-        }
+        Self { light: vec![0.0; 3 * pixels], is_opaque: true }
     }
 }
 
@@ -157,11 +149,9 @@ fn has_colours(header: &Header) -> bool {
 /// Checks that the channels are floats, that the compression is not DWA, and that the layer covers the display window.
 fn check_supported(header: &Header) -> Result<(), String> {
     // The decoder of DWA allocates as much memory as the file states (found with mutated files).
-    if matches!(
-        header.compression,
-        Compression::DWAA(_) | Compression::DWAB(_)
-    ) {
-        let problem = "an OpenEXR image of the lossy compression DWAA or DWAB, which is not read; save it with ZIP or PIZ";
+    if matches!(header.compression, Compression::DWAA(_) | Compression::DWAB(_)) {
+        let problem =
+            "an OpenEXR image of the lossy compression DWAA or DWAB, which is not read; save it with ZIP or PIZ";
         return Err(problem.to_owned());
     }
     let has_integers = header
@@ -178,13 +168,8 @@ fn check_supported(header: &Header) -> Result<(), String> {
         return Err(problem.to_owned());
     }
     let window = header.shared_attributes.display_window;
-    let (start, size) = (
-        header.own_attributes.layer_position - window.position,
-        header.layer_size.to_i32(),
-    );
-    if covers(start.x(), size.x(), window.size.width())
-        && covers(start.y(), size.y(), window.size.height())
-    {
+    let (start, size) = (header.own_attributes.layer_position - window.position, header.layer_size.to_i32());
+    if covers(start.x(), size.x(), window.size.width()) && covers(start.y(), size.y(), window.size.height()) {
         return Ok(());
     }
     Err(format!(
@@ -204,12 +189,7 @@ fn covers(start: i32, length: i32, side: usize) -> bool {
 }
 
 fn primaries(stated: &Chromaticities) -> Primaries {
-    Primaries {
-        red: xy(stated.red),
-        green: xy(stated.green),
-        blue: xy(stated.blue),
-        white: xy(stated.white),
-    }
+    Primaries { red: xy(stated.red), green: xy(stated.green), blue: xy(stated.blue), white: xy(stated.white) }
 }
 
 fn xy(point: Vec2<f32>) -> [f64; 2] {
@@ -229,9 +209,7 @@ fn are_bt709(found: &Primaries) -> bool {
 /// Problem of a file whose headers the decoder refuses.
 fn unreadable(file: &[u8], e: &exr::error::Error) -> String {
     match new_compression(file) {
-        Some(name) => format!(
-            "an OpenEXR image of the compression {name}, which is not read; save it with ZIP or PIZ"
-        ),
+        Some(name) => format!("an OpenEXR image of the compression {name}, which is not read; save it with ZIP or PIZ"),
         None => format!("not a readable OpenEXR image: {}", one_line(e)),
     }
 }

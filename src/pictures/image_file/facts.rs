@@ -76,11 +76,7 @@ impl FileFacts {
             }
             FileFormat::Jpeg => {
                 let properties = JpegProperties::parse(file);
-                let form = if properties.is_adobe {
-                    InkForm::Adobe
-                } else {
-                    InkForm::Plain
-                };
+                let form = if properties.is_adobe { InkForm::Adobe } else { InkForm::Plain };
                 Self {
                     orientation: exif_orientation(properties.exif),
                     inks: (properties.components == Some(4)).then_some(form),
@@ -101,9 +97,7 @@ impl FileFacts {
                 let properties = TiffProperties::parse(file);
                 let stated = u8::try_from(properties.orientation).ok();
                 Self {
-                    orientation: stated
-                        .and_then(Orientation::from_exif)
-                        .unwrap_or(Orientation::NoTransforms),
+                    orientation: stated.and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms),
                     first_of: kind_if_several(properties.pages, "TIFF of several pages"),
                     colour: profile_tag(properties.profile.map(<[u8]>::to_vec)),
                     depth: code_depth(properties.bits),
@@ -129,8 +123,7 @@ impl FileFacts {
 }
 
 fn exif_orientation(exif: Option<&[u8]>) -> Orientation {
-    exif.and_then(Orientation::from_exif_chunk)
-        .unwrap_or(Orientation::NoTransforms)
+    exif.and_then(Orientation::from_exif_chunk).unwrap_or(Orientation::NoTransforms)
 }
 
 fn kind_if_several(pictures: usize, kind: &'static str) -> Option<&'static str> {
@@ -142,11 +135,7 @@ fn profile_tag(profile: Option<Vec<u8>>) -> ColourTag {
 }
 
 fn code_depth(bits: u64) -> Depth {
-    if bits == 16 {
-        Depth::Sixteen
-    } else {
-        Depth::Eight
-    }
+    if bits == 16 { Depth::Sixteen } else { Depth::Eight }
 }
 
 /// Reason why a TIFF file is not supported; `None` if its tags show none.
@@ -161,7 +150,8 @@ fn unsupported_tiff(properties: &TiffProperties<'_>) -> Option<String> {
         ));
     }
     if properties.is_float {
-        let problem = "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
+        let problem =
+            "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
         return Some(problem.to_owned());
     }
     let colours = properties.colours?;
@@ -194,6 +184,5 @@ fn no_end_mark(file: &[u8]) -> String {
 
 /// The fault of a file that is shorter than `complete_length` bytes; `None` if it is not.
 fn truncation(file: &[u8], complete_length: u64) -> Option<String> {
-    (complete_length > file.len() as u64)
-        .then(|| format!("the file ends at byte {} of {complete_length}", file.len()))
+    (complete_length > file.len() as u64).then(|| format!("the file ends at byte {} of {complete_length}", file.len()))
 }

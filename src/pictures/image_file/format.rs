@@ -37,12 +37,7 @@ const UNSUPPORTED: [(usize, &[u8], &str, &str); 23] = [
     (4, b"ftyphevc", HEIC, CONVERT),
     (4, b"ftyphevx", HEIC, CONVERT),
     (4, b"ftypmif1", "a HEIF image (HEIC or AVIF)", CONVERT),
-    (
-        4,
-        b"ftypmsf1",
-        "a HEIF image sequence (HEIC or AVIF)",
-        CONVERT,
-    ),
+    (4, b"ftypmsf1", "a HEIF image sequence (HEIC or AVIF)", CONVERT),
     (4, b"ftypcrx ", "a camera's RAW file (CR3)", DEVELOP),
     (4, b"JXL \r\n", "a JPEG XL image", CONVERT),
     (0, b"\xFF\x0A", "a JPEG XL image", CONVERT),
@@ -66,9 +61,8 @@ impl FileFormat {
     /// # Errors
     /// If the format is not supported. The error names it, if known, and the remedy.
     pub fn detect(file: &[u8]) -> Result<Self, String> {
-        if let Some((.., name, remedy)) = UNSUPPORTED
-            .iter()
-            .find(|(offset, signature, ..)| has_signature(file, *offset, signature))
+        if let Some((.., name, remedy)) =
+            UNSUPPORTED.iter().find(|(offset, signature, ..)| has_signature(file, *offset, signature))
         {
             return Err(format!("{name}, which is not read; {remedy}"));
         }
@@ -133,8 +127,7 @@ impl FileFormat {
 }
 
 fn has_signature(file: &[u8], offset: usize, signature: &[u8]) -> bool {
-    file.get(offset..)
-        .is_some_and(|rest| rest.starts_with(signature))
+    file.get(offset..).is_some_and(|rest| rest.starts_with(signature))
 }
 
 #[cfg(test)]
@@ -143,35 +136,17 @@ mod tests {
 
     #[test]
     fn formats_are_known_by_their_first_bytes() {
-        assert_eq!(
-            FileFormat::detect(b"\xFF\xD8\xFF\xE0"),
-            Ok(FileFormat::Jpeg)
-        );
-        assert_eq!(
-            FileFormat::detect(b"RIFF\x10\0\0\0WEBPVP8 "),
-            Ok(FileFormat::WebP)
-        );
+        assert_eq!(FileFormat::detect(b"\xFF\xD8\xFF\xE0"), Ok(FileFormat::Jpeg));
+        assert_eq!(FileFormat::detect(b"RIFF\x10\0\0\0WEBPVP8 "), Ok(FileFormat::WebP));
         assert_eq!(FileFormat::detect(b"MM\0*\0\0\0\x08"), Ok(FileFormat::Tiff));
         assert_eq!(FileFormat::detect(b"BM\x36\0\0\0"), Ok(FileFormat::Bmp));
         for (file, expected) in [
-            (
-                &b"\0\0\0\x18ftypheic\0\0\0\0"[..],
-                "HEIC image, which is not read; convert",
-            ),
-            (
-                b"\0\0\0\x1cftypavif\0\0\0\0",
-                "AVIF image, which is not read; convert",
-            ),
+            (&b"\0\0\0\x18ftypheic\0\0\0\0"[..], "HEIC image, which is not read; convert"),
+            (b"\0\0\0\x1cftypavif\0\0\0\0", "AVIF image, which is not read; convert"),
             (b"\0\0\0\x18ftypmif1", "HEIC or AVIF"),
-            (
-                b"II*\0\x10\0\0\0CR\x02\0",
-                "RAW file (CR2), which is not read; develop",
-            ),
+            (b"II*\0\x10\0\0\0CR\x02\0", "RAW file (CR2), which is not read; develop"),
             (b"GIF89a", "GIF"),
-            (
-                b"RIFF\x10\0\0\0WAVE",
-                "not an image: PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected",
-            ),
+            (b"RIFF\x10\0\0\0WAVE", "not an image: PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected"),
             (b"", "the file is empty"),
             (b"ab", "not an image"),
         ] {

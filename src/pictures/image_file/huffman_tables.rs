@@ -10,8 +10,8 @@ const HUFFMAN_TABLES: u8 = 0xC4;
 /// Frame headers of sequential Huffman coding (SOF0 and SOF1).
 const SEQUENTIAL: [u8; 2] = [0xC0, 0xC1];
 
-/// The file with the standard Huffman tables before its first scan, if the scan uses one that the file does not define. Cameras that deliver
-/// Motion JPEG over USB leave them out.
+/// The file with the standard Huffman tables before its first scan, if the scan uses one that the file does not define.
+/// Cameras that deliver Motion JPEG over USB leave them out.
 pub(super) fn with_standard_tables(file: &[u8]) -> Cow<'_, [u8]> {
     let mut segments = Segments(file);
     let (mut is_sequential, mut defined) = (false, Vec::new());
@@ -21,10 +21,7 @@ pub(super) fn with_standard_tables(file: &[u8]) -> Cow<'_, [u8]> {
             defined.extend(table_ids(segment));
         }
         if marker == START_OF_SCAN {
-            let missing: Vec<&StandardTable> = STANDARD
-                .iter()
-                .filter(|table| !defined.contains(&table.id))
-                .collect();
+            let missing: Vec<&StandardTable> = STANDARD.iter().filter(|table| !defined.contains(&table.id)).collect();
             let used = used_tables(segment);
             if !is_sequential || !missing.iter().any(|table| used.contains(&table.id)) {
                 break;
@@ -54,12 +51,7 @@ fn table_ids(mut segment: &[u8]) -> Vec<u8> {
 /// Classes and numbers of the tables that a scan uses (ITU-T T.81, section B.2.3).
 fn used_tables(scan: &[u8]) -> Vec<u8> {
     let components = usize::from(scan.first().copied().unwrap_or(0));
-    scan.iter()
-        .skip(2)
-        .step_by(2)
-        .take(components)
-        .flat_map(|numbers| [numbers >> 4, AC | (numbers & 15)])
-        .collect()
+    scan.iter().skip(2).step_by(2).take(components).flat_map(|numbers| [numbers >> 4, AC | (numbers & 15)]).collect()
 }
 
 /// Class of the tables for AC coefficients; that for DC coefficients is 0.
@@ -78,14 +70,7 @@ impl StandardTable {
     /// The segment that defines the table.
     fn segment(&self) -> Vec<u8> {
         let length = (2 + 1 + 16 + self.values.len() as u16).to_be_bytes();
-        [
-            &[0xFF, HUFFMAN_TABLES][..],
-            &length,
-            &[self.id],
-            &self.counts,
-            self.values,
-        ]
-        .concat()
+        [&[0xFF, HUFFMAN_TABLES][..], &length, &[self.id], &self.counts, self.values].concat()
     }
 }
 
@@ -141,12 +126,8 @@ mod tests {
     /// A baseline JPEG of 32 × 24 pixels with the standard tables.
     fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let samples: Vec<u8> = (0..32 * 24 * channels)
-            .map(|i| (i * 7 % 251) as u8)
-            .collect();
-        jpeg_encoder::Encoder::new(&mut bytes, 90)
-            .encode(&samples, 32, 24, color)
-            .unwrap();
+        let samples: Vec<u8> = (0..32 * 24 * channels).map(|i| (i * 7 % 251) as u8).collect();
+        jpeg_encoder::Encoder::new(&mut bytes, 90).encode(&samples, 32, 24, color).unwrap();
         bytes
     }
 
@@ -191,29 +172,17 @@ mod tests {
         let grey = without_tables(&grey, |id| matches!(id, 0 | AC));
         assert!(matches!(with_standard_tables(&grey), Cow::Borrowed(_)));
         let mut progressive = without_tables(&whole, |_| false);
-        let frame = progressive
-            .windows(2)
-            .position(|two| two == [0xFF, 0xC0])
-            .unwrap();
+        let frame = progressive.windows(2).position(|two| two == [0xFF, 0xC0]).unwrap();
         progressive[frame + 1] = 0xC2;
-        assert!(matches!(
-            with_standard_tables(&progressive),
-            Cow::Borrowed(_)
-        ));
+        assert!(matches!(with_standard_tables(&progressive), Cow::Borrowed(_)));
     }
 
     #[test]
     fn damaged_files_are_not_changed() {
         let whole = without_tables(&jpeg(jpeg_encoder::ColorType::Rgb, 3), |_| false);
-        let scan = whole
-            .windows(2)
-            .position(|two| two == [0xFF, START_OF_SCAN])
-            .unwrap();
+        let scan = whole.windows(2).position(|two| two == [0xFF, START_OF_SCAN]).unwrap();
         for length in 0..scan + 4 {
-            assert!(matches!(
-                with_standard_tables(&whole[..length]),
-                Cow::Borrowed(_)
-            ));
+            assert!(matches!(with_standard_tables(&whole[..length]), Cow::Borrowed(_)));
         }
     }
 }

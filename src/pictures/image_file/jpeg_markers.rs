@@ -1,7 +1,7 @@
 //! Facts of a JPEG file from its markers: [`JpegProperties`], and the check for its end marker: [`has_end`].
 //!
-//! The decoder converts CMYK to RGB without the ICC profile, and fills the missing part of a truncated file with grey. Both must be
-//! detected here, because models would be asked about the wrong image.
+//! The decoder converts CMYK to RGB without the ICC profile, and fills the missing part of a truncated file with grey.
+//! Both must be detected here, because models would be asked about the wrong image.
 
 /// Start of the segment with the EXIF data (EXIF 2.32, section 4.5.5).
 const EXIF: &[u8] = b"Exif\0\0";
@@ -99,9 +99,7 @@ impl<'a> Iterator for Segments<'a> {
 
 /// The next marker, and the bytes after it. In coded samples, 0xFF is followed by 0.
 fn next_marker(bytes: &[u8]) -> Option<(u8, &[u8])> {
-    let at = bytes
-        .windows(2)
-        .position(|two| two[0] == 0xFF && !matches!(two[1], 0 | 0xFF))?;
+    let at = bytes.windows(2).position(|two| two[0] == 0xFF && !matches!(two[1], 0 | 0xFF))?;
     Some((bytes[at + 1], &bytes[at + 2..]))
 }
 

@@ -73,12 +73,7 @@ impl<'a> ColourChunks<'a> {
             b"sRGB" => self.is_srgb = true,
             b"gAMA" => self.gamma.exponent = four.map(|bytes| u32::from_be_bytes(*bytes)),
             b"cHRM" => {
-                let numbers: Vec<u32> = data
-                    .as_chunks::<4>()
-                    .0
-                    .iter()
-                    .map(|four| u32::from_be_bytes(*four))
-                    .collect();
+                let numbers: Vec<u32> = data.as_chunks::<4>().0.iter().map(|four| u32::from_be_bytes(*four)).collect();
                 self.gamma.primaries = numbers.try_into().ok();
             }
             _ => {}
@@ -97,7 +92,8 @@ impl<'a> ColourChunks<'a> {
     }
 }
 
-/// The file without chunks that do not affect the samples, because the decoder would decompress profiles and texts of any size.
+/// The file without chunks that do not affect the samples, because the decoder would decompress profiles and texts of
+/// any size.
 pub(super) fn without_metadata(file: &[u8]) -> Cow<'_, [u8]> {
     const NEEDED: [&[u8; 4]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"];
     let mut chunks = Chunks::new(file);
@@ -157,11 +153,6 @@ impl<'a> Iterator for Chunks<'a> {
         let (checksum, rest) = rest.split_first_chunk::<4>()?;
         let (kind, data) = body.split_first_chunk::<4>()?;
         self.0 = rest;
-        Some(Chunk {
-            kind,
-            data,
-            body,
-            checksum: u32::from_be_bytes(*checksum),
-        })
+        Some(Chunk { kind, data, body, checksum: u32::from_be_bytes(*checksum) })
     }
 }

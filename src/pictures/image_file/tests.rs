@@ -8,9 +8,7 @@ fn image_file(bytes: Vec<u8>, place: impl Into<String>) -> ImageFile {
 
 fn png(image: &DynamicImage) -> ImageFile {
     let mut bytes = Vec::new();
-    image
-        .write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png)
-        .unwrap();
+    image.write_to(&mut Cursor::new(&mut bytes), ImageFormat::Png).unwrap();
     image_file(bytes, "test.png")
 }
 
@@ -18,39 +16,22 @@ fn png(image: &DynamicImage) -> ImageFile {
 fn grey_and_opaque_alpha_become_rgb() {
     let grey = png(&GrayImage::from_raw(2, 1, vec![7, 9]).unwrap().into());
     assert_eq!(grey.decode().unwrap().samples(), [7, 7, 7, 9, 9, 9]);
-    let opaque = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 255])
-        .unwrap()
-        .into());
+    let opaque = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 255]).unwrap().into());
     assert_eq!(opaque.decode().unwrap().samples(), [1, 2, 3]);
 }
 
 #[test]
 fn sixteen_bits_become_the_nearest_eight() {
-    let deep =
-        image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 1, vec![0, 32_896, 65_535]).unwrap();
-    assert_eq!(
-        png(&deep.into()).decode().unwrap().samples(),
-        [0, 0, 0, 128, 128, 128, 255, 255, 255]
-    );
+    let deep = image::ImageBuffer::<image::Luma<u16>, _>::from_raw(3, 1, vec![0, 32_896, 65_535]).unwrap();
+    assert_eq!(png(&deep.into()).decode().unwrap().samples(), [0, 0, 0, 128, 128, 128, 255, 255, 255]);
 }
 
 #[test]
 fn unsupported_images_are_refused_by_name() {
     let transparent = png(&RgbaImage::from_raw(1, 1, vec![1, 2, 3, 9]).unwrap().into());
-    assert!(
-        transparent
-            .decode()
-            .unwrap_err()
-            .to_string()
-            .contains("transparent")
-    );
+    assert!(transparent.decode().unwrap_err().to_string().contains("transparent"));
     let text = image_file(b"no image".to_vec(), "a.png");
-    assert!(
-        text.check()
-            .unwrap_err()
-            .to_string()
-            .starts_with("a.png: not an image")
-    );
+    assert!(text.check().unwrap_err().to_string().starts_with("a.png: not an image"));
 }
 
 #[test]
@@ -74,10 +55,7 @@ fn the_pixel_limit_can_be_changed() {
     picture.decode().unwrap();
     picture.rule.max_pixels = 4095;
     let error = picture.decode().unwrap_err().to_string();
-    assert!(
-        error.contains("64 × 64 pixels") && error.contains("--decode max-pixels"),
-        "{error}"
-    );
+    assert!(error.contains("64 × 64 pixels") && error.contains("--decode max-pixels"), "{error}");
 }
 
 /// The error for bytes that are not a complete image; one line that begins with the file name.
@@ -104,10 +82,7 @@ fn a_corrupt_png_is_named() {
     for at in end - 4..end {
         let mut flipped = bytes.clone();
         flipped[at] ^= 1;
-        assert!(
-            decoding_error(flipped).contains("checksum"),
-            "checksum at {at}"
-        );
+        assert!(decoding_error(flipped).contains("checksum"), "checksum at {at}");
     }
     for length in [data + 9, end - 4, end, end + 4, end + 8, end + 11] {
         let cut = decoding_error(bytes[..length].to_vec());
@@ -119,9 +94,7 @@ fn a_corrupt_png_is_named() {
 fn jpeg(color: jpeg_encoder::ColorType, channels: usize) -> Vec<u8> {
     let mut bytes = Vec::new();
     let samples: Vec<u8> = (0..32 * 32 * channels).map(|i| (i * 7) as u8).collect();
-    jpeg_encoder::Encoder::new(&mut bytes, 90)
-        .encode(&samples, 32, 32, color)
-        .unwrap();
+    jpeg_encoder::Encoder::new(&mut bytes, 90).encode(&samples, 32, 32, color).unwrap();
     bytes
 }
 
@@ -132,9 +105,7 @@ fn cmyk_jpeg(color: jpeg_encoder::ColorType, inks: [u8; 4], profile: Option<&[u8
     if let Some(profile) = profile {
         encoder.add_icc_profile(profile).unwrap();
     }
-    encoder
-        .encode(&inks.repeat(32 * 32), 32, 32, color)
-        .unwrap();
+    encoder.encode(&inks.repeat(32 * 32), 32, 32, color).unwrap();
     bytes
 }
 
@@ -143,10 +114,7 @@ fn assert_near(file: &ImageFile, expected: [u8; 3]) {
     let rgb = file.decode().unwrap();
     assert_eq!((rgb.width(), rgb.height()), (32, 32));
     for pixel in rgb.samples().as_chunks::<3>().0 {
-        let is_near = pixel
-            .iter()
-            .zip(expected)
-            .all(|(found, code)| found.abs_diff(code) <= 3);
+        let is_near = pixel.iter().zip(expected).all(|(found, code)| found.abs_diff(code) <= 3);
         assert!(is_near, "{pixel:?}, not {expected:?}");
     }
 }
@@ -156,11 +124,9 @@ fn inks_become_rgb_with_a_note() {
     use jpeg_encoder::ColorType::{Cmyk, CmykAsYcck};
     // The encoder takes 255 for full ink, and writes Adobe's marker.
     for color in [Cmyk, CmykAsYcck] {
-        for (inks, expected) in [
-            ([0, 0, 0, 0], [255, 255, 255]),
-            ([255, 0, 0, 0], [0, 255, 255]),
-            ([40, 90, 200, 60], [164, 126, 42]),
-        ] {
+        for (inks, expected) in
+            [([0, 0, 0, 0], [255, 255, 255]), ([255, 0, 0, 0], [0, 255, 255]), ([40, 90, 200, 60], [164, 126, 42])]
+        {
             let file = image_file(cmyk_jpeg(color, inks, None), "a.jpg");
             assert_near(&file, expected);
             assert_eq!(file.check().unwrap(), (32, 32));
@@ -187,10 +153,7 @@ fn inks_without_the_adobe_marker_are_not_inverted() {
 fn a_broken_cmyk_profile_is_named_and_can_be_ignored() {
     let file = cmyk_jpeg(jpeg_encoder::ColorType::Cmyk, [0; 4], Some(b"no profile"));
     let problem = decoding_error(file.clone());
-    assert!(
-        problem.contains("ICC profile") && problem.contains("--decode colour=ignore"),
-        "{problem}"
-    );
+    assert!(problem.contains("ICC profile") && problem.contains("--decode colour=ignore"), "{problem}");
     let mut file = image_file(file, "a.jpg");
     file.rule.colour = ColourRule::Ignore;
     assert_near(&file, [255, 255, 255]);
@@ -198,10 +161,7 @@ fn a_broken_cmyk_profile_is_named_and_can_be_ignored() {
 
 #[test]
 fn grey_and_rgb_files_have_no_inks() {
-    for (color, channels) in [
-        (jpeg_encoder::ColorType::Rgb, 3),
-        (jpeg_encoder::ColorType::Luma, 1),
-    ] {
+    for (color, channels) in [(jpeg_encoder::ColorType::Rgb, 3), (jpeg_encoder::ColorType::Luma, 1)] {
         let (bytes, place) = (jpeg(color, channels), String::new());
         let file = image_file(bytes, place);
         assert!(file.decode().is_ok() && file.note().colour.is_none());

@@ -1,8 +1,8 @@
 //! Parser for the tags of the first image in a TIFF file: [`TiffProperties`].
 //!
-//! The decoder of the crate `tiff` is not enough here. It returns no tags if it cannot decode the first image (a camera's RAW file, a
-//! mask, a broken file). It returns no tag longer than 1 MiB, and some ICC profiles are longer. For some compressions it decodes
-//! the missing part of a truncated file as if it were samples.
+//! The decoder of the crate `tiff` is not enough here. It returns no tags if it cannot decode the first image (a
+//! camera's RAW file, a mask, a broken file). It returns no tag longer than 1 MiB, and some ICC profiles are longer.
+//! For some compressions it decodes the missing part of a truncated file as if it were samples.
 //!
 //! The format is that of TIFF 6.0, section 2, and BigTIFF as in libtiff.
 
@@ -11,7 +11,8 @@ use std::collections::BTreeSet;
 /// Maximum number of directories counted after the first (chosen). The limit also ends a circular chain.
 const MAX_PAGES: usize = 10_000;
 
-/// Maximum number of entries of a directory that are read (chosen): real ones have fewer than 100. A stated count may be any number.
+/// Maximum number of entries of a directory that are read (chosen): real ones have fewer than 100. A stated count may
+/// be any number.
 const MAX_ENTRIES: u64 = 4096;
 
 /// Maximum number of values read from a tag (chosen). The tallest image has fewer strips, even at one row per strip.
@@ -92,10 +93,7 @@ impl<'a> TiffProperties<'a> {
         properties.is_raw = is_preview || directory.iter().any(|entry| entry.tag == DNG_VERSION);
         properties.is_float = value(SAMPLE_FORMAT) == Some(FLOAT);
         properties.unread_compression = value(COMPRESSION).and_then(unread_compression);
-        for (offsets, counts) in [
-            (STRIP_OFFSETS, STRIP_BYTE_COUNTS),
-            (TILE_OFFSETS, TILE_BYTE_COUNTS),
-        ] {
+        for (offsets, counts) in [(STRIP_OFFSETS, STRIP_BYTE_COUNTS), (TILE_OFFSETS, TILE_BYTE_COUNTS)] {
             let end = reader
                 .values(&directory, offsets)
                 .zip(reader.values(&directory, counts))
@@ -183,17 +181,9 @@ impl<'a> Reader<'a> {
     /// Opens a file. Returns its reader and the offset of the first directory; `None` if the header is truncated.
     fn open(file: &'a [u8]) -> Option<(Self, u64)> {
         let is_big_endian = file.starts_with(b"MM");
-        let mut reader = Self {
-            file,
-            is_big_endian,
-            is_big_tiff: false,
-        };
+        let mut reader = Self { file, is_big_endian, is_big_tiff: false };
         reader.is_big_tiff = reader.read_uint(2, 2)? == 43;
-        let first = if reader.is_big_tiff {
-            reader.read_uint(8, 8)?
-        } else {
-            reader.read_uint(4, 4)?
-        };
+        let first = if reader.is_big_tiff { reader.read_uint(8, 8)? } else { reader.read_uint(4, 4)? };
         Some((reader, first))
     }
 
@@ -211,7 +201,8 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Reads the entries of a directory and the offset of the next one (0 after the last); `None` at offset 0 or if an entry is truncated.
+    /// Reads the entries of a directory and the offset of the next one (0 after the last); `None` at offset 0 or if an
+    /// entry is truncated.
     fn directory(&self, at: u64) -> Option<(Vec<Entry>, u64)> {
         if at == 0 {
             return None;
@@ -223,24 +214,12 @@ impl<'a> Reader<'a> {
         let mut entries = Vec::new();
         let mut entry = at.checked_add(count_size as u64)?;
         for _ in 0..count {
-            let (tag, value_type) = (
-                self.read_uint(entry, 2)? as u16,
-                self.read_uint(entry + 2, 2)? as u16,
-            );
+            let (tag, value_type) = (self.read_uint(entry, 2)? as u16, self.read_uint(entry + 2, 2)? as u16);
             let count = self.read_uint(entry + 4, offset_size)?;
             let inline = entry + 4 + offset_size as u64;
             let length = count.saturating_mul(size_of_type(value_type));
-            let offset = if length <= offset_size as u64 {
-                inline
-            } else {
-                self.read_uint(inline, offset_size)?
-            };
-            entries.push(Entry {
-                tag,
-                value_type,
-                count,
-                offset,
-            });
+            let offset = if length <= offset_size as u64 { inline } else { self.read_uint(inline, offset_size)? };
+            entries.push(Entry { tag, value_type, count, offset });
             entry = entry.checked_add(entry_size)?;
         }
         Some((entries, self.read_uint(entry, offset_size).unwrap_or(0)))
@@ -257,9 +236,8 @@ impl<'a> Reader<'a> {
     /// Reads the values of a tag as unsigned integers, up to the end of the file; none if the directory lacks the tag.
     fn values(&self, directory: &[Entry], tag: u16) -> impl Iterator<Item = u64> {
         let entry = directory.iter().find(|entry| entry.tag == tag);
-        let (offset, count, size) = entry.map_or((0, 0, 1), |entry| {
-            (entry.offset, entry.count, size_of_type(entry.value_type))
-        });
+        let (offset, count, size) =
+            entry.map_or((0, 0, 1), |entry| (entry.offset, entry.count, size_of_type(entry.value_type)));
         (0..count.min(MAX_VALUES))
             .map(move |index| offset.checked_add(index * size))
             .map_while(move |offset| self.read_uint(offset?, size as usize))

@@ -58,29 +58,13 @@ fn every_integer_is_read() {
         ("<i2", vec![0xfe, 0xff, 2, 1], [-2, 258]),
         ("<u2", vec![0xfe, 0xff, 2, 1], [65_534, 258]),
         ("<i4", [[0xff; 4], [1, 0, 1, 0]].concat(), [-1, 65_537]),
-        (
-            "<u4",
-            [[0xff; 4], [1, 0, 1, 0]].concat(),
-            [4_294_967_295, 65_537],
-        ),
-        (
-            "<i8",
-            [[0xff; 8], [9, 0, 0, 0, 0, 0, 0, 0]].concat(),
-            [-1, 9],
-        ),
-        (
-            "<u8",
-            [[0xff; 8], [9, 0, 0, 0, 0, 0, 0, 0]].concat(),
-            [u64::MAX.into(), 9],
-        ),
+        ("<u4", [[0xff; 4], [1, 0, 1, 0]].concat(), [4_294_967_295, 65_537]),
+        ("<i8", [[0xff; 8], [9, 0, 0, 0, 0, 0, 0, 0]].concat(), [-1, 9]),
+        ("<u8", [[0xff; 8], [9, 0, 0, 0, 0, 0, 0, 0]].concat(), [u64::MAX.into(), 9]),
     ] {
         let bytes = array(descr, "(2, 1)", &data);
         let npy = Npy::parse(&bytes).unwrap();
-        assert_eq!(
-            npy.integers().unwrap().collect::<Vec<_>>(),
-            expected,
-            "{descr}"
-        );
+        assert_eq!(npy.integers().unwrap().collect::<Vec<_>>(), expected, "{descr}");
         assert!(npy.floats().is_err());
     }
 }
@@ -104,10 +88,7 @@ fn errors_name_the_unsupported_property() {
         (array("|u1", "()", &[0]), "[]"),
         (array("|u1", "(1 1)", &[0]), "its header is not"),
         (array("|u1", "(1, -1)", &[0]), "its header is not"),
-        (
-            array("|u1", "(99999999999999999999, 1)", &[0]),
-            "its header is not",
-        ),
+        (array("|u1", "(99999999999999999999, 1)", &[0]), "its header is not"),
         (array("<u8", "(4611686018427387904, 4)", &[]), "not a whole"),
         (array("|u1", "(2, 2)", &[0; 3]), "not a whole"),
         (array("|u1", "(2, 2)", &[0; 5]), "not a whole"),

@@ -35,7 +35,8 @@ impl Depth {
 }
 
 impl Layout {
-    /// The layout of an encoding, by its name in ROS or Foxglove. `8UC3` and `8UC4` have the channel order of OpenCV (BGR).
+    /// The layout of an encoding, by its name in ROS or Foxglove. `8UC3` and `8UC4` have the channel order of OpenCV
+    /// (BGR).
     ///
     /// # Errors
     /// If the encoding is unknown, or its numbers are not colours.
@@ -62,9 +63,7 @@ impl Layout {
             "bayer_gbrg" => (1, Order::Mosaic([1, 0])),
             "bayer_bggr" => (1, Order::Mosaic([1, 1])),
             "16UC1" | "32FC1" => {
-                return Err(format!(
-                    "encoding {encoding:?} is depth or another measure, not an image"
-                ));
+                return Err(format!("encoding {encoding:?} is depth or another measure, not an image"));
             }
             _ => {
                 return Err(format!(
@@ -72,10 +71,6 @@ impl Layout {
                 ));
             }
         };
-        Ok(Self {
-            channels,
-            depth,
-            order,
-        })
+        Ok(Self { channels, depth, order })
     }
 }

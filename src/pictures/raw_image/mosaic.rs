@@ -10,14 +10,10 @@ pub(super) trait RawSample: Sample + Into<u32> + TryFrom<u32> {}
 impl RawSample for u8 {}
 impl RawSample for u16 {}
 
-/// Appends the RGB samples of a Bayer mosaic. A missing colour of a site is the rounded mean of the two or four nearest sites with that
-/// colour; beyond an edge, rows and columns are mirrored. `red` is the row and column (0 or 1) of the first red site.
-pub(super) fn demosaic<T: RawSample>(
-    sites: &[T],
-    width: usize,
-    red: [usize; 2],
-    samples: &mut Vec<T>,
-) {
+/// Appends the RGB samples of a Bayer mosaic. A missing colour of a site is the rounded mean of the two or four nearest
+/// sites with that colour; beyond an edge, rows and columns are mirrored. `red` is the row and column (0 or 1) of the
+/// first red site.
+pub(super) fn demosaic<T: RawSample>(sites: &[T], width: usize, red: [usize; 2], samples: &mut Vec<T>) {
     let height = sites.len() / width;
     for y in 0..height {
         let [above, below] = neighbours(y, height).map(|row| &sites[row * width..][..width]);
@@ -50,11 +46,7 @@ fn mean<T: RawSample>(sites: [T; 4]) -> T {
 fn neighbours(i: usize, count: usize) -> [usize; 2] {
     let last = count - 1;
     let before = if i == 0 { 1.min(last) } else { i - 1 };
-    let after = if i == last {
-        last.saturating_sub(1)
-    } else {
-        i + 1
-    };
+    let after = if i == last { last.saturating_sub(1) } else { i + 1 };
     [before, after]
 }
 
@@ -74,12 +66,7 @@ mod tests {
     }
 
     /// A mosaic with the values `value(row, column, channel)`.
-    fn mosaic(
-        width: usize,
-        height: usize,
-        red: [usize; 2],
-        value: impl Fn(usize, usize, usize) -> u16,
-    ) -> Vec<u16> {
+    fn mosaic(width: usize, height: usize, red: [usize; 2], value: impl Fn(usize, usize, usize) -> u16) -> Vec<u16> {
         (0..height)
             .flat_map(|y| (0..width).map(move |x| (y, x)))
             .map(|(y, x)| value(y, x, channel(y, x, red)))
@@ -90,9 +77,7 @@ mod tests {
     fn constant_colours_stay_constant_to_the_border() {
         for red in PATTERNS {
             for (width, height) in [(2, 2), (3, 5), (8, 6)] {
-                let sites = mosaic(width, height, red, |_, _, channel| {
-                    [10, 500, 65535][channel]
-                });
+                let sites = mosaic(width, height, red, |_, _, channel| [10, 500, 65535][channel]);
                 let mut samples = Vec::new();
                 demosaic(&sites, width, red, &mut samples);
                 assert_eq!(samples, [10, 500, 65535].repeat(width * height), "{red:?}");
@@ -105,9 +90,7 @@ mod tests {
     fn pixels_are_means_of_their_neighbours() {
         let (width, height) = (9, 7);
         for red in PATTERNS {
-            let sites = mosaic(width, height, red, |y, x, _| {
-                ((y * 31 + x * 17) % 64) as u16
-            });
+            let sites = mosaic(width, height, red, |y, x, _| ((y * 31 + x * 17) % 64) as u16);
             let mut samples = Vec::new();
             demosaic(&sites, width, red, &mut samples);
             for (y, x) in (1..height - 1).flat_map(|y| (1..width - 1).map(move |x| (y, x))) {

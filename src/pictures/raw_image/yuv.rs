@@ -20,8 +20,8 @@ pub(super) enum YuvLayout {
 }
 
 impl YuvLayout {
-    /// The layout of an encoding, by its name in ROS, Foxglove or V4L2; `None` if it is not one of YUV. ROS names UYVY `yuv422`
-    /// (`sensor_msgs/image_encodings.hpp`).
+    /// The layout of an encoding, by its name in ROS, Foxglove or V4L2; `None` if it is not one of YUV. ROS names UYVY
+    /// `yuv422` (`sensor_msgs/image_encodings.hpp`).
     pub(super) fn from_encoding(encoding: &str) -> Option<Self> {
         let packed = |luma, u, v| Self::Packed { luma, u, v };
         let planes = |shared, u| Self::Planes { shared, u };
@@ -40,17 +40,12 @@ impl YuvLayout {
         })
     }
 
-    /// Converts an image to RGB samples, with the chroma of the nearest pair. `step` is the number of bytes from the start of one row to the
-    /// start of the next.
+    /// Converts an image to RGB samples, with the chroma of the nearest pair. `step` is the number of bytes from the
+    /// start of one row to the start of the next.
     ///
     /// # Errors
     /// If the width is odd where two columns share their chroma, or the data are shorter than the size requires.
-    pub(super) fn decode(
-        self,
-        [width, height]: [usize; 2],
-        step: usize,
-        data: &[u8],
-    ) -> Result<Vec<u8>, String> {
+    pub(super) fn decode(self, [width, height]: [usize; 2], step: usize, data: &[u8]) -> Result<Vec<u8>, String> {
         let is_shared = !matches!(self, Self::Planes { shared: [1, _], .. });
         if is_shared && !width.is_multiple_of(2) {
             return Err(format!("{width} columns; an even number expected"));
@@ -76,7 +71,8 @@ impl YuvLayout {
             }
             Self::Planes { shared, u } => {
                 let chroma_rows = height.div_ceil(shared[1]);
-                // V4L2: a row of chroma has the length of a row of luma if two columns share a pair, else twice the length.
+                // V4L2: a row of chroma has the length of a row of luma if two columns share a pair, else twice the
+                // length.
                 let needed = |stride: usize| {
                     let chroma = (stride.saturating_mul(2) / shared[0]).saturating_mul(chroma_rows);
                     stride.saturating_mul(height).saturating_add(chroma)
@@ -106,8 +102,8 @@ impl YuvLayout {
     }
 }
 
-/// Converts a pixel by the matrix of BT.601 for the limited range (luma 16 to 235, chroma 16 to 240), in the integers of OpenCV
-/// (`ITUR_BT_602_CY` and following in `color_yuv.simd.hpp`), which `cv_bridge` uses.
+/// Converts a pixel by the matrix of BT.601 for the limited range (luma 16 to 235, chroma 16 to 240), in the integers
+/// of OpenCV (`ITUR_BT_602_CY` and following in `color_yuv.simd.hpp`), which `cv_bridge` uses.
 fn rgb(luma: u8, u: u8, v: u8) -> [u8; 3] {
     let luma = (i32::from(luma) - 16).max(0) * 1_220_542;
     let [u, v] = [u, v].map(|chroma| i32::from(chroma) - 128);
@@ -122,32 +118,20 @@ mod tests {
 
     /// Bytes that vary over the whole range.
     fn bytes(count: usize) -> Vec<u8> {
-        (0..count)
-            .map(|i| ((i * 7919 + i * i * 31) >> 3) as u8)
-            .collect()
+        (0..count).map(|i| ((i * 7919 + i * i * 31) >> 3) as u8).collect()
     }
 
-    fn decode(
-        encoding: &str,
-        [width, height]: [usize; 2],
-        step: usize,
-        data: &[u8],
-    ) -> Result<Vec<u8>, String> {
-        let image = RawImage {
-            width,
-            height,
-            step,
-            encoding: encoding.to_owned(),
-            is_big_endian: false,
-            data: data.into(),
-        };
+    fn decode(encoding: &str, [width, height]: [usize; 2], step: usize, data: &[u8]) -> Result<Vec<u8>, String> {
+        let image =
+            RawImage { width, height, step, encoding: encoding.to_owned(), is_big_endian: false, data: data.into() };
         match image.decode()? {
             RawPixels::Codes8(image) => Ok(image.samples().to_vec()),
             other @ RawPixels::Rgb16Image(_) => panic!("{other:?}"),
         }
     }
 
-    /// The samples are of `cv2.cvtColor` (OpenCV 5.0.0) with `COLOR_YUV2RGB_UYVY`, `_YUY2`, `_YVYU`, `_NV12` and `_NV21`.
+    /// The samples are of `cv2.cvtColor` (OpenCV 5.0.0) with `COLOR_YUV2RGB_UYVY`, `_YUY2`, `_YVYU`, `_NV12` and
+    /// `_NV21`.
     #[test]
     fn samples_are_those_of_opencv() {
         let packed = bytes(4 * 2 * 2);
@@ -158,8 +142,8 @@ mod tests {
                 8,
                 &packed,
                 [
-                    255, 232, 0, 255, 189, 0, 255, 122, 255, 255, 151, 255, 0, 26, 208, 0, 116,
-                    255, 63, 255, 255, 0, 178, 143,
+                    255, 232, 0, 255, 189, 0, 255, 122, 255, 255, 151, 255, 0, 26, 208, 0, 116, 255, 63, 255, 255, 0,
+                    178, 143,
                 ],
             ),
             (
@@ -167,8 +151,8 @@ mod tests {
                 8,
                 &packed,
                 [
-                    96, 0, 196, 255, 131, 255, 255, 107, 255, 255, 117, 255, 194, 255, 4, 0, 111,
-                    0, 115, 141, 255, 0, 0, 178,
+                    96, 0, 196, 255, 131, 255, 255, 107, 255, 255, 117, 255, 194, 255, 4, 0, 111, 0, 115, 141, 255, 0,
+                    0, 178,
                 ],
             ),
             (
@@ -176,8 +160,8 @@ mod tests {
                 8,
                 &packed,
                 [
-                    155, 0, 121, 255, 115, 255, 255, 117, 255, 255, 128, 255, 56, 255, 180, 0, 148,
-                    0, 255, 96, 105, 143, 0, 0,
+                    155, 0, 121, 255, 115, 255, 255, 117, 255, 255, 128, 255, 56, 255, 180, 0, 148, 0, 255, 96, 105,
+                    143, 0, 0,
                 ],
             ),
             (
@@ -185,8 +169,8 @@ mod tests {
                 4,
                 &planes,
                 [
-                    0, 59, 208, 49, 255, 255, 162, 255, 52, 144, 255, 35, 0, 251, 255, 0, 252, 255,
-                    147, 255, 37, 166, 255, 57,
+                    0, 59, 208, 49, 255, 255, 162, 255, 52, 144, 255, 35, 0, 251, 255, 0, 252, 255, 147, 255, 37, 166,
+                    255, 57,
                 ],
             ),
             (
@@ -194,17 +178,13 @@ mod tests {
                 4,
                 &planes,
                 [
-                    164, 0, 0, 255, 207, 0, 87, 255, 147, 69, 255, 130, 255, 156, 0, 255, 157, 0,
-                    72, 255, 132, 91, 255, 152,
+                    164, 0, 0, 255, 207, 0, 87, 255, 147, 69, 255, 130, 255, 156, 0, 255, 157, 0, 72, 255, 132, 91,
+                    255, 152,
                 ],
             ),
         ] {
             for encoding in encodings {
-                assert_eq!(
-                    decode(encoding, [4, 2], step, data).unwrap(),
-                    expected,
-                    "{encoding}"
-                );
+                assert_eq!(decode(encoding, [4, 2], step, data).unwrap(), expected, "{encoding}");
             }
         }
     }
@@ -225,10 +205,7 @@ mod tests {
         let chroma = |x: usize, y: usize| y / 2 * 2 + x / 2;
         let pairs = |columns: usize, rows: usize, swap: bool| {
             let mut data = luma.clone();
-            for (y, x) in (0..4)
-                .step_by(rows)
-                .flat_map(|y| (0..4).step_by(columns).map(move |x| (y, x)))
-            {
+            for (y, x) in (0..4).step_by(rows).flat_map(|y| (0..4).step_by(columns).map(move |x| (y, x))) {
                 let pair = [u[chroma(x, y)], v[chroma(x, y)]];
                 data.extend(if swap { [pair[1], pair[0]] } else { pair });
             }
@@ -237,12 +214,7 @@ mod tests {
         let quads = |order: [usize; 4]| {
             let mut data = Vec::new();
             for (y, x) in (0..4).flat_map(|y| [(y, 0), (y, 2)]) {
-                let quad = [
-                    luma[y * 4 + x],
-                    luma[y * 4 + x + 1],
-                    u[chroma(x, y)],
-                    v[chroma(x, y)],
-                ];
+                let quad = [luma[y * 4 + x], luma[y * 4 + x + 1], u[chroma(x, y)], v[chroma(x, y)]];
                 data.extend(order.map(|i| quad[i]));
             }
             data
@@ -268,33 +240,16 @@ mod tests {
             assert_eq!(found, expected, "{encoding}");
         }
         // Control: U and V are not exchanged without effect.
-        assert_ne!(
-            decode("nv21", [4, 4], 4, &pairs(2, 2, false)).unwrap(),
-            expected
-        );
+        assert_ne!(decode("nv21", [4, 4], 4, &pairs(2, 2, false)).unwrap(), expected);
     }
 
     #[test]
     fn padding_of_rows_is_skipped() {
         let data = bytes(6);
-        let padded = [
-            &data[..2],
-            &[9; 2],
-            &data[2..4],
-            &[9; 2],
-            &data[4..],
-            &[9; 2],
-        ]
-        .concat();
-        assert_eq!(
-            decode("nv12", [2, 2], 4, &padded),
-            decode("nv12", [2, 2], 2, &data)
-        );
+        let padded = [&data[..2], &[9; 2], &data[2..4], &[9; 2], &data[4..], &[9; 2]].concat();
+        assert_eq!(decode("nv12", [2, 2], 4, &padded), decode("nv12", [2, 2], 2, &data));
         let quad = [&data[..4], &[9; 4], &data[..4]].concat();
-        assert_eq!(
-            decode("uyvy", [2, 2], 8, &quad).unwrap(),
-            decode("uyvy", [2, 1], 4, &data[..4]).unwrap().repeat(2)
-        );
+        assert_eq!(decode("uyvy", [2, 2], 8, &quad).unwrap(), decode("uyvy", [2, 1], 4, &data[..4]).unwrap().repeat(2));
     }
 
     #[test]
@@ -305,13 +260,7 @@ mod tests {
             ("nv12", [2, 2], 2, 5, "nv12: 5 bytes; 2 × 2 pixels need 6"),
             ("nv12", [0, 0], 0, 0, "0 × 0 pixels"),
             ("nv24", [1, 1], usize::MAX, 2, "2 bytes"),
-            (
-                "uyvy",
-                [2, 1],
-                3,
-                4,
-                "rows of 3; 2 × 1 pixels need rows of 4",
-            ),
+            ("uyvy", [2, 1], 3, 4, "rows of 3; 2 × 1 pixels need rows of 4"),
             ("uyvy", [2, 2], 4, 7, "7 bytes"),
         ] {
             let problem = decode(encoding, size, step, &vec![0; bytes]).unwrap_err();

@@ -26,33 +26,13 @@ fn read(bytes: &[u8], forms: &[SampleForm]) -> Result<Vec<u16>, String> {
 #[test]
 fn palette_indices_stay_indices() {
     for (bits, data, expected) in [
-        (
-            BitDepth::Eight,
-            vec![0, 7, 255, 1, 2, 3],
-            [0, 7, 255, 1, 2, 3],
-        ),
-        (
-            BitDepth::Four,
-            vec![0x07, 0xf0, 0x12, 0x30],
-            [0, 7, 15, 1, 2, 3],
-        ),
-        (
-            BitDepth::Two,
-            vec![0b00_01_11_00, 0b01_10_11_00],
-            [0, 1, 3, 1, 2, 3],
-        ),
-        (
-            BitDepth::One,
-            vec![0b0110_0000, 0b1010_0000],
-            [0, 1, 1, 1, 0, 1],
-        ),
+        (BitDepth::Eight, vec![0, 7, 255, 1, 2, 3], [0, 7, 255, 1, 2, 3]),
+        (BitDepth::Four, vec![0x07, 0xf0, 0x12, 0x30], [0, 7, 15, 1, 2, 3]),
+        (BitDepth::Two, vec![0b00_01_11_00, 0b01_10_11_00], [0, 1, 3, 1, 2, 3]),
+        (BitDepth::One, vec![0b0110_0000, 0b1010_0000], [0, 1, 1, 1, 0, 1]),
     ] {
         let bytes = png([2, 3], ColorType::Indexed, bits, &data);
-        assert_eq!(
-            read(&bytes, &[SampleForm::Palette]).unwrap(),
-            expected,
-            "{bits:?}"
-        );
+        assert_eq!(read(&bytes, &[SampleForm::Palette]).unwrap(), expected, "{bits:?}");
     }
 }
 
@@ -60,12 +40,7 @@ fn palette_indices_stay_indices() {
 fn grey_samples_are_not_scaled() {
     let shallow = png([1, 2], ColorType::Grayscale, BitDepth::Eight, &[40, 255]);
     assert_eq!(read(&shallow, &[SampleForm::Grey8]).unwrap(), [40, 255]);
-    let deep = png(
-        [2, 1],
-        ColorType::Grayscale,
-        BitDepth::Sixteen,
-        &[1, 2, 255, 255],
-    );
+    let deep = png([2, 1], ColorType::Grayscale, BitDepth::Sixteen, &[1, 2, 255, 255]);
     let opened = RawPng::open(&deep, &[SampleForm::Grey16], 2).unwrap();
     assert_eq!(opened.size, (2, 1));
     assert_eq!(opened.samples(|sample| sample).unwrap(), [258, 65_535]);
@@ -73,53 +48,14 @@ fn grey_samples_are_not_scaled() {
 
 #[test]
 fn other_forms_are_refused_by_name() {
-    let (all, deep) = (
-        [SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette],
-        [SampleForm::Grey16],
-    );
+    let (all, deep) = ([SampleForm::Grey8, SampleForm::Grey16, SampleForm::Palette], [SampleForm::Grey16]);
     for (color, bits, size, forms, expected) in [
-        (
-            ColorType::Rgb,
-            BitDepth::Eight,
-            3,
-            &all[..],
-            "an RGB PNG of 8 bits; 8-bit grey or 16-bit grey or palette",
-        ),
-        (
-            ColorType::Rgba,
-            BitDepth::Sixteen,
-            8,
-            &all,
-            "an RGBA PNG of 16 bits",
-        ),
-        (
-            ColorType::GrayscaleAlpha,
-            BitDepth::Eight,
-            2,
-            &all,
-            "a grey-and-alpha PNG",
-        ),
-        (
-            ColorType::Grayscale,
-            BitDepth::Four,
-            1,
-            &all,
-            "a grey PNG of 4 bits",
-        ),
-        (
-            ColorType::Grayscale,
-            BitDepth::Eight,
-            1,
-            &deep,
-            "a grey PNG of 8 bits; 16-bit grey expected",
-        ),
-        (
-            ColorType::Indexed,
-            BitDepth::Eight,
-            1,
-            &deep,
-            "a palette PNG of 8 bits; 16-bit grey expected",
-        ),
+        (ColorType::Rgb, BitDepth::Eight, 3, &all[..], "an RGB PNG of 8 bits; 8-bit grey or 16-bit grey or palette"),
+        (ColorType::Rgba, BitDepth::Sixteen, 8, &all, "an RGBA PNG of 16 bits"),
+        (ColorType::GrayscaleAlpha, BitDepth::Eight, 2, &all, "a grey-and-alpha PNG"),
+        (ColorType::Grayscale, BitDepth::Four, 1, &all, "a grey PNG of 4 bits"),
+        (ColorType::Grayscale, BitDepth::Eight, 1, &deep, "a grey PNG of 8 bits; 16-bit grey expected"),
+        (ColorType::Indexed, BitDepth::Eight, 1, &deep, "a palette PNG of 8 bits; 16-bit grey expected"),
     ] {
         let problem = read(&png([1, 1], color, bits, &vec![0; size]), forms).unwrap_err();
         assert!(problem.contains(expected), "{problem}");
@@ -134,10 +70,7 @@ fn a_bomb_is_refused_before_it_is_decompressed() {
     bytes[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
     seal(&mut bytes);
     let problem = read(&bytes, &[SampleForm::Grey16]).unwrap_err();
-    assert!(
-        problem.starts_with("65536 × 65536 pixels are more"),
-        "{problem}"
-    );
+    assert!(problem.starts_with("65536 × 65536 pixels are more"), "{problem}");
 }
 
 #[test]
@@ -145,18 +78,9 @@ fn each_cause_of_a_refusal_has_its_own_error() {
     let deep = png([2, 1], ColorType::Grayscale, BitDepth::Sixteen, &[0; 4]);
     let grey_16 = [SampleForm::Grey16];
     assert!(RawPng::open(&deep, &grey_16, 2).is_ok_and(|png| png.size == (2, 1)));
-    assert!(matches!(
-        RawPng::open(&deep[..30], &grey_16, 2),
-        Err(RawPngError::Broken(_))
-    ));
-    assert!(matches!(
-        RawPng::open(&deep, &grey_16, 1),
-        Err(RawPngError::TooLarge(_))
-    ));
-    assert!(matches!(
-        RawPng::open(&deep, &[SampleForm::Grey8], 2),
-        Err(RawPngError::OtherForm(_))
-    ));
+    assert!(matches!(RawPng::open(&deep[..30], &grey_16, 2), Err(RawPngError::Broken(_))));
+    assert!(matches!(RawPng::open(&deep, &grey_16, 1), Err(RawPngError::TooLarge(_))));
+    assert!(matches!(RawPng::open(&deep, &[SampleForm::Grey8], 2), Err(RawPngError::OtherForm(_))));
 }
 
 /// Updates the checksum of the header after its content was changed.
@@ -167,9 +91,7 @@ fn seal(bytes: &mut [u8]) {
 
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, byte| {
-        (0..8).fold(crc ^ u32::from(*byte), |crc, _| {
-            (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }
-        })
+        (0..8).fold(crc ^ u32::from(*byte), |crc, _| (crc >> 1) ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 })
     })
 }
 

@@ -10,8 +10,8 @@ use crate::statistics::Segment;
 use darkqa_base::types::Question;
 
 impl Observation {
-    /// Answers a question with the index of a choice. `None` if no seen object decides it, or if the question is not one of the rulebook
-    /// (see [`is_in_rulebook`](super::is_in_rulebook)).
+    /// Answers a question with the index of a choice. `None` if no seen object decides it, or if the question is not
+    /// one of the rulebook (see [`is_in_rulebook`](super::is_in_rulebook)).
     #[must_use]
     pub fn answer(&self, question: &Question, rules: &Rules, palette: &Palette) -> Option<usize> {
         let answer = match QuestionTopic::from_question(question, rules.book())? {
@@ -21,25 +21,18 @@ impl Observation {
             QuestionTopic::Color(thing) => self.color(&thing, question, rules, palette),
             QuestionTopic::Closest => self.closest(question, rules),
         }?;
-        question
-            .choices
-            .texts()
-            .iter()
-            .position(|text| *text == answer)
+        question.choices.texts().iter().position(|text| *text == answer)
     }
 
-    /// Room type by the seen segments; if the rulebook gives none, the type with the highest score, unless several types share it.
+    /// Room type by the seen segments; if the rulebook gives none, the type with the highest score, unless several
+    /// types share it.
     fn room(&self, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let signs = classify(&self.statistics, book);
         signs.room.ok().or_else(|| {
             let highest = signs.scores.values().max()?;
-            let best: Vec<&String> = signs
-                .scores
-                .iter()
-                .filter(|(_, score)| *score == highest)
-                .map(|(room, _)| room)
-                .collect();
+            let best: Vec<&String> =
+                signs.scores.iter().filter(|(_, score)| *score == highest).map(|(room, _)| room).collect();
             match best[..] {
                 [room] if book.room.order.contains(room) => Some(room.clone()),
                 _ => None,
@@ -51,50 +44,33 @@ impl Observation {
     fn affordance(&self, activity: usize, rules: &Rules) -> Option<String> {
         let book = rules.book();
         let activity = book.activity.get(activity)?;
-        let enabled = activity.enablers.iter().any(|tokens| {
-            tokens
-                .iter()
-                .all(|token| self.statistics.has_token(token, book))
-        });
+        let enabled =
+            activity.enablers.iter().any(|tokens| tokens.iter().all(|token| self.statistics.has_token(token, book)));
         let yes = enabled || activity.rooms.contains(&self.room(rules)?);
         Some(yes_no(yes))
     }
 
-    /// Yes if the object is seen. No if it is not, although at least half of the area of all objects is seen: otherwise, the answers for a
-    /// black image would be no.
+    /// Yes if the object is seen. No if it is not, although at least half of the area of all objects is seen:
+    /// otherwise, the answers for a black image would be no.
     fn presence(&self, thing: &ThingWord, rules: &Rules) -> Option<String> {
-        let is_seen = self
-            .statistics
-            .segments
-            .iter()
-            .any(|segment| thing.matches(segment, rules.book()));
+        let is_seen = self.statistics.segments.iter().any(|segment| thing.matches(segment, rules.book()));
         (is_seen || self.sees_half(rules)).then(|| yes_no(is_seen))
     }
 
-    /// True if at least half of the area of the frame's objects is seen, or of all segments if the frame has no objects.
+    /// True if at least half of the area of the frame's objects is seen, or of all segments if the frame has no
+    /// objects.
     fn sees_half(&self, rules: &Rules) -> bool {
         let book = rules.book();
         let is_thing = |segment: &&Segment| !book.has_flag(&segment.class, ClassFlag::Structural);
         let has_things = self.frame.segments.iter().any(|segment| is_thing(&segment));
-        let [seen, all] =
-            [&self.statistics.segments, &self.frame.segments].map(|segments| -> u64 {
-                segments
-                    .iter()
-                    .filter(|segment| !has_things || is_thing(segment))
-                    .map(|segment| segment.area)
-                    .sum()
-            });
+        let [seen, all] = [&self.statistics.segments, &self.frame.segments].map(|segments| -> u64 {
+            segments.iter().filter(|segment| !has_things || is_thing(segment)).map(|segment| segment.area).sum()
+        });
         all > 0 && 2 * seen >= all
     }
 
     /// Colour of the largest segment with this word, among the colours offered; `None` if the segment is not seen.
-    fn color(
-        &self,
-        thing: &ThingWord,
-        question: &Question,
-        rules: &Rules,
-        palette: &Palette,
-    ) -> Option<String> {
+    fn color(&self, thing: &ThingWord, question: &Question, rules: &Rules, palette: &Palette) -> Option<String> {
         let largest = self
             .frame
             .segments
@@ -103,10 +79,8 @@ impl Observation {
             .max_by_key(|segment| (segment.area, std::cmp::Reverse(segment.id)))?;
         let color: &ColorPosterior = self.colors.get(&largest.id)?.as_ref()?;
         let texts = question.choices.texts();
-        let offered: Vec<Color> = Color::ALL
-            .into_iter()
-            .filter(|color| texts.iter().any(|text| text == color.name()))
-            .collect();
+        let offered: Vec<Color> =
+            Color::ALL.into_iter().filter(|color| texts.iter().any(|text| text == color.name())).collect();
         let color = color.name(palette, &offered)?;
         Some(color.name().to_owned())
     }
@@ -121,17 +95,12 @@ impl Observation {
             .iter()
             .filter(|segment| {
                 let word = segment.question_word(book);
-                book.has_flag(&segment.class, ClassFlag::Asked)
-                    && texts.iter().any(|text| Some(&**text) == word)
+                book.has_flag(&segment.class, ClassFlag::Asked) && texts.iter().any(|text| Some(&**text) == word)
             })
             .filter_map(|segment| Some((segment.reliable_depth(book)?, segment)))
             .collect();
-        let (_, nearest) = measured
-            .iter()
-            .min_by_key(|(depth, _)| (depth.median, depth.p10))?;
-        let has_two = measured
-            .iter()
-            .any(|(_, segment)| segment.class != nearest.class);
+        let (_, nearest) = measured.iter().min_by_key(|(depth, _)| (depth.median, depth.p10))?;
+        let has_two = measured.iter().any(|(_, segment)| segment.class != nearest.class);
         has_two.then(|| nearest.question_word(book).map(str::to_owned))?
     }
 }

@@ -1,15 +1,16 @@
 //! Geometry of the contrast measurements: [`Cells`] of a frame, and [`Element`]s of its outlines at three scales.
 //!
-//! The frame is cut into square cells. The pixels of one mask in one cell form a patch. A cell of the second or third scale consists of
-//! four or sixteen of the smallest cells, so that its sums are sums of theirs. A cell of the coarsest scale is a tile.
+//! The frame is cut into square cells. The pixels of one mask in one cell form a patch. A cell of the second or third
+//! scale consists of four or sixteen of the smallest cells, so that its sums are sums of theirs. A cell of the coarsest
+//! scale is a tile.
 
 use std::collections::BTreeMap;
 
 /// Number of the smallest cells along the shorter side of the frame (chosen).
 const CELLS: usize = 60;
 
-/// Sides of the cells of each scale, relative to the smallest. An observer that knows the signal averages over area: with a single scale,
-/// an enhancer that removes noise would appear to add evidence.
+/// Sides of the cells of each scale, relative to the smallest. An observer that knows the signal averages over area:
+/// with a single scale, an enhancer that removes noise would appear to add evidence.
 pub(super) const SCALES: [usize; 3] = [1, 2, TILE];
 
 /// Side of a tile, relative to the smallest cells.
@@ -94,9 +95,7 @@ impl Cells {
         let patches = &self.scales[0].patches;
         self.runs
             .iter()
-            .flat_map(|run| {
-                std::iter::repeat_n(patches[run.patch as usize].mask, run.length as usize)
-            })
+            .flat_map(|run| std::iter::repeat_n(patches[run.patch as usize].mask, run.length as usize))
             .collect()
     }
 }
@@ -125,10 +124,9 @@ fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<Run>, Vec<Patch>) {
             count,
         }));
         let numbers: BTreeMap<(usize, u32), usize> = counts.into_keys().zip(first..).collect();
-        runs.extend(found.into_iter().map(|(column, mask, length)| Run {
-            patch: numbers[&(column, mask)] as u32,
-            length,
-        }));
+        runs.extend(
+            found.into_iter().map(|(column, mask, length)| Run { patch: numbers[&(column, mask)] as u32, length }),
+        );
     }
     (runs, patches)
 }
@@ -143,14 +141,8 @@ impl Scale {
             *counts.entry((cell_of(patch.cell), patch.mask)).or_default() += patch.count;
         }
         let numbers: BTreeMap<(usize, u32), usize> = counts.keys().copied().zip(0..).collect();
-        let part_of = smallest
-            .iter()
-            .map(|patch| numbers[&(cell_of(patch.cell), patch.mask)] as u32)
-            .collect();
-        let patches: Vec<Patch> = counts
-            .into_iter()
-            .map(|((cell, mask), count)| Patch { cell, mask, count })
-            .collect();
+        let part_of = smallest.iter().map(|patch| numbers[&(cell_of(patch.cell), patch.mask)] as u32).collect();
+        let patches: Vec<Patch> = counts.into_iter().map(|((cell, mask), count)| Patch { cell, mask, count }).collect();
         let cells = patches.last().map_or(0, |last| last.cell + 1);
         Self {
             elements: elements(&patches, cells, side * scale, |cell| {
@@ -164,13 +156,9 @@ impl Scale {
     }
 }
 
-/// Returns the elements: patches for which the mask and the other pixels each cover at least 1/16 of the cell and three pixels.
-fn elements(
-    patches: &[Patch],
-    cells: usize,
-    side: usize,
-    tile_of: impl Fn(usize) -> usize,
-) -> Vec<Element> {
+/// Returns the elements: patches for which the mask and the other pixels each cover at least 1/16 of the cell and three
+/// pixels.
+fn elements(patches: &[Patch], cells: usize, side: usize, tile_of: impl Fn(usize) -> usize) -> Vec<Element> {
     let min_pixels = (side * side / 16).max(3) as u32;
     let mut totals = vec![0; cells];
     for patch in patches {
@@ -200,9 +188,7 @@ mod tests {
     #[test]
     fn cells_count_every_pixel_at_every_scale() {
         let [width, height] = [37, 29];
-        let masks: Vec<u32> = (0..width * height)
-            .map(|i: usize| (i % width / 9 + i / width / 11) as u32 % 3)
-            .collect();
+        let masks: Vec<u32> = (0..width * height).map(|i: usize| (i % width / 9 + i / width / 11) as u32 % 3).collect();
         let cells = Cells::from_masks(&masks, [width, height]);
         assert_eq!(cells.side, 4);
         assert_eq!(cells.mask_of_pixels(), masks);
@@ -213,11 +199,8 @@ mod tests {
                 let cell = i / width / side * width.div_ceil(side) + i % width / side;
                 *counts.entry((cell, *mask)).or_default() += 1;
             }
-            let found: BTreeMap<(usize, u32), u32> = scale
-                .patches
-                .iter()
-                .map(|patch| ((patch.cell, patch.mask), patch.count))
-                .collect();
+            let found: BTreeMap<(usize, u32), u32> =
+                scale.patches.iter().map(|patch| ((patch.cell, patch.mask), patch.count)).collect();
             assert_eq!(found, counts);
             assert!(scale.elements.iter().all(|element| element.mask > 0));
         }
@@ -225,12 +208,7 @@ mod tests {
 
     #[test]
     fn frames_without_an_outline_have_no_element() {
-        for (masks, size) in [
-            (vec![], [0, 0]),
-            (vec![1], [1, 1]),
-            (vec![1; 400], [20, 20]),
-            (vec![0; 400], [20, 20]),
-        ] {
+        for (masks, size) in [(vec![], [0, 0]), (vec![1], [1, 1]), (vec![1; 400], [20, 20]), (vec![0; 400], [20, 20])] {
             let cells = Cells::from_masks(&masks, size);
             assert!(cells.scales.iter().all(|scale| scale.elements.is_empty()));
         }

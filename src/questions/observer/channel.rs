@@ -1,12 +1,14 @@
 //! [`ChannelFit`]: effect of a degradation on the codes of one colour channel, estimated from one image.
 //!
-//! The tone curve is the increasing function of the untouched code that is nearest to the received codes (isotonic regression by pool
-//! adjacent violators: Ayer et al., Ann. Math. Stat. 26:641, 1955). The residual counts as noise. A global tone curve or gain therefore
-//! changes nothing, and content that an enhancer invents is noise, because it is not a function of the untouched code.
+//! The tone curve is the increasing function of the untouched code that is nearest to the received codes (isotonic
+//! regression by pool adjacent violators: Ayer et al., Ann. Math. Stat. 26:641, 1955). The residual counts as noise. A
+//! global tone curve or gain therefore changes nothing, and content that an enhancer invents is noise, because it is
+//! not a function of the untouched code.
 
 use super::tiles::{CODES, SameCode, TileSums, Tiles};
 
-/// Number of codes on either side over which the variance of a code is pooled, so that rare codes also have a variance (chosen).
+/// Number of codes on either side over which the variance of a code is pooled, so that rare codes also have a variance
+/// (chosen).
 const POOLED: usize = 8;
 
 /// Variance of rounding to whole codes, in codes squared.
@@ -34,11 +36,7 @@ pub(super) struct TileFit {
 
 impl Default for TileFit {
     fn default() -> Self {
-        Self {
-            gain: [1.0; 3],
-            noise: [1.0; 3],
-            is_disturbed: false,
-        }
+        Self { gain: [1.0; 3], noise: [1.0; 3], is_disturbed: false }
     }
 }
 
@@ -50,8 +48,8 @@ pub(super) struct Fit {
     pub(super) tiles: Vec<TileFit>,
     /// True if light and noise are fitted for each tile.
     pub(super) is_local: bool,
-    /// R² = 1 − Σ(R − P)² / Σ(R − mean)² over all pixels and channels, with one curve for the whole image; from 0 to 1, and 0 for a
-    /// constant image.
+    /// R² = 1 − Σ(R − P)² / Σ(R − mean)² over all pixels and channels, with one curve for the whole image; from 0 to 1,
+    /// and 0 for a constant image.
     pub(super) explained: f64,
 }
 
@@ -73,11 +71,7 @@ impl Fit {
             channels,
             tiles: vec![TileFit::default(); tiles.len()],
             is_local: false,
-            explained: if total > 0.0 {
-                (1.0 - residual / total).clamp(0.0, 1.0)
-            } else {
-                0.0
-            },
+            explained: if total > 0.0 { (1.0 - residual / total).clamp(0.0, 1.0) } else { 0.0 },
         }
     }
 }
@@ -97,12 +91,7 @@ pub(super) struct CodeTotals {
 
 impl Default for CodeTotals {
     fn default() -> Self {
-        Self {
-            weight: [0.0; CODES],
-            power: [0.0; CODES],
-            received: [0.0; CODES],
-            squares: [0.0; CODES],
-        }
+        Self { weight: [0.0; CODES], power: [0.0; CODES], received: [0.0; CODES], squares: [0.0; CODES] }
     }
 }
 
@@ -120,10 +109,7 @@ impl CodeTotals {
     /// Fits the curve, and the noise around it.
     fn fit(&self) -> ChannelFit {
         let curve = self.curve();
-        ChannelFit {
-            variance: self.noise(&curve),
-            curve,
-        }
+        ChannelFit { variance: self.noise(&curve), curve }
     }
 
     /// Fits the increasing curve nearest to the received codes; codes without pixels are interpolated linearly.
@@ -187,8 +173,7 @@ impl CodeTotals {
     fn residuals(&self, curve: &[f64; CODES]) -> [f64; CODES] {
         std::array::from_fn(|code| {
             let fitted = curve[code];
-            let sum = self.squares[code] - 2.0 * fitted * self.received[code]
-                + fitted * fitted * self.power[code];
+            let sum = self.squares[code] - 2.0 * fitted * self.received[code] + fitted * fitted * self.power[code];
             sum.max(0.0)
         })
     }
@@ -197,11 +182,7 @@ impl CodeTotals {
     fn total_squares(&self) -> f64 {
         let [weight, received, squares] =
             [&self.weight, &self.received, &self.squares].map(|sums| sums.iter().sum::<f64>());
-        if weight > 0.0 {
-            squares - received * received / weight
-        } else {
-            0.0
-        }
+        if weight > 0.0 { squares - received * received / weight } else { 0.0 }
     }
 }
 
@@ -226,22 +207,10 @@ mod tests {
     fn curve_is_the_isotonic_fit() {
         let found = fit(&[10, 10, 20, 30, 40], &[4, 6, 8, 7, 90]);
         let curve = &found.channels[0].curve;
-        for (code, value) in [
-            (0, 5.0),
-            (10, 5.0),
-            (15, 6.25),
-            (20, 7.5),
-            (25, 7.5),
-            (30, 7.5),
-            (35, 48.75),
-            (40, 90.0),
-            (255, 90.0),
-        ] {
-            assert!(
-                (curve[code] - value).abs() < 1e-9,
-                "{code}: {}",
-                curve[code]
-            );
+        for (code, value) in
+            [(0, 5.0), (10, 5.0), (15, 6.25), (20, 7.5), (25, 7.5), (30, 7.5), (35, 48.75), (40, 90.0), (255, 90.0)]
+        {
+            assert!((curve[code] - value).abs() < 1e-9, "{code}: {}", curve[code]);
         }
         // Residuals 1 and 1 at code 10, 0.5 at 20 and 30: pooled over the codes from 2 to 18.
         assert!((found.channels[0].variance[10] - 1.0).abs() < 1e-9);

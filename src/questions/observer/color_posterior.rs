@@ -1,4 +1,5 @@
-//! Untouched colour of an object, inferred from the received pixels and the light of its surroundings: [`ColorPosterior`].
+//! Untouched colour of an object, inferred from the received pixels and the light of its surroundings:
+//! [`ColorPosterior`].
 
 use super::cells::Cells;
 use super::channel::{ChannelFit, Fit, ROUNDING};
@@ -10,7 +11,8 @@ use crate::colors::{Color, Palette};
 /// Maximum standard deviation of an inferred code for naming a colour, in codes (chosen).
 const MAX_DEVIATION: f64 = 48.0;
 
-/// Standard deviation of the Gaussian weights of the surroundings of an object, relative to the longer side of the frame (chosen).
+/// Standard deviation of the Gaussian weights of the surroundings of an object, relative to the longer side of the
+/// frame (chosen).
 const KERNEL_WIDTH: f64 = 0.125;
 
 /// Ratio of the standard deviation of normal numbers to their median absolute deviation.
@@ -35,8 +37,8 @@ struct Posterior {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ColorPosterior([Posterior; 3]);
 
-/// Light on the objects of a frame, estimated from their surroundings. The pixels of the object itself are ignored: otherwise, the
-/// estimated light would give each object the expected colour.
+/// Light on the objects of a frame, estimated from their surroundings. The pixels of the object itself are ignored:
+/// otherwise, the estimated light would give each object the expected colour.
 pub(super) struct LightEstimate<'a> {
     cells: &'a Cells,
     tiles: &'a Tiles,
@@ -80,19 +82,8 @@ fn linear_terms(tile: [f64; 2], center: [f64; 2]) -> [f64; 3] {
 }
 
 impl<'a> LightEstimate<'a> {
-    pub(super) fn new(
-        cells: &'a Cells,
-        tiles: &'a Tiles,
-        sums: &'a [PatchSums],
-        fit: &'a Fit,
-    ) -> Self {
-        let mut light = Self {
-            cells,
-            tiles,
-            sums,
-            fit,
-            patches: Vec::new(),
-        };
+    pub(super) fn new(cells: &'a Cells, tiles: &'a Tiles, sums: &'a [PatchSums], fit: &'a Fit) -> Self {
+        let mut light = Self { cells, tiles, sums, fit, patches: Vec::new() };
         if fit.is_local {
             light.patches = light.undisturbed_patches();
         }
@@ -142,14 +133,8 @@ impl<'a> LightEstimate<'a> {
             .collect();
         let is_disturbed = |tile: usize| self.fit.tiles[tile].is_disturbed;
         let all_disturbed = patches.iter().all(|(tile, ..)| is_disturbed(*tile));
-        let patches: Vec<_> = patches
-            .into_iter()
-            .filter(|(tile, ..)| all_disturbed || !is_disturbed(*tile))
-            .collect();
-        let positions: Vec<[f64; 2]> = patches
-            .iter()
-            .map(|(tile, ..)| self.tiles.column_and_row(*tile))
-            .collect();
+        let patches: Vec<_> = patches.into_iter().filter(|(tile, ..)| all_disturbed || !is_disturbed(*tile)).collect();
+        let positions: Vec<[f64; 2]> = patches.iter().map(|(tile, ..)| self.tiles.column_and_row(*tile)).collect();
         if positions.is_empty() {
             return None;
         }
@@ -159,16 +144,14 @@ impl<'a> LightEstimate<'a> {
             let means = patches
                 .iter()
                 .zip(&gains)
-                .map(|((_, pixels, sums), gains)| {
-                    sums.received[channel] as f64 / pixels / gains[channel]
-                });
+                .map(|((_, pixels, sums), gains)| sums.received[channel] as f64 / pixels / gains[channel]);
             let gain = gains.iter().map(|gains| gains[channel]).sum::<f64>() / gains.len() as f64;
             Posterior::new(&self.fit.channels[channel], means.collect(), gain)
         })))
     }
 
-    /// Fits the light around the mean of these positions to the patches of all other masks, by local linear regression (Cleveland, J. Am.
-    /// Stat. Assoc. 74:829, 1979).
+    /// Fits the light around the mean of these positions to the patches of all other masks, by local linear regression
+    /// (Cleveland, J. Am. Stat. Assoc. 74:829, 1979).
     fn field_around(&self, mask: u32, positions: &[[f64; 2]]) -> LightField {
         let center = [0, 1].map(|axis| {
             let sum: f64 = positions.iter().map(|position| position[axis]).sum();
@@ -183,35 +166,21 @@ impl<'a> LightEstimate<'a> {
             let weight = patch.pixels * libm::exp(-0.5 * distance);
             for (channel, equations) in equations.iter_mut().enumerate() {
                 let (received, predicted) = (patch.received[channel], patch.predicted[channel]);
-                equations.add(
-                    &terms,
-                    weight * predicted * predicted,
-                    weight * predicted * received,
-                );
+                equations.add(&terms, weight * predicted * predicted, weight * predicted * received);
             }
         }
-        LightField {
-            center,
-            channels: equations.map(NormalEquations::solve),
-        }
+        LightField { center, channels: equations.map(NormalEquations::solve) }
     }
 }
 
 impl ColorPosterior {
     /// Most probable of the offered colours. `None` if a channel is too uncertain, or if no offered colour is possible.
     pub(super) fn name(&self, palette: &Palette, offered: &[Color]) -> Option<Color> {
-        if self
-            .0
-            .iter()
-            .any(|channel| channel.deviation > MAX_DEVIATION)
-        {
+        if self.0.iter().any(|channel| channel.deviation > MAX_DEVIATION) {
             return None;
         }
         let codes = [0, 1, 2].map(|channel| self.0[channel].mean.round() as u8);
-        palette
-            .color(codes)
-            .filter(|color| offered.contains(color))
-            .or_else(|| self.most_probable(palette, offered))
+        palette.color(codes).filter(|color| offered.contains(color)).or_else(|| self.most_probable(palette, offered))
     }
 
     /// Offered colour with the highest posterior probability; the first if several are equal.
@@ -221,8 +190,7 @@ impl ColorPosterior {
         for (r, red) in red.blocks.iter().enumerate() {
             for (g, green) in green.blocks.iter().enumerate() {
                 for (b, blue) in blue.blocks.iter().enumerate() {
-                    let color =
-                        palette.color([r, g, b].map(|block| (block * (256 / BLOCKS)) as u8));
+                    let color = palette.color([r, g, b].map(|block| (block * (256 / BLOCKS)) as u8));
                     if let Some(index) = offered.iter().position(|other| Some(*other) == color) {
                         masses[index] += red * green * blue;
                     }
@@ -240,13 +208,12 @@ impl ColorPosterior {
 }
 
 impl Posterior {
-    /// Computes the posterior of the untouched code for the median of these means, with a flat prior over all codes. The means are received
-    /// codes divided by the gain of the light.
+    /// Computes the posterior of the untouched code for the median of these means, with a flat prior over all codes.
+    /// The means are received codes divided by the gain of the light.
     fn new(fit: &ChannelFit, mut means: Vec<f64>, gain: f64) -> Self {
         let middle = median(&mut means);
         let mut distances: Vec<f64> = means.iter().map(|mean| (mean - middle).abs()).collect();
-        let error =
-            DEVIATION_PER_MAD * median(&mut distances) * MEDIAN_ERROR / (means.len() as f64).sqrt();
+        let error = DEVIATION_PER_MAD * median(&mut distances) * MEDIAN_ERROR / (means.len() as f64).sqrt();
         let variance = ROUNDING / (gain * gain) + error * error;
         let distances: [f64; 256] = std::array::from_fn(|code| {
             let difference = middle - fit.curve[code];
@@ -263,20 +230,11 @@ impl Posterior {
         for value in &mut likelihood {
             *value /= sum;
         }
-        let codes = likelihood
-            .iter()
-            .zip(0_u16..)
-            .map(|(p, code)| (p, f64::from(code)));
+        let codes = likelihood.iter().zip(0_u16..).map(|(p, code)| (p, f64::from(code)));
         let mean: f64 = codes.clone().map(|(p, code)| p * code).sum();
-        let variance: f64 = codes
-            .map(|(p, code)| p * (code - mean) * (code - mean))
-            .sum();
+        let variance: f64 = codes.map(|(p, code)| p * (code - mean) * (code - mean)).sum();
         let (blocks, _) = likelihood.as_chunks::<{ 256 / BLOCKS }>();
-        Self {
-            mean,
-            deviation: variance.sqrt(),
-            blocks: std::array::from_fn(|block| blocks[block].iter().sum()),
-        }
+        Self { mean, deviation: variance.sqrt(), blocks: std::array::from_fn(|block| blocks[block].iter().sum()) }
     }
 }
 

@@ -114,8 +114,8 @@ fn mosaic(image: &Rgb, side: usize) -> Rgb {
     mosaic
 }
 
-/// Shuffles the tiles by a random cyclic permutation (Sattolo 1986), so that none stays in place. At the right and lower edges, a tile is
-/// cut or its last pixels are repeated.
+/// Shuffles the tiles by a random cyclic permutation (Sattolo 1986), so that none stays in place. At the right and
+/// lower edges, a tile is cut or its last pixels are repeated.
 fn shuffle_tiles(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let side = TILE.min(width.min(height) / 3).max(1);
@@ -126,16 +126,13 @@ fn shuffle_tiles(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
     }
     remap(image, &|x, y| {
         let tile = order[y / side * columns + x / side];
-        let from = [
-            tile % columns * side + x % side,
-            tile / columns * side + y % side,
-        ];
+        let from = [tile % columns * side + x % side, tile / columns * side + y % side];
         [from[0].min(width - 1), from[1].min(height - 1)]
     })
 }
 
-/// Pink noise: a sum of noise fields, each twice as coarse as the one before, all with the same variance. It is scaled to a mean of 128 and
-/// a standard deviation of 50 codes.
+/// Pink noise: a sum of noise fields, each twice as coarse as the one before, all with the same variance. It is scaled
+/// to a mean of 128 and a standard deviation of 50 codes.
 fn pink_noise(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
     let [width, height] = [image.width(), image.height()];
     let mut noise = image.clone();
@@ -151,17 +148,13 @@ fn pink_noise(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
                 let [right, below] = [x % side, y % side].map(|rest| rest as f64 / side as f64);
                 let knot = y / side * columns + x / side;
                 let upper = knots[knot] * (1.0 - right) + knots[knot + 1] * right;
-                let lower =
-                    knots[knot + columns] * (1.0 - right) + knots[knot + columns + 1] * right;
+                let lower = knots[knot + columns] * (1.0 - right) + knots[knot + columns + 1] * right;
                 *value += upper * (1.0 - below) + lower * below;
             }
             side *= 2;
         }
         let mean = field.iter().sum::<f64>() / field.len() as f64;
-        let squares: f64 = field
-            .iter()
-            .map(|value| (value - mean) * (value - mean))
-            .sum();
+        let squares: f64 = field.iter().map(|value| (value - mean) * (value - mean)).sum();
         let scale = 50.0 / (squares / field.len() as f64).sqrt().max(1e-9);
         for (pixel, value) in noise.samples_mut().chunks_exact_mut(3).zip(field) {
             pixel[channel] = (128.5 + (value - mean) * scale).clamp(0.0, 255.0) as u8;
@@ -173,11 +166,7 @@ fn pink_noise(image: &Rgb, rng: &mut SplitMix64) -> Rgb {
 /// Blurs an image with three box filters along each axis.
 fn blur(image: &Rgb) -> Rgb {
     let [width, height] = [image.width(), image.height()];
-    let mut planes: Vec<f64> = image
-        .samples()
-        .iter()
-        .map(|code| f64::from(*code))
-        .collect();
+    let mut planes: Vec<f64> = image.samples().iter().map(|code| f64::from(*code)).collect();
     for _ in 0..3 {
         for start in (0..height).map(|row| row * width * 3) {
             for channel in 0..3 {
@@ -195,7 +184,8 @@ fn blur(image: &Rgb) -> Rgb {
     blurred
 }
 
-/// Replaces `count` values, `step` apart, by their means over [`BOX`] values; the end values are repeated beyond the ends.
+/// Replaces `count` values, `step` apart, by their means over [`BOX`] values; the end values are repeated beyond the
+/// ends.
 fn box_mean(values: &mut [f64], start: usize, step: usize, count: usize) {
     let line: Vec<f64> = (0..count).map(|i| values[start + i * step]).collect();
     let half = BOX as isize / 2;
@@ -210,9 +200,7 @@ fn box_mean(values: &mut [f64], start: usize, step: usize, count: usize) {
 
 /// Fills each mask of a frame with a random colour.
 fn random_masks(frame: &ObservedFrame, rng: &mut SplitMix64) -> Rgb {
-    let colours: Vec<[u8; 3]> = (0..=frame.cells.masks)
-        .map(|_| [0; 3].map(|_: u8| (rng.next() >> 56) as u8))
-        .collect();
+    let colours: Vec<[u8; 3]> = (0..=frame.cells.masks).map(|_| [0; 3].map(|_: u8| (rng.next() >> 56) as u8)).collect();
     let masks = frame.cells.mask_of_pixels();
     let mut image = frame.untouched.clone();
     for (pixel, mask) in image.samples_mut().chunks_exact_mut(3).zip(masks) {
@@ -229,10 +217,7 @@ fn draw_outlines(frame: &ObservedFrame) -> Rgb {
     for (i, pixel) in image.samples_mut().chunks_exact_mut(3).enumerate() {
         let right = (i % width + 1 < width).then_some(i + 1);
         let below = masks.get(i + width).map(|_| i + width);
-        let is_outline = [right, below]
-            .into_iter()
-            .flatten()
-            .any(|other| masks[other] != masks[i]);
+        let is_outline = [right, below].into_iter().flatten().any(|other| masks[other] != masks[i]);
         pixel.fill(if is_outline { 0 } else { 128 });
     }
     image

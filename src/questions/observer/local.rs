@@ -1,18 +1,20 @@
 //! Fit with light and noise that vary across the image: [`fit`].
 //!
-//! A single curve for all pixels fails if only a part of the image was changed. A covered corner would raise the noise everywhere, and
-//! uneven light would look like noise in every tile. This fit therefore estimates the curve together with a smooth light field, by
-//! iteratively reweighted least squares: the weight of a tile is the inverse of its mean squared residual, so tiles that contradict
-//! the curve count little (Huber and Ronchetti, *Robust Statistics*, 2009, chapter 7).
+//! A single curve for all pixels fails if only a part of the image was changed. A covered corner would raise the noise
+//! everywhere, and uneven light would look like noise in every tile. This fit therefore estimates the curve together
+//! with a smooth light field, by iteratively reweighted least squares: the weight of a tile is the inverse of its mean
+//! squared residual, so tiles that contradict the curve count little (Huber and Ronchetti, *Robust Statistics*, 2009,
+//! chapter 7).
 //!
-//! The tiles with contrast then vote. A tile agrees if its received contrast is between half and twice the predicted contrast. If fewer
-//! than half of them agree, the image shows something else, and the fit to all pixels is used. An image of another room therefore
-//! cannot be confirmed by a few tiles that look alike by chance.
+//! The tiles with contrast then vote. A tile agrees if its received contrast is between half and twice the predicted
+//! contrast. If fewer than half of them agree, the image shows something else, and the fit to all pixels is used. An
+//! image of another room therefore cannot be confirmed by a few tiles that look alike by chance.
 
 use super::channel::{ChannelFit, CodeTotals, Fit, ROUNDING, TileFit};
 use super::tiles::{CODES, TileSums, Tiles};
 
-/// Number of rounds before the light field is fitted (chosen). Covered tiles lose their weight first, so the field does not fit them.
+/// Number of rounds before the light field is fitted (chosen). Covered tiles lose their weight first, so the field does
+/// not fit them.
 const ROUNDS_WITHOUT_FIELD: usize = 3;
 
 /// Total number of rounds of reweighting (chosen).
@@ -24,39 +26,40 @@ const TERMS: usize = 6;
 /// Minimum gain of the light (chosen).
 pub(super) const MIN_GAIN: f64 = 0.02;
 
-/// Ratio of received to predicted contrast at which a tile agrees: from half-way between no contrast and the predicted contrast, to the
-/// inverse.
+/// Ratio of received to predicted contrast at which a tile agrees: from half-way between no contrast and the predicted
+/// contrast, to the inverse.
 const AGREEING: std::ops::RangeInclusive<f64> = 0.5..=2.0;
 
-/// Minimum signal-to-noise ratio of a tile's predicted contrast for the tile to contradict the prediction (chosen, as for an element of
-/// an outline).
+/// Minimum signal-to-noise ratio of a tile's predicted contrast for the tile to contradict the prediction (chosen, as
+/// for an element of an outline).
 const MIN_SNR: f64 = 6.8;
 
-/// Maximum ratio of a tile's mean squared residual to the median over all tiles (chosen). A tile is disturbed if it exceeds this ratio
-/// and [`MAX_UNEXPLAINED`].
+/// Maximum ratio of a tile's mean squared residual to the median over all tiles (chosen). A tile is disturbed if it
+/// exceeds this ratio and [`MAX_UNEXPLAINED`].
 const MAX_RESIDUAL: f64 = 9.0;
 
 /// Maximum ratio of a tile's sum of squared residuals to its squared predicted contrasts (chosen).
 const MAX_UNEXPLAINED: f64 = 0.25;
 
-/// Number of pixels with the expected noise that are added to each tile, to shrink its noise towards that of all tiles (chosen).
+/// Number of pixels with the expected noise that are added to each tile, to shrink its noise towards that of all tiles
+/// (chosen).
 const SHARED_PIXELS: f64 = 64.0;
 
-/// Fits the channels of a received image: tile by tile if enough tiles agree with one curve, else with one fit for all pixels.
+/// Fits the channels of a received image: tile by tile if enough tiles agree with one curve, else with one fit for all
+/// pixels.
 pub(super) fn fit(tiles: &Tiles, sums: &TileSums) -> Fit {
     let whole = Fit::whole(tiles, sums);
     by_tile(tiles, sums, &whole).unwrap_or(whole)
 }
 
-/// Fit with the light and noise of each tile; `None` unless at least half of the tiles with contrast agree. `whole` is the fit to all
-/// pixels, from which the iteration starts.
+/// Fit with the light and noise of each tile; `None` unless at least half of the tiles with contrast agree. `whole` is
+/// the fit to all pixels, from which the iteration starts.
 fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
     let curves = curves(tiles, sums, whole);
     let moments = moments(tiles, sums, &curves);
     let contrasts: Vec<Contrast> = moments.iter().map(Contrast::from_moments).collect();
-    let [agreeing, voting] = (0..tiles.len())
-        .filter(|tile| tiles.has_contrast(*tile))
-        .fold([0, 0], |[agreeing, voting], tile| {
+    let [agreeing, voting] =
+        (0..tiles.len()).filter(|tile| tiles.has_contrast(*tile)).fold([0, 0], |[agreeing, voting], tile| {
             let agrees = AGREEING.contains(&contrasts[tile].amplitude);
             [agreeing + usize::from(agrees), voting + 1]
         });
@@ -68,8 +71,7 @@ fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
         .iter()
         .enumerate()
         .map(|(tile, contrast)| {
-            contrast.is_disturbed(median_residual)
-                || tiles.has_contrast(tile) && contrast.contradicts_prediction()
+            contrast.is_disturbed(median_residual) || tiles.has_contrast(tile) && contrast.contradicts_prediction()
         })
         .collect();
     let channels = [0, 1, 2].map(|channel| {
@@ -79,31 +81,21 @@ fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
             codes.add(tiles.by_code(sums, tile, channel), gain, 1.0);
         }
         let curve = curves[channel];
-        ChannelFit {
-            variance: codes.noise(&curve),
-            curve,
-        }
+        ChannelFit { variance: codes.noise(&curve), curve }
     });
     let tile_fits = (0..tiles.len())
         .map(|tile| TileFit {
             gain: moments[tile].map(|moments| moments.gain()),
             noise: [0, 1, 2].map(|channel| {
                 let variance = &channels[channel].variance;
-                let expected: f64 = tiles
-                    .by_code(sums, tile, channel)
-                    .map(|same| same.count * variance[same.code].max(ROUNDING))
-                    .sum();
+                let expected: f64 =
+                    tiles.by_code(sums, tile, channel).map(|same| same.count * variance[same.code].max(ROUNDING)).sum();
                 moments[tile][channel].noise(expected)
             }),
             is_disturbed: disturbed[tile],
         })
         .collect();
-    Some(Fit {
-        tiles: tile_fits,
-        channels,
-        is_local: true,
-        explained: whole.explained,
-    })
+    Some(Fit { tiles: tile_fits, channels, is_local: true, explained: whole.explained })
 }
 
 /// Estimates the curve of each channel by iteratively reweighted least squares over the tiles, starting from `whole`.
@@ -120,24 +112,12 @@ fn curves(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> [[f64; CODES]; 3] {
             .iter()
             .zip(&gains)
             .map(|(moments, gains)| {
-                let residual: f64 = moments
-                    .iter()
-                    .zip(gains)
-                    .map(|(moments, gain)| moments.residual(*gain))
-                    .sum();
-                residual
-                    / moments
-                        .iter()
-                        .map(|moments| moments.pixels)
-                        .sum::<f64>()
-                        .max(1.0)
+                let residual: f64 = moments.iter().zip(gains).map(|(moments, gain)| moments.residual(*gain)).sum();
+                residual / moments.iter().map(|moments| moments.pixels).sum::<f64>().max(1.0)
             })
             .collect();
         let floor = f64::max(0.1 * median(residuals.iter().copied()), ROUNDING);
-        weights = residuals
-            .iter()
-            .map(|residual| 1.0 / (residual + floor))
-            .collect();
+        weights = residuals.iter().map(|residual| 1.0 / (residual + floor)).collect();
         curves = [0, 1, 2].map(|channel| {
             let mut codes = CodeTotals::default();
             for tile in 0..tiles.len() {
@@ -170,11 +150,7 @@ struct Moments {
 impl Moments {
     /// Least-squares gain of the light; 1 if nothing is predicted.
     fn gain(&self) -> f64 {
-        if self.power > 0.0 {
-            self.product / self.power
-        } else {
-            1.0
-        }
+        if self.power > 0.0 { self.product / self.power } else { 1.0 }
     }
 
     /// Sum of squared residuals at a given gain of the light.
@@ -182,7 +158,8 @@ impl Moments {
         (self.squares - 2.0 * gain * self.product + gain * gain * self.power).max(0.0)
     }
 
-    /// Ratio of the noise variance to the expected variance. `expected` is the sum of the expected variances of the pixels.
+    /// Ratio of the noise variance to the expected variance. `expected` is the sum of the expected variances of the
+    /// pixels.
     fn noise(&self, expected: f64) -> f64 {
         let shared = SHARED_PIXELS * expected / self.pixels.max(1.0);
         (self.residual(self.gain()) + shared) / (expected + shared).max(ROUNDING)
@@ -242,10 +219,10 @@ impl Contrast {
         }
     }
 
-    /// True if the residual exceeds the noise. `median_residual` is the median over all tiles of the mean squared residual.
+    /// True if the residual exceeds the noise. `median_residual` is the median over all tiles of the mean squared
+    /// residual.
     fn is_disturbed(&self, median_residual: f64) -> bool {
-        self.residual > MAX_RESIDUAL * median_residual
-            && self.residual * self.samples > MAX_UNEXPLAINED * self.power
+        self.residual > MAX_RESIDUAL * median_residual && self.residual * self.samples > MAX_UNEXPLAINED * self.power
     }
 
     /// True if the predicted contrast is strong enough to detect and the received contrast does not agree with it.
@@ -295,16 +272,13 @@ pub(super) struct NormalEquations<const N: usize> {
 
 impl<const N: usize> Default for NormalEquations<N> {
     fn default() -> Self {
-        Self {
-            matrix: [[0.0; N]; N],
-            right: [0.0; N],
-        }
+        Self { matrix: [[0.0; N]; N], right: [0.0; N] }
     }
 }
 
 impl<const N: usize> NormalEquations<N> {
-    /// Adds observations that share these terms: `power` is the sum of their squared predictors, `product` the sum of predictor ×
-    /// response.
+    /// Adds observations that share these terms: `power` is the sum of their squared predictors, `product` the sum of
+    /// predictor × response.
     pub(super) fn add(&mut self, terms: &[f64; N], power: f64, product: f64) {
         for (i, row) in self.matrix.iter_mut().enumerate() {
             for (j, value) in row.iter_mut().enumerate() {
@@ -314,8 +288,8 @@ impl<const N: usize> NormalEquations<N> {
         }
     }
 
-    /// Returns the coefficients; without observations, the constant term is 1 and the others are 0. A small ridge keeps terms near 0
-    /// that the observations do not determine.
+    /// Returns the coefficients; without observations, the constant term is 1 and the others are 0. A small ridge keeps
+    /// terms near 0 that the observations do not determine.
     pub(super) fn solve(mut self) -> [f64; N] {
         let total = self.matrix[0][0];
         let mut solution = [0.0; N];

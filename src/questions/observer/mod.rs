@@ -1,31 +1,33 @@
-//! Model observer: finds the answers that can still be read from an image if the frame is known, [`ObservedFrame`] and [`Observation`].
+//! Model observer: finds the answers that can still be read from an image if the frame is known, [`ObservedFrame`] and
+//! [`Observation`].
 //!
-//! The observer is signal-known-exactly and location-known (Barrett and Myers, *Foundations of Image Science*, 2004, chapter 13;
-//! Barrett, Yao, Rolland and Myers, "Model observers for assessment of image quality", PNAS 90:9758, 1993; Rose, J. Opt. Soc.
-//! Am. 38:196, 1948; Burgess, J. Opt. Soc. Am. A 16:633, 1999). It knows the masks, classes, depth and untouched pixels of a
-//! frame, but not the degradation, the enhancer or the answer. For each object it tests the hypothesis that the received pixels
-//! show this object:
+//! The observer is signal-known-exactly and location-known (Barrett and Myers, *Foundations of Image Science*, 2004,
+//! chapter 13; Barrett, Yao, Rolland and Myers, "Model observers for assessment of image quality", PNAS 90:9758, 1993;
+//! Rose, J. Opt. Soc. Am. 38:196, 1948; Burgess, J. Opt. Soc. Am. A 16:633, 1999). It knows the masks, classes, depth
+//! and untouched pixels of a frame, but not the degradation, the enhancer or the answer. For each object it tests the
+//! hypothesis that the received pixels show this object:
 //!
-//! 1. Channel (`channel`): fits an increasing curve from untouched to received codes for each colour channel; the residual is noise. A
-//!    global tone curve or gain therefore changes nothing, and content that an enhancer invents counts as noise.
-//! 2. Local light and noise (`local`): if most of the image agrees with one curve, the gain of the light and the noise are estimated for
-//!    each tile. Uneven light therefore changes little, and an occluder changes nothing elsewhere.
-//! 3. Outline (`cells`, `outlines`): compares the contrast of each element of the outline with the predicted one, at three scales. An
-//!    object is seen if at least half of the elements at one scale are confirmed.
-//! 4. Answer (`answers`): follows from the seen objects by the rules. Without a seen object that decides a question, there is no answer,
-//!    and the caller guesses.
+//! 1. Channel (`channel`): fits an increasing curve from untouched to received codes for each colour channel; the
+//!    residual is noise. A global tone curve or gain therefore changes nothing, and content that an enhancer invents
+//!    counts as noise.
+//! 2. Local light and noise (`local`): if most of the image agrees with one curve, the gain of the light and the noise
+//!    are estimated for each tile. Uneven light therefore changes little, and an occluder changes nothing elsewhere.
+//! 3. Outline (`cells`, `outlines`): compares the contrast of each element of the outline with the predicted one, at
+//!    three scales. An object is seen if at least half of the elements at one scale are confirmed.
+//! 4. Answer (`answers`): follows from the seen objects by the rules. Without a seen object that decides a question,
+//!    there is no answer, and the caller guesses.
 //!
-//! The result is the share of answers that a viewer who knows frame, position and appearance could still find by confirming each object
-//! piece by piece. It does not imply:
+//! The result is the share of answers that a viewer who knows frame, position and appearance could still find by
+//! confirming each object piece by piece. It does not imply:
 //!
 //! - that a model could do this: an exactly known signal is far more than a viewer knows;
-//! - an upper bound: the covariance is diagonal with two measured factors, half of an outline is a chosen threshold, and a viewer who uses
-//!   the interior of objects or knows rooms may do better;
-//! - that an enhancer destroyed evidence if its result is lower: sharpening and halos are not a function of the untouched code and smooth
-//!   light, so they count as noise.
+//! - an upper bound: the covariance is diagonal with two measured factors, half of an outline is a chosen threshold,
+//!   and a viewer who uses the interior of objects or knows rooms may do better;
+//! - that an enhancer destroyed evidence if its result is lower: sharpening and halos are not a function of the
+//!   untouched code and smooth light, so they count as noise.
 //!
-//! Changed geometry counts as another image: a shift by four pixels at 640×480 is enough. `controls` makes images without any evidence; the
-//! answers must then be guesses.
+//! Changed geometry counts as another image: a shift by four pixels at 640×480 is enough. `controls` makes images
+//! without any evidence; the answers must then be guesses.
 
 mod answers;
 mod cells;
@@ -90,7 +92,8 @@ impl ObservedFrame {
         })
     }
 
-    /// Observes a degraded or enhanced image of the frame. An image of another size is resampled to the size of the masks.
+    /// Observes a degraded or enhanced image of the frame. An image of another size is resampled to the size of the
+    /// masks.
     #[must_use]
     pub fn observe(&self, image: &Rgb) -> Observation {
         self.observe_with(image, MIN_CONFIRMED)
@@ -132,9 +135,7 @@ impl ObservedFrame {
     /// Statistics of the frame, with the seen segments only.
     fn seen_only(&self, seen: &BTreeMap<u32, Option<ColorPosterior>>) -> FrameStatistics {
         let mut statistics = (*self.statistics).clone();
-        statistics
-            .segments
-            .retain(|segment| seen.contains_key(&segment.id));
+        statistics.segments.retain(|segment| seen.contains_key(&segment.id));
         let (mut classes, mut words) = (BTreeMap::new(), BTreeMap::new());
         for segment in &statistics.segments {
             *classes.entry(segment.class.clone()).or_insert(0) += segment.area;
@@ -185,10 +186,7 @@ impl Observation {
     /// Number of objects that are detected by their whole outline. It does not affect the answers.
     #[must_use]
     pub fn detected_count(&self) -> usize {
-        self.outlines
-            .values()
-            .filter(|outline| outline.is_detected())
-            .count()
+        self.outlines.values().filter(|outline| outline.is_detected()).count()
     }
 
     /// True if the segment of this number is seen.
@@ -199,16 +197,11 @@ impl Observation {
 
     /// Number and class of each segment of the frame that is not tiny.
     pub fn segments(&self) -> impl Iterator<Item = (u32, &str)> {
-        self.frame
-            .segments
-            .iter()
-            .map(|segment| (segment.id, &*segment.class))
+        self.frame.segments.iter().map(|segment| (segment.id, &*segment.class))
     }
 
     /// Number of each object, confirmed share of its outline from 0 to 1, and z of the whole outline.
     pub fn outlines(&self) -> impl Iterator<Item = (u32, f64, f64)> {
-        self.outlines
-            .iter()
-            .map(|(id, outline)| (*id, outline.confirmed, outline.z))
+        self.outlines.iter().map(|(id, outline)| (*id, outline.confirmed, outline.z))
     }
 }

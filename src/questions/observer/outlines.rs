@@ -1,16 +1,18 @@
 //! [`Outline`]: comparison of the contrast along each outline with the one that the untouched frame predicts.
 //!
-//! In each element (the pixels of a mask, and all others, in one cell) the difference of the means is compared with the predicted one: a
-//! matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1 for the predicted contrast and 0 for
-//! none; its detectability d′ is the signal-to-noise ratio of the prediction. Noise is neither white nor independent along an outline. Two
-//! factors correct for this, each measured in the same image from the residual of the contrasts, and never below 1. They are
-//! measured separately for disturbed tiles, so that an object that covers a part of the image changes nothing elsewhere.
+//! In each element (the pixels of a mask, and all others, in one cell) the difference of the means is compared with the
+//! predicted one: a matched filter whose template is the prediction, whitened by measured variances. Its amplitude is 1
+//! for the predicted contrast and 0 for none; its detectability d′ is the signal-to-noise ratio of the prediction.
+//! Noise is neither white nor independent along an outline. Two factors correct for this, each measured in the same
+//! image from the residual of the contrasts, and never below 1. They are measured separately for disturbed tiles, so
+//! that an object that covers a part of the image changes nothing elsewhere.
 
 use super::cells::{Cells, Element, Scale};
 use super::channel::{Fit, ROUNDING, TileFit};
 use darkqa_base::types::Rgb;
 
-/// z that normal noise exceeds with probability 0.001 / 3: one false alarm in a thousand tests, over three scales (chosen).
+/// z that normal noise exceeds with probability 0.001 / 3: one false alarm in a thousand tests, over three scales
+/// (chosen).
 pub(super) const THRESHOLD: f64 = 3.402_932_835_385_304_3;
 
 /// Minimum amplitude: nearer to the predicted contrast (1) than to none (0).
@@ -19,8 +21,8 @@ const MIN_AMPLITUDE: f64 = 0.5;
 /// Minimum share of confirmed elements of the outline of a seen object (chosen).
 pub(super) const MIN_CONFIRMED: f64 = 0.5;
 
-/// Minimum number of elements of an object for a coarser scale to count, so that one lucky element is not enough (chosen). The finest scale
-/// always counts.
+/// Minimum number of elements of an object for a coarser scale to count, so that one lucky element is not enough
+/// (chosen). The finest scale always counts.
 const MIN_ELEMENTS: u32 = 3;
 
 /// Scale of fixed-point numbers, with 16 fractional bits. Fixed-point sums are exact and do not depend on the order.
@@ -48,36 +50,24 @@ impl PatchSums {
     /// Means of received codes, predicted codes and variances of a channel, over `count` pixels.
     pub(super) fn means(&self, channel: usize, count: f64) -> [f64; 3] {
         let [predicted, variance] = self.predicted[channel];
-        [
-            self.received[channel] as f64 / count,
-            predicted as f64 / FIXED / count,
-            variance as f64 / FIXED / count,
-        ]
+        [self.received[channel] as f64 / count, predicted as f64 / FIXED / count, variance as f64 / FIXED / count]
     }
 
     /// Returns the sums without those of a part.
     fn without(&self, part: &Self) -> Self {
         Self {
             received: [0, 1, 2].map(|i| self.received[i].saturating_sub(part.received[i])),
-            predicted: [0, 1, 2]
-                .map(|i| [0, 1].map(|j| self.predicted[i][j].saturating_sub(part.predicted[i][j]))),
+            predicted: [0, 1, 2].map(|i| [0, 1].map(|j| self.predicted[i][j].saturating_sub(part.predicted[i][j]))),
         }
     }
 }
 
 /// Sums over the patches of the smallest cells.
-pub(super) fn patch_sums(
-    cells: &Cells,
-    untouched: &[u8],
-    fit: &Fit,
-    image: &Rgb,
-) -> Vec<PatchSums> {
+pub(super) fn patch_sums(cells: &Cells, untouched: &[u8], fit: &Fit, image: &Rgb) -> Vec<PatchSums> {
     let tables: [[[u32; 2]; 256]; 3] = [0, 1, 2].map(|channel| {
         let fit = &fit.channels[channel];
         // The conversion to an integer saturates; curves exceed its range only in light near 0.
-        std::array::from_fn(|code| {
-            [fit.curve[code], fit.variance[code]].map(|value| (value * FIXED + 0.5) as u32)
-        })
+        std::array::from_fn(|code| [fit.curve[code], fit.variance[code]].map(|value| (value * FIXED + 0.5) as u32))
     });
     let mut sums = vec![PatchSums::default(); cells.scales[0].patches.len()];
     let (mut untouched, _) = untouched.as_chunks::<3>();
@@ -97,10 +87,7 @@ pub(super) fn patch_sums(
                 fitted[channel][1] += u64::from(variance);
             }
         }
-        sums[run.patch as usize].add(&PatchSums {
-            received: codes.map(u64::from),
-            predicted: fitted,
-        });
+        sums[run.patch as usize].add(&PatchSums { received: codes.map(u64::from), predicted: fitted });
     }
     sums
 }
@@ -115,7 +102,8 @@ pub(super) struct Outline {
 }
 
 impl Outline {
-    /// True if the object is detected by its whole outline. It does not affect the answers, because clutter may agree by chance.
+    /// True if the object is detected by its whole outline. It does not affect the answers, because clutter may agree
+    /// by chance.
     pub(super) fn is_detected(&self) -> bool {
         self.z >= THRESHOLD
     }
@@ -142,8 +130,8 @@ struct Contrast {
     variance: f64,
 }
 
-/// Matched filter of an element or an outline: sums over the channels, with p the predicted contrast, d the received contrast and v its
-/// variance.
+/// Matched filter of an element or an outline: sums over the channels, with p the predicted contrast, d the received
+/// contrast and v its variance.
 #[derive(Debug, Clone, Copy, Default)]
 struct MatchedFilter {
     /// Σ p d / v: output of the filter.
@@ -161,7 +149,8 @@ impl MatchedFilter {
         self.residual += other.residual;
     }
 
-    /// z of the filter if its variance is `inflation` times its power; `None` without power or if the amplitude is too small.
+    /// z of the filter if its variance is `inflation` times its power; `None` without power or if the amplitude is too
+    /// small.
     fn z(&self, inflation: f64) -> Option<f64> {
         let is_strong_enough = self.power > 0.0 && self.output >= MIN_AMPLITUDE * self.power;
         is_strong_enough.then(|| self.output / (inflation * self.power).sqrt())
@@ -169,13 +158,7 @@ impl MatchedFilter {
 }
 
 /// Measures the elements of one scale and updates the outlines that they confirm better than the other scales.
-fn measure_scale(
-    scale: &Scale,
-    sums: &[PatchSums],
-    tiles: &[TileFit],
-    min_elements: u32,
-    outlines: &mut [Outline],
-) {
+fn measure_scale(scale: &Scale, sums: &[PatchSums], tiles: &[TileFit], min_elements: u32, outlines: &mut [Outline]) {
     let filters = filters(scale, sums, tiles);
     let mut whole = vec![MatchedFilter::default(); outlines.len()];
     for (element, filter) in scale.elements.iter().zip(&filters) {
@@ -212,17 +195,12 @@ fn measure_scale(
 /// Ratio of the scatter of the outputs of filters to the scatter expected from their power; at least 1.
 fn inflation<'a>(filters: impl Iterator<Item = &'a MatchedFilter> + Clone) -> f64 {
     let power: f64 = filters.clone().map(|filter| filter.power).sum();
-    let squares: f64 = filters
-        .map(|filter| filter.residual * filter.residual)
-        .sum();
-    if power > 0.0 {
-        (squares / power).max(1.0)
-    } else {
-        1.0
-    }
+    let squares: f64 = filters.map(|filter| filter.residual * filter.residual).sum();
+    if power > 0.0 { (squares / power).max(1.0) } else { 1.0 }
 }
 
-/// Returns the filter of each element. The variance of each channel is first scaled by the excess scatter of its contrasts.
+/// Returns the filter of each element. The variance of each channel is first scaled by the excess scatter of its
+/// contrasts.
 fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<MatchedFilter> {
     let mut sums = vec![PatchSums::default(); scale.patches.len()];
     for (part, whole) in smallest.iter().zip(&scale.part_of) {
@@ -242,9 +220,7 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Matc
         .collect();
     let elements = scale.elements.iter().zip(&contrasts);
     let excess = [false, true].map(|is_disturbed| {
-        let alike = elements
-            .clone()
-            .filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
+        let alike = elements.clone().filter(|(element, _)| tiles[element.tile].is_disturbed == is_disturbed);
         [0, 1, 2].map(|channel| excess(alike.clone().map(|(_, contrast)| contrast[channel])))
     });
     elements
@@ -264,7 +240,8 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Matc
         .collect()
 }
 
-/// Ratio of the scatter of contrasts around the predicted ones to the scatter expected from their variances; at least 1.
+/// Ratio of the scatter of contrasts around the predicted ones to the scatter expected from their variances; at least
+/// 1.
 fn excess(contrasts: impl Iterator<Item = Contrast>) -> f64 {
     let [sum, count] = contrasts.fold([0.0, 0.0], |[sum, count], contrast| {
         let residual = contrast.received - contrast.predicted;
@@ -274,12 +251,7 @@ fn excess(contrasts: impl Iterator<Item = Contrast>) -> f64 {
 }
 
 /// Contrast of an element in each channel.
-fn contrast(
-    element: &Element,
-    inside: &PatchSums,
-    cell: &PatchSums,
-    tile: &TileFit,
-) -> [Contrast; 3] {
+fn contrast(element: &Element, inside: &PatchSums, cell: &PatchSums, tile: &TileFit) -> [Contrast; 3] {
     let outside = cell.without(inside);
     [0, 1, 2].map(|channel| {
         let [received, predicted, noise] = inside.means(channel, element.inside);

@@ -34,7 +34,8 @@ pub(crate) enum QuestionTopic {
 }
 
 impl QuestionTopic {
-    /// Parses the text of a question by the templates of the rulebook. The evidence is not read, because it contains the answer.
+    /// Parses the text of a question by the templates of the rulebook. The evidence is not read, because it contains
+    /// the answer.
     pub(crate) fn from_question(question: &Question, book: &RuleBook) -> Option<Self> {
         let text = question.text.trim();
         if text == book.room_type.text {
@@ -43,25 +44,17 @@ impl QuestionTopic {
         if text == book.closest.text {
             return Some(Self::Closest);
         }
-        let activity = book.activity.iter().position(|activity| {
-            text == book
-                .affordance
-                .text
-                .replace("{activity}", &activity.activity)
-        });
+        let activity = book
+            .activity
+            .iter()
+            .position(|activity| text == book.affordance.text.replace("{activity}", &activity.activity));
         if let Some(activity) = activity {
             return Some(Self::Activity(activity));
         }
         let word = |singular: &str, plural: &str| {
             book.class.iter().find_map(|(class, rule)| {
-                let word = rule
-                    .words
-                    .iter()
-                    .find(|word| text == book.fill_template(singular, plural, word))?;
-                Some(ThingWord {
-                    class: class.clone(),
-                    word: word.clone(),
-                })
+                let word = rule.words.iter().find(|word| text == book.fill_template(singular, plural, word))?;
+                Some(ThingWord { class: class.clone(), word: word.clone() })
             })
         };
         word(&book.presence.text, &book.presence.plural)

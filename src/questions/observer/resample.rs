@@ -27,11 +27,11 @@ pub fn area_mean(image: &Rgb, [width, height]: [usize; 2]) -> Cow<'_, Rgb> {
             samples.extend(sums.map(|sum| ((sum + whole / 2) / whole) as u8));
         }
     }
-    Rgb::new(height, width, samples)
-        .map_or_else(|_| Cow::Owned(Rgb::black(height, width)), Cow::Owned)
+    Rgb::new(height, width, samples).map_or_else(|_| Cow::Owned(Rgb::black(height, width)), Cow::Owned)
 }
 
-/// For each of `to` equal parts of `from` pixels, returns the covered pixels with their overlaps, in units of 1 / `to` pixel.
+/// For each of `to` equal parts of `from` pixels, returns the covered pixels with their overlaps, in units of 1 / `to`
+/// pixel.
 fn spans(from: usize, to: usize) -> Vec<Vec<(usize, u64)>> {
     (0..to)
         .map(|part: usize| {

@@ -12,11 +12,7 @@ const SIZE: [usize; 2] = [240, 180];
 /// Approximately normal draws: sums of twelve uniform ones.
 fn normal(seed: u64) -> impl FnMut() -> f64 {
     let frame = FrameId("noise".to_owned());
-    let picker = Picker {
-        seed,
-        dataset: "",
-        frame: &frame,
-    };
+    let picker = Picker { seed, dataset: "", frame: &frame };
     let mut state = picker.bits("", "") | 1;
     let mut uniform = move || {
         // Marsaglia's xorshift64 (2003).
@@ -42,11 +38,7 @@ fn discs(columns: usize, radius: f64) -> Vec<u32> {
             });
             let is_inside = dx * dx + dy * dy < radius * radius;
             let is_inside = is_inside && column < columns && (row + 1) * side <= height;
-            if is_inside {
-                2 + (row * columns + column) as u32
-            } else {
-                1
-            }
+            if is_inside { 2 + (row * columns + column) as u32 } else { 1 }
         })
         .collect()
 }
@@ -69,11 +61,7 @@ impl<'a> Untouched<'a> {
     fn new(masks: &[u32], image: &'a Rgb) -> Self {
         let cells = Cells::from_masks(masks, SIZE);
         let tiles = Tiles::new(image, TILE * cells.side);
-        Self {
-            image,
-            cells,
-            tiles,
-        }
+        Self { image, cells, tiles }
     }
 
     fn observe(&self, received: &Rgb) -> Vec<Outline> {
@@ -94,9 +82,7 @@ fn in_noise(untouched: &Rgb, deviation: f64, seed: u64) -> Rgb {
     let mut draw = normal(seed);
     let mut noisy = untouched.clone();
     for code in noisy.samples_mut() {
-        *code = (f64::from(*code) + deviation * draw())
-            .round()
-            .clamp(0.0, 255.0) as u8;
+        *code = (f64::from(*code) + deviation * draw()).round().clamp(0.0, 255.0) as u8;
     }
     noisy
 }
@@ -105,13 +91,7 @@ fn in_noise(untouched: &Rgb, deviation: f64, seed: u64) -> Rgb {
 fn z_is_contrast_over_noise_times_the_root_of_the_pixels() {
     let masks = discs(4, 22.0);
     let (contrast, deviation) = (24.0, 12.0);
-    let untouched = image(|i| {
-        if masks[i] > 1 {
-            120.0 + contrast
-        } else {
-            120.0
-        }
-    });
+    let untouched = image(|i| if masks[i] > 1 { 120.0 + contrast } else { 120.0 });
     let cells = Cells::from_masks(&masks, SIZE);
     // An element of n inside and m outside has as much as 1 / (1/n + 1/m) pixels, in each of three channels.
     let pixels = cells
@@ -136,10 +116,7 @@ fn z_is_contrast_over_noise_times_the_root_of_the_pixels() {
         .collect();
     let mean = found.iter().sum::<f64>() / found.len() as f64;
     // The factors of the noise are never below 1, so that with thirteen outlines z is some 6 % below, and never above.
-    assert!(
-        (0.92..1.02).contains(&(mean / expected)),
-        "{mean} {expected}"
-    );
+    assert!((0.92..1.02).contains(&(mean / expected)), "{mean} {expected}");
 }
 
 #[test]
@@ -159,28 +136,17 @@ fn contrast_is_seen_if_it_is_the_predicted_one() {
         (100.0, 150.0, false),
         (100.0, 100.0, false),
     ] {
-        assert_eq!(
-            seen(&step(inside, outside, 3)),
-            expected,
-            "{inside} {outside}"
-        );
+        assert_eq!(seen(&step(inside, outside, 3)), expected, "{inside} {outside}");
     }
 }
 
-/// Three discs of different untouched codes: a curve through two of them predicts the third, which has less contrast than that.
+/// Three discs of different untouched codes: a curve through two of them predicts the third, which has less contrast
+/// than that.
 #[test]
 fn less_than_half_of_the_predicted_contrast_is_not_confirmed() {
     let masks = discs(4, 22.0);
-    let codes: Vec<f64> = masks
-        .iter()
-        .map(|mask| {
-            if *mask > 1 && mask.is_multiple_of(2) {
-                180.0
-            } else {
-                100.0
-            }
-        })
-        .collect();
+    let codes: Vec<f64> =
+        masks.iter().map(|mask| if *mask > 1 && mask.is_multiple_of(2) { 180.0 } else { 100.0 }).collect();
     let untouched = image(|i| codes[i]);
     for (share, expected) in [(1.0, true), (0.8, true), (0.3, false), (0.0, false)] {
         let received = image(|i| {
@@ -225,8 +191,9 @@ fn noise_alone_shows_nothing() {
         }
     }
     assert!(things >= 10_000, "{things}");
-    // Twice the rate of false alarms that the tests allow. The noise that an outline shares is measured from the twelve outlines of
-    // the image, so that the z of a whole outline has the tails of Student's distribution; it decides no answer.
+    // Twice the rate of false alarms that the tests allow. The noise that an outline shares is measured from the twelve
+    // outlines of the image, so that the z of a whole outline has the tails of Student's distribution; it decides no
+    // answer.
     for (found, rate) in [(seen, 0.002), (detected, 0.005)] {
         let max = (rate * f64::from(things)) as u32;
         assert!(found.iter().sum::<u32>() <= max, "{found:?} of {things}");
@@ -246,9 +213,6 @@ fn frames_without_contrast_show_nothing() {
         (&vec![0; width * height], &untouched, &untouched),
     ] {
         let found = observe(masks, untouched, received);
-        assert!(
-            found.iter().all(|outline| outline.confirmed <= 0.0),
-            "{found:?}"
-        );
+        assert!(found.iter().all(|outline| outline.confirmed <= 0.0), "{found:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! Untouched codes of each tile of a frame, [`Tiles`], and received codes at the same pixels, [`TileSums`].
 //!
-//! A tile is a cell of the coarsest scale. The channels are estimated from the sums over the pixels of each tile, channel and untouched
-//! code, both for the whole frame and for any part of it.
+//! A tile is a cell of the coarsest scale. The channels are estimated from the sums over the pixels of each tile,
+//! channel and untouched code, both for the whole frame and for any part of it.
 
 use std::ops::Range;
 
@@ -124,9 +124,7 @@ impl Tiles {
         let bands = untouched.chunks(band).zip(received.chunks(band));
         for (first, (untouched, received)) in (0..).step_by(self.columns.max(1)).zip(bands) {
             for (untouched, received) in untouched.chunks(row).zip(received.chunks(row)) {
-                let pieces = untouched
-                    .chunks(self.side * 3)
-                    .zip(received.chunks(self.side * 3));
+                let pieces = untouched.chunks(self.side * 3).zip(received.chunks(self.side * 3));
                 for (sums, (untouched, received)) in row_of_tiles.iter_mut().zip(pieces) {
                     add(sums, untouched, received);
                 }
@@ -136,10 +134,7 @@ impl Tiles {
                     let codes = &self.codes[self.range(first + tile, channel)];
                     sums.extend(codes.iter().map(|code| {
                         let sums = std::mem::take(&mut table[usize::from(*code)]);
-                        CodeSums {
-                            received: sums.received as f64,
-                            squares: sums.squares as f64,
-                        }
+                        CodeSums { received: sums.received as f64, squares: sums.squares as f64 }
                     }));
                 }
             }
@@ -155,16 +150,14 @@ impl Tiles {
         channel: usize,
     ) -> impl Iterator<Item = SameCode> {
         let range = self.range(tile, channel);
-        self.codes[range.clone()]
-            .iter()
-            .zip(&self.counts[range.clone()])
-            .zip(&sums.0[range])
-            .map(|((code, count), sums)| SameCode {
+        self.codes[range.clone()].iter().zip(&self.counts[range.clone()]).zip(&sums.0[range]).map(
+            |((code, count), sums)| SameCode {
                 code: usize::from(*code),
                 count: f64::from(*count),
                 received: sums.received,
                 squares: sums.squares,
-            })
+            },
+        )
     }
 
     fn range(&self, tile: usize, channel: usize) -> Range<usize> {
@@ -174,14 +167,10 @@ impl Tiles {
 
 /// Variance of the codes in a histogram; 0 for an empty one.
 fn variance(counts: &[u32; CODES]) -> f64 {
-    let [n, sum, squares] =
-        counts
-            .iter()
-            .zip(0_u32..)
-            .fold([0.0; 3], |[n, sum, squares], (count, code)| {
-                let (count, code) = (f64::from(*count), f64::from(code));
-                [n + count, sum + count * code, squares + count * code * code]
-            });
+    let [n, sum, squares] = counts.iter().zip(0_u32..).fold([0.0; 3], |[n, sum, squares], (count, code)| {
+        let (count, code) = (f64::from(*count), f64::from(code));
+        [n + count, sum + count * code, squares + count * code * code]
+    });
     let n: f64 = f64::max(n, 1.0);
     squares / n - sum / n * (sum / n)
 }

@@ -20,18 +20,13 @@ impl RuleBook {
         }
         let percents = [measure.light_percent, measure.around_percent];
         if measure.light_rows == 0 || percents.iter().any(|percent| !(1..=100).contains(percent)) {
-            return Err(
-                "light_rows must be above 0, light_percent and around_percent 1 to 100".to_owned(),
-            );
+            return Err("light_rows must be above 0, light_percent and around_percent 1 to 100".to_owned());
         }
         self.check_classes()?;
         self.check_words()?;
         self.check_rooms()?;
         if !(2..=Choices::MOST).contains(&self.closest.choices) {
-            return Err(format!(
-                "closest.choices is {}; 2 to 26 expected",
-                self.closest.choices
-            ));
+            return Err(format!("closest.choices is {}; 2 to 26 expected", self.closest.choices));
         }
         for (family, text, blank) in [
             ("affordance.text", &self.affordance.text, "{activity}"),
@@ -51,9 +46,7 @@ impl RuleBook {
         if self.class.contains_key(class) {
             return Ok(());
         }
-        Err(format!(
-            "{place} names the class {class:?}, which [class] does not define"
-        ))
+        Err(format!("{place} names the class {class:?}, which [class] does not define"))
     }
 
     fn check_classes(&self) -> Result<(), String> {
@@ -79,7 +72,8 @@ impl RuleBook {
         Ok(())
     }
 
-    /// Checks that every asked class has a word, that no two classes share a word, and that `[words]` lists known words only.
+    /// Checks that every asked class has a word, that no two classes share a word, and that `[words]` lists known words
+    /// only.
     fn check_words(&self) -> Result<(), String> {
         let mut known = BTreeSet::new();
         for (class, rule) in &self.class {
@@ -90,14 +84,8 @@ impl RuleBook {
             if let Some(twice) = rule.words.iter().find(|word| !known.insert(word.as_str())) {
                 return Err(format!("class.{class} has the word {twice:?} again"));
             }
-            if let Some(other) = rule
-                .hidden
-                .iter()
-                .find(|other| !self.class.contains_key(*other))
-            {
-                return Err(format!(
-                    "class.{class}.hidden names the class {other:?}, which [class] does not define"
-                ));
+            if let Some(other) = rule.hidden.iter().find(|other| !self.class.contains_key(*other)) {
+                return Err(format!("class.{class}.hidden names the class {other:?}, which [class] does not define"));
             }
         }
         let unknown = self
@@ -133,45 +121,26 @@ impl RuleBook {
                 return Err(format!("the room {room:?} has no clue"));
             }
         }
-        let signs = self
-            .clue
-            .iter()
-            .flat_map(|clue| clue.seen.iter().map(|sign| &sign.token).chain(&clue.unseen));
-        let enablers = self
-            .activity
-            .iter()
-            .flat_map(|activity| activity.enablers.iter().flatten().chain(&activity.pinch));
-        let contests = self
-            .contest
-            .iter()
-            .flat_map(|contest| contest.tokens.iter().flatten().chain(&contest.unseen));
+        let signs = self.clue.iter().flat_map(|clue| clue.seen.iter().map(|sign| &sign.token).chain(&clue.unseen));
+        let enablers =
+            self.activity.iter().flat_map(|activity| activity.enablers.iter().flatten().chain(&activity.pinch));
+        let contests = self.contest.iter().flat_map(|contest| contest.tokens.iter().flatten().chain(&contest.unseen));
         for token in signs.chain(enablers).chain(contests) {
-            let known = self.class.contains_key(token)
-                || self.token.iter().any(|known| known.token == *token);
+            let known = self.class.contains_key(token) || self.token.iter().any(|known| known.token == *token);
             if !known {
                 return Err(format!("{token:?} is neither a token nor a class"));
             }
         }
-        let repeated = self.activity.iter().enumerate().find(|(i, activity)| {
-            self.activity[..*i]
-                .iter()
-                .any(|other| other.activity == activity.activity)
-        });
-        if let Some((_, activity)) = repeated {
-            return Err(format!(
-                "the activity {:?} is defined twice",
-                activity.activity
-            ));
-        }
-        match self
+        let repeated = self
             .activity
             .iter()
-            .find(|activity| activity.enablers.is_empty())
-        {
-            Some(activity) => Err(format!(
-                "the activity {:?} has no enablers",
-                activity.activity
-            )),
+            .enumerate()
+            .find(|(i, activity)| self.activity[..*i].iter().any(|other| other.activity == activity.activity));
+        if let Some((_, activity)) = repeated {
+            return Err(format!("the activity {:?} is defined twice", activity.activity));
+        }
+        match self.activity.iter().find(|activity| activity.enablers.is_empty()) {
+            Some(activity) => Err(format!("the activity {:?} has no enablers", activity.activity)),
             None => Ok(()),
         }
     }

@@ -1,7 +1,7 @@
 //! Rulebook with all thresholds, tables and templates for generating questions: [`Rules`].
 //!
-//! A rulebook is a TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source. The fields here have
-//! the same names.
+//! A rulebook is a TOML file. The built-in one is `rules.toml`; its comments explain each entry and give its source.
+//! The fields here have the same names.
 
 mod check;
 mod entries;
@@ -85,16 +85,10 @@ impl Rules {
             let TomlFault { line, problem } = TomlFault::new(text, &e);
             Error::data("rules", format!("line {line}: {problem}"))
         })?;
-        book.check()
-            .map_err(|problem| Error::data("rules", problem))?;
+        book.check().map_err(|problem| Error::data("rules", problem))?;
         let digest = digest_values(&book).map_err(|e| Error::data("rules", e))?;
-        let measure_digest =
-            digest_values(&(&book.measure, &book.coarse)).map_err(|e| Error::data("rules", e))?;
-        Ok(Self {
-            book,
-            digest,
-            measure_digest,
-        })
+        let measure_digest = digest_values(&(&book.measure, &book.coarse)).map_err(|e| Error::data("rules", e))?;
+        Ok(Self { book, digest, measure_digest })
     }
 
     /// Content of the rulebook.
@@ -126,9 +120,7 @@ impl RuleBook {
     /// True if a class has a flag; false for unknown classes.
     #[must_use]
     pub fn has_flag(&self, class: &str, flag: ClassFlag) -> bool {
-        self.class
-            .get(class)
-            .is_some_and(|class| class.flags.contains(&flag))
+        self.class.get(class).is_some_and(|class| class.flags.contains(&flag))
     }
 
     /// Spelling in questions of a data set's `word` for an object; `None` if the class does not have this word.
@@ -137,10 +129,7 @@ impl RuleBook {
         let plain = word.replace('_', " ");
         let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
         let words = &self.class.get(class)?.words;
-        words
-            .iter()
-            .find(|known| *known == spelled)
-            .map(String::as_str)
+        words.iter().find(|known| *known == spelled).map(String::as_str)
     }
 
     /// Fills an object's word into a template: `plural` for plural words, else `singular` with the article.
@@ -149,30 +138,19 @@ impl RuleBook {
         if self.words.plural.contains(word) {
             return plural.replace("{object}", word);
         }
-        let article = if self.words.an.contains(word) {
-            "an"
-        } else {
-            "a"
-        };
-        singular
-            .replace("{article}", article)
-            .replace("{object}", word)
+        let article = if self.words.an.contains(word) { "an" } else { "a" };
+        singular.replace("{article}", article).replace("{object}", word)
     }
 
-    /// True if a data set's word ends in a word of the class and may name such an object: "decorative lamp" ends in "lamp".
+    /// True if a data set's word ends in a word of the class and may name such an object: "decorative lamp" ends in
+    /// "lamp".
     #[must_use]
     pub fn resembles(&self, word: &str, class: &str) -> bool {
         let plain = word.replace('_', " ");
         let spelled = self.words.spelled.get(&plain).unwrap_or(&plain);
-        self.class
-            .get(class)
-            .into_iter()
-            .flat_map(|class| &class.words)
-            .any(|known| {
-                spelled
-                    .strip_suffix(known.as_str())
-                    .is_some_and(|before| before.is_empty() || before.ends_with(' '))
-            })
+        self.class.get(class).into_iter().flat_map(|class| &class.words).any(|known| {
+            spelled.strip_suffix(known.as_str()).is_some_and(|before| before.is_empty() || before.ends_with(' '))
+        })
     }
 
     /// Token of a segment with the word `name` and this class; the class itself if no rule matches.
@@ -180,10 +158,7 @@ impl RuleBook {
     pub fn token<'a>(&'a self, name: &str, class: &'a str) -> &'a str {
         let token = self.token.iter().find(|token| {
             let word_matches = token.names.contains(name)
-                || token
-                    .starts
-                    .iter()
-                    .any(|start| name.starts_with(start.as_str()))
+                || token.starts.iter().any(|start| name.starts_with(start.as_str()))
                 || token.names.is_empty() && token.starts.is_empty();
             word_matches && token.class.as_deref().is_none_or(|only| only == class)
         });
@@ -199,16 +174,9 @@ mod tests {
     fn built_in_rules_are_complete() {
         let rules = Rules::built_in().unwrap();
         let book = rules.book();
-        let asked = book
-            .class
-            .values()
-            .filter(|class| class.flags.contains(&ClassFlag::Asked))
-            .count();
+        let asked = book.class.values().filter(|class| class.flags.contains(&ClassFlag::Asked)).count();
         assert_eq!((asked, book.class.len()), (23, 40));
-        assert_eq!(
-            (book.room.order.len(), book.color.neighbours.len()),
-            (6, 11)
-        );
+        assert_eq!((book.room.order.len(), book.color.neighbours.len()), (6, 11));
         assert_eq!(book.token("desk", "table"), "desk");
         assert_eq!(book.token("side table", "table"), "table");
         assert_eq!(book.token("shower curtain", "curtain"), "bath fitting");
@@ -220,11 +188,7 @@ mod tests {
     fn words_have_article_or_plural() {
         let rules = Rules::built_in().unwrap();
         let book = rules.book();
-        for word in book
-            .class
-            .values()
-            .flat_map(|class| &class.words)
-            .filter(|word| !book.words.plural.contains(*word))
+        for word in book.class.values().flat_map(|class| &class.words).filter(|word| !book.words.plural.contains(*word))
         {
             let vowel = word.starts_with(['a', 'e', 'i', 'o', 'u']);
             assert_eq!(book.words.an.contains(word), vowel, "{word}");
@@ -236,10 +200,7 @@ mod tests {
     #[test]
     fn digests_ignore_comments_and_track_values() {
         let commented = format!("# nothing\n{BUILT_IN}");
-        let (rules, same) = (
-            Rules::built_in().unwrap(),
-            Rules::parse(&commented).unwrap(),
-        );
+        let (rules, same) = (Rules::built_in().unwrap(), Rules::parse(&commented).unwrap());
         assert_eq!(rules.digest(), same.digest());
         let other = Rules::parse(&BUILT_IN.replace("gap_mm = 300", "gap_mm = 301")).unwrap();
         assert_ne!(rules.digest(), other.digest());
@@ -253,62 +214,21 @@ mod tests {
         for (from, to, expected) in [
             ("gap_mm = 300", "gap_mm = \"wide\"", "line "),
             ("gap_mm = 300", "gap_mn = 300", "unknown field `gap_mn`"),
-            (
-                "darkqa.rules/1",
-                "darkqa.rules/9",
-                "schema \"darkqa.rules/9\"",
-            ),
-            (
-                "classes = [\"plant\"]",
-                "classes = [\"palm\"]",
-                "the class \"palm\"",
-            ),
-            (
-                "token = \"nightstand\" }",
-                "token = \"nightstnd\" }",
-                "\"nightstnd\" is neither",
-            ),
-            (
-                "rooms = [\"office\"]",
-                "rooms = [\"study\"]",
-                "\"study\" has no clue",
-            ),
-            (
-                "{activity}, is",
-                "that, is",
-                "affordance.text has no {activity}",
-            ),
+            ("darkqa.rules/1", "darkqa.rules/9", "schema \"darkqa.rules/9\""),
+            ("classes = [\"plant\"]", "classes = [\"palm\"]", "the class \"palm\""),
+            ("token = \"nightstand\" }", "token = \"nightstnd\" }", "\"nightstnd\" is neither"),
+            ("rooms = [\"office\"]", "rooms = [\"study\"]", "\"study\" has no clue"),
+            ("{activity}, is", "that, is", "affordance.text has no {activity}"),
             ("choices = 4", "choices = 1", "closest.choices is 1"),
-            (
-                "words = [\"sofa\"]",
-                "words = []",
-                "class.sofa has no words",
-            ),
-            (
-                "words = [\"sofa\"]",
-                "words = [\"bed\"]",
-                "has the word \"bed\" again",
-            ),
-            (
-                "\"towels\"]\n# Words",
-                "\"oxen\"]\n# Words",
-                "[words] has \"oxen\"",
-            ),
-            (
-                "hidden = [\"furniture\"]",
-                "hidden = [\"attic\"]",
-                "names the class \"attic\"",
-            ),
+            ("words = [\"sofa\"]", "words = []", "class.sofa has no words"),
+            ("words = [\"sofa\"]", "words = [\"bed\"]", "has the word \"bed\" again"),
+            ("\"towels\"]\n# Words", "\"oxen\"]\n# Words", "[words] has \"oxen\""),
+            ("hidden = [\"furniture\"]", "hidden = [\"attic\"]", "names the class \"attic\""),
             ("\"office\"]   #", "\"bedroom\"]   #", "\"bedroom\" twice"),
         ] {
             assert!(BUILT_IN.contains(from), "{from}");
-            let error = Rules::parse(&BUILT_IN.replacen(from, to, 1))
-                .unwrap_err()
-                .to_string();
-            assert!(
-                error.starts_with("rules: ") && error.contains(expected),
-                "{error}"
-            );
+            let error = Rules::parse(&BUILT_IN.replacen(from, to, 1)).unwrap_err().to_string();
+            assert!(error.starts_with("rules: ") && error.contains(expected), "{error}");
         }
     }
 }

@@ -9,8 +9,9 @@ struct LabelRun {
     label: u32,
 }
 
-/// Returns the component of each pixel. Pixels with equal labels that touch by edges or corners form one component; components are numbered
-/// row by row from 1. `to_label` gives the label of a value; pixels with label 0 belong to no component and get 0.
+/// Returns the component of each pixel. Pixels with equal labels that touch by edges or corners form one component;
+/// components are numbered row by row from 1. `to_label` gives the label of a value; pixels with label 0 belong to no
+/// component and get 0.
 pub(super) fn components<T: Copy + PartialEq>(
     values: &[T],
     [width, height]: [usize; 2],
@@ -22,7 +23,8 @@ pub(super) fn components<T: Copy + PartialEq>(
         let row = &values[y * width..][..width];
         let mut found: Vec<(LabelRun, u32)> = Vec::new();
         let above: &[(LabelRun, u32)] = rows.last().map_or(&[], |above| above);
-        // The runs of both rows are sorted from left to right. Runs above that end before this one begins are no longer needed.
+        // The runs of both rows are sorted from left to right. Runs above that end before this one begins are no longer
+        // needed.
         let mut first = 0;
         for (left, right) in runs(row) {
             let label = to_label(row[left]);
@@ -33,10 +35,7 @@ pub(super) fn components<T: Copy + PartialEq>(
                 first += 1;
             }
             let mut joined = None;
-            for (run, node) in above[first..]
-                .iter()
-                .take_while(|(run, _)| run.left <= right)
-            {
+            for (run, node) in above[first..].iter().take_while(|(run, _)| run.left <= right) {
                 if run.label != label {
                     continue;
                 }
@@ -74,11 +73,7 @@ fn root(parents: &mut [u32], mut node: u32) -> u32 {
 }
 
 /// Numbers the components row by row from 1 and returns the number of each pixel.
-fn number_components(
-    rows: &[Vec<(LabelRun, u32)>],
-    parents: &mut [u32],
-    [width, height]: [usize; 2],
-) -> Vec<u32> {
+fn number_components(rows: &[Vec<(LabelRun, u32)>], parents: &mut [u32], [width, height]: [usize; 2]) -> Vec<u32> {
     let mut numbers = vec![0; parents.len()];
     let mut next = 1;
     let mut pieces = vec![0; width * height];

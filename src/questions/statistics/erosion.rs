@@ -1,10 +1,11 @@
 //! Erosion of all masks of an image in one pass: [`cores`].
 
-/// Calls `visit(y, left, right, mask)`, row by row, for every run of pixels whose square of radius `radius` is within their own mask. Masks
-/// continue beyond the edge of the image, because depth has no flying pixels there. Mask 0 is skipped.
+/// Calls `visit(y, left, right, mask)`, row by row, for every run of pixels whose square of radius `radius` is within
+/// their own mask. Masks continue beyond the edge of the image, because depth has no flying pixels there. Mask 0 is
+/// skipped.
 ///
-/// Each run of a row is shortened by the radius. For each column, `streaks` counts the consecutive rows in which the column was inside such
-/// a shortened run of the same mask.
+/// Each run of a row is shortened by the radius. For each column, `streaks` counts the consecutive rows in which the
+/// column was inside such a shortened run of the same mask.
 pub(super) fn cores(
     masks: &[u32],
     [width, height]: [usize; 2],
@@ -21,11 +22,7 @@ pub(super) fn cores(
             for (left, right) in runs(row) {
                 let (from, to) = (
                     if left == 0 { 0 } else { left + radius },
-                    if right == width {
-                        width
-                    } else {
-                        right.saturating_sub(radius)
-                    },
+                    if right == width { width } else { right.saturating_sub(radius) },
                 );
                 let (from, to) = (from.min(right), to.max(from.min(right)));
                 streaks[left..from].fill(0);
@@ -79,18 +76,10 @@ fn run_length<T: PartialEq>(values: &[T]) -> Option<usize> {
     /// Number of values compared without a branch, so that the compiler can use SIMD.
     const LANES: usize = 32;
     let first = values.first()?;
-    let count_different =
-        |lanes: &[T; LANES]| -> u32 { lanes.iter().map(|value| u32::from(value != first)).sum() };
+    let count_different = |lanes: &[T; LANES]| -> u32 { lanes.iter().map(|value| u32::from(value != first)).sum() };
     let (chunks, _) = values.as_chunks::<LANES>();
-    let whole = LANES
-        * chunks
-            .iter()
-            .take_while(|lanes| count_different(lanes) == 0)
-            .count();
-    let rest = values[whole..]
-        .iter()
-        .take_while(|value| *value == first)
-        .count();
+    let whole = LANES * chunks.iter().take_while(|lanes| count_different(lanes) == 0).count();
+    let rest = values[whole..].iter().take_while(|value| *value == first).count();
     Some(whole + rest)
 }
 
@@ -107,8 +96,7 @@ mod tests {
                 let (x, y) = (i % width, i / width);
                 let columns = x.saturating_sub(radius)..=(x + radius).min(width - 1);
                 let mut rows = y.saturating_sub(radius)..=(y + radius).min(height - 1);
-                let is_core =
-                    rows.all(|y| columns.clone().all(|x| masks[y * width + x] == masks[i]));
+                let is_core = rows.all(|y| columns.clone().all(|x| masks[y * width + x] == masks[i]));
                 if is_core { masks[i] } else { 0 }
             })
             .collect()

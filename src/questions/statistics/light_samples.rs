@@ -1,9 +1,9 @@
 //! Light of a frame, estimated from its surfaces: [`LightSamples`].
 //!
-//! A surface that looks grey may be a white one in shade, so colours are judged relative to the brightest surfaces in the same light: the
-//! "highest luminance is white" rule of anchoring (Gilchrist et al. 1999, Psychol. Rev. 106:795), which is max-RGB of colour constancy
-//! (Land and McCann 1971, J. Opt. Soc. Am. 61:1). A quantile replaces the maximum, because single bright pixels may be glints (Funt and Shi
-//! 2010, "The rehabilitation of MaxRGB", CIC 18:256).
+//! A surface that looks grey may be a white one in shade, so colours are judged relative to the brightest surfaces in
+//! the same light: the "highest luminance is white" rule of anchoring (Gilchrist et al. 1999, Psychol. Rev. 106:795),
+//! which is max-RGB of colour constancy (Land and McCann 1971, J. Opt. Soc. Am. 61:1). A quantile replaces the maximum,
+//! because single bright pixels may be glints (Funt and Shi 2010, "The rehabilitation of MaxRGB", CIC 18:256).
 
 use super::mask_core::{pixel_luma, quantile};
 use super::scene_maps::SceneMaps;
@@ -17,7 +17,8 @@ struct Sample {
     rgb: [u8; 3],
 }
 
-/// Pixels of the frame's surfaces on a regular grid, sorted by row. Classes that emit light or show something else are left out.
+/// Pixels of the frame's surfaces on a regular grid, sorted by row. Classes that emit light or show something else are
+/// left out.
 pub(super) struct LightSamples {
     samples: Vec<Sample>,
     /// Quantile of the light of the frame, in percent.
@@ -35,25 +36,15 @@ impl LightSamples {
         let mut samples = Vec::new();
         for y in (0..height).step_by(step) {
             scene.each_run_in_row(y, &mut |left, right, mask, id| {
-                let is_surface = scene
-                    .class(id)
-                    .is_some_and(|class| !rule.luminous.contains(class));
+                let is_surface = scene.class(id).is_some_and(|class| !rule.luminous.contains(class));
                 if is_surface {
                     let (left, right) = (left - y * width, right - y * width);
                     let columns = (left.next_multiple_of(step)..right).step_by(step);
-                    samples.extend(columns.map(|x| Sample {
-                        position: [x, y],
-                        mask,
-                        rgb: pixels[y * width + x],
-                    }));
+                    samples.extend(columns.map(|x| Sample { position: [x, y], mask, rgb: pixels[y * width + x] }));
                 }
             });
         }
-        Self {
-            samples,
-            frame_percent: rule.light_percent,
-            around_percent: rule.around_percent,
-        }
+        Self { samples, frame_percent: rule.light_percent, around_percent: rule.around_percent }
     }
 
     /// Light of the frame: a high quantile of each channel over all surfaces. White without surfaces.
@@ -64,25 +55,18 @@ impl LightSamples {
         })
     }
 
-    /// Light around a mask: a high quantile of luma over the other surfaces in its bounding box, enlarged by half of the longer side on
-    /// each side. `None` without such surfaces.
+    /// Light around a mask: a high quantile of luma over the other surfaces in its bounding box, enlarged by half of
+    /// the longer side on each side. `None` without such surfaces.
     pub(super) fn around(&self, mask: u32, [left, top, right, bottom]: [usize; 4]) -> Option<u8> {
         let reach = (right - left).max(bottom - top) / 2;
         let columns = left.saturating_sub(reach)..right + reach;
         let rows = top.saturating_sub(reach)..bottom + reach;
-        let first = self
-            .samples
-            .partition_point(|sample| sample.position[1] < rows.start);
-        let last = self
-            .samples
-            .partition_point(|sample| sample.position[1] < rows.end);
+        let first = self.samples.partition_point(|sample| sample.position[1] < rows.start);
+        let last = self.samples.partition_point(|sample| sample.position[1] < rows.end);
         let near = self.samples[first..last]
             .iter()
             .filter(|sample| sample.mask != mask && columns.contains(&sample.position[0]));
-        code_quantile(
-            near.map(|sample| pixel_luma(sample.rgb)),
-            self.around_percent,
-        )
+        code_quantile(near.map(|sample| pixel_luma(sample.rgb)), self.around_percent)
     }
 }
 

@@ -26,10 +26,7 @@ impl MaskCore {
             channels: [[0; 256]; 3],
             bright: 0,
             crushed: 0,
-            depths: frame
-                .depth
-                .as_ref()
-                .map(|_| Vec::with_capacity(area as usize)),
+            depths: frame.depth.as_ref().map(|_| Vec::with_capacity(area as usize)),
         }
     }
 
@@ -37,9 +34,7 @@ impl MaskCore {
     pub(super) fn write_to(self, segment: &mut Segment) {
         segment.core = self.count;
         segment.colors = self.colors;
-        segment.median = self
-            .channels
-            .map(|counts| quantile(&counts, self.count, 50));
+        segment.median = self.channels.map(|counts| quantile(&counts, self.count, 50));
         (segment.bright, segment.crushed) = (self.bright, self.crushed);
         segment.depth = self.depths.and_then(depth_quantiles);
     }
@@ -52,15 +47,12 @@ fn depth_quantiles(mut depths: Vec<u32>) -> Option<SegmentDepth> {
     }
     let count = depths.len() as u64;
     let [near, middle, far] = [10, 50, 90].map(|percent| rank(count, percent) as usize);
-    // The values before the median are smaller and those after it larger, so each outer quantile is searched in its half only.
+    // The values before the median are smaller and those after it larger, so each outer quantile is searched in its
+    // half only.
     let (nearer, &mut median, farther) = depths.select_nth_unstable(middle);
     Some(SegmentDepth {
         valid: count,
-        p10: if near < middle {
-            *nearer.select_nth_unstable(near).1
-        } else {
-            median
-        },
+        p10: if near < middle { *nearer.select_nth_unstable(near).1 } else { median },
         median,
         p90: match far.checked_sub(middle + 1) {
             Some(far) => *farther.select_nth_unstable(far).1,
@@ -98,24 +90,13 @@ pub(super) struct PixelLight<'a> {
 impl<'a> PixelLight<'a> {
     pub(super) fn new(frame: &'a Frame, rule: &'a MeasureRule, palette: &'a Palette) -> Self {
         let slopes = depth_conversion(frame).map(|camera| {
-            [
-                (frame.rgb.width(), camera.fx, camera.cx),
-                (frame.rgb.height(), camera.fy, camera.cy),
-            ]
-            .map(|(length, focal, center)| {
-                (0..length)
-                    .map(|i| (i as f64 - center) / focal)
-                    .map(|slope| slope * slope)
-                    .collect()
-            })
+            [(frame.rgb.width(), camera.fx, camera.cx), (frame.rgb.height(), camera.fy, camera.cy)].map(
+                |(length, focal, center)| {
+                    (0..length).map(|i| (i as f64 - center) / focal).map(|slope| slope * slope).collect()
+                },
+            )
         });
-        Self {
-            frame,
-            rule,
-            palette,
-            depth: frame.depth.as_ref().map(|depth| depth.as_standard_layout()),
-            slopes,
-        }
+        Self { frame, rule, palette, depth: frame.depth.as_ref().map(|depth| depth.as_standard_layout()), slopes }
     }
 
     /// Adds a run of pixels of a row to a core.
@@ -154,9 +135,7 @@ impl<'a> PixelLight<'a> {
 
 /// Camera intrinsics, if depth must be converted from the optical axis to the rays.
 fn depth_conversion(frame: &Frame) -> Option<Intrinsics> {
-    frame
-        .intrinsics
-        .filter(|_| frame.depth_kind == DepthKind::Planar)
+    frame.intrinsics.filter(|_| frame.depth_kind == DepthKind::Planar)
 }
 
 /// Measures the depth map of a frame; `None` without one.

@@ -20,33 +20,19 @@ pub(super) struct MaskShape {
 }
 
 impl MaskShape {
-    const NONE: Self = Self {
-        area: 0,
-        bbox: [usize::MAX, usize::MAX, 0, 0],
-        rim: 0,
-        rim_on_border: 0,
-    };
+    const NONE: Self = Self { area: 0, bbox: [usize::MAX, usize::MAX, 0, 0], rim: 0, rim_on_border: 0 };
 
     /// Adds a run of pixels of a row.
     fn add(&mut self, row: usize, left: usize, right: usize) {
         self.area += (right - left) as u64;
         let [first, top, last, bottom] = self.bbox;
-        self.bbox = [
-            first.min(left),
-            top.min(row),
-            last.max(right),
-            bottom.max(row + 1),
-        ];
+        self.bbox = [first.min(left), top.min(row), last.max(right), bottom.max(row + 1)];
     }
 }
 
-/// Number of rim pixels of a run between the columns `from` and `to`: the ends of the run, and pixels with another mask above or below.
-fn count_rim(
-    mask: u32,
-    [from, to]: [usize; 2],
-    [left, right]: [usize; 2],
-    rows: [Option<&[u32]>; 2],
-) -> u64 {
+/// Number of rim pixels of a run between the columns `from` and `to`: the ends of the run, and pixels with another mask
+/// above or below.
+fn count_rim(mask: u32, [from, to]: [usize; 2], [left, right]: [usize; 2], rows: [Option<&[u32]>; 2]) -> u64 {
     if from >= to {
         return 0;
     }
@@ -77,10 +63,7 @@ impl MaskShapes {
     /// Measures the shapes of all masks.
     pub(super) fn measure(scene: &SceneMaps<'_>, rule: &MeasureRule) -> Self {
         let [width, height] = scene.size;
-        let mut shapes = Self {
-            list: vec![MaskShape::NONE; scene.numbers.len()],
-            joint: JointCounts::new(),
-        };
+        let mut shapes = Self { list: vec![MaskShape::NONE; scene.numbers.len()], joint: JointCounts::new() };
         for y in 0..height {
             scene.each_run_in_row(y, &mut |left, right, mask, id| {
                 *shapes.joint.entry((mask, id)).or_insert(0) += (right - left) as u64;

@@ -14,9 +14,9 @@ use darkqa_base::types::{Digest, Frame, Labels};
 
 /// Measures a frame. `key` is the digest of the measured files and the thresholds.
 ///
-/// Counts are in whole pixels and lengths in whole millimetres. Only the conversion of depth from the optical axis to the ray,
-/// `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`, uses floating-point numbers; IEEE 754 rounds these operations the same
-/// way on every machine.
+/// Counts are in whole pixels and lengths in whole millimetres. Only the conversion of depth from the optical axis to
+/// the ray, `z · √(1 + ((x − cx) / fx)² + ((y − cy) / fy)²)`, uses floating-point numbers; IEEE 754 rounds these
+/// operations the same way on every machine.
 ///
 /// # Errors
 /// [`darkqa_base::error::Error::Data`], with the frame, if the frame has no classes at all.

@@ -41,7 +41,8 @@ pub struct FrameStatistics {
     pub size: [usize; 2],
     /// 10 %, 50 % and 90 % quantiles of luma, from 0 to 255.
     pub luma: [u8; 3],
-    /// Light of the frame: a high quantile of each channel over all surfaces except windows, lamps, mirrors and screens.
+    /// Light of the frame: a high quantile of each channel over all surfaces except windows, lamps, mirrors and
+    /// screens.
     pub light: [u8; 3],
     /// Number of pixels without a class.
     pub void: u64,
@@ -95,8 +96,8 @@ pub enum DepthAxis {
 /// Measurements of a segment.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Segment {
-    /// Number in the segment map. Without such a map, or if it maps parts of objects, the number of the connected component, counted row by
-    /// row from 1.
+    /// Number in the segment map. Without such a map, or if it maps parts of objects, the number of the connected
+    /// component, counted row by row from 1.
     pub id: u32,
     /// Most common canonical class of the pixels; the first by name if two are equally common.
     pub class: String,
@@ -106,11 +107,7 @@ pub struct Segment {
     #[serde(default, skip_serializing_if = "WordSource::is_name")]
     pub source: WordSource,
     /// Place of the segment, according to its word.
-    #[serde(
-        rename = "stands",
-        default,
-        skip_serializing_if = "SegmentPlace::is_here"
-    )]
+    #[serde(rename = "stands", default, skip_serializing_if = "SegmentPlace::is_here")]
     pub place: SegmentPlace,
     /// Region of the scene, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -128,7 +125,8 @@ pub struct Segment {
     pub rim: u64,
     /// Number of rim pixels within the border of the frame.
     pub rim_on_border: u64,
-    /// Number of core pixels, on which depth and colour are measured: the eroded mask, or the whole mask if erosion leaves nothing.
+    /// Number of core pixels, on which depth and colour are measured: the eroded mask, or the whole mask if erosion
+    /// leaves nothing.
     pub core: u64,
     /// Depth of the core; `None` if no core pixel has depth.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -184,29 +182,20 @@ pub enum WordSource {
 }
 
 impl WordSource {
-    #[expect(
-        clippy::trivially_copy_pass_by_ref,
-        reason = "serde passes a reference"
-    )]
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
     fn is_name(&self) -> bool {
         *self == Self::Name
     }
 }
 
 impl SegmentPlace {
-    #[expect(
-        clippy::trivially_copy_pass_by_ref,
-        reason = "serde passes a reference"
-    )]
+    #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
     fn is_here(&self) -> bool {
         *self == Self::Here
     }
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a reference"
-)]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(count: &usize) -> bool {
     *count == 0
 }
@@ -275,9 +264,7 @@ impl FrameStatistics {
 
     /// Segments that are evidence.
     pub fn evidence<'a>(&'a self, book: &'a RuleBook) -> impl Iterator<Item = &'a Segment> {
-        self.segments
-            .iter()
-            .filter(|segment| self.is_evidence(segment, book))
+        self.segments.iter().filter(|segment| self.is_evidence(segment, book))
     }
 
     /// True if the frame has a pixel of a token, including tiny segments.
@@ -286,12 +273,9 @@ impl FrameStatistics {
         if book.class.contains_key(token) && self.class_pixels(token) > 0 {
             return true;
         }
-        // Words are looked up without a class, because tiny segments are counted by word only. A token that requires a class is named after
-        // that class.
-        self.words
-            .keys()
-            .map(|word| book.token(word, ""))
-            .any(|found| found == token)
+        // Words are looked up without a class, because tiny segments are counted by word only. A token that requires a
+        // class is named after that class.
+        self.words.keys().map(|word| book.token(word, "")).any(|found| found == token)
     }
 }
 
@@ -305,10 +289,7 @@ impl Segment {
     /// True if the word of the segment does not fit its class in plain English, such as a dog bed in the class bed.
     #[must_use]
     pub fn has_unfitting_word(&self, book: &RuleBook) -> bool {
-        book.names
-            .unlike
-            .get(&self.class)
-            .is_some_and(|words| words.contains(&self.word))
+        book.names.unlike.get(&self.class).is_some_and(|words| words.contains(&self.word))
     }
 
     /// Word that questions use for the segment; `None` if it has no specific word, or one that questions do not use.
@@ -336,13 +317,12 @@ impl Segment {
     #[must_use]
     pub fn reliable_depth(&self, book: &RuleBook) -> Option<SegmentDepth> {
         self.depth.filter(|depth| {
-            depth.valid >= book.measure.valid_depth_px
-                && ppm(depth.valid, self.core) >= book.measure.valid_depth_ppm
+            depth.valid >= book.measure.valid_depth_px && ppm(depth.valid, self.core) >= book.measure.valid_depth_ppm
         })
     }
 
-    /// Most common colour name, its number of pixels, the number of pixels of the second most common bin (a name or none), and the number
-    /// of pixels without a name. If two names are equally common, the first in order counts.
+    /// Most common colour name, its number of pixels, the number of pixels of the second most common bin (a name or
+    /// none), and the number of pixels without a name. If two names are equally common, the first in order counts.
     #[must_use]
     pub fn leading_color(&self) -> (Option<Color>, u64, u64, u64) {
         let mut bins: Vec<(usize, u64)> = self.colors.iter().copied().enumerate().collect();
@@ -350,26 +330,18 @@ impl Segment {
         let [(first, most), (_, next), ..] = bins[..] else {
             return (None, 0, 0, 0);
         };
-        (
-            Color::ALL.get(first).copied(),
-            most,
-            next,
-            self.colors[NONE],
-        )
+        (Color::ALL.get(first).copied(), most, next, self.colors[NONE])
     }
 }
 
-/// Normalizes a word of a data set (lower case, single spaces) and returns the place that it gives. The suffixes `/otherroom` and
-/// `/outside` of HM3D-Sem are removed.
+/// Normalizes a word of a data set (lower case, single spaces) and returns the place that it gives. The suffixes
+/// `/otherroom` and `/outside` of HM3D-Sem are removed.
 #[must_use]
 pub fn plain_word(word: &str) -> (String, SegmentPlace) {
     let lower = word.to_lowercase();
     let mut place = SegmentPlace::Here;
     let mut rest = lower.trim();
-    while let Some(before) = OTHER_PLACES
-        .iter()
-        .find_map(|suffix| rest.strip_suffix(suffix))
-    {
+    while let Some(before) = OTHER_PLACES.iter().find_map(|suffix| rest.strip_suffix(suffix)) {
         (rest, place) = (before.trim_end(), SegmentPlace::Elsewhere);
     }
     let words: Vec<&str> = rest.split_whitespace().collect();

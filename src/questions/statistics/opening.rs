@@ -2,8 +2,9 @@
 
 use super::erosion::runs;
 
-/// Opens a mask in place with a square of radius `radius`: only pixels covered by squares that are entirely within the mask remain. Pixels
-/// outside the image are not in the mask, so an unlabelled border around the image is also a margin.
+/// Opens a mask in place with a square of radius `radius`: only pixels covered by squares that are entirely within the
+/// mask remain. Pixels outside the image are not in the mask, so an unlabelled border around the image is also a
+/// margin.
 pub(super) fn open_mask(set: &mut [bool], [width, height]: [usize; 2], radius: usize) {
     let whole = 2 * radius + 1;
     let mut streaks = vec![0_usize; width];
@@ -13,11 +14,7 @@ pub(super) fn open_mask(set: &mut [bool], [width, height]: [usize; 2], radius: u
         let row = &set[y * width..][..width];
         for (left, right) in runs(row) {
             let is_long_enough = row[left] && right - left >= whole;
-            let (from, to) = if is_long_enough {
-                (left + radius, right - radius)
-            } else {
-                (right, right)
-            };
+            let (from, to) = if is_long_enough { (left + radius, right - radius) } else { (right, right) };
             streaks[left..from].fill(0);
             streaks[to..right].fill(0);
             for streak in &mut streaks[from..to] {
@@ -41,15 +38,8 @@ pub(super) fn open_mask(set: &mut [bool], [width, height]: [usize; 2], radius: u
     for direction in [Direction::Down, Direction::Up] {
         let mut since = vec![radius + 1; width];
         for i in 0..height {
-            let y = if direction == Direction::Down {
-                i
-            } else {
-                height - 1 - i
-            };
-            let (centers, row) = (
-                &spread[y * width..][..width],
-                &mut set[y * width..][..width],
-            );
+            let y = if direction == Direction::Down { i } else { height - 1 - i };
+            let (centers, row) = (&spread[y * width..][..width], &mut set[y * width..][..width]);
             for ((since, center), pixel) in since.iter_mut().zip(centers).zip(row) {
                 *since = if *center { 0 } else { *since + 1 };
                 *pixel |= *since <= radius;
@@ -75,8 +65,7 @@ mod tests {
         let side = 2 * radius + 1;
         for top in 0..(height + 1).saturating_sub(side) {
             for left in 0..(width + 1).saturating_sub(side) {
-                let square =
-                    (top..top + side).flat_map(|y| (left..left + side).map(move |x| y * width + x));
+                let square = (top..top + side).flat_map(|y| (left..left + side).map(move |x| y * width + x));
                 if square.clone().all(|i| set[i]) {
                     square.for_each(|i| expected[i] = true);
                 }

@@ -64,7 +64,8 @@ impl<'a> SceneMaps<'a> {
                 scene.label_by_name(frame);
             }
             None => {
-                let problem = "no classes: neither a semantic map (sem) nor segments (over) with names in segments.json";
+                let problem =
+                    "no classes: neither a semantic map (sem) nor segments (over) with names in segments.json";
                 return Err(Error::data(format_args!("frame {:?}", frame.id.0), problem));
             }
         }
@@ -105,10 +106,7 @@ impl<'a> SceneMaps<'a> {
             })
         });
         self.source = LabelSource::SegmentNames(std::iter::once(VOID).chain(named).collect());
-        self.named = classes
-            .into_iter()
-            .map(|(name, id)| (id, name.to_owned()))
-            .collect();
+        self.named = classes.into_iter().map(|(name, id)| (id, name.to_owned())).collect();
     }
 
     /// Makes a mask of each connected component of a label.
@@ -134,11 +132,7 @@ impl<'a> SceneMaps<'a> {
             }
         }
         modes[0].1 = VOID;
-        let labels: Vec<u32> = self
-            .masks
-            .iter()
-            .map(|mask| modes[*mask as usize].1.wrapping_add(1))
-            .collect();
+        let labels: Vec<u32> = self.masks.iter().map(|mask| modes[*mask as usize].1.wrapping_add(1)).collect();
         let pieces = components(&labels, self.size, |label| label);
         let count = pieces.iter().copied().max().unwrap_or(0);
         let mut parts = vec![BTreeSet::new(); count as usize];
@@ -148,10 +142,7 @@ impl<'a> SceneMaps<'a> {
                 if let Some(piece) = pieces[x].checked_sub(1) {
                     parts[piece as usize].insert(self.masks[x]);
                 }
-                x += pieces[x..right]
-                    .iter()
-                    .take_while(|piece| **piece == pieces[x])
-                    .count();
+                x += pieces[x..right].iter().take_while(|piece| **piece == pieces[x]).count();
             }
         }
         self.parts = parts.iter().map(BTreeSet::len).collect();
@@ -161,11 +152,7 @@ impl<'a> SceneMaps<'a> {
 
     /// Label of a number of the semantic map; [`VOID`] for void numbers.
     fn label(&self, id: u16) -> u32 {
-        if self.labels.void.contains(&id) {
-            VOID
-        } else {
-            id.into()
-        }
+        if self.labels.void.contains(&id) { VOID } else { id.into() }
     }
 
     /// Visits every run of pixels of one mask and one label, row by row, as left, right (exclusive), mask and label.
@@ -197,28 +184,21 @@ impl<'a> SceneMaps<'a> {
     /// Canonical class of a label; `None` if it has no class.
     pub(super) fn class(&self, id: u32) -> Option<&str> {
         match u16::try_from(id) {
-            Ok(id) => self
-                .labels
-                .labels
-                .get(&id)
-                .map(|label| label.canonical.as_str()),
+            Ok(id) => self.labels.labels.get(&id).map(|label| label.canonical.as_str()),
             Err(_) => self.named.get(&id).map(String::as_str),
         }
     }
 
     /// Word of the data set for a label; may be empty.
     pub(super) fn word(&self, id: u32) -> &str {
-        let label = u16::try_from(id)
-            .ok()
-            .and_then(|id| self.labels.labels.get(&id));
+        let label = u16::try_from(id).ok().and_then(|id| self.labels.labels.get(&id));
         label.map_or("", |label| &label.name)
     }
 
-    /// True if pixels of a mask and a label have a specific word: the name of their segment, or a label that identifies the object.
+    /// True if pixels of a mask and a label have a specific word: the name of their segment, or a label that identifies
+    /// the object.
     pub(super) fn is_named(&self, frame: &Frame, mask: u32, id: u32, coarse: &CoarseRule) -> bool {
-        let number = (mask as usize)
-            .checked_sub(1)
-            .and_then(|mask| self.numbers.get(mask));
+        let number = (mask as usize).checked_sub(1).and_then(|mask| self.numbers.get(mask));
         let name = match (&frame.segments, frame.segmentation) {
             (Some(_), Segmentation::Instances) => number.and_then(|number| frame.names.get(number)),
             _ => None,
@@ -242,27 +222,19 @@ impl<'a> SceneMaps<'a> {
         unknown
     }
 
-    /// Numbers of pixels without a class: of all pixels, after a morphological opening, and after the opening in the lower half of the
-    /// frame.
+    /// Numbers of pixels without a class: of all pixels, after a morphological opening, and after the opening in the
+    /// lower half of the frame.
     pub(super) fn void(&self, joint: &JointCounts, rule: &MeasureRule) -> (u64, u64, u64) {
         let [width, height] = self.size;
-        let all = joint
-            .iter()
-            .filter(|((_, id), _)| self.class(*id).is_none())
-            .map(|(_, count)| count)
-            .sum();
+        let all = joint.iter().filter(|((_, id), _)| self.class(*id).is_none()).map(|(_, count)| count).sum();
         if all == 0 {
             return (0, 0, 0);
         }
         let mut void = vec![false; width * height];
         self.each_run(|left, right, _, id| void[left..right].fill(self.class(id).is_none()));
-        open_mask(
-            &mut void,
-            self.size,
-            scaled_length(height, rule.void_per_height),
-        );
-        let [wide, lower] = [&void[..], &void[height / 2 * width..]]
-            .map(|pixels| pixels.iter().filter(|void| **void).count() as u64);
+        open_mask(&mut void, self.size, scaled_length(height, rule.void_per_height));
+        let [wide, lower] =
+            [&void[..], &void[height / 2 * width..]].map(|pixels| pixels.iter().filter(|void| **void).count() as u64);
         (all, wide, lower)
     }
 }

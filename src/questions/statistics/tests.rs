@@ -9,15 +9,10 @@ use proptest::prelude::*;
 use super::*;
 use crate::colors::Palette;
 use crate::rules::Rules;
-use darkqa_base::types::{
-    DepthKind, Frame, Intrinsics, Label, Labels, Rgb, SegmentName, Segmentation,
-};
+use darkqa_base::types::{DepthKind, Frame, Intrinsics, Label, Labels, Rgb, SegmentName, Segmentation};
 
 fn label(name: &str, canonical: &str) -> Label {
-    Label {
-        name: name.into(),
-        canonical: canonical.into(),
-    }
+    Label { name: name.into(), canonical: canonical.into() }
 }
 
 fn labels() -> Labels {
@@ -39,14 +34,7 @@ fn frame(width: usize, height: usize, semantic: Vec<u16>) -> Frame {
     Frame {
         id: FrameId("s/0".into()),
         scene: "s".into(),
-        rgb: Rgb::new(
-            height,
-            width,
-            (0..width * height * 3)
-                .map(|i| (i * 37 % 256) as u8)
-                .collect(),
-        )
-        .unwrap(),
+        rgb: Rgb::new(height, width, (0..width * height * 3).map(|i| (i * 37 % 256) as u8).collect()).unwrap(),
         depth: None,
         depth_kind: DepthKind::Planar,
         intrinsics: None,
@@ -98,57 +86,22 @@ fn pixels_are_counted_by_class_and_segment() {
     let mut frame = frame(6, 4, semantic);
     frame.segments = Some(map(6, 4, &segments));
     let found = measured(&frame);
-    assert_eq!(
-        found.classes,
-        [
-            ("chair".into(), 3),
-            ("chest_of_drawers".into(), 4),
-            ("wall".into(), 15)
-        ]
-        .into()
-    );
+    assert_eq!(found.classes, [("chair".into(), 3), ("chest_of_drawers".into(), 4), ("wall".into(), 15)].into());
     assert_eq!(found.loose, [("wall".into(), 1)].into());
-    assert_eq!(
-        (found.void, found.effective_void, found.size),
-        (2, 0, [6, 4])
-    );
+    assert_eq!((found.void, found.effective_void, found.size), (2, 0, [6, 4]));
     let ids: Vec<u32> = found.segments.iter().map(|segment| segment.id).collect();
     assert_eq!(ids, [3, 7, 9]);
     let stand = &found.segments[0];
-    assert_eq!(
-        (stand.class.as_str(), stand.word.as_str()),
-        ("chest_of_drawers", "night stand")
-    );
+    assert_eq!((stand.class.as_str(), stand.word.as_str()), ("chest_of_drawers", "night stand"));
     assert_eq!((stand.area, stand.pure, stand.bbox), (4, 4, [2, 2, 4, 4]));
     assert_eq!((stand.rim, stand.rim_on_border), (4, 4));
     assert_eq!(found.segments[2].bbox, [1, 1, 6, 2]);
-    assert_eq!(
-        found.words,
-        [
-            ("chair".into(), 3),
-            ("night stand".into(), 4),
-            ("wall".into(), 14)
-        ]
-        .into()
-    );
+    assert_eq!(found.words, [("chair".into(), 3), ("night stand".into(), 4), ("wall".into(), 14)].into());
     // Without a map of segments, the connected components of a label are segments.
     frame.segments = None;
     let found = measured(&frame);
-    let pieces: Vec<(&str, u64)> = found
-        .segments
-        .iter()
-        .map(|s| (s.word.as_str(), s.area))
-        .collect();
-    assert_eq!(
-        pieces,
-        [
-            ("wall", 15),
-            ("chair", 1),
-            ("chair", 2),
-            ("night stand", 3),
-            ("dresser", 1)
-        ]
-    );
+    let pieces: Vec<(&str, u64)> = found.segments.iter().map(|s| (s.word.as_str(), s.area)).collect();
+    assert_eq!(pieces, [("wall", 15), ("chair", 1), ("chair", 2), ("night stand", 3), ("dresser", 1)]);
     assert!(found.loose.is_empty());
 }
 
@@ -162,18 +115,11 @@ fn unknown_numbers_are_void_and_counted() {
 fn names_of_segments_override_the_words_of_labels() {
     let mut frame = frame(4, 1, vec![4, 4, 1, 1]);
     frame.segments = Some(map(4, 1, &[5_u32, 5, 70_000, 70_000]));
-    let name = SegmentName {
-        name: "Office Chair /otherroom".into(),
-        canonical: "chair".into(),
-        region: Some(3),
-    };
+    let name = SegmentName { name: "Office Chair /otherroom".into(), canonical: "chair".into(), region: Some(3) };
     frame.names = Arc::new([(5, name)].into());
     let found = measured(&frame);
     let chair = &found.segments[0];
-    assert_eq!(
-        (chair.word.as_str(), chair.place, chair.region),
-        ("office chair", SegmentPlace::Elsewhere, Some(3))
-    );
+    assert_eq!((chair.word.as_str(), chair.place, chair.region), ("office chair", SegmentPlace::Elsewhere, Some(3)));
     assert_eq!(found.segments[1].word, "wall");
     // Without a semantic map, only the names of segments give classes.
     frame.semantic = None;
@@ -181,19 +127,9 @@ fn names_of_segments_override_the_words_of_labels() {
     assert_eq!(found.classes, [("chair".into(), 2)].into());
     assert_eq!((found.void, found.segments.len()), (2, 1));
     frame.names = Arc::default();
-    let error = measure(
-        &frame,
-        &labels(),
-        &Rules::built_in().unwrap(),
-        &Palette::built_in().unwrap(),
-        Digest::from_bytes(b""),
-    );
-    assert!(
-        error
-            .unwrap_err()
-            .to_string()
-            .contains("frame \"s/0\": no classes")
-    );
+    let error =
+        measure(&frame, &labels(), &Rules::built_in().unwrap(), &Palette::built_in().unwrap(), Digest::from_bytes(b""));
+    assert!(error.unwrap_err().to_string().contains("frame \"s/0\": no classes"));
 }
 
 #[test]
@@ -203,20 +139,8 @@ fn parts_of_one_class_are_merged() {
     frame.segmentation = Segmentation::Parts;
     let found = measured(&frame);
     // Most of part 2 is wall, so it is not merged with the chair.
-    let parts: Vec<(&str, u64, usize)> = found
-        .segments
-        .iter()
-        .map(|s| (s.class.as_str(), s.area, s.parts))
-        .collect();
-    assert_eq!(
-        parts,
-        [
-            ("chair", 1, 1),
-            ("wall", 3, 1),
-            ("chair", 2, 2),
-            ("wall", 1, 1)
-        ]
-    );
+    let parts: Vec<(&str, u64, usize)> = found.segments.iter().map(|s| (s.class.as_str(), s.area, s.parts)).collect();
+    assert_eq!(parts, [("chair", 1, 1), ("wall", 3, 1), ("chair", 2, 2), ("wall", 1, 1)]);
     assert_eq!(found.segments[1].pure, 2);
 }
 
@@ -225,33 +149,16 @@ fn depth_is_along_the_ray_if_the_camera_is_known() {
     let mut frame = frame(3, 1, vec![4, 4, 4]);
     frame.depth = Some(map(3, 1, &[1000_u32, 1000, 0]));
     assert_eq!(measured(&frame).depth.unwrap().along, DepthAxis::Axis);
-    frame.intrinsics = Some(Intrinsics {
-        fx: 1.0,
-        fy: 1.0,
-        cx: 1.0,
-        cy: 0.0,
-    });
+    frame.intrinsics = Some(Intrinsics { fx: 1.0, fy: 1.0, cx: 1.0, cy: 0.0 });
     let found = measured(&frame);
     let depth = found.segments[0].depth.unwrap();
     // One pixel is one focal length off the axis: factor √2.
-    assert_eq!(
-        (depth.valid, depth.p10, depth.median, depth.p90),
-        (2, 1000, 1000, 1414)
-    );
+    assert_eq!((depth.valid, depth.p10, depth.median, depth.p90), (2, 1000, 1000, 1414));
     let whole = found.depth.unwrap();
-    assert_eq!(
-        (whole.holes, whole.median, whole.along),
-        (1, 1000, DepthAxis::Ray)
-    );
+    assert_eq!((whole.holes, whole.median, whole.along), (1, 1000, DepthAxis::Ray));
     frame.depth_kind = DepthKind::Euclid;
     let found = measured(&frame);
-    assert_eq!(
-        (
-            found.segments[0].depth.unwrap().p90,
-            found.depth.unwrap().along
-        ),
-        (1000, DepthAxis::Ray)
-    );
+    assert_eq!((found.segments[0].depth.unwrap().p90, found.depth.unwrap().along), (1000, DepthAxis::Ray));
     frame.depth = Some(map(3, 1, &[15_000_u32, 15_001, 0]));
     assert_eq!(measured(&frame).segments[0].depth.unwrap().valid, 1);
 }
@@ -260,39 +167,21 @@ fn depth_is_along_the_ray_if_the_camera_is_known() {
 fn the_rim_of_a_mask_is_not_used_for_depth_and_colour() {
     let (width, height) = (12, 9);
     let [inside, core]: [Vec<bool>; 2] = [(3..10, 2..8), (4..9, 3..7)].map(|(columns, rows)| {
-        (0..width * height)
-            .map(|i| columns.contains(&(i % width)) && rows.contains(&(i / width)))
-            .collect()
+        (0..width * height).map(|i| columns.contains(&(i % width)) && rows.contains(&(i / width))).collect()
     });
     let ids = inside.iter().map(|inside| if *inside { 4 } else { 1 });
     let mut frame = frame(width, height, ids.collect());
-    let samples = core
-        .iter()
-        .flat_map(|core| if *core { [200, 30, 30] } else { [255; 3] });
+    let samples = core.iter().flat_map(|core| if *core { [200, 30, 30] } else { [255; 3] });
     frame.rgb = Rgb::new(height, width, samples.collect()).unwrap();
-    let depth: Vec<u32> = core
-        .iter()
-        .map(|core| if *core { 2000 } else { 5 })
-        .collect();
+    let depth: Vec<u32> = core.iter().map(|core| if *core { 2000 } else { 5 }).collect();
     frame.depth = Some(map(width, height, &depth));
     let found = measured(&frame);
-    let chair = found
-        .segments
-        .iter()
-        .find(|segment| segment.class == "chair")
-        .unwrap();
+    let chair = found.segments.iter().find(|segment| segment.class == "chair").unwrap();
     assert_eq!((chair.area, chair.core, chair.rim), (42, 20, 22));
-    assert_eq!(
-        (chair.colors[3], chair.median, chair.bright),
-        (20, [200, 30, 30], 0)
-    );
+    assert_eq!((chair.colors[3], chair.median, chair.bright), (20, [200, 30, 30], 0));
     let depth = chair.depth.unwrap();
     assert_eq!((depth.p10, depth.p90), (2000, 2000));
-    let wall = found
-        .segments
-        .iter()
-        .find(|segment| segment.class == "wall")
-        .unwrap();
+    let wall = found.segments.iter().find(|segment| segment.class == "wall").unwrap();
     assert!(wall.core < wall.area && wall.bright == wall.core);
 }
 
@@ -321,19 +210,13 @@ fn void_counts_if_it_is_wider_than_a_margin() {
         })
         .collect();
     let found = measured(&frame(width, height, ids));
-    assert_eq!(
-        (found.void, found.effective_void, found.lower_void),
-        (1630, 30, 30)
-    );
+    assert_eq!((found.void, found.effective_void, found.lower_void), (1630, 30, 30));
 }
 
 #[test]
 fn words_have_one_spelling() {
     for (word, expected) in [
-        (
-            "  Kitchen   Cabinet ",
-            ("kitchen cabinet", SegmentPlace::Here),
-        ),
+        ("  Kitchen   Cabinet ", ("kitchen cabinet", SegmentPlace::Here)),
         ("bed/otherroom", ("bed", SegmentPlace::Elsewhere)),
         ("bed /outside", ("bed", SegmentPlace::Elsewhere)),
         ("", ("", SegmentPlace::Here)),
@@ -344,22 +227,14 @@ fn words_have_one_spelling() {
 
 /// Area, number of rim pixels and depth quantiles of each segment, computed pixel by pixel.
 fn reference(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
-    let (segments, depth) = (
-        frame.segments.as_ref().unwrap(),
-        frame.depth.as_ref().unwrap(),
-    );
+    let (segments, depth) = (frame.segments.as_ref().unwrap(), frame.depth.as_ref().unwrap());
     let (height, width) = segments.dim();
     let mut found = BTreeMap::new();
     for ((y, x), id) in segments.indexed_iter().filter(|(_, id)| **id != 0) {
         let entry = found.entry(*id).or_insert((0, 0, Vec::new(), Vec::new()));
         entry.0 += 1;
         // Beyond the upper and left edges, the wrapped index is outside the map too.
-        let around = [
-            (y.wrapping_sub(1), x),
-            (y + 1, x),
-            (y, x.wrapping_sub(1)),
-            (y, x + 1),
-        ];
+        let around = [(y.wrapping_sub(1), x), (y + 1, x), (y, x.wrapping_sub(1)), (y, x + 1)];
         let is_rim = around.iter().any(|place| segments.get(*place) != Some(id));
         entry.1 += u64::from(is_rim);
         let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
@@ -384,9 +259,8 @@ fn reference(frame: &Frame) -> BTreeMap<u32, (u64, u64, Option<[u32; 3]>)> {
             let eroded: Vec<u32> = core.iter().copied().filter(|depth| *depth > 0).collect();
             let mut depths = if core.is_empty() { all } else { eroded };
             depths.sort_unstable();
-            let quantiles = (!depths.is_empty()).then(|| {
-                [10, 50, 90].map(|percent| depths[(depths.len() * percent).div_ceil(100) - 1])
-            });
+            let quantiles = (!depths.is_empty())
+                .then(|| [10, 50, 90].map(|percent| depths[(depths.len() * percent).div_ceil(100) - 1]));
             (id, (area, rim, quantiles))
         })
         .collect()
@@ -441,9 +315,7 @@ fn the_light_of_a_frame_is_that_of_its_surfaces() {
         })
         .collect();
     let mut frame = frame(width, height, semantic.clone());
-    let codes = semantic
-        .iter()
-        .flat_map(|class| [[250, 200, 0, 0, 90, 255][usize::from(*class)]; 3]);
+    let codes = semantic.iter().flat_map(|class| [[250, 200, 0, 0, 90, 255][usize::from(*class)]; 3]);
     frame.rgb = Rgb::new(height, width, codes.collect()).unwrap();
     let mut labels = labels();
     labels.labels.insert(5, label("window", "window"));
@@ -453,10 +325,7 @@ fn the_light_of_a_frame_is_that_of_its_surfaces() {
     assert_eq!(measured.light, [200; 3]);
     // Around the chair is the wall; around the wall only the chair, because windows and void are no surfaces.
     for (class, around) in [("chair", 200), ("wall", 90)] {
-        let segment = measured
-            .segments
-            .iter()
-            .find(|segment| segment.class == class);
+        let segment = measured.segments.iter().find(|segment| segment.class == class);
         assert_eq!(segment.unwrap().around, Some(around), "{class}");
     }
 }

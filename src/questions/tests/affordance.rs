@@ -14,53 +14,20 @@ fn yes_needs_the_room_and_an_enabler() {
     let bathroom = frame(&[("toilet", "toilet", 60_000), ("towel", "towel", 9_000)]);
     assert_eq!(ask(&bathroom, "use the toilet", "yes"), None);
     assert_eq!(ask(&bathroom, "take a shower", "yes"), Some(Reason::Unseen));
-    assert_eq!(
-        ask(&frame(&[("wall", "", 9_000)]), "sleep", "yes"),
-        Some(Reason::NoRoom)
-    );
+    assert_eq!(ask(&frame(&[("wall", "", 9_000)]), "sleep", "yes"), Some(Reason::NoRoom));
     for (segments, activity) in [
         (vec![("bathtub", "bathtub", 60_000)], "take a shower"),
-        (
-            vec![("toilet", "", 60_000), ("sink", "sink", 9_000)],
-            "wash my hands",
-        ),
-        (
-            vec![
-                ("cabinet", "kitchen cabinet", 60_000),
-                ("sink", "sink", 9_000),
-            ],
-            "wash my hands",
-        ),
+        (vec![("toilet", "", 60_000), ("sink", "sink", 9_000)], "wash my hands"),
+        (vec![("cabinet", "kitchen cabinet", 60_000), ("sink", "sink", 9_000)], "wash my hands"),
         (vec![("appliances", "stove", 60_000)], "cook a meal"),
-        (
-            vec![("appliances", "toaster", 60_000), ("counter", "", 60_000)],
-            "cook a meal",
-        ),
-        (
-            vec![("sofa", "sofa", 60_000), ("tv_monitor", "tv", 9_000)],
-            "watch TV on the sofa",
-        ),
+        (vec![("appliances", "toaster", 60_000), ("counter", "", 60_000)], "cook a meal"),
+        (vec![("sofa", "sofa", 60_000), ("tv_monitor", "tv", 9_000)], "watch TV on the sofa"),
         (vec![("sofa", "sofa", 60_000)], "relax on a sofa"),
-        (
-            vec![("table", "dining table", 60_000), ("chair", "chair", 9_000)],
-            "have dinner with my family",
-        ),
-        (
-            vec![("table", "desk", 60_000), ("chair", "office chair", 9_000)],
-            "work at a desk",
-        ),
+        (vec![("table", "dining table", 60_000), ("chair", "chair", 9_000)], "have dinner with my family"),
+        (vec![("table", "desk", 60_000), ("chair", "office chair", 9_000)], "work at a desk"),
         // A room type that questions do not ask about is still one in which something is done.
-        (
-            vec![("appliances", "washing machine", 60_000)],
-            "do the laundry",
-        ),
-        (
-            vec![
-                ("toilet", "toilet", 60_000),
-                ("appliances", "laundry machine", 9_000),
-            ],
-            "do the laundry",
-        ),
+        (vec![("appliances", "washing machine", 60_000)], "do the laundry"),
+        (vec![("toilet", "toilet", 60_000), ("appliances", "laundry machine", 9_000)], "do the laundry"),
     ] {
         assert_eq!(ask(&frame(&segments), activity, "yes"), None, "{activity}");
     }
@@ -74,9 +41,7 @@ fn laundry_reasons(labels: &Labels, frames: &[FrameStatistics]) -> Vec<Option<Re
         .iter()
         .filter_map(|result| match result {
             RuleResult::Viable(candidate) if candidate.about == "do the laundry" => Some(None),
-            RuleResult::Rejected(rejected) if rejected.about == "do the laundry" => {
-                Some(Some(rejected.reason))
-            }
+            RuleResult::Rejected(rejected) if rejected.about == "do the laundry" => Some(Some(rejected.reason)),
             _ => None,
         })
         .collect()
@@ -86,10 +51,7 @@ fn laundry_reasons(labels: &Labels, frames: &[FrameStatistics]) -> Vec<Option<Re
 fn an_activity_that_the_data_set_cannot_enable_is_not_asked_about() {
     let bedroom = [frame(&BEDROOM)];
     let knows = labels();
-    assert_eq!(
-        laundry_reasons(&knows, &bedroom),
-        [Some(Reason::OtherRoom), None]
-    );
+    assert_eq!(laundry_reasons(&knows, &bedroom), [Some(Reason::OtherRoom), None]);
     let mut knows_none = knows.clone();
     let named = &mut knows_none.labels;
     named.retain(|_, label| label.name != "washing machine");
@@ -109,22 +71,14 @@ fn the_sofa_of_a_coarse_label_may_be_an_armchair() {
     room.segments[0].source = WordSource::Coarse;
     assert_eq!(ask(&room, "relax on a sofa", "yes"), Some(Reason::Unseen));
     // It shows a living room all the same.
-    assert_eq!(
-        candidate(&room, &Family::RoomType, "", "")
-            .unwrap()
-            .answer(),
-        "living room"
-    );
+    assert_eq!(candidate(&room, &Family::RoomType, "", "").unwrap().answer(), "living room");
 }
 
 #[test]
 fn no_needs_that_no_enabler_and_no_substitute_is_visible() {
     let bathroom = [("toilet", "toilet", 60_000), ("towel", "towel", 9_000)];
     assert_eq!(ask(&frame(&bathroom), "sleep", "no"), None);
-    assert_eq!(
-        ask(&frame(&bathroom), "use the toilet", "no"),
-        Some(Reason::OtherRoom)
-    );
+    assert_eq!(ask(&frame(&bathroom), "use the toilet", "no"), Some(Reason::OtherRoom));
     for (activity, class, word) in [
         ("sleep", "bed", "bed"),
         ("sleep", "sofa", "sofa"),
@@ -138,11 +92,7 @@ fn no_needs_that_no_enabler_and_no_substitute_is_visible() {
         ("work at a desk", "table", "side table"),
     ] {
         let seen = frame(&[&bathroom[..], &[(class, word, 1)]].concat());
-        assert_eq!(
-            ask(&seen, activity, "no"),
-            Some(Reason::Seen),
-            "{activity} {word}"
-        );
+        assert_eq!(ask(&seen, activity, "no"), Some(Reason::Seen), "{activity} {word}");
         assert_eq!(ask(&frame(&bathroom), activity, "no"), None, "{activity}");
     }
 }
@@ -152,10 +102,7 @@ fn no_needs_a_frame_that_can_show_absence() {
     let bedroom = frame(&BEDROOM);
     assert_eq!(ask(&bedroom, "cook a meal", "no"), None);
     let void = [50_000, 50_001].map(|effective_void| {
-        let frame = FrameStatistics {
-            effective_void,
-            ..bedroom.clone()
-        };
+        let frame = FrameStatistics { effective_void, ..bedroom.clone() };
         ask(&frame, "cook a meal", "no")
     });
     assert_eq!(void, [None, Some(Reason::Void)]);
@@ -172,10 +119,7 @@ fn substitutes_count_only_if_the_rule_is_strict() {
     let rules = rules("strict = true", "strict = false");
     let lenient = candidate_by(&frame, &Family::Affordance, "sleep", "no", &rules);
     assert_eq!(ask(&frame, "sleep", "no"), Some(Reason::Seen));
-    assert_eq!(
-        lenient.unwrap().text,
-        "I want to sleep, is this room suitable for this?"
-    );
+    assert_eq!(lenient.unwrap().text, "I want to sleep, is this room suitable for this?");
 }
 
 #[test]
@@ -183,11 +127,7 @@ fn classes_that_cannot_be_labelled_are_not_called_absent() {
     let mut labels = labels();
     labels.expressible.remove("sofa");
     let rules = Rules::built_in().unwrap();
-    let results = run_rules(
-        &[frame(&BEDROOM)],
-        |request| request.families = [Family::Affordance].into(),
-        &rules,
-    );
+    let results = run_rules(&[frame(&BEDROOM)], |request| request.families = [Family::Affordance].into(), &rules);
     assert!(results.candidates.len() > 10);
     let bathroom = frame(&[("toilet", "toilet", 60_000)]);
     let palette = Palette::built_in().unwrap();

@@ -4,11 +4,7 @@ use super::*;
 
 /// Reason to reject the question about a chair at 2 m and a table at 3 m, after `change`; `None` if it is accepted.
 fn rejection_after_change(change: impl FnOnce(&mut FrameStatistics)) -> Option<Reason> {
-    let mut frame = frame(&[
-        ("chair", "chair", 50_000),
-        ("table", "table", 50_000),
-        ("wall", "wall", 500_000),
-    ]);
+    let mut frame = frame(&[("chair", "chair", 50_000), ("table", "table", 50_000), ("wall", "wall", 500_000)]);
     frame.segments[0].depth = Some(depth_at(50_000, 2000));
     frame.segments[1].depth = Some(depth_at(50_000, 3000));
     change(&mut frame);
@@ -60,12 +56,7 @@ fn the_gap_must_be_wide() {
     }
     let reasons = [2050, 2049, 1899].map(|p10| {
         rejection_after_change(|frame| {
-            frame.segments[1].depth = Some(SegmentDepth {
-                valid: 50_000,
-                p10,
-                median: 3000,
-                p90: 3100,
-            });
+            frame.segments[1].depth = Some(SegmentDepth { valid: 50_000, p10, median: 3000, p90: 3100 });
         })
     });
     assert_eq!(reasons, [None, Some(Reason::Gap), Some(Reason::Disputed)]);
@@ -80,24 +71,13 @@ fn gap_scope_counts_instances_or_classes() {
     let class_rules = rules("gap_scope = \"instances\"", "gap_scope = \"classes\"");
     let mut frame = frame(&[("chair", "chair", 50_000), ("table", "table", 50_000)]);
     add_third_segment(&mut frame, "chair", 50_000, Some(3100));
-    assert_eq!(
-        candidate(&frame, &Family::Closest, "", "").err(),
-        Some(Reason::Gap)
-    );
-    assert_eq!(
-        candidate_by(&frame, &Family::Closest, "", "", &class_rules)
-            .unwrap()
-            .answer(),
-        "chair"
-    );
+    assert_eq!(candidate(&frame, &Family::Closest, "", "").err(), Some(Reason::Gap));
+    assert_eq!(candidate_by(&frame, &Family::Closest, "", "", &class_rules).unwrap().answer(), "chair");
 }
 
 #[test]
 fn two_objects_must_be_eligible() {
-    assert_eq!(
-        rejection_after_change(|frame| drop(frame.segments.remove(1))),
-        Some(Reason::Few)
-    );
+    assert_eq!(rejection_after_change(|frame| drop(frame.segments.remove(1))), Some(Reason::Few));
     for (class, word) in [
         ("picture", ""),
         ("mirror", ""),
@@ -113,10 +93,7 @@ fn two_objects_must_be_eligible() {
         });
         assert_eq!(reason, Some(Reason::Few), "{class}");
     }
-    assert_eq!(
-        rejection_after_change(|frame| frame.segments[1].class = "chair".into()),
-        Some(Reason::Few)
-    );
+    assert_eq!(rejection_after_change(|frame| frame.segments[1].class = "chair".into()), Some(Reason::Few));
     let small = [5_000, 4_999].map(|area| {
         rejection_after_change(|frame| {
             let segment = &mut frame.segments[1];
@@ -127,22 +104,17 @@ fn two_objects_must_be_eligible() {
         })
     });
     assert_eq!(small, [None, Some(Reason::Few)]);
-    let unmeasured = [25_000, 24_999].map(|valid| {
-        rejection_after_change(|frame| frame.segments[1].depth = Some(depth_at(valid, 3000)))
-    });
+    let unmeasured = [25_000, 24_999]
+        .map(|valid| rejection_after_change(|frame| frame.segments[1].depth = Some(depth_at(valid, 3000))));
     assert_eq!(unmeasured, [None, Some(Reason::Few)]);
 }
 
 #[test]
 fn depth_must_exist_and_be_plausible() {
-    assert_eq!(
-        rejection_after_change(|frame| frame.depth = None),
-        Some(Reason::NoDepth)
-    );
+    assert_eq!(rejection_after_change(|frame| frame.depth = None), Some(Reason::NoDepth));
     for medians in [[300, 299], [15_000, 15_001]] {
-        let reasons = medians.map(|median| {
-            rejection_after_change(|frame| frame.depth.as_mut().unwrap().median = median)
-        });
+        let reasons =
+            medians.map(|median| rejection_after_change(|frame| frame.depth.as_mut().unwrap().median = median));
         assert_eq!(reasons, [None, Some(Reason::Scale)], "{medians:?}");
     }
     let void = [50_000, 50_001].map(|void| rejection_after_change(|frame| frame.lower_void = void));
@@ -157,49 +129,18 @@ fn rejection_with_third_segment(class: &str, area: u64, depth: Option<u32>) -> O
 #[test]
 fn objects_that_may_be_nearer_block_the_question() {
     for class in ["objects", "misc", "furniture", "clothes", "gym_equipment"] {
-        assert_eq!(
-            rejection_with_third_segment(class, 2_000, Some(2_999)),
-            Some(Reason::Rival),
-            "{class}"
-        );
-        assert_eq!(
-            rejection_with_third_segment(class, 2_000, Some(3_000)),
-            None,
-            "{class}"
-        );
-        assert_eq!(
-            rejection_with_third_segment(class, 1_999, Some(2_999)),
-            None,
-            "{class}"
-        );
-        assert_eq!(
-            rejection_with_third_segment(class, 10_000, None),
-            Some(Reason::Unmeasured),
-            "{class}"
-        );
-        assert_eq!(
-            rejection_with_third_segment(class, 9_999, None),
-            None,
-            "{class}"
-        );
+        assert_eq!(rejection_with_third_segment(class, 2_000, Some(2_999)), Some(Reason::Rival), "{class}");
+        assert_eq!(rejection_with_third_segment(class, 2_000, Some(3_000)), None, "{class}");
+        assert_eq!(rejection_with_third_segment(class, 1_999, Some(2_999)), None, "{class}");
+        assert_eq!(rejection_with_third_segment(class, 10_000, None), Some(Reason::Unmeasured), "{class}");
+        assert_eq!(rejection_with_third_segment(class, 9_999, None), None, "{class}");
     }
     for class in ["wall", "floor", "door", "picture", "curtain", "board_panel"] {
-        assert_eq!(
-            rejection_with_third_segment(class, 90_000, Some(1_000)),
-            None,
-            "{class}"
-        );
-        assert_eq!(
-            rejection_with_third_segment(class, 90_000, None),
-            None,
-            "{class}"
-        );
+        assert_eq!(rejection_with_third_segment(class, 90_000, Some(1_000)), None, "{class}");
+        assert_eq!(rejection_with_third_segment(class, 90_000, None), None, "{class}");
     }
     // A near object that is too small for an answer is a rival.
-    assert_eq!(
-        rejection_with_third_segment("sofa", 4_000, Some(1_000)),
-        Some(Reason::Rival)
-    );
+    assert_eq!(rejection_with_third_segment("sofa", 4_000, Some(1_000)), Some(Reason::Rival));
     // A near segment that is not pure is a rival, whatever its class.
     let mixed = rejection_after_change(|frame| {
         add_third_segment(frame, "wall", 90_000, Some(1_000));
@@ -210,20 +151,14 @@ fn objects_that_may_be_nearer_block_the_question() {
     let far_by_median = [1_900, 1_899].map(|p10| {
         rejection_after_change(|frame| {
             add_third_segment(frame, "objects", 90_000, Some(4_000));
-            frame.segments.last_mut().unwrap().depth = Some(SegmentDepth {
-                valid: 90_000,
-                p10,
-                median: 4_000,
-                p90: 5_000,
-            });
+            frame.segments.last_mut().unwrap().depth =
+                Some(SegmentDepth { valid: 90_000, p10, median: 4_000, p90: 5_000 });
         })
     });
     assert_eq!(far_by_median, [None, Some(Reason::Rival)]);
-    for (class, pixels, expected) in [
-        ("objects", 1_999, None),
-        ("objects", 2_000, Some(Reason::Rival)),
-        ("wall", 500_000, None),
-    ] {
+    for (class, pixels, expected) in
+        [("objects", 1_999, None), ("objects", 2_000, Some(Reason::Rival)), ("wall", 500_000, None)]
+    {
         let reason = rejection_after_change(|frame| {
             frame.loose.insert(class.into(), pixels);
         });

@@ -40,22 +40,10 @@ fn one_colour_must_dominate() {
 #[test]
 fn things_are_called_by_their_own_words() {
     for (class, word, text) in [
-        (
-            "cushion",
-            "pillow",
-            "What color is the pillow in the image?",
-        ),
+        ("cushion", "pillow", "What color is the pillow in the image?"),
         ("table", "desk", "What color is the desk in the image?"),
-        (
-            "curtain",
-            "curtains",
-            "What color are the curtains in the image?",
-        ),
-        (
-            "blinds",
-            "window blinds",
-            "What color are the blinds in the image?",
-        ),
+        ("curtain", "curtains", "What color are the curtains in the image?"),
+        ("blinds", "window blinds", "What color are the blinds in the image?"),
     ] {
         let frame = frame(&[(class, word, 100_000)]);
         let question = candidate(&frame, &Family::Color, class, "").unwrap();
@@ -91,26 +79,9 @@ fn the_object_must_be_unique_and_large_enough() {
         })
     });
     assert_eq!(small_core, [None, Some(Reason::Small)]);
-    for class in [
-        "mirror",
-        "window",
-        "tv_monitor",
-        "picture",
-        "plant",
-        "lighting",
-        "shower",
-        "fireplace",
-    ] {
-        let results = run_rules(
-            &[frame(&[(class, "", 100_000)])],
-            |_| {},
-            &Rules::built_in().unwrap(),
-        );
-        let colors = results
-            .generated
-            .asked
-            .iter()
-            .filter(|asked| asked.question.family == Family::Color);
+    for class in ["mirror", "window", "tv_monitor", "picture", "plant", "lighting", "shower", "fireplace"] {
+        let results = run_rules(&[frame(&[(class, "", 100_000)])], |_| {}, &Rules::built_in().unwrap());
+        let colors = results.generated.asked.iter().filter(|asked| asked.question.family == Family::Color);
         assert_eq!(colors.count(), 0, "{class}");
     }
 }
@@ -161,13 +132,11 @@ fn a_colour_must_be_the_same_relative_to_the_light() {
         let reason = lit(Color::Grey, [128; 3], [light; 3], around);
         assert_eq!(reason, expected, "{light} {around:?}");
     }
-    // Under warm light, a grey thing that looks brown is not asked about; nor is a brown one that looks orange in sunshine.
+    // Under warm light, a grey thing that looks brown is not asked about; nor is a brown one that looks orange in
+    // sunshine.
     let brown = [150, 108, 66];
     assert_eq!(lit(Color::Brown, brown, [250; 3], Some(240)), None);
-    assert_eq!(
-        lit(Color::Brown, brown, [190, 137, 84], None),
-        Some(Reason::Lit)
-    );
+    assert_eq!(lit(Color::Brown, brown, [190, 137, 84], None), Some(Reason::Lit));
     // Pink in shade looks red.
     let red = [190, 110, 126];
     assert_eq!(lit(Color::Red, red, [250; 3], Some(250)), None);
@@ -177,13 +146,7 @@ fn a_colour_must_be_the_same_relative_to_the_light() {
 }
 
 /// A frame with a sofa whose core has this colour and number of pixels.
-fn view(
-    scene: &str,
-    index: u32,
-    median: [u8; 3],
-    core: u64,
-    source: WordSource,
-) -> FrameStatistics {
+fn view(scene: &str, index: u32, median: [u8; 3], core: u64, source: WordSource) -> FrameStatistics {
     let mut view = frame(&[("wall", "wall", 500_000), ("sofa", "sofa", 100_000)]);
     (view.frame, view.scene) = (FrameId(format!("{scene}/{index}")), scene.into());
     let sofa = &mut view.segments[1];
@@ -205,26 +168,14 @@ fn two_views_of_a_thing_must_show_the_same_colour() {
         ("b", white, 100_000, named, None),
         ("a", white, 100_000, WordSource::Label, None),
     ] {
-        let frames = [
-            view("a", 0, brown, 100_000, named),
-            view(scene, 1, color, core, source),
-        ];
+        let frames = [view("a", 0, brown, 100_000, named), view(scene, 1, color, core, source)];
         let results = run_rules(&frames, |_| {}, &Rules::built_in().unwrap());
-        let reason = results
-            .candidates
-            .into_iter()
-            .find_map(|result| match result {
-                RuleResult::Viable(found) if found.family == Family::Color => Some(None),
-                RuleResult::Rejected(found) if found.family == Family::Color => {
-                    Some(Some(found.reason))
-                }
-                _ => None,
-            });
-        assert_eq!(
-            reason,
-            Some(expected),
-            "{scene} {color:?} {core} {source:?}"
-        );
+        let reason = results.candidates.into_iter().find_map(|result| match result {
+            RuleResult::Viable(found) if found.family == Family::Color => Some(None),
+            RuleResult::Rejected(found) if found.family == Family::Color => Some(Some(found.reason)),
+            _ => None,
+        });
+        assert_eq!(reason, Some(expected), "{scene} {color:?} {core} {source:?}");
     }
 }
 
@@ -235,11 +186,7 @@ fn other_choices_can_be_offered() {
     let question = candidate_by(&frame, &Family::Color, "sofa", "", &eight).unwrap();
     assert_eq!((question.choices.len(), question.answer()), (8, "brown"));
     let without = rules("\"blue\", \"brown\"]\nneighbours", "\"blue\"]\nneighbours");
-    let text = include_str!("../rules.toml").replacen(
-        "\"blue\", \"brown\"]\nneighbours",
-        "\"blue\"]\nneighbours",
-        1,
-    );
+    let text = include_str!("../rules.toml").replacen("\"blue\", \"brown\"]\nneighbours", "\"blue\"]\nneighbours", 1);
     let seven = Rules::parse(&text.replacen("\"all11\"", "\"fixed8\"", 1)).unwrap();
     assert_ne!(without.digest(), seven.digest());
     let rejection = candidate_by(&frame, &Family::Color, "sofa", "", &seven);
@@ -248,9 +195,6 @@ fn other_choices_can_be_offered() {
     let question = candidate_by(&frame, &Family::Color, "sofa", "", &five).unwrap();
     assert_eq!((question.choices.len(), question.answer()), (5, "brown"));
     for near in ["black", "red", "orange"] {
-        assert!(
-            !question.choices.iter().any(|choice| choice == near),
-            "{near}"
-        );
+        assert!(!question.choices.iter().any(|choice| choice == near), "{near}");
     }
 }

@@ -23,8 +23,7 @@ use crate::room::{NoRoom, RoomSigns, RoomSource, classify};
 use crate::rule_context::{Candidate, RuleResult};
 use crate::rules::Rules;
 use crate::statistics::{
-    DepthAxis, FrameDepth, FrameStatistics, Segment, SegmentDepth, SegmentPlace, WordSource,
-    plain_word,
+    DepthAxis, FrameDepth, FrameStatistics, Segment, SegmentDepth, SegmentPlace, WordSource, plain_word,
 };
 use darkqa_base::types::{Digest, Family, FrameId, Label, Labels, QuestionId};
 
@@ -45,20 +44,12 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
         unnamed: BTreeMap::new(),
         words: BTreeMap::new(),
         unknown: BTreeMap::new(),
-        depth: Some(FrameDepth {
-            holes: 0,
-            median: 3000,
-            along: DepthAxis::Ray,
-        }),
+        depth: Some(FrameDepth { holes: 0, median: 3000, along: DepthAxis::Ray }),
         segments: Vec::new(),
         room: None,
     };
     for (id, &(class, word, area)) in (1..).zip(segments) {
-        let word = if word.is_empty() {
-            default_word(class)
-        } else {
-            word
-        };
+        let word = if word.is_empty() { default_word(class) } else { word };
         let (word, place) = plain_word(word);
         *frame.classes.entry(class.to_owned()).or_insert(0) += area;
         *frame.words.entry(word.clone()).or_insert(0) += area;
@@ -91,44 +82,26 @@ pub(crate) fn frame(segments: &[(&str, &str, u64)]) -> FrameStatistics {
 
 /// Depth quantiles within 100 mm of the median.
 fn depth_at(valid: u64, median: u32) -> SegmentDepth {
-    SegmentDepth {
-        valid,
-        p10: median - 100,
-        median,
-        p90: median + 100,
-    }
+    SegmentDepth { valid, p10: median - 100, median, p90: median + 100 }
 }
 
 /// The first word of a class in questions; the class itself if questions do not name it.
 fn default_word(class: &str) -> &str {
     static RULES: LazyLock<Rules> = LazyLock::new(|| Rules::built_in().unwrap());
     let rule = RULES.book().class.get(class);
-    rule.and_then(|rule| rule.words.first())
-        .map_or(class, String::as_str)
+    rule.and_then(|rule| rule.words.first()).map_or(class, String::as_str)
 }
 
 /// A label space in which every class is expressible, with a label for its first word.
 pub(crate) fn labels() -> Labels {
     let rules = Rules::built_in().unwrap();
     let classes = (1..).zip(rules.book().class.keys()).map(|(id, class)| {
-        let label = Label {
-            name: default_word(class).to_owned(),
-            canonical: class.clone(),
-        };
+        let label = Label { name: default_word(class).to_owned(), canonical: class.clone() };
         (id, label)
     });
-    let words = [
-        "washing machine",
-        "desk",
-        "dining table",
-        "dining chair",
-        "stove",
-    ];
+    let words = ["washing machine", "desk", "dining table", "dining chair", "stove"];
     let named = (100..).zip(words).map(|(id, word)| {
-        let label = Label {
-            name: word.to_owned(),
-            canonical: "misc".to_owned(),
-        };
+        let label = Label { name: word.to_owned(), canonical: "misc".to_owned() };
         (id, label)
     });
     Labels {
@@ -144,11 +117,7 @@ struct RuleResults {
     candidates: Vec<RuleResult>,
 }
 
-fn run_rules(
-    frames: &[FrameStatistics],
-    change: impl FnOnce(&mut QuestionRequest<'_>),
-    rules: &Rules,
-) -> RuleResults {
+fn run_rules(frames: &[FrameStatistics], change: impl FnOnce(&mut QuestionRequest<'_>), rules: &Rules) -> RuleResults {
     run_rules_of(frames, change, rules, &labels())
 }
 
@@ -176,19 +145,11 @@ fn run_rules_of(
             candidates.push(result.clone());
         }
     });
-    RuleResults {
-        generated: generated.unwrap(),
-        candidates,
-    }
+    RuleResults { generated: generated.unwrap(), candidates }
 }
 
 /// The candidate of a family, subject and answer, or why it is rejected. An empty subject or answer stands for any.
-fn candidate(
-    frame: &FrameStatistics,
-    family: &Family,
-    about: &str,
-    answer: &str,
-) -> Result<Candidate, Reason> {
+fn candidate(frame: &FrameStatistics, family: &Family, about: &str, answer: &str) -> Result<Candidate, Reason> {
     candidate_by(frame, family, about, answer, &Rules::built_in().unwrap())
 }
 
@@ -219,10 +180,7 @@ fn candidate_by(
             }
         }
     }
-    found
-        .into_iter()
-        .next()
-        .unwrap_or_else(|| panic!("no candidate {family} {about} {answer}"))
+    found.into_iter().next().unwrap_or_else(|| panic!("no candidate {family} {about} {answer}"))
 }
 
 /// The built-in rulebook with one text replaced.
@@ -240,8 +198,5 @@ fn room(segments: &[(&str, &str, u64)]) -> Result<String, NoRoom> {
     signs(segments).room
 }
 
-const BEDROOM: [(&str, &str, u64); 3] = [
-    ("wall", "wall", 500_000),
-    ("bed", "bed", 200_000),
-    ("chest_of_drawers", "nightstand", 30_000),
-];
+const BEDROOM: [(&str, &str, u64); 3] =
+    [("wall", "wall", 500_000), ("bed", "bed", 200_000), ("chest_of_drawers", "nightstand", 30_000)];

@@ -18,29 +18,17 @@ fn yes_needs_one_good_segment() {
     assert_eq!(question.text, "Is there a chair in the image?");
     assert_eq!(question.evidence["segments"][0]["id"], 2);
     for (change, expected) in [
-        (
-            (|c: &mut Segment| (c.area, c.pure) = (5_000, 5_000)) as fn(&mut Segment),
-            None,
-        ),
+        ((|c: &mut Segment| (c.area, c.pure) = (5_000, 5_000)) as fn(&mut Segment), None),
         (|c| (c.area, c.pure) = (4_999, 4_999), Some(Reason::Small)),
         (|c| c.pure = 18_000, None),
         (|c| c.pure = 17_999, Some(Reason::Mixed)),
         (|c| c.rim_on_border = 500, None),
         (|c| c.rim_on_border = 501, Some(Reason::Cut)),
-        (
-            |c| (c.rim_on_border, c.area, c.pure) = (1000, 99_999, 99_999),
-            Some(Reason::Cut),
-        ),
-        (
-            |c| (c.rim_on_border, c.area, c.pure) = (1000, 100_000, 100_000),
-            None,
-        ),
+        (|c| (c.rim_on_border, c.area, c.pure) = (1000, 99_999, 99_999), Some(Reason::Cut)),
+        (|c| (c.rim_on_border, c.area, c.pure) = (1000, 100_000, 100_000), None),
         (|c| c.bbox = [0, 0, 20, 900], None),
         (|c| c.bbox = [0, 0, 19, 900], Some(Reason::Thin)),
-        (
-            |c| c.place = SegmentPlace::Elsewhere,
-            Some(Reason::Elsewhere),
-        ),
+        (|c| c.place = SegmentPlace::Elsewhere, Some(Reason::Elsewhere)),
     ] {
         assert_eq!(ask(&chair(change), "chair", "yes"), expected);
     }
@@ -79,19 +67,12 @@ fn things_without_a_word_of_their_own_are_not_asked_about() {
     assert_eq!(ask(&sofa, "sofa", "yes"), None);
     sofa.segments[0].source = WordSource::Coarse;
     assert_eq!(ask(&sofa, "sofa", "yes"), Some(Reason::Wordless));
-    for (class, word) in [
-        ("bed", "bed sheet"),
-        ("lighting", "light fixture"),
-        ("sofa", "Sessel"),
-    ] {
+    for (class, word) in [("bed", "bed sheet"), ("lighting", "light fixture"), ("sofa", "Sessel")] {
         let frame = frame(&[(class, word, 20_000)]);
         assert_eq!(ask(&frame, class, "yes"), Some(Reason::Wordless), "{word}");
     }
     // Each word that a class has in the frame is asked about.
-    let both = frame(&[
-        ("chair", "armchair", 20_000),
-        ("chair", "dining chair", 9_000),
-    ]);
+    let both = frame(&[("chair", "armchair", 20_000), ("chair", "dining chair", 9_000)]);
     let results = run_rules(&[both], |_| {}, &Rules::built_in().unwrap());
     let texts = results.candidates.iter().filter_map(|result| match result {
         RuleResult::Viable(found) if found.about == "chair" && found.family == Family::Presence => {
@@ -99,10 +80,7 @@ fn things_without_a_word_of_their_own_are_not_asked_about() {
         }
         _ => None,
     });
-    let expected = [
-        "Is there a dining chair in the image?",
-        "Is there an armchair in the image?",
-    ];
+    let expected = ["Is there a dining chair in the image?", "Is there an armchair in the image?"];
     assert_eq!(texts.collect::<BTreeSet<_>>(), expected.into());
 }
 
@@ -137,9 +115,7 @@ fn denied(frames: &[FrameStatistics]) -> BTreeSet<String> {
         .candidates
         .into_iter()
         .filter_map(|result| match result {
-            RuleResult::Viable(found) if found.about == "lighting" && found.answer() == "no" => {
-                Some(found.text)
-            }
+            RuleResult::Viable(found) if found.about == "lighting" && found.answer() == "no" => Some(found.text),
             _ => None,
         })
         .collect()
@@ -153,10 +129,7 @@ fn only_words_of_the_data_set_are_denied() {
     let mut lit = frame(&[("lighting", "ceiling light", 9_000)]);
     lit.frame = FrameId("scene/1".into());
     let ceiling = "Is there a ceiling light in the image?".to_owned();
-    assert_eq!(
-        denied(&[wall.clone(), lit.clone()]),
-        [lamp, ceiling.clone()].into()
-    );
+    assert_eq!(denied(&[wall.clone(), lit.clone()]), [lamp, ceiling.clone()].into());
     // Where segments have names, only names count.
     lit.segments[0].source = WordSource::Name;
     assert_eq!(denied(&[wall, lit]), [ceiling].into());
@@ -170,26 +143,14 @@ fn no_needs_that_no_confusable_class_is_visible() {
     assert_eq!(ask(&bathtub, "bathtub", "yes"), Some(Reason::Small));
     let rules = Rules::built_in().unwrap();
     for group in &rules.book().confusable {
-        for class in group
-            .classes
-            .iter()
-            .filter(|class| rules.book().has_flag(class, crate::rules::ClassFlag::Asked))
-        {
+        for class in group.classes.iter().filter(|class| rules.book().has_flag(class, crate::rules::ClassFlag::Asked)) {
             for other in group.classes.iter().filter(|other| *other != class) {
                 let seen = frame(&[("wall", "wall", 500_000), (other, "", 1)]);
-                assert_eq!(
-                    ask(&seen, class, "no"),
-                    Some(Reason::Confusable),
-                    "{class} {other}"
-                );
+                assert_eq!(ask(&seen, class, "no"), Some(Reason::Confusable), "{class} {other}");
             }
             for word in &group.names {
                 let seen = frame(&[("wall", "wall", 500_000), ("misc", word, 1)]);
-                assert_eq!(
-                    ask(&seen, class, "no"),
-                    Some(Reason::Confusable),
-                    "{class} {word}"
-                );
+                assert_eq!(ask(&seen, class, "no"), Some(Reason::Confusable), "{class} {word}");
             }
         }
     }
@@ -199,15 +160,11 @@ fn no_needs_that_no_confusable_class_is_visible() {
 fn no_needs_a_frame_that_can_show_absence() {
     let wall = frame(&[("wall", "wall", 500_000)]);
     let void = [50_000, 50_001].map(|effective_void| {
-        let frame = FrameStatistics {
-            effective_void,
-            ..wall.clone()
-        };
+        let frame = FrameStatistics { effective_void, ..wall.clone() };
         ask(&frame, "bathtub", "no")
     });
     assert_eq!(void, [None, Some(Reason::Void)]);
-    let mirror =
-        [30_000, 30_001].map(|area| ask(&frame(&[("mirror", "mirror", area)]), "bathtub", "no"));
+    let mirror = [30_000, 30_001].map(|area| ask(&frame(&[("mirror", "mirror", area)]), "bathtub", "no"));
     assert_eq!(mirror, [None, Some(Reason::Mirror)]);
 }
 
@@ -232,20 +189,12 @@ fn no_is_asked_about_classes_common_in_such_rooms_elsewhere() {
     (other.frame, other.scene) = (FrameId("other/0".into()), "other".into());
     let rules = Rules::built_in().unwrap();
     let results = run_rules(&[frame(&BEDROOM), other], |_| {}, &rules);
-    for (class, expected) in [
-        ("plant", None),
-        ("towel", None),
-        ("bathtub", Some(Reason::Implausible)),
-    ] {
+    for (class, expected) in [("plant", None), ("towel", None), ("bathtub", Some(Reason::Implausible))] {
         let reason = results.candidates.iter().find_map(|result| match result {
-            RuleResult::Rejected(rejection)
-                if rejection.family == Family::Presence && rejection.about == class =>
-            {
+            RuleResult::Rejected(rejection) if rejection.family == Family::Presence && rejection.about == class => {
                 Some(Some(rejection.reason))
             }
-            RuleResult::Viable(candidate)
-                if candidate.family == Family::Presence && candidate.about == class =>
-            {
+            RuleResult::Viable(candidate) if candidate.family == Family::Presence && candidate.about == class => {
                 Some(None)
             }
             _ => None,

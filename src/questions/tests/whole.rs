@@ -10,20 +10,10 @@ fn many() -> Vec<FrameStatistics> {
         let mut statistics = match i % 4 {
             0 => frame(&BEDROOM),
             1 => frame(&[("toilet", "toilet", 60_000), ("sink", "sink", 9_000)]),
-            2 => frame(&[
-                ("sofa", "sofa", 90_000),
-                ("table", "coffee table", 9_000),
-                ("plant", "plant", 9_000),
-            ]),
-            _ => frame(&[
-                ("cabinet", "kitchen cabinet", 90_000),
-                ("appliances", "stove", 9_000),
-            ]),
+            2 => frame(&[("sofa", "sofa", 90_000), ("table", "coffee table", 9_000), ("plant", "plant", 9_000)]),
+            _ => frame(&[("cabinet", "kitchen cabinet", 90_000), ("appliances", "stove", 9_000)]),
         };
-        (statistics.scene, statistics.frame) = (
-            format!("s{}", i / 12),
-            FrameId(format!("s{}/{i:02}", i / 12)),
-        );
+        (statistics.scene, statistics.frame) = (format!("s{}", i / 12), FrameId(format!("s{}/{i:02}", i / 12)));
         frames.push(statistics);
     }
     frames
@@ -48,32 +38,18 @@ fn the_order_of_frames_does_not_matter_and_ids_depend_on_content() {
     assert_eq!(names.len(), one.asked.len());
     let wider = crate::tests::rules("gap_mm = 300", "gap_mm = 301");
     let same = balanced(&frames, &wider);
-    assert!(
-        one.asked
-            .iter()
-            .map(|asked| &asked.question.id)
-            .eq(same.asked.iter().map(|asked| &asked.question.id))
-    );
+    assert!(one.asked.iter().map(|asked| &asked.question.id).eq(same.asked.iter().map(|asked| &asked.question.id)));
 }
 
 #[test]
 fn yes_and_no_are_nearly_even_before_anything_is_dropped() {
     let rules = Rules::built_in().unwrap();
-    let generated = run_rules(
-        &many(),
-        |request| request.balance = BalanceMode::Binary,
-        &rules,
-    )
-    .generated;
+    let generated = run_rules(&many(), |request| request.balance = BalanceMode::Binary, &rules).generated;
     let mut counts: BTreeMap<(&Family, &str), [i64; 2]> = BTreeMap::new();
-    for asked in generated
-        .asked
-        .iter()
-        .filter(|asked| matches!(asked.question.family, Family::Affordance | Family::Presence))
+    for asked in
+        generated.asked.iter().filter(|asked| matches!(asked.question.family, Family::Affordance | Family::Presence))
     {
-        counts
-            .entry((&asked.question.family, &asked.about))
-            .or_default()[asked.question.choices.truth().unwrap()] += 1;
+        counts.entry((&asked.question.family, &asked.about)).or_default()[asked.question.choices.truth().unwrap()] += 1;
     }
     assert!(counts.len() > 10);
     for (about, [yes, no]) in counts {
@@ -86,12 +62,7 @@ fn questions_that_a_person_rejects_are_not_asked_and_nothing_else_changes() {
     let rules = Rules::built_in().unwrap();
     let before = run_rules(&many(), |_| {}, &rules).generated;
     let rejected = before.asked[7].question.id.clone();
-    let after = run_rules(
-        &many(),
-        |request| request.rejected = [rejected.clone()].into(),
-        &rules,
-    )
-    .generated;
+    let after = run_rules(&many(), |request| request.rejected = [rejected.clone()].into(), &rules).generated;
     let mut expected = before.asked.clone();
     expected.retain(|asked| asked.question.id != rejected);
     assert_eq!(after.asked, expected);
@@ -100,10 +71,7 @@ fn questions_that_a_person_rejects_are_not_asked_and_nothing_else_changes() {
 #[test]
 fn no_question_is_asked_about_black_frames() {
     for (median, is_dark) in [(15, true), (16, false)] {
-        let frame = FrameStatistics {
-            luma: [0, median, 90],
-            ..frame(&BEDROOM)
-        };
+        let frame = FrameStatistics { luma: [0, median, 90], ..frame(&BEDROOM) };
         let generated = run_rules(&[frame], |_| {}, &Rules::built_in().unwrap()).generated;
         assert_eq!(generated.asked.is_empty(), is_dark, "{median}");
         assert_eq!(generated.dark.len(), usize::from(is_dark), "{median}");
@@ -118,21 +86,11 @@ fn frames_without_depth_get_no_closest_question() {
     }
     let generated = run_rules(&frames, |_| {}, &Rules::built_in().unwrap()).generated;
     assert_eq!(generated.counts[&Family::Closest].viable, 0);
-    assert_eq!(
-        generated.counts[&Family::Closest].rejections,
-        [(Reason::NoDepth, 60)].into()
-    );
+    assert_eq!(generated.counts[&Family::Closest].rejections, [(Reason::NoDepth, 60)].into());
 }
 
 fn any_segment() -> impl Strategy<Value = (usize, usize, u64, u64, u32, u64)> {
-    (
-        0..40_usize,
-        0..12_usize,
-        1..400_000_u64,
-        0..100_u64,
-        0..9_000_u32,
-        0..100_u64,
-    )
+    (0..40_usize, 0..12_usize, 1..400_000_u64, 0..100_u64, 0..9_000_u32, 0..100_u64)
 }
 
 proptest! {

@@ -1,4 +1,5 @@
-//! Data of a report's figures, before they are drawn: line charts over the levels ([`Chart`]), bars, points, counts and thresholds.
+//! Data of a report's figures, before they are drawn: line charts over the levels ([`Chart`]), bars, points, counts and
+//! thresholds.
 //!
 //! Lines differ by colour, and also by dash and marker, so that they can be distinguished without colour.
 
@@ -20,8 +21,9 @@ use darkqa_score::estimate::Estimate;
 /// Colour of axes and text, and of lines that belong to no model.
 pub(crate) const INK: [u8; 3] = [34, 34, 34];
 
-/// Six colours, found by search. Each has a contrast with white of at least 3.1. Any two differ by a CIEDE2000 distance of at least 21 in
-/// normal, protanopic, deuteranopic and tritanopic vision (Machado, Oliveira and Fernandes 2009, severity 1).
+/// Six colours, found by search. Each has a contrast with white of at least 3.1. Any two differ by a CIEDE2000 distance
+/// of at least 21 in normal, protanopic, deuteranopic and tritanopic vision (Machado, Oliveira and Fernandes 2009,
+/// severity 1).
 pub(crate) const COLOURS: [[u8; 3]; 6] = [
     [0x01, 0x97, 0xea],
     [0x72, 0x11, 0x57],
@@ -93,8 +95,8 @@ pub(crate) enum LineContent {
     Marks(Vec<DarkMark>),
 }
 
-/// Share of a set of photographs in the dark. Their darkness is measured, not one of the levels, so the mark is never joined to a curve of
-/// synthetic images.
+/// Share of a set of photographs in the dark. Their darkness is measured, not one of the levels, so the mark is never
+/// joined to a curve of synthetic images.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct DarkMark {
     /// Lower quartile, median and upper quartile of the photographs' exposure drop, in EV.
@@ -127,19 +129,11 @@ pub(crate) struct LineItems {
 
 impl LineItems {
     /// Selects the items of all families; `None` unless `models` has exactly one model.
-    pub(crate) fn for_model(
-        models: &[&str],
-        variant: &Variant,
-        enhancer: Option<&EnhancerName>,
-    ) -> Option<Self> {
+    pub(crate) fn for_model(models: &[&str], variant: &Variant, enhancer: Option<&EnhancerName>) -> Option<Self> {
         let [model] = models else {
             return None;
         };
-        Some(Self {
-            model: (*model).to_owned(),
-            light: light(variant, enhancer),
-            family: None,
-        })
+        Some(Self { model: (*model).to_owned(), light: light(variant, enhancer), family: None })
     }
 }
 
@@ -190,11 +184,7 @@ impl Panel {
                 LineContent::Flat(_) | LineContent::Curve(_) => &[],
             })
             .map(|mark| mark.ev[2]);
-        self.levels()
-            .into_iter()
-            .map(AxisLevel::value)
-            .chain(marks)
-            .fold(0.0, f64::max)
+        self.levels().into_iter().map(AxisLevel::value).chain(marks).fold(0.0, f64::max)
     }
 
     /// Title of the horizontal axis.

@@ -1,4 +1,5 @@
-//! Figures: a [`chart`] has a figure's data, [`paper`] draws it as SVG and PDF, and [`sheet`] arranges given images as one image.
+//! Figures: a [`chart`] has a figure's data, [`paper`] draws it as SVG and PDF, and [`sheet`] arranges given images as
+//! one image.
 
 pub(crate) mod chart;
 pub(crate) mod figures;

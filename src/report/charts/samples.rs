@@ -35,36 +35,25 @@ struct SampleImage {
 /// Maximum number of frames in a table (chosen).
 const MAX_FRAMES: usize = 3;
 
-/// Sample images of the first frames: a table for each axis, with a row for each frame, variant and enhancer. Empty without thumbnails.
+/// Sample images of the first frames: a table for each axis, with a row for each frame, variant and enhancer. Empty
+/// without thumbnails.
 pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SampleTable> {
-    Axis::present(|axis| {
-        thumbnails
-            .iter()
-            .any(|thumbnail| thumbnail.condition.level().axis() == Some(axis))
-    })
-    .into_iter()
-    .filter_map(|axis| {
-        let on_axis: Vec<&Thumbnail> = thumbnails
-            .iter()
-            .filter(|thumbnail| thumbnail.condition.level().belongs_to(axis))
-            .collect();
-        axis_table(&on_axis, axis)
-    })
-    .collect()
+    Axis::present(|axis| thumbnails.iter().any(|thumbnail| thumbnail.condition.level().axis() == Some(axis)))
+        .into_iter()
+        .filter_map(|axis| {
+            let on_axis: Vec<&Thumbnail> =
+                thumbnails.iter().filter(|thumbnail| thumbnail.condition.level().belongs_to(axis)).collect();
+            axis_table(&on_axis, axis)
+        })
+        .collect()
 }
 
 /// Table of the thumbnails on one axis; `None` without any.
 fn axis_table(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SampleTable> {
-    let mut frames: Vec<&FrameId> = thumbnails
-        .iter()
-        .map(|thumbnail| &thumbnail.frame)
-        .collect();
+    let mut frames: Vec<&FrameId> = thumbnails.iter().map(|thumbnail| &thumbnail.frame).collect();
     frames.sort_unstable();
     frames.dedup();
-    let levels: BTreeSet<AxisLevel> = thumbnails
-        .iter()
-        .map(|thumbnail| thumbnail.condition.level())
-        .collect();
+    let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(|thumbnail| thumbnail.condition.level()).collect();
     let lights = row_lights(thumbnails);
     let mut rows = Vec::new();
     for frame in frames.into_iter().take(MAX_FRAMES) {
@@ -83,10 +72,7 @@ fn axis_table(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SampleTable> {
                     })
                 })
                 .collect();
-            rows.push(SampleRow {
-                name: format!("{frame}, {}", light(variant, *enhancer)),
-                images,
-            });
+            rows.push(SampleRow { name: format!("{frame}, {}", light(variant, *enhancer)), images });
         }
     }
     let level_names = levels.iter().map(|level| match *level {
@@ -103,20 +89,16 @@ fn axis_table(thumbnails: &[&Thumbnail], axis: Axis) -> Option<SampleTable> {
     })
 }
 
-/// True if an image of a condition belongs to the row of a variant and an enhancer. Clean frames (L0) belong to all variants of their run
-/// groups.
-fn belongs_to_row(
-    condition: &Condition,
-    variant: &Variant,
-    enhancer: Option<&EnhancerName>,
-) -> bool {
-    let is_clean_frame = condition.level() == AxisLevel::L0
-        && RunGroup::overlap(condition.group.as_ref(), variant.group.as_ref());
+/// True if an image of a condition belongs to the row of a variant and an enhancer. Clean frames (L0) belong to all
+/// variants of their run groups.
+fn belongs_to_row(condition: &Condition, variant: &Variant, enhancer: Option<&EnhancerName>) -> bool {
+    let is_clean_frame =
+        condition.level() == AxisLevel::L0 && RunGroup::overlap(condition.group.as_ref(), variant.group.as_ref());
     condition.enhancer.as_ref() == enhancer && (condition.variant() == *variant || is_clean_frame)
 }
 
-/// Variant and enhancer of each row of a frame. Clean frames are in the rows of the degraded ones; they get a row of their own if no
-/// degraded image has the same enhancer (or none).
+/// Variant and enhancer of each row of a frame. Clean frames are in the rows of the degraded ones; they get a row of
+/// their own if no degraded image has the same enhancer (or none).
 fn row_lights<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(Variant, Option<&'a EnhancerName>)> {
     let (mut lights, clean): (BTreeSet<_>, BTreeSet<_>) = thumbnails
         .iter()
@@ -138,10 +120,7 @@ const HEAD: [usize; 2] = [180, 28];
 
 /// Draws a table as one SVG, with the images embedded.
 pub(crate) fn figure(samples: &SampleTable) -> String {
-    let size = [
-        HEAD[0] + samples.levels.len() * (CELL[0] + 4),
-        HEAD[1] + samples.rows.len() * (CELL[1] + 4),
-    ];
+    let size = [HEAD[0] + samples.levels.len() * (CELL[0] + 4), HEAD[1] + samples.rows.len() * (CELL[1] + 4)];
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0}\" height=\"{1}\" viewBox=\"0 0 {0} {1}\" \
          font-family=\"sans-serif\" font-size=\"13\">\n<rect width=\"100%\" height=\"100%\" fill=\"#FFFFFF\"/>\n",
@@ -149,10 +128,7 @@ pub(crate) fn figure(samples: &SampleTable) -> String {
     );
     for (index, level) in samples.levels.iter().enumerate() {
         let x = HEAD[0] + index * (CELL[0] + 4) + CELL[0] / 2;
-        let _ = writeln!(
-            svg,
-            "<text x=\"{x}\" y=\"18\" text-anchor=\"middle\">{level}</text>"
-        );
+        let _ = writeln!(svg, "<text x=\"{x}\" y=\"18\" text-anchor=\"middle\">{level}</text>");
     }
     for (index, row) in samples.rows.iter().enumerate() {
         let y = HEAD[1] + index * (CELL[1] + 4);
@@ -177,10 +153,7 @@ pub(crate) fn figure(samples: &SampleTable) -> String {
 
 /// Escapes hidden characters, and the special characters of XML.
 fn escape_xml(text: &str) -> String {
-    escape_hidden(text)
-        .replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    escape_hidden(text).replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 #[cfg(test)]
@@ -224,10 +197,7 @@ mod tests {
         let names: Vec<&str> = tables.iter().map(|table| table.name).collect();
         assert_eq!(names, ["samples", "blur_samples"]);
         assert_eq!(tables[0].levels, ["L0, 0 EV", "L3, 6 EV"]);
-        assert_eq!(
-            tables[1].levels,
-            ["L0, 0 ms", "T8.33, 8.33 ms", "T33.33, 33.33 ms"]
-        );
+        assert_eq!(tables[1].levels, ["L0, 0 ms", "T8.33, 8.33 ms", "T33.33, 33.33 ms"]);
         assert!(tables[1].rows.len() == 1 && tables[1].rows[0].images.iter().all(Option::is_some));
         assert!(samples(&[]).is_empty());
     }
@@ -249,10 +219,7 @@ mod tests {
         let clean = single_table(&clean);
         let rows: BTreeSet<Vec<String>> = clean.rows.iter().map(urls).collect();
         let expected = [["data:L0", "data:L3-noise"], ["data:L0+lift", ""]];
-        assert_eq!(
-            rows,
-            expected.map(|row| row.map(str::to_owned).to_vec()).into()
-        );
+        assert_eq!(rows, expected.map(|row| row.map(str::to_owned).to_vec()).into());
     }
 
     #[test]

@@ -15,45 +15,27 @@ fn sentence(kind: &'static str, tone: Tone, text: &str, scope: Scope) -> Sentenc
 }
 
 fn scope_of_subject(subject: &str) -> Scope {
-    Scope {
-        subject: Some(subject.to_owned()),
-        ..Scope::default()
-    }
+    Scope { subject: Some(subject.to_owned()), ..Scope::default() }
 }
 
 fn scope_of_light(light: &str, level: &str) -> Scope {
-    Scope {
-        light: Some(light.to_owned()),
-        at: Some(level.to_owned()),
-        ..Scope::default()
-    }
+    Scope { light: Some(light.to_owned()), at: Some(level.to_owned()), ..Scope::default() }
 }
 
 #[test]
 fn a_detected_finding_is_the_main_finding() {
     let sentences = [
-        sentence(
-            "enhancer",
-            Tone::NotShown,
-            "a does nothing",
-            scope_of_subject("a"),
-        ),
+        sentence("enhancer", Tone::NotShown, "a does nothing", scope_of_subject("a")),
         sentence("enhancer", Tone::Worse, "b harms", scope_of_subject("b")),
         sentence("fidelity", Tone::Better, "psnr", Scope::default()),
         sentence("darkness", Tone::NotShown, "no loss", Scope::default()),
         sentence("best", Tone::Better, "m sees best", Scope::default()),
     ];
     let groups = FindingGroups::new(&sentences);
-    let first: Vec<(&str, String)> = groups
-        .main_findings()
-        .into_iter()
-        .map(|(title, finding)| (title, finding.text()))
-        .collect();
+    let first: Vec<(&str, String)> =
+        groups.main_findings().into_iter().map(|(title, finding)| (title, finding.text())).collect();
     let expected = [("Darkness", "no loss"), ("Enhancers", "b harms")];
-    assert_eq!(
-        first,
-        expected.map(|(title, text)| (title, text.to_owned()))
-    );
+    assert_eq!(first, expected.map(|(title, text)| (title, text.to_owned())));
     assert_eq!(groups.summary(), "no loss; b harms.");
     assert_eq!(groups.count(), 5);
 }
@@ -67,90 +49,47 @@ fn enhancer_with_the_largest_effect_stands_for_its_group() {
         sentence.scope.training = format!("{subject} was trained.");
         sentence
     };
-    let mut sentences = vec![
-        of("a", -2.0, Tone::NotShown),
-        of("b", -9.0, Tone::NotShown),
-        of("c", 3.0, Tone::NotShown),
-    ];
+    let mut sentences =
+        vec![of("a", -2.0, Tone::NotShown), of("b", -9.0, Tone::NotShown), of("c", 3.0, Tone::NotShown)];
     let groups = FindingGroups::new(&sentences);
     assert_eq!(groups.main_findings()[0].1.text(), "b acts. b was trained");
-    assert_eq!(
-        groups.summary(),
-        "no effect of the 3 enhancers was detected."
-    );
+    assert_eq!(groups.summary(), "no effect of the 3 enhancers was detected.");
     // A detected effect comes before a larger one that is not detected.
     sentences[0].tone = Tone::Worse;
     sentences[2].tone = Tone::Better;
     let groups = FindingGroups::new(&sentences);
-    assert_eq!(
-        groups.summary(),
-        "c acts; a acts. c was trained. a was trained."
-    );
+    assert_eq!(groups.summary(), "c acts; a acts. c was trained. a was trained.");
 }
 
 #[test]
 fn all_effects_of_an_enhancer_are_one_finding() {
     let sentences = [
-        sentence(
-            "enhancer",
-            Tone::Worse,
-            "a harms at L1",
-            scope_of_subject("a"),
-        ),
-        sentence(
-            "enhancer",
-            Tone::Better,
-            "a helps at L4",
-            scope_of_subject("a"),
-        ),
+        sentence("enhancer", Tone::Worse, "a harms at L1", scope_of_subject("a")),
+        sentence("enhancer", Tone::Better, "a helps at L4", scope_of_subject("a")),
         sentence("enhancer", Tone::NotShown, "a at L2", scope_of_subject("a")),
     ];
     let groups = FindingGroups::new(&sentences);
     assert_eq!(groups.count(), 1);
-    assert_eq!(
-        groups.main_findings()[0].1.text(),
-        "a harms at L1; a helps at L4"
-    );
+    assert_eq!(groups.main_findings()[0].1.text(), "a harms at L1; a helps at L4");
 }
 
 #[test]
 fn noise_profiles_are_compared_in_one_finding() {
     let sentences = [
-        sentence(
-            "darkness",
-            Tone::NotShown,
-            "paper: no loss",
-            scope_of_light("paper", "L3"),
-        ),
-        sentence(
-            "darkness",
-            Tone::Worse,
-            "eld: costs",
-            scope_of_light("eld", "L5"),
-        ),
+        sentence("darkness", Tone::NotShown, "paper: no loss", scope_of_light("paper", "L3")),
+        sentence("darkness", Tone::Worse, "eld: costs", scope_of_light("eld", "L5")),
     ];
     let groups = FindingGroups::new(&sentences);
     let first = groups.main_findings();
     assert_eq!(first[0].1.text(), "eld: costs");
     let intervals = first[0].1.intervals();
     let texts: Vec<String> = intervals.iter().map(ToString::to_string).collect();
-    assert_eq!(
-        texts,
-        [
-            "−20.0 [−40.0, −5.0] at L5",
-            "paper: −20.0 [−40.0, −5.0] at L3"
-        ]
-    );
+    assert_eq!(texts, ["−20.0 [−40.0, −5.0] at L5", "paper: −20.0 [−40.0, −5.0] at L3"]);
 }
 
 #[test]
 fn a_summary_without_darkness_is_the_first_finding() {
-    let sentences = [sentence(
-        "noise",
-        Tone::Worse,
-        "noise costs",
-        Scope::default(),
-    )];
+    let sentences = [sentence("noise", Tone::Worse, "noise costs", Scope::default())];
     assert_eq!(FindingGroups::new(&sentences).summary(), "noise costs.");
     assert_eq!(FindingGroups::new(&[]).summary(), "");
 }

@@ -66,15 +66,8 @@ impl SubjectCosts {
     }
 
     fn add(&mut self, trial: TrialRef<'_>, cost: Option<TrialCost>) {
-        for dollars in cost
-            .into_iter()
-            .flat_map(|cost| [cost.reply, cost.lost])
-            .flatten()
-        {
-            *self
-                .0
-                .entry(ModelInCondition::from_trial(trial))
-                .or_default() += dollars;
+        for dollars in cost.into_iter().flat_map(|cost| [cost.reply, cost.lost]).flatten() {
+            *self.0.entry(ModelInCondition::from_trial(trial)).or_default() += dollars;
         }
     }
 }
@@ -126,16 +119,13 @@ impl Baseline {
             let model = marked.strip_suffix(&suffix).unwrap_or(marked);
             costs.add(trial, old_run.trial_cost(model, trial));
         }
-        let rows = baseline_rows(&grid, &healths(&grid), &pairs, |index| {
-            costs.0.get(&grid.subjects[index]).copied()
-        });
+        let rows = baseline_rows(&grid, &healths(&grid), &pairs, |index| costs.0.get(&grid.subjects[index]).copied());
         let compared: BTreeSet<usize> = pairs
             .iter()
             .filter(|(new, _)| rows.iter().any(|row| row.subject == grid.subjects[*new]))
             .map(|(_, old)| *old)
             .collect();
-        let is_tested =
-            |subject: &ModelInCondition| !subject.is_reference() && !is_control(&subject.model);
+        let is_tested = |subject: &ModelInCondition| !subject.is_reference() && !is_control(&subject.model);
         let missing = grid
             .subjects
             .iter()
@@ -143,10 +133,7 @@ impl Baseline {
             .filter(|(index, _)| !compared.contains(index))
             .filter_map(|(_, subject)| {
                 let model = subject.model.strip_suffix(&suffix)?.to_owned();
-                Some(ModelInCondition {
-                    model,
-                    ..subject.clone()
-                })
+                Some(ModelInCondition { model, ..subject.clone() })
             })
             .filter(is_tested)
             .collect();
@@ -157,13 +144,7 @@ impl Baseline {
             .filter(|subject| !rows.iter().any(|row| row.subject.model == subject.model))
             .map(|subject| subject.model.clone())
             .collect();
-        Ok(Self {
-            rows,
-            old: name,
-            alerts,
-            missing,
-            added,
-        })
+        Ok(Self { rows, old: name, alerts, missing, added })
     }
 
     /// The sentence about conditions of the old run that are not compared, with the reason; `None` if all are.
@@ -178,12 +159,8 @@ impl Baseline {
         let named = first_names(&missing, MAX_NAMED);
         let conditions = format!("{named} of {old} {are} not compared");
         let reason = if !self.added.is_empty()
-            && self.missing.iter().all(|subject| {
-                !self
-                    .rows
-                    .iter()
-                    .any(|row| row.subject.model == subject.model)
-            }) {
+            && self.missing.iter().all(|subject| !self.rows.iter().any(|row| row.subject.model == subject.model))
+        {
             let added: Vec<&str> = self.added.iter().map(String::as_str).collect();
             format!(
                 "the new model is {}, and models are compared by their names, which `name` in a file of --models sets",
@@ -195,23 +172,17 @@ impl Baseline {
         Some(format!("{conditions}: {reason}"))
     }
 
-    /// Adds the comparison to a report: its sentences first, its table below the table of levels. The observer is left out if a control
-    /// has invalidated it.
+    /// Adds the comparison to a report: its sentences first, its table below the table of levels. The observer is left
+    /// out if a control has invalidated it.
     pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
         let is_hidden = report.findings.observer.is_hidden();
-        let rows: Vec<BaselineRow> = self
-            .rows
-            .iter()
-            .filter(|row| !(is_hidden && is_observer(&row.subject.model)))
-            .cloned()
-            .collect();
+        let rows: Vec<BaselineRow> =
+            self.rows.iter().filter(|row| !(is_hidden && is_observer(&row.subject.model))).cloned().collect();
         let sentences = against_baseline(&rows, &self.old, report.findings.unit);
         report.sentences.splice(..0, sentences);
         let place = report.tables.len().min(2);
         report.tables.insert(place, baseline(&rows, &self.old));
-        let missing_alert = self
-            .missing_sentence()
-            .map(|text| Alert::new(AlertKind::Items, format!("{text}.")));
+        let missing_alert = self.missing_sentence().map(|text| Alert::new(AlertKind::Items, format!("{text}.")));
         for alert in self.alerts.iter().chain(&missing_alert) {
             if !report.alerts.contains(alert) {
                 report.alerts.push(alert.clone());
@@ -220,21 +191,15 @@ impl Baseline {
         report.alerts.sort_by_key(|alert| alert.kind);
     }
 
-    /// True if any model is significantly worse in any condition. `random`, the observer and its controls do not count as models.
+    /// True if any model is significantly worse in any condition. `random`, the observer and its controls do not count
+    /// as models.
     ///
     /// # Errors
     /// If a condition of the old run is not compared or has no verdict, or if no model can be compared.
     pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
-        let models: Vec<&BaselineRow> = self
-            .rows
-            .iter()
-            .filter(|row| !row.subject.is_reference())
-            .collect();
+        let models: Vec<&BaselineRow> = self.rows.iter().filter(|row| !row.subject.is_reference()).collect();
         let old = &self.old;
-        if models
-            .iter()
-            .any(|row| row.significance == Significance::Worse)
-        {
+        if models.iter().any(|row| row.significance == Significance::Worse) {
             return Ok(true);
         }
         if let Some(missing) = self.missing_sentence() {
@@ -246,10 +211,7 @@ impl Baseline {
                  observer do not count)"
             ));
         }
-        let undecided: Vec<&BaselineRow> = models
-            .into_iter()
-            .filter(|row| !row.significance.is_decided())
-            .collect();
+        let undecided: Vec<&BaselineRow> = models.into_iter().filter(|row| !row.significance.is_decided()).collect();
         if !undecided.is_empty() {
             let conditions: Vec<String> = undecided.iter().map(|row| name(&row.subject)).collect();
             return refuse(&format!(

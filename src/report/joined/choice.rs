@@ -25,22 +25,13 @@ use crate::types::{ChoiceDetail, Truths};
 use darkqa_score::findings::Findings;
 
 /// Writes the report and the manifest of a run into its folder.
-pub(crate) fn write(
-    store: &Store,
-    mut run: StoredRun<ChoiceDetail>,
-    show: StdoutFormat,
-) -> Result<Outcome> {
+pub(crate) fn write(store: &Store, mut run: StoredRun<ChoiceDetail>, show: StdoutFormat) -> Result<Outcome> {
     let manifest = run.manifest.clone();
     run.leave_out(ShownModels::Current);
     Ok(Outcome::wrote(
         store.folder(),
         manifest.status,
-        write_report(
-            &ReportFolder::Run(store),
-            &manifest,
-            &combine(vec![run])?,
-            show,
-        )?,
+        write_report(&ReportFolder::Run(store), &manifest, &combine(vec![run])?, show)?,
     )
     .in_format(show))
 }
@@ -59,8 +50,8 @@ pub(super) fn write_report(
         return own_answers::write_report(target, manifest, combined, show);
     }
     let (folder, findings) = (target.path(), combined.findings());
-    let report = ChoiceReport::new(&findings, alerts(combined, &findings))
-        .with_enhancers(&enhancers::rows(&combined.runs));
+    let report =
+        ChoiceReport::new(&findings, alerts(combined, &findings)).with_enhancers(&enhancers::rows(&combined.runs));
     let files = files(&report, combined, SummaryRuns::One(manifest, None))?;
     write_flip_rows(&findings, folder)?;
     target.write(&files, manifest)?;
@@ -111,11 +102,7 @@ pub(super) fn text(
 }
 
 /// The report as Markdown.
-pub(super) fn markdown(
-    report: &ChoiceReport<'_>,
-    runs: &[(&RunManifest, &Path)],
-    length: ReportLength,
-) -> String {
+pub(super) fn markdown(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
     let names = runs.iter().map(|(_, folder)| run_name(folder)).collect();
     MarkdownReport::for_choices(report, names, length).text()
 }

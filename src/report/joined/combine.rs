@@ -11,9 +11,7 @@ use crate::error::{Error, Result};
 use crate::report::page::{self, PageInputs};
 use crate::runs::stored::StoredRun;
 use crate::types::manifests::RunManifest;
-use crate::types::{
-    ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word,
-};
+use crate::types::{ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word};
 use darkqa_score::accuracies::OfferedChoices;
 use darkqa_score::cluster::{ClusterUnit, Clusters, FrameTies};
 use darkqa_score::findings::Findings;
@@ -34,37 +32,27 @@ impl Combined {
             &self.fidelity,
             &self.listing,
         );
-        let findings = findings
-            .with_set(self.photographed_set())
-            .with_groups(&self.questions);
+        let findings = findings.with_set(self.photographed_set()).with_groups(&self.questions);
         // A model whose replies vary is still the same model.
         self.model_names
             .split
             .iter()
             .filter(|split| split.differs_by_replies_alone())
-            .fold(findings, |findings, split| {
-                findings.with_lights_between(&split.names)
-            })
+            .fold(findings, |findings, split| findings.with_lights_between(&split.names))
     }
 
-    /// The light in which the data set was photographed: dark if all runs state so, with the brightness of the first run that measured it.
+    /// The light in which the data set was photographed: dark if all runs state so, with the brightness of the first
+    /// run that measured it.
     pub(super) fn photographed_set(&self) -> PhotographedSet {
-        let is_dark =
-            |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
+        let is_dark = |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
         if self.runs.is_empty() || !self.runs.iter().all(is_dark) {
             return PhotographedSet::default();
         }
         let brightness = self.runs.iter().find_map(|run| {
             let measured = run.manifest.settings.get("brightness")?;
-            Some((
-                measured.get("mean")?.as_f64()?,
-                measured.get("frames")?.as_u64()? as usize,
-            ))
+            Some((measured.get("mean")?.as_f64()?, measured.get("frames")?.as_u64()? as usize))
         });
-        PhotographedSet {
-            light: SetLight::Dark,
-            brightness,
-        }
+        PhotographedSet { light: SetLight::Dark, brightness }
     }
 
     /// Whether true answers are known. [`combine`] checks that they are known for all questions or for none.
@@ -115,15 +103,12 @@ impl Combined {
 
     /// The manifest and the folder of each run.
     pub(super) fn manifests(&self) -> Vec<(&RunManifest, &Path)> {
-        self.runs
-            .iter()
-            .map(|run| (&run.manifest, &*run.folder))
-            .collect()
+        self.runs.iter().map(|run| (&run.manifest, &*run.folder)).collect()
     }
 }
 
-/// A folder as it is shown in a command, quoted for a shell. Of an absolute path only the name is shown, after `DIR/`, so that a page does
-/// not reveal where the user's files are.
+/// A folder as it is shown in a command, quoted for a shell. Of an absolute path only the name is shown, after `DIR/`,
+/// so that a page does not reveal where the user's files are.
 pub(super) fn command_path(folder: &Path) -> String {
     let shown = match folder.file_name() {
         Some(name) if folder.is_absolute() => Path::new("DIR").join(name),
@@ -132,8 +117,8 @@ pub(super) fn command_path(folder: &Path) -> String {
     shell_word(&shown.display().to_string()).into_owned()
 }
 
-/// The scenes, further images and digests that questions state for their frames. If runs have other files under the same name, the first
-/// counts.
+/// The scenes, further images and digests that questions state for their frames. If runs have other files under the
+/// same name, the first counts.
 pub(super) fn frame_ties<'a>(questions: impl IntoIterator<Item = &'a RunQuestion>) -> FrameTies {
     let mut ties = FrameTies::default();
     for question in questions {
@@ -162,8 +147,8 @@ pub(super) fn clusters<'a>(
 /// Joins runs after checking that they can be compared.
 ///
 /// # Errors
-/// If a run shares no question with the others, a question has other choices or another truth in two runs, or the true answers are known
-/// for some questions and not for others.
+/// If a run shares no question with the others, a question has other choices or another truth in two runs, or the true
+/// answers are known for some questions and not for others.
 pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     check_one_measure(&runs)?;
     if runs.len() > 1 {
@@ -174,19 +159,14 @@ pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
     Ok(combined)
 }
 
-/// The number of choices of each question, for chance accuracy, with the number of orders in which they were asked, because each order is
-/// answered separately. A question that is not asked yet has one order. Questions come from both the trials and the stored questions.
-fn offered_choices(
-    trials: &Trials<ChoiceDetail>,
-    questions: &[RunQuestion],
-) -> Vec<OfferedChoices> {
+/// The number of choices of each question, for chance accuracy, with the number of orders in which they were asked,
+/// because each order is answered separately. A question that is not asked yet has one order. Questions come from both
+/// the trials and the stored questions.
+fn offered_choices(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> Vec<OfferedChoices> {
     let mut orders = BTreeMap::<&QuestionId, BTreeSet<&[String]>>::new();
     let mut all = BTreeMap::<&QuestionId, OfferedChoices>::new();
     for item in trials.items().into_iter().flatten() {
-        orders
-            .entry(&item.question)
-            .or_default()
-            .insert(&item.choices);
+        orders.entry(&item.question).or_default().insert(&item.choices);
         all.entry(&item.question).or_insert_with(|| OfferedChoices {
             family: item.family.as_ref().clone(),
             choices: item.choices.len(),
@@ -201,14 +181,12 @@ fn offered_choices(
         });
     }
     all.into_iter()
-        .map(|(question, offer)| OfferedChoices {
-            orders: orders.get(question).map_or(1, BTreeSet::len),
-            ..offer
-        })
+        .map(|(question, offer)| OfferedChoices { orders: orders.get(question).map_or(1, BTreeSet::len), ..offer })
         .collect()
 }
 
-/// Checks that true answers are known for all questions or for none, because accuracy and self-agreement are different measures.
+/// Checks that true answers are known for all questions or for none, because accuracy and self-agreement are different
+/// measures.
 fn check_one_measure(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
     let mut first: Option<(&Path, bool)> = None;
     for run in runs {
@@ -253,16 +231,12 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
             let choices: BTreeSet<&String> = item.choices.iter().collect();
             let truth = item.truth.map(|truth| item.choices.get(truth));
             if truth == Some(None) {
-                let problem = format!(
-                    "a record of the question {} has no true choice",
-                    item.question
-                );
+                let problem = format!("a record of the question {} has no true choice", item.question);
                 return refuse(run, problem);
             }
             let truth = truth.flatten();
-            let (first, known, known_truth) = questions
-                .entry(&item.question)
-                .or_insert_with(|| (index, choices.clone(), truth));
+            let (first, known, known_truth) =
+                questions.entry(&item.question).or_insert_with(|| (index, choices.clone(), truth));
             shared |= *first != index;
             let differs = (&*known, *known_truth) != (&choices, truth);
             if differs && differing.is_none_or(|(other, _)| *item.question < *other) {
@@ -277,10 +251,8 @@ pub(super) fn check_comparable(runs: &[StoredRun<ChoiceDetail>]) -> Result<()> {
             return refuse(run, problem);
         }
         if others && !shared {
-            let problem = format!(
-                "the run shares no question with {}; report each run alone",
-                runs[0].folder.display()
-            );
+            let problem =
+                format!("the run shares no question with {}; report each run alone", runs[0].folder.display());
             return refuse(run, problem);
         }
     }

@@ -43,8 +43,8 @@ pub(crate) struct ReportArgs {
     /// Read all stored replies again by the rules of this version; asks nothing, and stores the readings that changed
     #[arg(long, add = Decides::Nothing)]
     pub rescore: bool,
-    /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run if it
-    /// is one, else nowhere
+    /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run if
+    /// it is one, else nowhere
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Report only on the items that all models with images answered
@@ -78,24 +78,21 @@ pub(crate) struct ReportShowArgs {
 /// The flags of a comparison with an old run.
 #[derive(Debug, Args)]
 pub(crate) struct BaselineArgs {
-    /// Compare each model and condition with the same ones of an old run: new less old, on the items and images that both have;
-    /// default: no comparison
+    /// Compare each model and condition with the same ones of an old run: new less old, on the items and images that
+    /// both have; default: no comparison
     #[arg(long, value_name = "OLD", add = Decides::Nothing)]
     pub baseline: Option<PathBuf>,
-    /// Exit with 1 if any model is detected to be worse than in OLD in any condition, else with 2 if a model or condition of OLD is not
-    /// compared or no verdict is possible. If no model changed, at most 5 % of reports exit with 1, whatever the number of models and
-    /// conditions. The report names the smallest loss detected with 80 % power. random and the observer do not count as models
+    /// Exit with 1 if any model is detected to be worse than in OLD in any condition, else with 2 if a model or
+    /// condition of OLD is not compared or no verdict is possible. If no model changed, at most 5 % of reports exit
+    /// with 1, whatever the number of models and conditions. The report names the smallest loss detected with 80 %
+    /// power. random and the observer do not count as models
     #[arg(long, add = Decides::Nothing)]
     pub fail_if_worse: bool,
 }
 
 impl ReportArgs {
     fn shown_models(&self) -> ShownModels {
-        if self.all {
-            ShownModels::All
-        } else {
-            ShownModels::Current
-        }
+        if self.all { ShownModels::All } else { ShownModels::Current }
     }
 
     /// True if the report is written into the folder of its only run.
@@ -107,14 +104,7 @@ impl ReportArgs {
     /// Format of the report on standard output.
     fn format(&self) -> StdoutFormat {
         let format = self.show.show.format();
-        if self.show.markdown {
-            StdoutFormat {
-                syntax: Syntax::Markdown,
-                ..format
-            }
-        } else {
-            format
-        }
+        if self.show.markdown { StdoutFormat { syntax: Syntax::Markdown, ..format } } else { format }
     }
 }
 
@@ -159,11 +149,8 @@ pub(super) fn distinct(folders: &[PathBuf]) -> (Vec<&PathBuf>, Vec<Alert>) {
             None => counted.push((canonical, folder, 1)),
         }
     }
-    let duplicates: Vec<(String, usize)> = counted
-        .iter()
-        .filter(|(.., count)| *count > 1)
-        .map(|(_, folder, count)| (run_name(folder), *count))
-        .collect();
+    let duplicates: Vec<(String, usize)> =
+        counted.iter().filter(|(.., count)| *count > 1).map(|(_, folder, count)| (run_name(folder), *count)).collect();
     let folders = counted.into_iter().map(|(_, folder, _)| folder);
     (folders.collect(), duplicate_folder_alerts(&duplicates))
 }
@@ -190,8 +177,7 @@ fn report_choices(
     }
     let new_and_old = match &args.baseline.baseline {
         Some(folder) => {
-            let mut old =
-                open_choice_run(folder, "--baseline compares runs of questions with choices")?;
+            let mut old = open_choice_run(folder, "--baseline compares runs of questions with choices")?;
             old.leave_out(args.shown_models());
             Some((runs.clone(), old))
         }
@@ -205,15 +191,12 @@ fn report_choices(
         combined = keep_common_items(combined)?;
     }
     combined.listing.add_columns(&args.columns);
-    let baseline = new_and_old
-        .map(|(new, old)| Baseline::new(&combined, new, old))
-        .transpose()?;
+    let baseline = new_and_old.map(|(new, old)| Baseline::new(&combined, new, old)).transpose()?;
     let is_worse = match &baseline {
         Some(baseline) if args.baseline.fail_if_worse => baseline.is_worse(combined.unit())?,
         _ => false,
     };
-    let in_folder =
-        args.out.is_none() && !args.common && baseline.is_none() && duplicate_alerts.is_empty();
+    let in_folder = args.out.is_none() && !args.common && baseline.is_none() && duplicate_alerts.is_empty();
     let written = match &*combined.runs {
         [run] if in_folder => {
             let text = write_in_place(&run.folder, run.layout, &run.manifest, |target| {
@@ -238,16 +221,8 @@ fn report_choices(
         record_table::update(&folder, args.show.show.record_table())?;
     }
     // `Incomplete` makes the command exit with 1.
-    let status = if is_worse {
-        Status::Incomplete
-    } else {
-        Status::Complete
-    };
-    Ok(Outcome {
-        status,
-        output: rescore_text + &reported.output,
-        written: reported.written,
-    })
+    let status = if is_worse { Status::Incomplete } else { Status::Complete };
+    Ok(Outcome { status, output: rescore_text + &reported.output, written: reported.written })
 }
 
 /// Refuses flags that need accuracies, for runs whose questions have no true answers.
@@ -279,16 +254,14 @@ fn report_combined(
 ) -> Result<Outcome> {
     if combined.truths() == Truths::Unknown {
         let show = args.format();
-        let output =
-            own_answers::report_output(combined, duplicate_alerts, show, args.out.is_some())?;
+        let output = own_answers::report_output(combined, duplicate_alerts, show, args.out.is_some())?;
         return write_files(args, output.text, output.files);
     }
     let findings = combined.findings();
     let runs = combined.manifests();
     let mut all_alerts = duplicate_alerts.to_vec();
     all_alerts.extend(alerts(combined, &findings));
-    let mut report =
-        ChoiceReport::new(&findings, all_alerts).with_enhancers(&enhancers::rows(&combined.runs));
+    let mut report = ChoiceReport::new(&findings, all_alerts).with_enhancers(&enhancers::rows(&combined.runs));
     if let Some(baseline) = baseline {
         baseline.add_to(&mut report);
     }
@@ -306,11 +279,7 @@ fn report_combined(
 }
 
 /// Writes the files of the report into `--out`, if it is set, and adds a line about them to the text.
-fn write_files(
-    args: &ReportArgs,
-    mut text: String,
-    contents: Vec<(String, Vec<u8>)>,
-) -> Result<Outcome> {
+fn write_files(args: &ReportArgs, mut text: String, contents: Vec<(String, Vec<u8>)>) -> Result<Outcome> {
     let Some(out) = &args.out else {
         if !args.format().is_document() {
             text += "report: not written; --out DIR writes one\n";
@@ -326,17 +295,11 @@ fn write_files(
     Ok(Outcome::wrote(out, Status::Complete, text))
 }
 
-fn report_open(
-    args: &ReportArgs,
-    mut runs: Vec<StoredRun<OpenDetail>>,
-    duplicate_alerts: &[Alert],
-) -> Result<Outcome> {
-    let flags = [
-        ("--common", args.common),
-        ("--baseline", args.baseline.baseline.is_some()),
-    ];
+fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicate_alerts: &[Alert]) -> Result<Outcome> {
+    let flags = [("--common", args.common), ("--baseline", args.baseline.baseline.is_some())];
     if let Some((flag, _)) = flags.iter().find(|(_, is_set)| *is_set) {
-        let problem = "compares runs of questions with choices; marks of open questions have no such test: leave it out";
+        let problem =
+            "compares runs of questions with choices; marks of open questions have no such test: leave it out";
         return Err(Error::usage(*flag, problem));
     }
     if let Some(run) = runs.iter().find(|run| run.trials.is_empty()) {
@@ -352,9 +315,8 @@ fn report_open(
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {
-        let text = write_in_place(&run.folder, run.layout, &run.manifest, |target| {
-            scores.write(target, args.format())
-        })?;
+        let text =
+            write_in_place(&run.folder, run.layout, &run.manifest, |target| scores.write(target, args.format()))?;
         if let Some(text) = text {
             if run.layout == RunLayout::Whole {
                 record_table::update(&run.folder, args.show.show.record_table())?;
@@ -369,8 +331,8 @@ fn report_open(
     write_files(args, scores.stdout_text(args.format())?, files)
 }
 
-/// Parses all stored replies again by the current rules. Stores the changed records and the version of the rules, and returns a text
-/// about the change.
+/// Parses all stored replies again by the current rules. Stores the changed records and the version of the rules, and
+/// returns a text about the change.
 ///
 /// # Errors
 /// If the run is in shards, or one of its files cannot be read or written.

@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 use crate::types::{AskedItem, QuestionId};
 use darkqa_score::accuracies::shared_items;
 
-/// Keeps only the trials of items to which every model with images has a reply in some condition. Models without any reply are ignored.
+/// Keeps only the trials of items to which every model with images has a reply in some condition. Models without any
+/// reply are ignored.
 ///
 /// # Errors
 /// If there is no such item.
@@ -23,10 +24,7 @@ pub(super) fn keep_common_items(mut combined: Combined) -> Result<Combined> {
             .collect()
     };
     if shared.is_empty() {
-        return Err(Error::usage(
-            "--common",
-            "no item was answered by every model; leave it out",
-        ));
+        return Err(Error::usage("--common", "no item was answered by every model; leave it out"));
     }
     let is_shared: Vec<bool> = combined
         .trials
@@ -46,13 +44,9 @@ pub(super) fn keep_common_items(mut combined: Combined) -> Result<Combined> {
         let kept = run.trials.iter().filter_map(|place| places[place]);
         run.trials = TrialPlaces::Some(kept.collect());
     }
-    combined
-        .trials
-        .retain(|trial| is_shared[trial.item_number()]);
+    combined.trials.retain(|trial| is_shared[trial.item_number()]);
     let questions: HashSet<&QuestionId> = shared.iter().map(|(question, ..)| question).collect();
-    combined
-        .questions
-        .retain(|question| questions.contains(&question.id));
+    combined.questions.retain(|question| questions.contains(&question.id));
     Ok(combined)
 }
 

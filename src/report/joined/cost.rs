@@ -39,12 +39,9 @@ impl<'m> PricedRun<'m> {
         })
     }
 
-    /// The cost of a trial; `None` if the price of its model is unknown. `model` is the name under which the run asked the model.
-    pub(super) fn trial_cost<D: Detail>(
-        &mut self,
-        model: &str,
-        trial: TrialRef<'_, D>,
-    ) -> Option<TrialCost> {
+    /// The cost of a trial; `None` if the price of its model is unknown. `model` is the name under which the run asked
+    /// the model.
+    pub(super) fn trial_cost<D: Detail>(&mut self, model: &str, trial: TrialRef<'_, D>) -> Option<TrialCost> {
         let price = if let Some(known) = self.by_model.get(model) {
             *known
         } else {
@@ -83,17 +80,14 @@ pub(super) struct TrialCost {
 }
 
 impl TrialCost {
-    /// The cost of a trial: as the server states it, else at a price. `batch` is the price of a batch request as a fraction of the direct
-    /// price. `None` if neither is known.
+    /// The cost of a trial: as the server states it, else at a price. `batch` is the price of a batch request as a
+    /// fraction of the direct price. `None` if neither is known.
     fn new<D: Detail>(price: Option<Price>, batch: f64, trial: TrialRef<'_, D>) -> Option<Self> {
         let share = match trial.via() {
             Via::Direct | Via::File => 1.0,
             Via::Batch => batch,
         };
-        let mut cost = Self {
-            listed: price.map(|_| 0.0),
-            ..Self::default()
-        };
+        let mut cost = Self { listed: price.map(|_| 0.0), ..Self::default() };
         if let Some(usage) = trial.usage().filter(|_| trial.has_reply()) {
             cost.reply = cost.add(price, share, usage);
         }
@@ -108,8 +102,7 @@ impl TrialCost {
     fn add(&mut self, price: Option<Price>, share: f64, usage: Usage) -> Option<f64> {
         let listed = price.map(|price| share * price.list_charge(usage));
         // Servers without prices of their own state 0.
-        let stated = stated_charge(usage, listed.unwrap_or(0.0))
-            .filter(|stated| price.is_some() || *stated > 0.0);
+        let stated = stated_charge(usage, listed.unwrap_or(0.0)).filter(|stated| price.is_some() || *stated > 0.0);
         let Some(stated) = stated else {
             return listed;
         };
@@ -119,19 +112,15 @@ impl TrialCost {
     }
 }
 
-/// The price of a model of a run: from the run's models file, else from the price table by the name that the endpoint knows.
+/// The price of a model of a run: from the run's models file, else from the price table by the name that the endpoint
+/// knows.
 pub(crate) fn price(prices: &Prices, manifest: &RunManifest, model: &str) -> Option<Price> {
     stated_price(manifest, model).or_else(|| {
-        let columns = manifest
-            .columns
-            .get("model")
-            .and_then(|models| models.get(model));
+        let columns = manifest.columns.get("model").and_then(|models| models.get(model));
         let id = columns.and_then(|content| content.get("--model")?.as_str());
         let added = columns.and_then(|content| content.get("--extra-body")?.as_str());
         let added: Option<Value> = added.and_then(|json| serde_json::from_str(json).ok());
-        let tier = added
-            .as_ref()
-            .and_then(|added| added.get("service_tier")?.as_str());
+        let tier = added.as_ref().and_then(|added| added.get("service_tier")?.as_str());
         prices.price(id.unwrap_or(model), tier).ok()
     })
 }
@@ -148,8 +137,8 @@ fn stated_price(manifest: &RunManifest, model: &str) -> Option<Price> {
     stated.and_then(|entry| serde_json::from_value(entry.get("price")?.clone()).ok())
 }
 
-/// The cost of a run's trials at the prices in its manifest, as text. Attempts without a usable reply are included. `None` if no model of
-/// the run has a known price.
+/// The cost of a run's trials at the prices in its manifest, as text. Attempts without a usable reply are included.
+/// `None` if no model of the run has a known price.
 ///
 /// # Errors
 /// If the prices in the manifest are invalid.
@@ -189,10 +178,7 @@ pub(super) fn cost_text<'t, D: Detail + 't>(
     };
     let note = match unknown {
         0 => String::new(),
-        n => format!(
-            "; {} without a known price or usage",
-            text::plural(n, "reply", "replies")
-        ),
+        n => format!("; {} without a known price or usage", text::plural(n, "reply", "replies")),
     };
     let all = dollars + lost_dollars;
     let source = cost_source(all, stated, listed, &run.source());
@@ -209,10 +195,7 @@ fn cost_source(all: f64, stated: f64, listed: Option<f64>, prices: &str) -> Stri
     let part = if is_all {
         "as its replies state".to_owned()
     } else {
-        format!(
-            "({} of it as its replies state, the rest at {prices})",
-            money(stated)
-        )
+        format!("({} of it as its replies state, the rest at {prices})", money(stated))
     };
     match listed {
         Some(listed) if (stated - listed).abs() > TOLD_FROM * listed => {

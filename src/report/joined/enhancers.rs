@@ -12,20 +12,14 @@ use crate::types::text::counted;
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
     let mut rows: Vec<(EnhancerRow, BTreeSet<&str>)> = Vec::new();
     for (run, name, note) in notes(runs) {
-        let row = EnhancerRow {
-            name: name.to_owned(),
-            how: how(note),
-            looks: looks(note),
-        };
+        let row = EnhancerRow { name: name.to_owned(), how: how(note), looks: looks(note) };
         match rows.iter_mut().find(|(known, _)| *known == row) {
             Some((_, runs)) => drop(runs.insert(&run.name)),
             None => rows.push((row, BTreeSet::from([&*run.name]))),
         }
     }
     // The result must not depend on the order of the runs.
-    rows.sort_by(|(one, in_one), (other, in_other)| {
-        (&one.name, in_one).cmp(&(&other.name, in_other))
-    });
+    rows.sort_by(|(one, in_one), (other, in_other)| (&one.name, in_one).cmp(&(&other.name, in_other)));
     let names: Vec<String> = rows.iter().map(|(row, _)| row.name.clone()).collect();
     rows.into_iter()
         .map(|(mut row, runs)| {
@@ -54,9 +48,7 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
                 "{name} was used because of --allow bad-enhancer although its images may be read in a wrong way: {problem}."
             )),
             Some((ProbeOutcome::Doubtful, Some(problem))) => {
-                add(format!(
-                    "{name}, used as its sidecar or preset states: {problem}."
-                ));
+                add(format!("{name}, used as its sidecar or preset states: {problem}."));
             }
             _ => {}
         }
@@ -89,12 +81,7 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
 }
 
 fn notes(runs: &[JoinedRun]) -> impl Iterator<Item = (&JoinedRun, &str, &EnhancerNote)> {
-    runs.iter().flat_map(|run| {
-        run.manifest
-            .enhancers
-            .iter()
-            .map(move |(name, note)| (run, &**name, note))
-    })
+    runs.iter().flat_map(|run| run.manifest.enhancers.iter().map(move |(name, note)| (run, &**name, note)))
 }
 
 /// The conventions for a network's input and output, each with its source.
@@ -138,12 +125,8 @@ fn assumed_ranges(note: &EnhancerNote) -> Option<String> {
 
 /// The outputs of the graph that are not read; `None` if all are read.
 fn unread_outputs(note: &EnhancerNote) -> Option<String> {
-    let outputs: Vec<&str> = note
-        .convention
-        .iter()
-        .filter(|line| line.key == "not read")
-        .map(|line| &*line.value)
-        .collect();
+    let outputs: Vec<&str> =
+        note.convention.iter().filter(|line| line.key == "not read").map(|line| &*line.value).collect();
     (!outputs.is_empty()).then(|| format!("not read: {}", outputs.join(", ")))
 }
 
@@ -153,10 +136,7 @@ fn looks(note: &EnhancerNote) -> String {
         None => "no probe was run".to_owned(),
         Some(probe) => match probe.outcome {
             ProbeOutcome::Plausible => {
-                format!(
-                    "plausible on the {} of the probe",
-                    counted(probe.frames, "frame")
-                )
+                format!("plausible on the {} of the probe", counted(probe.frames, "frame"))
             }
             ProbeOutcome::Doubtful => "odd in the probe".to_owned(),
             ProbeOutcome::Overruled => "refused by the probe, used all the same".to_owned(),
@@ -202,15 +182,8 @@ fn burnt_out(note: &EnhancerNote) -> Option<String> {
 
 /// The number of images with each flaw, and a few examples.
 fn flaws(judged: &JudgedImages) -> String {
-    let flaws: Vec<String> = judged
-        .flawed
-        .iter()
-        .map(|(flaw, count)| format!("{count} {}", flaw.words()))
-        .collect();
-    let examples: Vec<String> = judged
-        .examples
-        .iter()
-        .map(|image| format!("{} at {}", image.frame, image.condition))
-        .collect();
+    let flaws: Vec<String> = judged.flawed.iter().map(|(flaw, count)| format!("{count} {}", flaw.words())).collect();
+    let examples: Vec<String> =
+        judged.examples.iter().map(|image| format!("{} at {}", image.frame, image.condition)).collect();
     format!("{} (for example {})", flaws.join(", "), examples.join("; "))
 }

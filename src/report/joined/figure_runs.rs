@@ -38,10 +38,7 @@ impl FigureRuns {
                            these runs";
             return Err(Error::usage("figures", problem));
         }
-        Ok(Self {
-            combined,
-            duplicate_alerts,
-        })
+        Ok(Self { combined, duplicate_alerts })
     }
 
     /// All results of the runs, computed from their records.

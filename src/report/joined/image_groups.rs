@@ -19,38 +19,25 @@ pub(super) struct LightCurve {
 
 impl LightCurve {
     fn new(condition: &Condition) -> Self {
-        Self {
-            variant: condition.variant(),
-            enhancer: condition.enhancer.clone(),
-        }
+        Self { variant: condition.variant(), enhancer: condition.enhancer.clone() }
     }
 
-    /// The raw curves that this one is compared with: L0, the degradation kind that this kind extends, and the same variant without the
-    /// enhancer.
+    /// The raw curves that this one is compared with: L0, the degradation kind that this kind extends, and the same
+    /// variant without the enhancer.
     fn bases(&self) -> Vec<Self> {
         let base = self.variant.kind.and_then(Kind::base);
-        let base = base.map(|kind| Variant {
-            kind: Some(kind),
-            ..Variant::NONE
-        });
+        let base = base.map(|kind| Variant { kind: Some(kind), ..Variant::NONE });
         [Some(Variant::NONE), base, Some(self.variant.clone())]
             .into_iter()
             .flatten()
-            .map(|variant| Self {
-                variant,
-                enhancer: None,
-            })
+            .map(|variant| Self { variant, enhancer: None })
             .filter(|base| base != self)
             .collect()
     }
 
     /// Name of the curve without levels, for example `noise+lift`; `L0` for untouched frames.
     pub(super) fn name(&self) -> String {
-        let kind = if self.variant.is_untouched() {
-            "L0".to_owned()
-        } else {
-            self.variant.kind_and_profile()
-        };
+        let kind = if self.variant.is_untouched() { "L0".to_owned() } else { self.variant.kind_and_profile() };
         match &self.enhancer {
             None => kind,
             Some(name) => format!("{kind}+{name}"),
@@ -81,7 +68,8 @@ pub(super) struct SplitCurve {
 
 /// Groups of runs with the same images, for each curve.
 ///
-/// Two runs have the same images if the digests of all images that both sent are equal. If they share none, their manifests decide.
+/// Two runs have the same images if the digests of all images that both sent are equal. If they share none, their
+/// manifests decide.
 #[derive(Debug, Default)]
 pub(super) struct ImageGroups {
     /// The group of each run, for the curves that are split.
@@ -93,7 +81,8 @@ pub(super) struct ImageGroups {
 }
 
 impl ImageGroups {
-    /// Groups runs by their images. `names` are the names of the runs, and `order` their indices in the order of the names.
+    /// Groups runs by their images. `names` are the names of the runs, and `order` their indices in the order of the
+    /// names.
     pub(super) fn new<D: Detail>(runs: &[StoredRun<D>], names: &[String], order: &[usize]) -> Self {
         if runs.len() < 2 {
             return Self::default();
@@ -101,17 +90,10 @@ impl ImageGroups {
         let comparison = ImageComparison::new(runs);
         let manifests: Vec<&RunManifest> = runs.iter().map(|run| &run.manifest).collect();
         let partitions = comparison.partitions(&manifests, order);
-        let mut found = Self {
-            undigested: comparison.undigested.clone(),
-            ..Self::default()
-        };
+        let mut found = Self { undigested: comparison.undigested.clone(), ..Self::default() };
         for (curve, groups) in &partitions {
-            let bases: Vec<_> = curve
-                .bases()
-                .iter()
-                .filter_map(|base| partitions.get(base))
-                .filter(|base| base.len() > 1)
-                .collect();
+            let bases: Vec<_> =
+                curve.bases().iter().filter_map(|base| partitions.get(base)).filter(|base| base.len() > 1).collect();
             if groups.len() < 2 && bases.is_empty() {
                 continue;
             }
@@ -156,22 +138,14 @@ impl ImageGroups {
 fn split_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
     let mut subgroups: Vec<(Vec<Option<usize>>, Vec<usize>)> = Vec::new();
     for run in group {
-        let base_groups: Vec<Option<usize>> = bases
-            .iter()
-            .map(|groups| groups.iter().position(|group| group.contains(run)))
-            .collect();
-        match subgroups
-            .iter_mut()
-            .find(|(known, _)| *known == base_groups)
-        {
+        let base_groups: Vec<Option<usize>> =
+            bases.iter().map(|groups| groups.iter().position(|group| group.contains(run))).collect();
+        match subgroups.iter_mut().find(|(known, _)| *known == base_groups) {
             Some((_, subgroup)) => subgroup.push(*run),
             None => subgroups.push((base_groups, vec![*run])),
         }
     }
-    subgroups
-        .into_iter()
-        .map(|(_, subgroup)| subgroup)
-        .collect()
+    subgroups.into_iter().map(|(_, subgroup)| subgroup).collect()
 }
 
 /// Pairwise agreement of the images of runs, by curve.
@@ -201,9 +175,7 @@ impl ImageComparison {
                 };
                 let mut groups: Vec<Vec<usize>> = Vec::new();
                 for run in order.iter().copied().filter(|run| having.contains(run)) {
-                    let group = groups
-                        .iter_mut()
-                        .find(|group| group.iter().all(|other| agree(run, *other)));
+                    let group = groups.iter_mut().find(|group| group.iter().all(|other| agree(run, *other)));
                     match group {
                         Some(group) => group.push(run),
                         None => groups.push(vec![run]),
@@ -258,22 +230,12 @@ impl ImageComparison {
                 }
             }
         }
-        let mut seen = Self {
-            curves: BTreeMap::new(),
-            pairs: HashMap::new(),
-            undigested,
-        };
+        let mut seen = Self { curves: BTreeMap::new(), pairs: HashMap::new(), undigested };
         for (condition, runs) in curves {
-            seen.curves
-                .entry(LightCurve::new(condition))
-                .or_default()
-                .extend(runs);
+            seen.curves.entry(LightCurve::new(condition)).or_default().extend(runs);
         }
         for ((condition, one, other), found) in pairs {
-            let pair = seen
-                .pairs
-                .entry((LightCurve::new(condition), one, other))
-                .or_default();
+            let pair = seen.pairs.entry((LightCurve::new(condition), one, other)).or_default();
             pair.shared += found.shared;
             pair.differing += found.differing;
         }
@@ -281,8 +243,8 @@ impl ImageComparison {
     }
 }
 
-/// The condition, the frame or walk, and the image digest of a trial. `None` if the trial had no image or failed, or if the model is a
-/// control of the observer, which gets a changed image.
+/// The condition, the frame or walk, and the image digest of a trial. `None` if the trial had no image or failed, or if
+/// the model is a control of the observer, which gets a changed image.
 fn image<D: Detail>(trial: TrialRef<'_, D>) -> Option<(&Condition, &str, Option<Digest>)> {
     let is_image = !trial.failed() && !is_control(trial.model());
     let condition = trial.condition().filter(|_| is_image)?;

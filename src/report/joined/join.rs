@@ -10,8 +10,7 @@ use crate::error::Result;
 use crate::runs::stored::{RunLayout, RunTexts, StoredRun};
 use crate::types::manifests::RunManifest;
 use crate::types::{
-    Condition, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail, TrialKey,
-    TrialRef, Trials,
+    Condition, FrameId, ImageFidelity, ModelListing, QuestionId, RunQuestion, Thumbnail, TrialKey, TrialRef, Trials,
 };
 use darkqa_score::answers::record::Detail;
 
@@ -78,9 +77,9 @@ impl TrialPlaces {
     }
 }
 
-/// Joins runs. Conditions whose images differ between runs are split ([`ImageGroups`]), and so are models that were asked in different ways
-/// or gave different replies to the same trials ([`ModelNames`]). A trial to which two runs have the same reply counts once. Models are
-/// compared only by the trials for which `is_compared` returns true.
+/// Joins runs. Conditions whose images differ between runs are split ([`ImageGroups`]), and so are models that were
+/// asked in different ways or gave different replies to the same trials ([`ModelNames`]). A trial to which two runs
+/// have the same reply counts once. Models are compared only by the trials for which `is_compared` returns true.
 ///
 /// Only the order of [`Joined::runs`] depends on the order of `runs`.
 pub(super) fn join<D: Detail>(
@@ -89,14 +88,11 @@ pub(super) fn join<D: Detail>(
 ) -> Result<Joined<D>> {
     let names = distinct_names(&runs);
     let mut order: Vec<usize> = (0..runs.len()).collect();
-    order.sort_by(|one, other| {
-        (&names[*one], &runs[*one].folder).cmp(&(&names[*other], &runs[*other].folder))
-    });
+    order.sort_by(|one, other| (&names[*one], &runs[*one].folder).cmp(&(&names[*other], &runs[*other].folder)));
     let image_groups = ImageGroups::new(&runs, &names, &order);
     if image_groups.is_split() {
         for (index, run) in runs.iter_mut().enumerate() {
-            run.trials
-                .change_conditions(|condition| image_groups.mark(condition, index));
+            run.trials.change_conditions(|condition| image_groups.mark(condition, index));
             for thumbnail in &mut run.thumbnails {
                 image_groups.mark(&mut thumbnail.condition, index);
             }
@@ -114,10 +110,7 @@ pub(super) fn join<D: Detail>(
         model_names,
         listing: ModelListing::default(),
     };
-    let mut known = AlreadyJoined {
-        trials: (runs.len() > 1).then(HashMap::new),
-        ..AlreadyJoined::default()
-    };
+    let mut known = AlreadyJoined { trials: (runs.len() > 1).then(HashMap::new), ..AlreadyJoined::default() };
     let mut runs: Vec<Option<StoredRun<D>>> = runs.into_iter().map(Some).collect();
     let mut by_name = Vec::new();
     for index in order {
@@ -165,8 +158,8 @@ impl<D: Detail> Joined<D> {
         run.trials.iter().map(|place| self.trials.at(place))
     }
 
-    /// Adds the trials of a run that no earlier run has. Returns the indices of all its trials, the number of its replies, and the number
-    /// of new replies.
+    /// Adds the trials of a run that no earlier run has. Returns the indices of all its trials, the number of its
+    /// replies, and the number of new replies.
     fn add_trials(
         &mut self,
         mut own: Trials<D>,
@@ -198,19 +191,12 @@ impl<D: Detail> Joined<D> {
                 next += 1;
                 if !trial.failed() {
                     added += 1;
-                    known
-                        .trials
-                        .as_mut()
-                        .map(|trials| trials.insert(key, place));
+                    known.trials.as_mut().map(|trials| trials.insert(key, place));
                 }
             }
             places.push(place);
         }
-        own.rename(|model| {
-            self.model_names
-                .group(model, index)
-                .map(|(_, name)| name.clone())
-        });
+        own.rename(|model| self.model_names.group(model, index).map(|(_, name)| name.clone()));
         if self.trials.is_empty() && self.texts.is_empty() {
             // The trials of the first run are moved, not copied.
             let mut is_new = is_new.into_iter();
@@ -226,21 +212,9 @@ impl<D: Detail> Joined<D> {
     }
 
     /// Adds the trials, questions and thumbnails of a run that no earlier run has.
-    fn add(
-        &mut self,
-        run: StoredRun<D>,
-        index: usize,
-        name: String,
-        known: &mut AlreadyJoined,
-    ) -> Result<JoinedRun> {
+    fn add(&mut self, run: StoredRun<D>, index: usize, name: String, known: &mut AlreadyJoined) -> Result<JoinedRun> {
         let cost = cost_text(run.trials.iter().chain(run.left_out.iter()), &run.manifest)?;
-        let left_out = run
-            .left_out
-            .asked()
-            .into_iter()
-            .flatten()
-            .map(|(model, _)| model.to_owned())
-            .collect();
+        let left_out = run.left_out.asked().into_iter().flatten().map(|(model, _)| model.to_owned()).collect();
         let served = served_names(&run.trials);
         let (trials, replies, added) = self.add_trials(run.trials, index, known);
         self.texts.extend(run.texts.by_file());
@@ -280,16 +254,11 @@ impl<D: Detail> Joined<D> {
 
 /// The names that servers reported for each model.
 fn served_names<D: Detail>(trials: &Trials<D>) -> BTreeMap<String, BTreeSet<String>> {
-    let pairs: HashSet<(&str, &str)> = trials
-        .iter()
-        .filter_map(|trial| Some((trial.model(), trial.served_model()?)))
-        .collect();
+    let pairs: HashSet<(&str, &str)> =
+        trials.iter().filter_map(|trial| Some((trial.model(), trial.served_model()?))).collect();
     let mut served = BTreeMap::<String, BTreeSet<String>>::new();
     for (model, name) in pairs {
-        served
-            .entry(model.to_owned())
-            .or_default()
-            .insert(name.to_owned());
+        served.entry(model.to_owned()).or_default().insert(name.to_owned());
     }
     served
 }
@@ -301,7 +270,5 @@ fn distinct_names<D: Detail>(runs: &[StoredRun<D>]) -> Vec<String> {
     if distinct.len() == runs.len() {
         return short;
     }
-    runs.iter()
-        .map(|run| run.folder.display().to_string())
-        .collect()
+    runs.iter().map(|run| run.folder.display().to_string()).collect()
 }

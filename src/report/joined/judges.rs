@@ -40,10 +40,7 @@ pub(super) fn check_same_judge(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
 
 /// Checks that judges of the same name have the same settings, because marks are identified by the judge's name.
 fn check_same_settings(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
-    let judges: Vec<Option<Settings>> = runs
-        .iter()
-        .map(|run| judge_settings(&run.manifest))
-        .collect();
+    let judges: Vec<Option<Settings>> = runs.iter().map(|run| judge_settings(&run.manifest)).collect();
     let names: Vec<String> = runs.iter().map(StoredRun::name).collect();
     let differences = differing_settings(&judges);
     let Some(first) = differences.first() else {
@@ -58,27 +55,19 @@ fn check_same_settings(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
     Err(Error::Run { path, problem })
 }
 
-/// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the manifest does not state them.
+/// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the manifest does not state
+/// them.
 fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
     let judge = text_setting(manifest, JUDGE)?;
     // Runs of earlier versions list the judge only among the models.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
     let settings = columns.into_iter().flatten().next().map(reply_settings)?;
-    Some(
-        settings
-            .into_iter()
-            .map(|(flag, value)| (judge_flag(&flag), value))
-            .collect(),
-    )
+    Some(settings.into_iter().map(|(flag, value)| (judge_flag(&flag), value)).collect())
 }
 
 /// A judge and a protocol in words.
 fn judge_words([judge, protocol]: &[Option<Value>; 2]) -> String {
     let judge = judge.as_ref().and_then(Value::as_str);
     let protocol = protocol.as_ref().and_then(Value::as_str);
-    format!(
-        "{} ({})",
-        judge.unwrap_or("nobody"),
-        protocol.unwrap_or("upstream")
-    )
+    format!("{} ({})", judge.unwrap_or("nobody"), protocol.unwrap_or("upstream"))
 }

@@ -25,10 +25,7 @@ impl LenientChange {
     /// A comparison without replies, for the run of this manifest.
     pub(super) fn new(manifest: &RunManifest) -> Self {
         let from = manifest.reply_reading.as_deref();
-        Self {
-            from: from.unwrap_or(FIRST_REPLY_READING).to_owned(),
-            ..Self::default()
-        }
+        Self { from: from.unwrap_or(FIRST_REPLY_READING).to_owned(), ..Self::default() }
     }
 
     /// True if the replies were parsed by the rules of this version.
@@ -40,10 +37,7 @@ impl LenientChange {
     ///
     /// # Errors
     /// If a record cannot be read, or its choices are not valid.
-    pub(super) fn with_records(
-        mut self,
-        records: impl IntoIterator<Item = Result<Record>>,
-    ) -> Result<Self> {
+    pub(super) fn with_records(mut self, records: impl IntoIterator<Item = Result<Record>>) -> Result<Self> {
         for record in records {
             let record = record?;
             self.add(&record.detail, &reread(record.clone())?.detail);
@@ -71,7 +65,8 @@ impl LenientChange {
         self.changed > 0
     }
 
-    /// The change in words: `lenient/3 reads 3 of 60 replies differently than lenient/2: the lenient accuracy is 45.0 %, and was 50.0 %`.
+    /// The change in words: `lenient/3 reads 3 of 60 replies differently than lenient/2: the lenient accuracy is 45.0
+    /// %, and was 50.0 %`.
     pub(super) fn words(&self) -> String {
         let change = format!(
             "{LENIENT_VERSION} reads {} of {} replies differently than {}",
@@ -80,9 +75,7 @@ impl LenientChange {
         if self.scored == 0 && self.replies > 0 {
             return change;
         }
-        let [before, now] = self
-            .right
-            .map(|right| 100.0 * right as f64 / self.scored.max(1) as f64);
+        let [before, now] = self.right.map(|right| 100.0 * right as f64 / self.scored.max(1) as f64);
         format!("{change}: the lenient accuracy is {now:.1} %, and was {before:.1} %")
     }
 }

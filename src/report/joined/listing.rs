@@ -11,7 +11,8 @@ use crate::runs::training::training_data;
 use crate::types::{ModelColumn, ModelListing};
 use darkqa_score::answers::record::Detail;
 
-/// The models with their order and groups from the models files of all runs, in the order of the runs' names, and facts about each model.
+/// The models with their order and groups from the models files of all runs, in the order of the runs' names, and facts
+/// about each model.
 pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
     let mut runs: Vec<(usize, &JoinedRun)> = joined.runs.iter().enumerate().collect();
     runs.sort_by_key(|(_, run)| (&run.name, &run.folder));
@@ -39,10 +40,8 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
             }
         }
         for (model, content) in run.manifest.columns.get("model").into_iter().flatten() {
-            let known = [
-                (ModelColumn::Id, content.get("--model")),
-                (ModelColumn::Deployment, content.get("deployment")),
-            ];
+            let known =
+                [(ModelColumn::Id, content.get("--model")), (ModelColumn::Deployment, content.get("deployment"))];
             for (column, value) in known {
                 if let Some(value) = value.and_then(Value::as_str) {
                     let values = facts.entry((column, shown(model))).or_default();
@@ -51,9 +50,7 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
             }
         }
         for (model, names) in &run.served {
-            let values = facts
-                .entry((ModelColumn::Served, shown(model)))
-                .or_default();
+            let values = facts.entry((ModelColumn::Served, shown(model))).or_default();
             values.extend(names.iter().cloned());
         }
     }
@@ -66,9 +63,5 @@ pub(super) fn listing<D: Detail>(joined: &Joined<D>) -> ModelListing {
 
 /// The strings in an array; none if the value is missing or not an array.
 fn strings(value: Option<&Value>) -> impl Iterator<Item = &str> {
-    value
-        .and_then(Value::as_array)
-        .into_iter()
-        .flatten()
-        .filter_map(Value::as_str)
+    value.and_then(Value::as_array).into_iter().flatten().filter_map(Value::as_str)
 }

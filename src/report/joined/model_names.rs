@@ -1,5 +1,5 @@
-//! Names of models in a report. A model that runs asked in different ways, or that gave different replies to the same trials, is listed
-//! under several names: [`ModelNames`].
+//! Names of models in a report. A model that runs asked in different ways, or that gave different replies to the same
+//! trials, is listed under several names: [`ModelNames`].
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -69,26 +69,20 @@ pub(super) struct SplitModel {
 impl SplitModel {
     /// The overlap of the two runs that differ most.
     pub(super) fn overlap(&self) -> Overlap {
-        self.overlaps
-            .iter()
-            .copied()
-            .max_by_key(|overlap| overlap.differing())
-            .unwrap_or_default()
+        self.overlaps.iter().copied().max_by_key(|overlap| overlap.differing()).unwrap_or_default()
     }
 
     /// True if all runs asked the model in the same way, and only its replies differ.
     pub(super) fn differs_by_replies_alone(&self) -> bool {
         self.differences.is_empty()
-            && self
-                .overlaps
-                .iter()
-                .all(|overlap| overlap.other_trials + overlap.other_served == 0)
+            && self.overlaps.iter().all(|overlap| overlap.other_trials + overlap.other_served == 0)
     }
 }
 
 impl ModelNames {
-    /// Finds the models that must be split. The conditions of `runs` must be marked by [`ImageGroups::mark`]. `names` are the names of the
-    /// runs, and `order` their indices in the order of the names. Trials for which `is_compared` returns false are ignored.
+    /// Finds the models that must be split. The conditions of `runs` must be marked by [`ImageGroups::mark`]. `names`
+    /// are the names of the runs, and `order` their indices in the order of the names. Trials for which `is_compared`
+    /// returns false are ignored.
     ///
     /// [`ImageGroups::mark`]: super::image_groups::ImageGroups::mark
     pub(super) fn new<D: Detail>(
@@ -104,11 +98,7 @@ impl ModelNames {
         // The runs of each model, in the order of their names.
         let mut runs_by_model = BTreeMap::<&str, Vec<usize>>::new();
         for &index in order {
-            for trial in runs[index]
-                .trials
-                .iter()
-                .filter(|trial| is_compared(*trial))
-            {
+            for trial in runs[index].trials.iter().filter(|trial| is_compared(*trial)) {
                 let runs = runs_by_model.entry(trial.model()).or_default();
                 if runs.last() != Some(&index) {
                     runs.push(index);
@@ -163,7 +153,8 @@ impl ModelNames {
         self.split.push(split);
     }
 
-    /// The number of the group that a run belongs to, and the name of the model in this group; `None` if the model is not split.
+    /// The number of the group that a run belongs to, and the name of the model in this group; `None` if the model is
+    /// not split.
     pub(super) fn group(&self, model: &str, run: usize) -> Option<(usize, &String)> {
         let (group, name) = self.by_run.get(model)?.get(&run)?;
         Some((*group, name))
@@ -171,10 +162,7 @@ impl ModelNames {
 
     /// The name under which a model was asked.
     pub(super) fn original_name<'a>(&'a self, name: &'a str) -> &'a str {
-        self.by_run
-            .iter()
-            .find(|(_, runs)| runs.values().any(|(_, new)| new == name))
-            .map_or(name, |(model, _)| model)
+        self.by_run.iter().find(|(_, runs)| runs.values().any(|(_, new)| new == name)).map_or(name, |(model, _)| model)
     }
 
     /// The key of the first trial that this one repeats, or its own key if it repeats none.
@@ -187,9 +175,7 @@ impl ModelNames {
 fn group_runs(runs: &[usize], is_same: impl Fn(usize, usize) -> bool) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     for &run in runs {
-        let group = groups
-            .iter_mut()
-            .find(|group| group.iter().all(|other| is_same(run, *other)));
+        let group = groups.iter_mut().find(|group| group.iter().all(|other| is_same(run, *other)));
         match group {
             Some(group) => group.push(run),
             None => groups.push(vec![run]),
@@ -199,10 +185,7 @@ fn group_runs(runs: &[usize], is_same: impl Fn(usize, usize) -> bool) -> Vec<Vec
 }
 
 /// The overlap of each pair of runs in different groups.
-fn overlaps_between(
-    groups: &[Vec<usize>],
-    overlap: impl Fn(usize, usize) -> Overlap,
-) -> Vec<Overlap> {
+fn overlaps_between(groups: &[Vec<usize>], overlap: impl Fn(usize, usize) -> Overlap) -> Vec<Overlap> {
     let mut overlaps = Vec::new();
     for (place, group) in groups.iter().enumerate() {
         for other in groups[place + 1..].iter().flatten() {
@@ -212,7 +195,8 @@ fn overlaps_between(
     overlaps
 }
 
-/// Distinct name suffixes of groups of runs: the settings that differ if they are few and short, else the name of the first run.
+/// Distinct name suffixes of groups of runs: the settings that differ if they are few and short, else the name of the
+/// first run.
 fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) -> Vec<String> {
     groups
         .iter()
@@ -233,9 +217,10 @@ fn suffixes(groups: &[Vec<usize>], differences: &[Setting], names: &[String]) ->
                 && differences.len() <= MAX_SETTINGS
                 && differences.iter().all(|setting| {
                     setting.flag.starts_with("--")
-                        && setting.values.iter().all(|(_, value)| {
-                            value.chars().count() <= MAX_VALUE_CHARS && !is_digest(value)
-                        })
+                        && setting
+                            .values
+                            .iter()
+                            .all(|(_, value)| value.chars().count() <= MAX_VALUE_CHARS && !is_digest(value))
                 })
         })
         .unwrap_or_else(|| groups.iter().map(|group| names[group[0]].clone()).collect())
@@ -279,22 +264,15 @@ impl Overlap {
 /// The overlap of each pair of runs, by model and by the indices of the runs in ascending order.
 type Overlaps<'a> = HashMap<(&'a str, usize, usize), Overlap>;
 
-/// The overlap of each pair of runs, and the trials that repeat an earlier one. The keys of two such trials may differ although image,
-/// words, model and parameters are the same, because the same image can be made in two ways.
+/// The overlap of each pair of runs, and the trials that repeat an earlier one. The keys of two such trials may differ
+/// although image, words, model and parameters are the same, because the same image can be made in two ways.
 fn overlaps<'a, D: Detail>(
     runs: &'a [StoredRun<D>],
     order: &[usize],
     is_compared: impl Fn(TrialRef<'_, D>) -> bool,
 ) -> (Overlaps<'a>, HashMap<TrialKey, TrialKey>) {
-    let texts: Vec<HashMap<&QuestionId, &RunQuestion>> = runs
-        .iter()
-        .map(|run| {
-            run.questions
-                .iter()
-                .map(|question| (&question.id, question))
-                .collect()
-        })
-        .collect();
+    let texts: Vec<HashMap<&QuestionId, &RunQuestion>> =
+        runs.iter().map(|run| run.questions.iter().map(|question| (&question.id, question)).collect()).collect();
     let is_repeated = |[one, other]: [(usize, TrialRef<'_, D>); 2]| {
         let words = [one, other].map(|(run, trial)| texts[run].get(trial.question()));
         let same_words = match words {
@@ -303,23 +281,14 @@ fn overlaps<'a, D: Detail>(
         };
         let [(run, trial), (other_run, other)] = [one, other];
         let image = trial.sent_digest();
-        let same_image =
-            trial.view() == View::Image && image.is_some() && image == other.sent_digest();
-        same_words
-            && same_image
-            && [run, other_run]
-                .iter()
-                .all(|run| parameters_are_known(&runs[*run], trial.model()))
+        let same_image = trial.view() == View::Image && image.is_some() && image == other.sent_digest();
+        same_words && same_image && [run, other_run].iter().all(|run| parameters_are_known(&runs[*run], trial.model()))
     };
     // The first trial of each run, by item.
     let mut first_trials = HashMap::<Item<'_>, Vec<(usize, TrialRef<'_, D>)>>::new();
     let (mut overlaps, mut repeated) = (Overlaps::new(), HashMap::new());
     for &index in order {
-        for trial in runs[index]
-            .trials
-            .iter()
-            .filter(|trial| is_compared(*trial))
-        {
+        for trial in runs[index].trials.iter().filter(|trial| is_compared(*trial)) {
             let known = first_trials.entry(Item::from_trial(trial)).or_default();
             if known.last().is_some_and(|(run, _)| *run == index) {
                 continue;

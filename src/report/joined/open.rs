@@ -1,12 +1,11 @@
-//! The report on runs of open questions: [`Scores`] scores their records, and [`write()`] writes the report into the folder of a run.
+//! The report on runs of open questions: [`Scores`] scores their records, and [`write()`] writes the report into the
+//! folder of a run.
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-use super::alerts::{
-    empty_answer_alerts, joining_alerts, missing_alerts, open_early_ends, run_alerts,
-};
+use super::alerts::{empty_answer_alerts, joining_alerts, missing_alerts, open_early_ends, run_alerts};
 use super::combine::command_path;
 use super::enhancers;
 use super::join::join;
@@ -32,14 +31,10 @@ use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials, text_s
 use crate::store::Store;
 use crate::types::flags::read_word;
 use crate::types::manifests::{RunManifest, Status};
-use crate::types::{
-    ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef,
-};
+use crate::types::{ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef};
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::model_in_condition::ModelInCondition;
-use darkqa_score::open::{
-    AnswerOutcome, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed,
-};
+use darkqa_score::open::{AnswerOutcome, Group, OpenSummary, QuestionGroups, ScoredAnswer, open_summary_listed};
 
 /// Scored answers of a run, or of several joined into one.
 pub(crate) struct Scores {
@@ -58,24 +53,16 @@ fn unscored_alerts(summary: &OpenSummary) -> Vec<Alert> {
     if cells.clone().all(|cell| cell.scored() == 0) {
         return Vec::new();
     }
-    let counts: Vec<_> = cells
-        .map(|cell| (&cell.subject, [cell.planned - cell.scored(), cell.planned]))
-        .collect();
+    let counts: Vec<_> = cells.map(|cell| (&cell.subject, [cell.planned - cell.scored(), cell.planned])).collect();
     missing_alerts(&counts, "Scores")
 }
 
 impl Scores {
     /// Scores a run by the marks of the judge in its manifest.
     pub(super) fn new(joined: JoinedRuns) -> Result<Self> {
-        let JoinedRuns {
-            run,
-            mut alerts,
-            enhancers,
-            listing,
-        } = joined;
+        let JoinedRuns { run, mut alerts, enhancers, listing } = joined;
         let judge = text_setting(&run.manifest, JUDGE).map(str::to_owned);
-        let protocol =
-            text_setting(&run.manifest, PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
+        let protocol = text_setting(&run.manifest, PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let ids: Vec<&QuestionId> = run.questions.iter().map(|question| &question.id).collect();
         let predictions = predictions(&run.records, &ids, protocol);
         let marks = marks(&run, judge.as_deref());
@@ -88,9 +75,8 @@ impl Scores {
                 AnswerState::Missing | AnswerState::Null => None,
             };
             let outcome = outcome(&prediction, mark_record, protocol);
-            let failure = failures
-                .get(&(question, prediction.subject.clone()))
-                .filter(|_| outcome == AnswerOutcome::Missing);
+            let failure =
+                failures.get(&(question, prediction.subject.clone())).filter(|_| outcome == AnswerOutcome::Missing);
             scored.push(ScoredAnswer {
                 subject: prediction.subject.clone(),
                 question: prediction.question,
@@ -110,22 +96,12 @@ impl Scores {
         let summary = open_summary_listed(&scored, &groups, &listing);
         alerts.extend(unscored_alerts(&summary));
         alerts.sort_by_key(|alert| alert.kind);
-        Ok(Self {
-            run,
-            judge,
-            protocol,
-            summary,
-            answers,
-            alerts,
-            enhancers,
-        })
+        Ok(Self { run, judge, protocol, summary, answers, alerts, enhancers })
     }
 
     /// True if the mark of an answer cannot be parsed.
     fn has_unmarked(&self) -> bool {
-        self.answers
-            .iter()
-            .any(|answer| answer.outcome == AnswerOutcome::Unmarked)
+        self.answers.iter().any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
 
     pub(super) fn summary(&self) -> &OpenSummary {
@@ -170,12 +146,7 @@ impl Scores {
         self.formatted(&report, &tables(&report), show)
     }
 
-    fn formatted(
-        &self,
-        report: &OpenReport<'_>,
-        tables: &[Table],
-        show: StdoutFormat,
-    ) -> Result<String> {
+    fn formatted(&self, report: &OpenReport<'_>, tables: &[Table], show: StdoutFormat) -> Result<String> {
         let folder = &self.run.folder;
         match show.syntax {
             Syntax::Json => summary_json(report, tables, Some(folder), show.length),
@@ -185,11 +156,7 @@ impl Scores {
     }
 
     /// Writes the report of the run. Returns the text for standard output.
-    pub(super) fn write(
-        &self,
-        target: &ReportFolder<'_, OpenDetail>,
-        show: StdoutFormat,
-    ) -> Result<String> {
+    pub(super) fn write(&self, target: &ReportFolder<'_, OpenDetail>, show: StdoutFormat) -> Result<String> {
         let report = self.report();
         let tables = tables(&report);
         target.write(&files(&report, &tables)?, &self.run.manifest)?;
@@ -275,30 +242,20 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
     let enhancers = enhancers::rows(&joined.runs);
     let listing = listing(&joined);
     let mut runs = joined.runs.into_iter();
-    let first = runs
-        .next()
-        .ok_or_else(|| Error::usage("RUN", "no run is named"))?;
+    let first = runs.next().ok_or_else(|| Error::usage("RUN", "no run is named"))?;
     let mut trials = joined.trials;
     let ids = joined.questions.iter().map(|question| &question.id);
     sort_trials(&mut trials, ids, &first.manifest.models);
     let mut records: Vec<Record<OpenDetail>> = trials.iter().map(TrialRef::record).collect();
-    // Marks keep the name under which the judge was asked, because a model listed under two names may also be the judge.
-    for record in records
-        .iter_mut()
-        .filter(|record| record.detail.step == Step::Mark)
-    {
+    // Marks keep the name under which the judge was asked, because a model listed under two names may also be the
+    // judge.
+    for record in records.iter_mut().filter(|record| record.detail.step == Step::Mark) {
         record.model = joined.model_names.original_name(&record.model).to_owned();
     }
     alerts.extend(empty_answer_alerts(&records));
     let run = OpenRun {
         records,
-        others: runs
-            .map(|run| OtherRun {
-                name: run.name,
-                folder: run.folder,
-                manifest: run.manifest,
-            })
-            .collect(),
+        others: runs.map(|run| OtherRun { name: run.name, folder: run.folder, manifest: run.manifest }).collect(),
         name: first.name,
         folder: first.folder,
         layout: first.layout,
@@ -306,12 +263,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         questions: joined.questions,
         thumbnails: joined.thumbnails,
     };
-    Ok(JoinedRuns {
-        run,
-        alerts,
-        enhancers,
-        listing,
-    })
+    Ok(JoinedRuns { run, alerts, enhancers, listing })
 }
 
 /// Checks that questions with the same name are the same in all runs; their images may differ.
@@ -320,14 +272,9 @@ fn check_questions(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
     for run in runs {
         for question in &run.questions {
             let known = first_seen.entry(&question.id).or_insert(question);
-            if !known.is_same(&RunQuestion {
-                image: None,
-                ..question.clone()
-            }) {
-                let problem = format!(
-                    "the question {} is different in the other runs; report each run alone",
-                    question.id
-                );
+            if !known.is_same(&RunQuestion { image: None, ..question.clone() }) {
+                let problem =
+                    format!("the question {} is different in the other runs; report each run alone", question.id);
                 let path = run.folder.clone();
                 return Err(Error::Run { path, problem });
             }
@@ -337,25 +284,18 @@ fn check_questions(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
 }
 
 /// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be parsed.
-pub(crate) fn write(
-    store: &Store<OpenDetail>,
-    mut run: StoredRun<OpenDetail>,
-    show: StdoutFormat,
-) -> Result<Outcome> {
+pub(crate) fn write(store: &Store<OpenDetail>, mut run: StoredRun<OpenDetail>, show: StdoutFormat) -> Result<Outcome> {
     run.leave_out(ShownModels::Current);
     let mut scores = Scores::new(combine(vec![run])?)?;
     if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
         scores.run.manifest.status = Status::Incomplete;
     }
-    Ok(Outcome::wrote(
-        store.folder(),
-        scores.run.manifest.status,
-        scores.write(&ReportFolder::Run(store), show)?,
-    )
-    .in_format(show))
+    Ok(Outcome::wrote(store.folder(), scores.run.manifest.status, scores.write(&ReportFolder::Run(store), show)?)
+        .in_format(show))
 }
 
-/// True if the trial asked for an answer, false if it asked for a mark. `TrialRef::is_answer` does not coerce to the `Fn` that [`join`] takes.
+/// True if the trial asked for an answer, false if it asked for a mark. `TrialRef::is_answer` does not coerce to the
+/// `Fn` that [`join`] takes.
 fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
     trial.is_answer()
 }
@@ -390,11 +330,7 @@ fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, ModelInCon
 }
 
 /// Outcome of an answer, given the record of its mark.
-fn outcome(
-    prediction: &Prediction,
-    mark_record: Option<&Record<OpenDetail>>,
-    protocol: Protocol,
-) -> AnswerOutcome {
+fn outcome(prediction: &Prediction, mark_record: Option<&Record<OpenDetail>>, protocol: Protocol) -> AnswerOutcome {
     match (&prediction.state, mark_record) {
         (AnswerState::Missing, _) => AnswerOutcome::Missing,
         (AnswerState::Null, _) => AnswerOutcome::Null,

@@ -47,7 +47,8 @@ pub(super) fn write_report(
     Ok(text + &format!("report: {}\n", page.display()))
 }
 
-/// The report on several runs, or on one whose report is not written into its folder. The files are empty unless `with_files` is set.
+/// The report on several runs, or on one whose report is not written into its folder. The files are empty unless
+/// `with_files` is set.
 pub(super) fn report_output(
     combined: &Combined,
     duplicate_alerts: &[Alert],
@@ -58,11 +59,7 @@ pub(super) fn report_output(
     let report = report(combined, &agreement, duplicate_alerts);
     let runs = combined.manifests();
     let list = SummaryRuns::Several(&runs);
-    let files = if with_files {
-        files(&report, combined, list)?
-    } else {
-        Vec::new()
-    };
+    let files = if with_files { files(&report, combined, list)? } else { Vec::new() };
     let text = stdout_text(&report, &runs, list, show)?;
     Ok(ReportOutput { files, text })
 }
@@ -79,24 +76,15 @@ pub(super) fn whole_report(combined: &Combined) -> Result<WholeReport> {
 }
 
 /// The files of a report, by name.
-fn files(
-    report: &AgreementReport<'_>,
-    combined: &Combined,
-    runs: SummaryRuns<'_>,
-) -> Result<Vec<(String, Vec<u8>)>> {
+fn files(report: &AgreementReport<'_>, combined: &Combined, runs: SummaryRuns<'_>) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, &combined.page_inputs())?;
     let summary = summary(report, runs, ReportLength::Summary)?;
     Ok(with_summary(products, summary))
 }
 
 fn self_agreement(combined: &Combined) -> SelfAgreement<'_> {
-    SelfAgreement::new(
-        &combined.trials,
-        &frame_ties(&combined.questions),
-        &combined.questions,
-        &combined.listing,
-    )
-    .with_set(combined.photographed_set())
+    SelfAgreement::new(&combined.trials, &frame_ties(&combined.questions), &combined.questions, &combined.listing)
+        .with_set(combined.photographed_set())
 }
 
 fn report<'a>(
@@ -123,11 +111,7 @@ fn stdout_text(
     }
 }
 
-fn markdown(
-    report: &AgreementReport<'_>,
-    runs: &[(&RunManifest, &Path)],
-    length: ReportLength,
-) -> String {
+fn markdown(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
     let names = runs.iter().map(|(_, folder)| run_name(folder)).collect();
     MarkdownReport::for_own_answers(report, names, length).text()
 }

@@ -29,11 +29,7 @@ impl<D: Detail> ReportFolder<'_, D> {
     ///
     /// # Errors
     /// If a file cannot be written.
-    pub(super) fn write(
-        &self,
-        contents: &[(String, Vec<u8>)],
-        manifest: &RunManifest,
-    ) -> Result<()> {
+    pub(super) fn write(&self, contents: &[(String, Vec<u8>)], manifest: &RunManifest) -> Result<()> {
         for (name, content) in contents {
             match self {
                 Self::Run(store) => store.write(name, content)?,
@@ -51,7 +47,8 @@ impl<D: Detail> ReportFolder<'_, D> {
     }
 }
 
-/// Refuses to write into a subfolder that is a symbolic link, because an untrusted folder of shards could redirect the report elsewhere.
+/// Refuses to write into a subfolder that is a symbolic link, because an untrusted folder of shards could redirect the
+/// report elsewhere.
 fn refuse_link(folder: &Path, path: &Path) -> Result<()> {
     match path.parent() {
         Some(inner) if inner != folder && inner.is_symlink() => Err(Error::data(
@@ -62,8 +59,8 @@ fn refuse_link(folder: &Path, path: &Path) -> Result<()> {
     }
 }
 
-/// Calls `write` with the folder of a run; returns the text for standard output, or `None` with a warning if the folder cannot be written
-/// to.
+/// Calls `write` with the folder of a run; returns the text for standard output, or `None` with a warning if the folder
+/// cannot be written to.
 ///
 /// # Errors
 /// If `write` fails for a run that could be opened for writing.

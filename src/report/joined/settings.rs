@@ -1,4 +1,5 @@
-//! Comparison of the settings in the manifests of several runs: [`differing_settings`] returns each [`Setting`] that differs.
+//! Comparison of the settings in the manifests of several runs: [`differing_settings`] returns each [`Setting`] that
+//! differs.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -18,19 +19,10 @@ const ASKED_ABOUT: &str = "people asked about";
 pub(super) const ENCODING: [&str; 3] = ["--max-side", "--image-size", "--image"];
 
 /// Other fields of a run's identity that determine the pixels of images.
-const PIXEL_FIELDS: [&str; 6] = [
-    "--num-frames",
-    "--degrade",
-    "--sensor",
-    "--seed",
-    "synthesis",
-    "enhancement",
-];
+const PIXEL_FIELDS: [&str; 6] = ["--num-frames", "--degrade", "--sensor", "--seed", "synthesis", "enhancement"];
 
 /// Flags of the noise model, without `--`; compared as the user wrote them.
-const NOISE_FLAGS: [&str; 9] = [
-    "profile", "amplify", "tone", "draws", "coupling", "camera", "gain", "ratio", "fixed",
-];
+const NOISE_FLAGS: [&str; 9] = ["profile", "amplify", "tone", "draws", "coupling", "camera", "gain", "ratio", "fixed"];
 
 /// Manifest column of the degradation kinds that are not in the paper.
 const VARIANT: &str = "variant";
@@ -68,11 +60,7 @@ impl Setting {
             .into_iter()
             .map(|(value, runs)| format!("{} in {}", shorten(value), joined_with_and(&runs)))
             .collect();
-        format!(
-            "{} is {}",
-            setting_spelling(&self.flag),
-            joined_with_and(&values)
-        )
+        format!("{} is {}", setting_spelling(&self.flag), joined_with_and(&values))
     }
 }
 
@@ -86,8 +74,8 @@ pub(super) fn joined_with_and<T: AsRef<str>>(texts: &[T]) -> String {
     }
 }
 
-/// Settings whose values differ between runs. Runs that are `None` are skipped. A setting of a column value is compared only between
-/// runs that have the value.
+/// Settings whose values differ between runs. Runs that are `None` are skipped. A setting of a column value is compared
+/// only between runs that have the value.
 pub(super) fn differing_settings(runs: &[Option<Settings>]) -> Vec<Setting> {
     let flags: BTreeSet<&String> = runs.iter().flatten().flat_map(BTreeMap::keys).collect();
     flags
@@ -97,46 +85,30 @@ pub(super) fn differing_settings(runs: &[Option<Settings>]) -> Vec<Setting> {
             values: runs
                 .iter()
                 .enumerate()
-                .filter_map(|(run, settings)| {
-                    Some((run, value_or_unset(settings.as_ref()?, flag)?))
-                })
+                .filter_map(|(run, settings)| Some((run, value_or_unset(settings.as_ref()?, flag)?)))
                 .collect(),
         })
-        .filter(|setting| {
-            setting
-                .values
-                .iter()
-                .any(|(_, v)| *v != setting.values[0].1)
-        })
+        .filter(|setting| setting.values.iter().any(|(_, v)| *v != setting.values[0].1))
         .collect()
 }
 
-/// Value of a setting; [`UNSET`] if the run does not have it. `None` if the setting belongs to a column value that the run does not have.
+/// Value of a setting; [`UNSET`] if the run does not have it. `None` if the setting belongs to a column value that the
+/// run does not have.
 fn value_or_unset(settings: &Settings, flag: &str) -> Option<String> {
     if let Some(value) = settings.get(flag) {
         return Some(value.clone());
     }
-    let applies = flag.split_once(OF).is_none_or(|(_, value)| {
-        settings
-            .keys()
-            .filter_map(|flag| flag.split_once(OF))
-            .any(|(_, own)| own == value)
-    });
+    let applies = flag
+        .split_once(OF)
+        .is_none_or(|(_, value)| settings.keys().filter_map(|flag| flag.split_once(OF)).any(|(_, own)| own == value));
     applies.then(|| UNSET.to_owned())
 }
 
 /// Identity of a run; for human answers, the identity of the run whose images people saw.
 pub(super) fn identity_settings(run: &RunManifest) -> Settings {
     match run.identity.get(ASKED_ABOUT) {
-        Some(Value::Object(asked)) => asked
-            .iter()
-            .map(|(name, value)| field(name, value))
-            .collect(),
-        _ => run
-            .identity
-            .iter()
-            .map(|(name, value)| field(name, value))
-            .collect(),
+        Some(Value::Object(asked)) => asked.iter().map(|(name, value)| field(name, value)).collect(),
+        _ => run.identity.iter().map(|(name, value)| field(name, value)).collect(),
     }
 }
 
@@ -152,16 +124,11 @@ pub(super) fn identity_fields(run: &RunManifest, fields: &[&str]) -> Settings {
     settings
 }
 
-/// Settings of a run that determine its images, except size and encoding. Noise settings are included only if the noise profiles of
-/// `runs` differ.
+/// Settings of a run that determine its images, except size and encoding. Noise settings are included only if the noise
+/// profiles of `runs` differ.
 pub(super) fn light_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     let variants = column_settings(run, VARIANT);
-    let parts = [
-        pixel_settings(run),
-        noise_settings(run, runs),
-        variants,
-        enhancer_settings(run),
-    ];
+    let parts = [pixel_settings(run), noise_settings(run, runs), variants, enhancer_settings(run)];
     parts.into_iter().flatten().collect()
 }
 
@@ -170,15 +137,12 @@ pub(super) fn pixel_settings(run: &RunManifest) -> Settings {
     identity_fields(run, &PIXEL_FIELDS)
 }
 
-/// Noise settings of a run: the flags as the user wrote them, and the content of its noise profiles. Empty if the noise profiles of
-/// `runs` are equal, or if this run has none.
+/// Noise settings of a run: the flags as the user wrote them, and the content of its noise profiles. Empty if the noise
+/// profiles of `runs` are equal, or if this run has none.
 pub(super) fn noise_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
     let own = noise_profiles(run);
     // Equal profiles are the same noise, even if only one run writes out a default.
-    let are_equal = runs
-        .iter()
-        .filter_map(|other| noise_profiles(other))
-        .all(|other| Some(&other) == own.as_ref());
+    let are_equal = runs.iter().filter_map(|other| noise_profiles(other)).all(|other| Some(&other) == own.as_ref());
     if own.is_none() || are_equal {
         return Settings::new();
     }
@@ -228,10 +192,7 @@ fn column_settings(run: &RunManifest, column: &str) -> Settings {
 /// Removes the noise settings of column values if a noise flag differs, because the flag already explains them.
 pub(super) fn without_explained(mut settings: Vec<Setting>) -> Vec<Setting> {
     let noise_flags = NOISE_FLAGS.map(|flag| format!("--{flag}"));
-    if settings
-        .iter()
-        .any(|setting| noise_flags.contains(&setting.flag))
-    {
+    if settings.iter().any(|setting| noise_flags.contains(&setting.flag)) {
         settings.retain(|setting| match setting.flag.split_once(OF) {
             Some((flag, _)) => !noise_flags.iter().any(|noise| flag.contains(noise)),
             None => true,
@@ -240,28 +201,23 @@ pub(super) fn without_explained(mut settings: Vec<Setting>) -> Vec<Setting> {
     settings
 }
 
-/// Settings that determine a model's replies, except question and images. `None` if the manifest does not have the model.
+/// Settings that determine a model's replies, except question and images. `None` if the manifest does not have the
+/// model.
 pub(super) fn model_settings(run: &RunManifest, model: &str) -> Option<Settings> {
     let content = run.columns.get("model")?.get(model)?;
     // A built-in model answers by rules and reads no prompt.
-    let asked_by = if run.is_built_in(model) {
-        "--rules"
-    } else {
-        "--prompts"
-    };
+    let asked_by = if run.is_built_in(model) { "--rules" } else { "--prompts" };
     let shared = identity_fields(run, &[asked_by]);
     Some(reply_settings(content).into_iter().chain(shared).collect())
 }
 
 /// Settings of a model, without its base URL and name.
 pub(super) fn reply_settings(content: &Value) -> Settings {
-    leaves(content)
-        .filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str()))
-        .collect()
+    leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str())).collect()
 }
 
-/// Settings of all models of a run that have a base URL, without judges; different values of a flag are joined with "or". `None` if
-/// the run has no such model.
+/// Settings of all models of a run that have a base URL, without judges; different values of a flag are joined with
+/// "or". `None` if the run has no such model.
 pub(super) fn remote_model_settings(run: &RunManifest) -> Option<Settings> {
     let models = run.columns.get("model")?;
     let mut values = BTreeMap::<String, BTreeSet<String>>::new();
@@ -313,11 +269,7 @@ fn add_leaves(flag: &str, value: &Value, found: &mut Vec<(String, String)>) {
         Value::Object(fields) => {
             for (name, value) in fields {
                 let is_flag = flag.is_empty() || name.starts_with("--");
-                let name = if is_flag {
-                    name.clone()
-                } else {
-                    format!("{flag} ({name})")
-                };
+                let name = if is_flag { name.clone() } else { format!("{flag} ({name})") };
                 add_leaves(&name, value, found);
             }
         }
@@ -360,34 +312,21 @@ mod tests {
 
     #[test]
     fn setting_lists_each_value_once() {
-        let runs = [
-            Some(seed_settings("0")),
-            Some(seed_settings("1")),
-            Some(seed_settings("0")),
-            None,
-            Some(Settings::new()),
-        ];
+        let runs =
+            [Some(seed_settings("0")), Some(seed_settings("1")), Some(seed_settings("0")), None, Some(Settings::new())];
         let names = ["a", "b", "c", "d", "e"].map(str::to_owned);
         let [setting] = &*differing_settings(&runs) else {
             panic!("one setting differs");
         };
-        assert_eq!(
-            setting.words(&names),
-            "--seed is 0 in a and c, 1 in b and unset in e"
-        );
+        assert_eq!(setting.words(&names), "--seed is 0 in a and c, 1 in b and unset in e");
         assert!(differing_settings(&[runs[0].clone(), runs[2].clone(), None]).is_empty());
     }
 
     #[test]
     fn digests_are_shortened_and_objects_flattened() {
         let content = serde_json::json!({"--llie": "ab".repeat(32), "--camera": {"name": "a7", "gain": null}});
-        let found: Vec<_> = leaves(&content)
-            .map(|(flag, value)| (flag, shorten(&value)))
-            .collect();
+        let found: Vec<_> = leaves(&content).map(|(flag, value)| (flag, shorten(&value))).collect();
         let expected = [("--camera (name)", "a7"), ("--llie", "abababab…")];
-        assert_eq!(
-            found,
-            expected.map(|(flag, value)| (flag.to_owned(), value.to_owned()))
-        );
+        assert_eq!(found, expected.map(|(flag, value)| (flag.to_owned(), value.to_owned())));
     }
 }

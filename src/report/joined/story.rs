@@ -11,7 +11,5 @@ use crate::types::ChoiceDetail;
 /// # Errors
 /// If a record of the run has no true choice.
 pub(crate) fn story_curves(run: StoredRun<ChoiceDetail>) -> Result<Option<StoryCurves>> {
-    Ok(figures::story_curves(
-        combine(vec![run])?.findings().shown(),
-    ))
+    Ok(figures::story_curves(combine(vec![run])?.findings().shown()))
 }

@@ -29,8 +29,8 @@ fn choice_report(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
         return own_answers::whole_report(&combined);
     }
     let findings = combined.findings();
-    let report = ChoiceReport::new(&findings, alerts(&combined, &findings))
-        .with_enhancers(&enhancers::rows(&combined.runs));
+    let report =
+        ChoiceReport::new(&findings, alerts(&combined, &findings)).with_enhancers(&enhancers::rows(&combined.runs));
     let runs = combined.manifests();
     let mut files = choice::files(&report, &combined, SummaryRuns::One(runs[0].0, None))?;
     if !findings.first_failures.is_empty() {
@@ -38,10 +38,7 @@ fn choice_report(run: StoredRun<ChoiceDetail>) -> Result<WholeReport> {
         write_flips(&findings, &mut rows)?;
         files.push((FLIPS.to_owned(), rows));
     }
-    Ok(WholeReport {
-        files,
-        markdown: choice::markdown(&report, &runs, ReportLength::Summary),
-    })
+    Ok(WholeReport { files, markdown: choice::markdown(&report, &runs, ReportLength::Summary) })
 }
 
 fn open_report(run: StoredRun<OpenDetail>) -> Result<WholeReport> {

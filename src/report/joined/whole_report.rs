@@ -18,10 +18,7 @@ pub(crate) struct WholeReport {
 }
 
 /// Adds the summary as JSON to the files of a report.
-pub(super) fn with_summary(
-    mut products: Vec<(String, Vec<u8>)>,
-    summary: String,
-) -> Vec<(String, Vec<u8>)> {
+pub(super) fn with_summary(mut products: Vec<(String, Vec<u8>)>, summary: String) -> Vec<(String, Vec<u8>)> {
     products.push((SUMMARY_JSON.to_owned(), summary.into_bytes()));
     products
 }

@@ -13,10 +13,7 @@ pub(crate) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
         None => 0,
     };
     let outcomes = [
-        (
-            total(report, |cell| cell.missing),
-            "not answered: not scored",
-        ),
+        (total(report, |cell| cell.missing), "not answered: not scored"),
         (unjudged, "not judged yet: not scored"),
         (
             total(report, |cell| cell.unmarked),
@@ -26,10 +23,7 @@ pub(crate) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
             total(report, |cell| cell.null),
             "without an answer (none in a file, only thoughts, no \"A:\" of a blind model): scored 0, unjudged",
         ),
-        (
-            total(report, |cell| cell.cut),
-            "cut after their last full stop before they were judged, as upstream does",
-        ),
+        (total(report, |cell| cell.cut), "cut after their last full stop before they were judged, as upstream does"),
     ];
     let mut lines = vec![format!("{scored} of {planned} answers scored")];
     for (count, outcome) in outcomes {
@@ -42,11 +36,5 @@ pub(crate) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
 
 /// Sum of a count over all models and conditions.
 fn total(report: &OpenReport<'_>, count: fn(&OpenCell) -> usize) -> usize {
-    report
-        .summary
-        .cells
-        .iter()
-        .filter(|cell| cell.group == Group::All)
-        .map(count)
-        .sum()
+    report.summary.cells.iter().filter(|cell| cell.group == Group::All).map(count).sum()
 }

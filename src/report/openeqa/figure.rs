@@ -12,7 +12,8 @@ use crate::types::text::counted;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{Group, OpenCell};
 
-/// Draws a chart of all questions and a chart with a panel for each category. Empty if the run has fewer than two levels.
+/// Draws a chart of all questions and a chart with a panel for each category. Empty if the run has fewer than two
+/// levels.
 pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
     let whole = ladder(report.summary, &Group::All);
     if whole.levels.len() < 2 {
@@ -48,12 +49,7 @@ pub(super) fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
         if panels.is_empty() {
             continue;
         }
-        let chart = Chart {
-            measure: "score in %",
-            panels,
-            columns,
-            note: note.clone(),
-        };
+        let chart = Chart { measure: "score in %", panels, columns, note: note.clone() };
         figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
     }
     Ok(figures)
@@ -68,33 +64,21 @@ fn panels(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) 
         .collect()
 }
 
-/// One panel: a curve per series, and a flat line per model without images. A series has the same line style in every panel: that of its
-/// position in `whole`, the ladder of all questions.
-fn panel(
-    report: &OpenReport<'_>,
-    group: &Group,
-    whole: &Ladder<'_, OpenCell>,
-    ladder: &Ladder<'_, OpenCell>,
-) -> Panel {
+/// One panel: a curve per series, and a flat line per model without images. A series has the same line style in every
+/// panel: that of its position in `whole`, the ladder of all questions.
+fn panel(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>, ladder: &Ladder<'_, OpenCell>) -> Panel {
     let series_count = whole.series.len();
     let curves = ladder.series.iter().map(|(series, cells)| {
         let position = whole.series.keys().position(|other| other == series);
         let style = LineStyle(position.unwrap_or(series_count));
         curve(ladder, series, cells, style)
     });
-    let flat_lines =
-        ladder
-            .without_level
-            .iter()
-            .enumerate()
-            .filter_map(|(index, (subject, cell))| {
-                flat_line(subject, cell, LineStyle(series_count + index))
-            });
-    Panel {
-        title: title(report, group),
-        lines: curves.chain(flat_lines).collect(),
-        model: None,
-    }
+    let flat_lines = ladder
+        .without_level
+        .iter()
+        .enumerate()
+        .filter_map(|(index, (subject, cell))| flat_line(subject, cell, LineStyle(series_count + index)));
+    Panel { title: title(report, group), lines: curves.chain(flat_lines).collect(), model: None }
 }
 
 /// Scores of a series over the levels. L0 is the start of the series in the ladder.
@@ -105,15 +89,8 @@ fn curve(
     style: LineStyle,
 ) -> PlotLine {
     let clean = ladder.l0_cell(series).map(|cell| (AxisLevel::L0, cell));
-    let degraded = cells
-        .iter()
-        .map(|(level, cell)| (*level, *cell))
-        .filter(|(level, _)| *level != AxisLevel::L0);
-    let points = clean
-        .into_iter()
-        .chain(degraded)
-        .filter_map(|(level, cell)| Some((level, cell.score?)))
-        .collect();
+    let degraded = cells.iter().map(|(level, cell)| (*level, *cell)).filter(|(level, _)| *level != AxisLevel::L0);
+    let points = clean.into_iter().chain(degraded).filter_map(|(level, cell)| Some((level, cell.score?))).collect();
     PlotLine {
         name: format!("{}, {}", series.model, series.light(&[])),
         style,
@@ -138,11 +115,9 @@ fn flat_line(subject: &ModelInCondition, cell: &OpenCell, style: LineStyle) -> O
 fn title(report: &OpenReport<'_>, group: &Group) -> String {
     let questions = match group {
         Group::All => report.questions.len(),
-        Group::Split(name) | Group::Category(name) => report
-            .questions
-            .iter()
-            .filter(|question| question.family.name() == name)
-            .count(),
+        Group::Split(name) | Group::Category(name) => {
+            report.questions.iter().filter(|question| question.family.name() == name).count()
+        }
     };
     format!("{}, n {questions}", group.name())
 }

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::Result;
 use crate::report::page::data::{
-    ABSENT, Distinct, FAILED, Item, ModelInCondition, PageData, PageKind, Question, SizeLimit,
-    UNREAD, levels, packed_by, shortened, sizes, thumbnails,
+    ABSENT, Distinct, FAILED, Item, ModelInCondition, PageData, PageKind, Question, SizeLimit, UNREAD, levels,
+    packed_by, shortened, sizes, thumbnails,
 };
 use crate::report::text::words;
 use crate::types::AxisLevel;
@@ -21,13 +21,8 @@ const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was
 /// # Errors
 /// If the data cannot be serialized.
 pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
-    let subjects: Vec<&model_in_condition::ModelInCondition> = report
-        .summary
-        .cells
-        .iter()
-        .filter(|cell| cell.group == Group::All)
-        .map(|cell| &cell.subject)
-        .collect();
+    let subjects: Vec<&model_in_condition::ModelInCondition> =
+        report.summary.cells.iter().filter(|cell| cell.group == Group::All).map(|cell| &cell.subject).collect();
     packed_by(|limit| data(report, &subjects, limit))
 }
 
@@ -58,10 +53,7 @@ fn data<'a>(
         .map(|question| Question {
             id: &question.id.0,
             frame: frames.index_of(&*question.frame.0),
-            family: families.index_of([
-                question.family.name(),
-                words::family(Some(&question.family)),
-            ]),
+            family: families.index_of([question.family.name(), words::family(Some(&question.family))]),
             text: &question.text,
             evidence: None,
             outlines: Vec::new(),
@@ -80,10 +72,7 @@ fn data<'a>(
         thumbnails: thumbnails(report.thumbnails, &frames.indices, limit.pictures),
         families: families.list,
         frames: frames.list,
-        subjects: subjects
-            .iter()
-            .map(|subject| subject_data(subject, subjects))
-            .collect(),
+        subjects: subjects.iter().map(|subject| subject_data(subject, subjects)).collect(),
         questions,
         choices: vec![&[]],
         items: results.items,
@@ -104,27 +93,18 @@ fn subject_data<'a>(
     all: &[&model_in_condition::ModelInCondition],
 ) -> ModelInCondition<'a> {
     let clean = subject.level.and_then(|_| {
-        let clean = model_in_condition::ModelInCondition::with_images(
-            &subject.model,
-            AxisLevel::L0,
-            &subject.variant,
-            None,
-        );
-        all.iter()
-            .position(|other| other.matches_up_to_group(&clean))
+        let clean =
+            model_in_condition::ModelInCondition::with_images(&subject.model, AxisLevel::L0, &subject.variant, None);
+        all.iter().position(|other| other.matches_up_to_group(&clean))
     });
     ModelInCondition::new(subject, clean)
 }
 
-/// Answers by subject, with one item for each question; if several people answered a question, each answer is an item of its own.
-fn results<'a>(
-    report: &'a OpenReport<'_>,
-    subjects: &[&model_in_condition::ModelInCondition],
-) -> Results<'a> {
-    let indices: BTreeMap<&model_in_condition::ModelInCondition, usize> =
-        subjects.iter().copied().zip(0..).collect();
-    let mut cells =
-        vec![vec![Vec::<&ReportedAnswer>::new(); subjects.len()]; report.questions.len()];
+/// Answers by subject, with one item for each question; if several people answered a question, each answer is an item
+/// of its own.
+fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&model_in_condition::ModelInCondition]) -> Results<'a> {
+    let indices: BTreeMap<&model_in_condition::ModelInCondition, usize> = subjects.iter().copied().zip(0..).collect();
+    let mut cells = vec![vec![Vec::<&ReportedAnswer>::new(); subjects.len()]; report.questions.len()];
     for answer in report.answers {
         if let Some(&subject) = indices.get(&answer.subject) {
             cells[answer.question][subject].push(answer);

@@ -30,15 +30,12 @@ use crate::report::text::wrapped::wrapped;
 use crate::runs::report_length::ReportLength;
 use crate::types::manifests::RunManifest;
 
-/// Files of a run by name: numbers as CSV, the table as LaTeX, figures as SVG, answers and marks in upstream's format, and the
-/// HTML page.
+/// Files of a run by name: numbers as CSV, the table as LaTeX, figures as SVG, answers and marks in upstream's format,
+/// and the HTML page.
 ///
 /// # Errors
 /// If a file cannot be made.
-pub(crate) fn products(
-    report: &OpenReport<'_>,
-    tables: &[Table],
-) -> Result<Vec<(String, Vec<u8>)>> {
+pub(crate) fn products(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figure::figures(report)?;
     let page = page::page(report, tables, &figures)?;
     let mut files = table_files(tables, &[], "Table")?;
@@ -67,8 +64,8 @@ struct Head<'a> {
     alerts: &'a [Alert],
 }
 
-/// Serializes the summary as JSON: manifest of the run, judge, protocol, and the rows of the CSV file. `folder` is the run's folder if the
-/// summary is stored elsewhere.
+/// Serializes the summary as JSON: manifest of the run, judge, protocol, and the rows of the CSV file. `folder` is the
+/// run's folder if the summary is stored elsewhere.
 ///
 /// # Errors
 /// If the summary cannot be serialized.
@@ -93,8 +90,8 @@ pub(crate) fn summary_json(
     json::document(head, &tables[0], tables, length)
 }
 
-/// Text of the report for the terminal: progress of an incomplete run, scores by level, split and category, number of scored answers, and
-/// folders of the runs.
+/// Text of the report for the terminal: progress of an incomplete run, scores by level, split and category, number of
+/// scored answers, and folders of the runs.
 #[must_use]
 pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folders: &[&Path]) -> String {
     let mut text = lines(report.alerts);

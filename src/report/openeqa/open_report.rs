@@ -38,10 +38,7 @@ pub(crate) struct OpenReport<'a> {
 impl OpenReport<'_> {
     /// Names of all runs.
     pub(crate) fn names(&self) -> Vec<String> {
-        self.runs
-            .iter()
-            .map(|(name, _)| (*name).to_owned())
-            .collect()
+        self.runs.iter().map(|(name, _)| (*name).to_owned()).collect()
     }
 
     /// Noise profiles of the noisy images.

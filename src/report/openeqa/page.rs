@@ -27,11 +27,7 @@ const MAX_CLAUSES: usize = 3;
 ///
 /// # Errors
 /// If the items cannot be serialized or the template cannot be rendered.
-pub(super) fn page(
-    report: &OpenReport<'_>,
-    tables: &[Table],
-    figures: &[Figure],
-) -> Result<String> {
+pub(super) fn page(report: &OpenReport<'_>, tables: &[Table], figures: &[Figure]) -> Result<String> {
     let content = OpenContent {
         title: match &*report.runs {
             [(name, _)] => format!("OpenEQA in the dark: {name}"),
@@ -48,8 +44,8 @@ pub(super) fn page(
     page_of_open_questions(content, figures)
 }
 
-/// One sentence with the scores at the darkest level: differences from L0, and of each enhancer from raw frames. The differences are not
-/// tested.
+/// One sentence with the scores at the darkest level: differences from L0, and of each enhancer from raw frames. The
+/// differences are not tested.
 fn summary(report: &OpenReport<'_>) -> Option<String> {
     let whole = ladder(report.summary, &Group::All);
     let clauses: Vec<String> = whole
@@ -72,21 +68,15 @@ fn summary(report: &OpenReport<'_>) -> Option<String> {
         .collect();
     match clauses.len() {
         0 => None,
-        count if count > MAX_CLAUSES => Some(format!(
-            "{}; {} more below.",
-            clauses[..MAX_CLAUSES].join("; "),
-            count - MAX_CLAUSES
-        )),
+        count if count > MAX_CLAUSES => {
+            Some(format!("{}; {} more below.", clauses[..MAX_CLAUSES].join("; "), count - MAX_CLAUSES))
+        }
         _ => Some(clauses.join("; ") + "."),
     }
 }
 
 /// Difference of a score from a baseline, with its interval; `None` if they share no questions.
-fn change_text(
-    report: &OpenReport<'_>,
-    subject: &ModelInCondition,
-    baseline: Baseline,
-) -> Option<String> {
+fn change_text(report: &OpenReport<'_>, subject: &ModelInCondition, baseline: Baseline) -> Option<String> {
     let change = report.summary.change(subject, baseline, &Group::All)?;
     let difference = change.difference;
     let [value, low, high] = [difference.value, difference.low, difference.high].map(points);
@@ -96,16 +86,8 @@ fn change_text(
 /// Warnings at the top of the page: missing marks, missing answers, no judge.
 fn alerts(report: &OpenReport<'_>) -> Vec<String> {
     let (status, counts) = (report.manifest.status, report.manifest.counts);
-    let mut alerts: Vec<String> = report
-        .alerts
-        .iter()
-        .map(|alert| alert.text.clone())
-        .collect();
-    let unmarked = report
-        .answers
-        .iter()
-        .filter(|answer| answer.outcome == AnswerOutcome::Unmarked)
-        .count();
+    let mut alerts: Vec<String> = report.alerts.iter().map(|alert| alert.text.clone()).collect();
+    let unmarked = report.answers.iter().filter(|answer| answer.outcome == AnswerOutcome::Unmarked).count();
     if unmarked > 0 {
         alerts.push(format!(
             "{} not scored, because the judge gave no mark.",
@@ -127,11 +109,7 @@ fn alerts(report: &OpenReport<'_>) -> Vec<String> {
 /// Lines at the top of the page on questions, score, intervals and coverage.
 fn intro(report: &OpenReport<'_>) -> Vec<String> {
     let (summary, judge) = (report.summary, report.judge.unwrap_or("nobody"));
-    let walks: BTreeSet<_> = report
-        .questions
-        .iter()
-        .map(|question| &question.frame)
-        .collect();
+    let walks: BTreeSet<_> = report.questions.iter().map(|question| &question.frame).collect();
     let mut lines = vec![
         format!(
             "{} about {}. Score: 100 · mean((mark − 1) / 4), marks from 1 to 5 by {judge}, protocol {}. Intervals are \

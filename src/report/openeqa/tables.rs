@@ -36,20 +36,13 @@ pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
         }
     }
     let mut tables = with_training(tables, &report.summary.listing);
-    tables.extend(enhancers(report.enhancers).map(|table| Table {
-        section: SECTION,
-        ..table
-    }));
+    tables.extend(enhancers(report.enhancers).map(|table| Table { section: SECTION, ..table }));
     tables
 }
 
 /// Scores of a group of questions by series and level.
 pub(super) fn ladder<'a>(summary: &'a OpenSummary, group: &Group) -> Ladder<'a, OpenCell> {
-    let cells = summary
-        .cells
-        .iter()
-        .filter(|cell| cell.group == *group)
-        .map(|cell| (&cell.subject, cell));
+    let cells = summary.cells.iter().filter(|cell| cell.group == *group).map(|cell| (&cell.subject, cell));
     Ladder::new(cells).with_clean()
 }
 
@@ -82,14 +75,8 @@ fn summary(summary: &OpenSummary) -> Table {
         .column(Count, "csv null", |cell| cell.null)
         .column(Count, "csv cut", |cell| cell.cut)
         .column(Share, "csv value low high", |cell| cell.score)
-        .column(
-            Points,
-            "csv change change_low change_high change_n",
-            |cell| change(summary, cell, Baseline::Clean),
-        )
-        .column(Points, "csv gain gain_low gain_high", |cell| {
-            change(summary, cell, Baseline::Raw)
-        })
+        .column(Points, "csv change change_low change_high change_n", |cell| change(summary, cell, Baseline::Clean))
+        .column(Points, "csv gain gain_low gain_high", |cell| change(summary, cell, Baseline::Raw))
         .column(Text, "csv reading", |cell| reading(&cell.subject))
         .model_facts(&summary.listing, |cell| &cell.subject)
         .build()
@@ -98,11 +85,8 @@ fn summary(summary: &OpenSummary) -> Table {
 /// Tables of scores by level, one for each axis.
 fn levels(report: &OpenReport<'_>) -> Vec<Table> {
     let whole = ladder(report.summary, &Group::All);
-    let mut tables: Vec<Table> = whole
-        .by_axis()
-        .into_iter()
-        .map(|(axis, ladder)| axis_table(report, axis, &ladder))
-        .collect();
+    let mut tables: Vec<Table> =
+        whole.by_axis().into_iter().map(|(axis, ladder)| axis_table(report, axis, &ladder)).collect();
     if let Some(last) = tables.last_mut() {
         last.notes = notes_without_images(report.summary, &whole);
     }
@@ -111,23 +95,12 @@ fn levels(report: &OpenReport<'_>) -> Vec<Table> {
 
 fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -> Table {
     let summary = report.summary;
-    let of = if axis == Axis::LIGHT {
-        String::new()
-    } else {
-        format!(" by {} of {}", axis.title, axis.cause)
-    };
+    let of = if axis == Axis::LIGHT { String::new() } else { format!(" by {} of {}", axis.title, axis.cause) };
     let mut table = ladder
         .table("levels", &summary.listing, |cell| score(summary, cell))
-        .page(
-            SECTION,
-            &format!("Score in %{of} with 95 % intervals (difference from L0)"),
-        )
+        .page(SECTION, &format!("Score in %{of} with 95 % intervals (difference from L0)"))
         .column(Count, "terminal scored", |line| {
-            format!(
-                "{} of {}",
-                line.sum(OpenCell::scored),
-                line.sum(|cell| cell.planned)
-            )
+            format!("{} of {}", line.sum(OpenCell::scored), line.sum(|cell| cell.planned))
         })
         .build();
     let judge = report.judge.unwrap_or("nobody");
@@ -154,18 +127,14 @@ fn notes_without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) ->
             let interval = cell.score.map(|share| format!(" [{}]", ends(share)));
             let text = text + &interval.unwrap_or_default();
             let (scored, planned) = (cell.scored(), cell.planned);
-            let of = if scored == planned {
-                String::new()
-            } else {
-                format!(" of {planned}")
-            };
+            let of = if scored == planned { String::new() } else { format!(" of {planned}") };
             format!("{} without images: {text}, n {scored}{of}", subject.model)
         })
         .collect()
 }
 
-/// Scores of one series, with a row for each split and category. The terminal joins the tables of all series to one table, with a column
-/// for models without images.
+/// Scores of one series, with a row for each split and category. The terminal joins the tables of all series to one
+/// table, with a column for models without images.
 fn by_group(
     summary: &OpenSummary,
     series: &Series<'_>,
@@ -175,27 +144,15 @@ fn by_group(
     let light = series.light(&[]);
     let mut builder = TableBuilder::new("groups", groups.iter().enumerate())
         .page(SECTION, &format!("{}, {light}", series.model))
-        .column(Text, "terminal model", |(index, _)| {
-            first_row_only(*index, series.model)
-        })
-        .column(Text, "terminal light", |(index, _)| {
-            first_row_only(*index, &light)
-        })
-        .column(
-            Text,
-            "terminal of | page split or category",
-            |(_, (group, _))| group.name().to_owned(),
-        );
+        .column(Text, "terminal model", |(index, _)| first_row_only(*index, series.model))
+        .column(Text, "terminal light", |(index, _)| first_row_only(*index, &light))
+        .column(Text, "terminal of | page split or category", |(_, (group, _))| group.name().to_owned());
     for level in &whole.levels {
-        builder = builder.column(
-            Accuracy,
-            &*format!("terminal {level} | page {level}"),
-            |(_, (_, ladder))| {
-                let cells: Option<&SeriesByLevel<'_, OpenCell>> = ladder.series.get(series);
-                let cell = cells.and_then(|cells| cells.get(level));
-                score(summary, cell.copied())
-            },
-        );
+        builder = builder.column(Accuracy, &*format!("terminal {level} | page {level}"), |(_, (_, ladder))| {
+            let cells: Option<&SeriesByLevel<'_, OpenCell>> = ladder.series.get(series);
+            let cell = cells.and_then(|cells| cells.get(level));
+            score(summary, cell.copied())
+        });
     }
     if !whole.without_level.is_empty() {
         builder = builder.column(Accuracy, "terminal blind", |(_, (_, ladder))| {
@@ -214,9 +171,5 @@ fn by_group(
 
 /// Text in the first row of a table, empty in all others.
 fn first_row_only(index: usize, text: &str) -> String {
-    if index == 0 {
-        text.to_owned()
-    } else {
-        String::new()
-    }
+    if index == 0 { text.to_owned() } else { String::new() }
 }

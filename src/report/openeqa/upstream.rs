@@ -16,26 +16,23 @@ const FOLDER: &str = "upstream";
 struct UpstreamAnswer<'a> {
     question_id: &'a str,
     answer: Option<&'a str>,
-    /// Condition, so that `--answers` assigns the answer to it; omitted at L0, as in upstream's own files. Upstream's scripts read only the
-    /// first two fields.
+    /// Condition, so that `--answers` assigns the answer to it; omitted at L0, as in upstream's own files. Upstream's
+    /// scripts read only the first two fields.
     #[serde(skip_serializing_if = "Option::is_none")]
     condition: Option<&'a str>,
 }
 
-/// Writes for each subject `NAME.json` with its answers and, if there is a judge, `NAME-JUDGE-metrics.json` with its marks.
+/// Writes for each subject `NAME.json` with its answers and, if there is a judge, `NAME-JUDGE-metrics.json` with its
+/// marks.
 ///
-/// Missing answers and marks are left out. A subject with several answers to a question gets no files, because the format has one answer
-/// for each question.
+/// Missing answers and marks are left out. A subject with several answers to a question gets no files, because the
+/// format has one answer for each question.
 pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut by_subject =
-        BTreeMap::<&ModelInCondition, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
+    let mut by_subject = BTreeMap::<&ModelInCondition, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
     for reported in report.answers {
         if reported.outcome != AnswerOutcome::Missing {
             let questions = by_subject.entry(&reported.subject).or_default();
-            questions
-                .entry(reported.question)
-                .or_default()
-                .push(reported);
+            questions.entry(reported.question).or_default().push(reported);
         }
     }
     let mut files = Vec::new();

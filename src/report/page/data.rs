@@ -16,7 +16,8 @@ use crate::types::questions::PixelBox;
 use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, ObjectCrop, Thumbnail, View};
 use darkqa_score::model_in_condition;
 
-/// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge ([`PageKind`]).
+/// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge
+/// ([`PageKind`]).
 pub(crate) const UNREAD: u8 = 26;
 /// Result code of a failed trial.
 pub(crate) const FAILED: u8 = 27;
@@ -27,18 +28,9 @@ pub(crate) const ABSENT: u8 = 28;
 const MAX_REPLY_CHARS: [usize; 5] = [20_000, 2_000, 400, 100, 30];
 /// Size limits, tried in order until the packed items fit into [`MAX_PACKED_BYTES`].
 const SIZE_LIMITS: [SizeLimit; 3] = [
-    SizeLimit {
-        text: 12_000_000,
-        pictures: 7_000_000,
-    },
-    SizeLimit {
-        text: 4_000_000,
-        pictures: 4_000_000,
-    },
-    SizeLimit {
-        text: 1_000_000,
-        pictures: 1_000_000,
-    },
+    SizeLimit { text: 12_000_000, pictures: 7_000_000 },
+    SizeLimit { text: 4_000_000, pictures: 4_000_000 },
+    SizeLimit { text: 1_000_000, pictures: 1_000_000 },
 ];
 /// Maximum size of the packed items in bytes, so that the page stays under 12 MB.
 const MAX_PACKED_BYTES: usize = 10_500_000;
@@ -62,8 +54,8 @@ pub(crate) enum PageKind {
     Open,
 }
 
-/// All data of the page's script. Entries refer to each other by their indices in these lists. Nested lists have a row for each subject
-/// and a column for each item.
+/// All data of the page's script. Entries refer to each other by their indices in these lists. Nested lists have a row
+/// for each subject and a column for each item.
 #[derive(Serialize)]
 pub(crate) struct PageData<'a> {
     pub(crate) kind: PageKind,
@@ -120,10 +112,7 @@ pub(crate) struct ModelInCondition<'a> {
 
 impl<'a> ModelInCondition<'a> {
     /// A subject as the script needs it.
-    pub(crate) fn new(
-        subject: &'a model_in_condition::ModelInCondition,
-        clean: Option<usize>,
-    ) -> Self {
+    pub(crate) fn new(subject: &'a model_in_condition::ModelInCondition, clean: Option<usize>) -> Self {
         Self {
             name: words::name(subject),
             model: &subject.model,
@@ -199,10 +188,7 @@ pub(crate) struct Distinct<T> {
 
 impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
     pub(crate) fn new() -> Self {
-        Self {
-            list: Vec::new(),
-            indices: HashMap::new(),
-        }
+        Self { list: Vec::new(), indices: HashMap::new() }
     }
 
     /// Returns the index of an entry; adds the entry if it is new.
@@ -244,7 +230,8 @@ fn compress(data: &PageData<'_>) -> std::io::Result<Vec<u8>> {
     encoder.finish()
 }
 
-/// Cuts all texts to one maximum length: the first of [`MAX_REPLY_CHARS`] at which they fit together into `limit` bytes, else the last.
+/// Cuts all texts to one maximum length: the first of [`MAX_REPLY_CHARS`] at which they fit together into `limit`
+/// bytes, else the last.
 pub(crate) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
     let max_chars = MAX_REPLY_CHARS
         .into_iter()
@@ -261,9 +248,7 @@ pub(crate) fn shortened(texts: &[&str], limit: usize) -> Vec<String> {
                 return short.to_owned();
             }
             let all = text.chars().count();
-            format!(
-                "{short} … [cut here after {max_chars} of {all} characters; records.jsonl has all]"
-            )
+            format!("{short} … [cut here after {max_chars} of {all} characters; records.jsonl has all]")
         })
         .collect()
 }
@@ -276,14 +261,9 @@ fn cut(text: &str, max_chars: usize) -> &str {
 
 /// Width and height of each frame in pixels; `None` if no thumbnail records them.
 pub(crate) fn sizes(thumbnails: &[Thumbnail], frames: &[&str]) -> Vec<Option<[u32; 2]>> {
-    let recorded: HashMap<&str, [u32; 2]> = thumbnails
-        .iter()
-        .filter_map(|thumbnail| Some((&*thumbnail.frame.0, thumbnail.size?)))
-        .collect();
-    frames
-        .iter()
-        .map(|frame| recorded.get(frame).copied())
-        .collect()
+    let recorded: HashMap<&str, [u32; 2]> =
+        thumbnails.iter().filter_map(|thumbnail| Some((&*thumbnail.frame.0, thumbnail.size?))).collect();
+    frames.iter().map(|frame| recorded.get(frame).copied()).collect()
 }
 
 /// Name and severity of each distinct level in ascending order, such as `L3` and `6 EV`.
@@ -307,26 +287,20 @@ pub(crate) fn fitting_thumbnails<'a>(
     all: &[Thumbnail],
     frames: impl IntoIterator<Item = &'a FrameId>,
 ) -> Vec<Thumbnail> {
-    let indices: HashMap<&str, usize> = frames
-        .into_iter()
-        .enumerate()
-        .map(|(index, frame)| (&*frame.0, index))
-        .collect();
+    let indices: HashMap<&str, usize> =
+        frames.into_iter().enumerate().map(|(index, frame)| (&*frame.0, index)).collect();
     let fitting = thumbnails(all, &indices, SIZE_LIMITS[0].pictures);
     all.iter()
         .filter_map(|thumbnail| {
             let index = indices.get(&*thumbnail.frame.0)?;
             let picture = fitting.get(index)?.get(&thumbnail.condition.to_string())?;
-            Some(Thumbnail {
-                objects: picture.objects.to_vec(),
-                ..thumbnail.clone()
-            })
+            Some(Thumbnail { objects: picture.objects.to_vec(), ..thumbnail.clone() })
         })
         .collect()
 }
 
-/// Selects thumbnails, in the order of frame ids, until a frame exceeds `bytes_left`. The result is by frame index, from `indices`, and
-/// condition name. The object crops of a frame are included if they fit into the bytes that remain.
+/// Selects thumbnails, in the order of frame ids, until a frame exceeds `bytes_left`. The result is by frame index,
+/// from `indices`, and condition name. The object crops of a frame are included if they fit into the bytes that remain.
 pub(crate) fn thumbnails<'a>(
     all: &'a [Thumbnail],
     indices: &HashMap<&str, usize>,
@@ -334,10 +308,7 @@ pub(crate) fn thumbnails<'a>(
 ) -> BTreeMap<usize, BTreeMap<String, Picture<'a>>> {
     let mut by_frame = BTreeMap::<&FrameId, Vec<&Thumbnail>>::new();
     for thumbnail in all {
-        by_frame
-            .entry(&thumbnail.frame)
-            .or_default()
-            .push(thumbnail);
+        by_frame.entry(&thumbnail.frame).or_default().push(thumbnail);
     }
     // Thumbnails of all frames take precedence over object crops of the first frames.
     let mut kept = Vec::new();
@@ -345,10 +316,7 @@ pub(crate) fn thumbnails<'a>(
         let Some(index) = indices.get(&*frame.0) else {
             continue;
         };
-        let size: usize = thumbnails
-            .iter()
-            .map(|thumbnail| thumbnail.small.len() + thumbnail.crop.len())
-            .sum();
+        let size: usize = thumbnails.iter().map(|thumbnail| thumbnail.small.len() + thumbnail.crop.len()).sum();
         if size > bytes_left {
             break;
         }
@@ -357,11 +325,8 @@ pub(crate) fn thumbnails<'a>(
     }
     let mut by_index = BTreeMap::new();
     for (index, thumbnails) in kept {
-        let size: usize = thumbnails
-            .iter()
-            .flat_map(|thumbnail| &thumbnail.objects)
-            .map(|object| object.crop.len())
-            .sum();
+        let size: usize =
+            thumbnails.iter().flat_map(|thumbnail| &thumbnail.objects).map(|object| object.crop.len()).sum();
         let has_room = size <= bytes_left;
         bytes_left -= if has_room { size } else { 0 };
         let pictures = thumbnails

@@ -50,7 +50,8 @@ struct Mark {
 }
 
 impl PageHead {
-    /// Builds the first screen of an evaluation; `None` without a main finding, as in runs with one level and no blind model.
+    /// Builds the first screen of an evaluation; `None` without a main finding, as in runs with one level and no blind
+    /// model.
     ///
     /// # Errors
     /// If the chart cannot be drawn, or a question cannot be read.
@@ -71,12 +72,7 @@ impl PageHead {
 
     /// First screen with only a summary.
     pub(crate) fn from_summary(summary: &str) -> Self {
-        Self {
-            summary: with_unbroken_percent(summary),
-            chart: None,
-            rows: Vec::new(),
-            strip: None,
-        }
+        Self { summary: with_unbroken_percent(summary), chart: None, rows: Vec::new(), strip: None }
     }
 
     /// First screen with the summary and the main findings, without chart and images.
@@ -88,10 +84,7 @@ impl PageHead {
             .flat_map(|[_, low, high]| [low.abs(), high.abs()])
             .fold(1.0, f64::max);
         Self {
-            rows: first
-                .iter()
-                .map(|(group, finding)| FindingRow::new(group, finding, reach))
-                .collect(),
+            rows: first.iter().map(|(group, finding)| FindingRow::new(group, finding, reach)).collect(),
             ..Self::from_summary(&groups.summary())
         }
     }
@@ -115,9 +108,7 @@ impl FindingRow {
         let tone = finding.main_sentence().tone;
         let mut intervals = finding.intervals();
         let others = intervals.split_off(intervals.len().min(1));
-        let (effect, at) = intervals
-            .pop()
-            .map_or_else(Default::default, |main| (main.effect, main.at));
+        let (effect, at) = intervals.pop().map_or_else(Default::default, |main| (main.effect, main.at));
         Self {
             group,
             class: tone.class(),
@@ -130,32 +121,24 @@ impl FindingRow {
             at: at.map_or_else(String::new, |at| format!("at {at}")),
             in_other_lights: others.iter().map(ToString::to_string).collect(),
             mark: difference(finding).map(|numbers| {
-                let [value, low, high] =
-                    numbers.map(|x| (x / reach * MARK_REACH * 10.0).round() / 10.0);
+                let [value, low, high] = numbers.map(|x| (x / reach * MARK_REACH * 10.0).round() / 10.0);
                 Mark { value, low, high }
             }),
         }
     }
 }
 
-/// Chart of the first screen: mean accuracy by level raw and with each enhancer, else by variant, else accuracy of each model.
+/// Chart of the first screen: mean accuracy by level raw and with each enhancer, else by variant, else accuracy of each
+/// model.
 fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
     let panels = overview(report.findings, &Names::default());
     ["enhancers", "variants", "models"]
         .into_iter()
         .find_map(|wanted| {
-            panels
-                .charts
-                .iter()
-                .filter(|(name, _)| *name == wanted)
-                .find_map(|(_, chart)| chart.as_ref().ok())
+            panels.charts.iter().filter(|(name, _)| *name == wanted).find_map(|(_, chart)| chart.as_ref().ok())
         })
         .map(|(caption, chart)| {
-            let chart = Chart {
-                note: panels.note.clone(),
-                panels: split(chart.panels.clone()),
-                ..chart.clone()
-            };
+            let chart = Chart { note: panels.note.clone(), panels: split(chart.panels.clone()), ..chart.clone() };
             figure("head", caption, &FigureChart::Lines(chart))
         })
         .transpose()
@@ -168,10 +151,7 @@ mod tests {
 
     #[test]
     fn a_percent_sign_stays_with_its_number() {
-        assert_eq!(
-            with_unbroken_percent("from 90.6 % at L0"),
-            "from 90.6\u{a0}% at L0"
-        );
+        assert_eq!(with_unbroken_percent("from 90.6 % at L0"), "from 90.6\u{a0}% at L0");
     }
 
     #[test]

@@ -21,8 +21,7 @@ pub struct PageRun<'a> {
 }
 
 /// Function that reads questions by id.
-pub(crate) type ReadQuestions<'a> =
-    Box<dyn Fn(&HashSet<&QuestionId>) -> Result<HashMap<QuestionId, RunQuestion>> + 'a>;
+pub(crate) type ReadQuestions<'a> = Box<dyn Fn(&HashSet<&QuestionId>) -> Result<HashMap<QuestionId, RunQuestion>> + 'a>;
 
 /// Data of the page other than the findings.
 pub struct PageInputs<'a> {

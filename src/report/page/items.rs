@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 
 use super::data::{
-    ABSENT, Confusion, Distinct, FAILED, Item, ModelInCondition, PageData, PageKind, Question,
-    SizeLimit, UNREAD, levels, packed_by, shortened, sizes, thumbnails,
+    ABSENT, Confusion, Distinct, FAILED, Item, ModelInCondition, PageData, PageKind, Question, SizeLimit, UNREAD,
+    levels, packed_by, shortened, sizes, thumbnails,
 };
 use super::inputs::PageInputs;
 use super::sample::sample;
@@ -59,9 +59,7 @@ fn data<'a>(
                 object: run_question.and_then(RunQuestion::object),
                 answer: None,
                 also_right: &[],
-                evidence: run_question
-                    .map(|run_question| &run_question.evidence)
-                    .filter(|e| !e.is_null()),
+                evidence: run_question.map(|run_question| &run_question.evidence).filter(|e| !e.is_null()),
             });
         }
         let time = times.entry(&asked.question).or_default();
@@ -106,22 +104,14 @@ type RunQuestions = HashMap<QuestionId, RunQuestion>;
 
 /// Reads the stored questions of the items.
 fn questions(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<RunQuestions> {
-    let ids = grid
-        .items
-        .iter()
-        .map(|item| &*item.asked.question)
-        .collect();
+    let ids = grid.items.iter().map(|item| &*item.asked.question).collect();
     (inputs.questions)(&ids)
 }
 
 /// Result codes with a row for each subject and a column for each item.
 fn codes(grid: &Grid<'_>, mode: ParsingMode) -> Vec<Vec<u8>> {
     (0..grid.subjects.len())
-        .map(|subject| {
-            (0..grid.items.len())
-                .map(|item| code(grid.result(subject, item), mode))
-                .collect()
-        })
+        .map(|subject| (0..grid.items.len()).map(|item| code(grid.result(subject, item), mode)).collect())
         .collect()
 }
 
@@ -135,17 +125,11 @@ fn code(result: TrialResult, mode: ParsingMode) -> u8 {
 
 /// Subjects of the grid as the script needs them.
 fn subjects<'a>(grid: &'a Grid<'_>) -> Vec<ModelInCondition<'a>> {
-    grid.subjects
-        .iter()
-        .map(|subject| ModelInCondition::new(subject, clean_index(grid, subject)))
-        .collect()
+    grid.subjects.iter().map(|subject| ModelInCondition::new(subject, clean_index(grid, subject))).collect()
 }
 
 /// Index of the same model at L0 without an enhancer; `None` for models without images.
-fn clean_index(
-    grid: &Grid<'_>,
-    subject: &darkqa_score::model_in_condition::ModelInCondition,
-) -> Option<usize> {
+fn clean_index(grid: &Grid<'_>, subject: &darkqa_score::model_in_condition::ModelInCondition) -> Option<usize> {
     subject.level?;
     let clean = darkqa_score::model_in_condition::ModelInCondition::with_images(
         &subject.model,
@@ -186,7 +170,8 @@ impl NoAnswerReason {
     }
 }
 
-/// Distinct reasons for results without an answer, the first one empty, and the index of the reason by subject and item.
+/// Distinct reasons for results without an answer, the first one empty, and the index of the reason by subject and
+/// item.
 fn reasons(grid: &Grid<'_>) -> (Vec<String>, Vec<Vec<usize>>) {
     let mut reasons = Distinct::new();
     reasons.index_of(NoAnswerReason::None);
@@ -238,10 +223,7 @@ impl Replies {
     }
 }
 
-fn confusion_data<'a>(
-    grid: &Grid<'_>,
-    confusions: &'a [confusion::Confusion],
-) -> Vec<Confusion<'a>> {
+fn confusion_data<'a>(grid: &Grid<'_>, confusions: &'a [confusion::Confusion]) -> Vec<Confusion<'a>> {
     confusions
         .iter()
         .filter_map(|confusion| {

@@ -1,7 +1,8 @@
 //! HTML page of a report: [`page`] for an evaluation, [`page_of`] for other content.
 //!
-//! Numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items and their thumbnails are
-//! packed data, which a script displays. The page needs no network, and its content security policy allows none.
+//! Numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items and their
+//! thumbnails are packed data, which a script displays. The page needs no network, and its content security policy
+//! allows none.
 
 pub(super) mod data;
 mod head;
@@ -45,16 +46,10 @@ const PAGE: &str = include_str!("page.html");
 /// CSS of the page.
 pub(super) const STYLE: &str = include_str!("page.css");
 /// Script of names, theme, and charts that are drawn at the available width.
-const CHART_SCRIPT: &str = concat!(
-    include_str!("script/base.js"),
-    include_str!("script/charts.js")
-);
+const CHART_SCRIPT: &str = concat!(include_str!("script/base.js"), include_str!("script/charts.js"));
 /// Script of the items and their images.
-const SCRIPT: &str = concat!(
-    include_str!("script/images.js"),
-    include_str!("script/open.js"),
-    include_str!("script/items.js")
-);
+const SCRIPT: &str =
+    concat!(include_str!("script/images.js"), include_str!("script/open.js"), include_str!("script/items.js"));
 
 /// Values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]
@@ -103,10 +98,7 @@ struct PageSentence<'a> {
 
 impl<'a> PageGroup<'a> {
     fn new(group: &FindingGroup<'a>) -> Self {
-        Self {
-            title: group.title,
-            sentences: group.sentences().map(PageSentence::new).collect(),
-        }
+        Self { title: group.title, sentences: group.sentences().map(PageSentence::new).collect() }
     }
 }
 
@@ -146,11 +138,7 @@ pub(crate) struct PageContent<'a> {
 ///
 /// # Errors
 /// If the items cannot be serialized or the template cannot be rendered.
-pub(crate) fn page<'a>(
-    report: &'a ChoiceReport<'a>,
-    figures: &[Figure],
-    inputs: &PageInputs<'a>,
-) -> Result<String> {
+pub(crate) fn page<'a>(report: &'a ChoiceReport<'a>, figures: &[Figure], inputs: &PageInputs<'a>) -> Result<String> {
     let findings = report.findings;
     let groups = FindingGroups::new(&report.sentences);
     let content = PageContent {
@@ -174,17 +162,11 @@ pub(crate) fn page<'a>(
 ///
 /// # Errors
 /// If the items cannot be serialized or the template cannot be rendered.
-pub(crate) fn page_of<'a>(
-    content: PageContent<'a>,
-    figures: &[Figure],
-    inputs: &PageInputs<'a>,
-) -> Result<String> {
+pub(crate) fn page_of<'a>(content: PageContent<'a>, figures: &[Figure], inputs: &PageInputs<'a>) -> Result<String> {
     let sections = content.sections;
     // A property of the noise profile holds for every run with it: a line of the introduction, no warning.
-    let (notes, warnings): (Vec<&Alert>, Vec<&Alert>) = content
-        .alerts
-        .iter()
-        .partition(|alert| alert.kind == AlertKind::Noise);
+    let (notes, warnings): (Vec<&Alert>, Vec<&Alert>) =
+        content.alerts.iter().partition(|alert| alert.kind == AlertKind::Noise);
     let notes = notes.into_iter().map(|note| note.text.clone());
     render(
         PAGE,
@@ -202,12 +184,7 @@ pub(crate) fn page_of<'a>(
             groups: content.groups.all().iter().map(PageGroup::new).collect(),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
-            intro: content
-                .intro
-                .into_iter()
-                .chain(notes)
-                .chain(sample::note(content.grid))
-                .collect(),
+            intro: content.intro.into_iter().chain(notes).chain(sample::note(content.grid)).collect(),
             sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(run_facts).collect(),
             data: items::packed(content.grid, content.confusions, inputs)?,
@@ -236,10 +213,7 @@ pub(crate) struct OpenContent<'a> {
 ///
 /// # Errors
 /// If the template cannot be rendered.
-pub(crate) fn page_of_open_questions(
-    content: OpenContent<'_>,
-    figures: &[Figure],
-) -> Result<String> {
+pub(crate) fn page_of_open_questions(content: OpenContent<'_>, figures: &[Figure]) -> Result<String> {
     render(
         PAGE,
         Page {
@@ -291,15 +265,10 @@ fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
     let readings = NoiseProfiles::new(&grid.subjects);
     let models = grid.subjects.iter().map(|subject| &*subject.model);
     let has_people = models.clone().any(|model| grid.listing.is_people(model));
-    let has_models = models_under_test(models)
-        .iter()
-        .any(|model| !grid.listing.is_people(model));
-    let people = (has_people && has_models)
-        .then(|| "The summary and the chart are about models, not about people.".to_owned());
-    std::iter::once(size)
-        .chain(people)
-        .chain(readings.open_question())
-        .collect()
+    let has_models = models_under_test(models).iter().any(|model| !grid.listing.is_people(model));
+    let people =
+        (has_people && has_models).then(|| "The summary and the chart are about models, not about people.".to_owned());
+    std::iter::once(size).chain(people).chain(readings.open_question()).collect()
 }
 
 /// Facts about a run, as JSON for the template.
@@ -323,19 +292,13 @@ fn fact(name: &str, value: impl Into<String>) -> (String, String) {
 
 /// Platform and settings of a run: names and values.
 fn setting_facts(manifest: &RunManifest) -> Vec<(String, String)> {
-    let platform = manifest
-        .platform
-        .iter()
-        .map(|(name, value)| (name.clone(), value.clone()));
+    let platform = manifest.platform.iter().map(|(name, value)| (name.clone(), value.clone()));
     let settings = manifest
         .identity
         .iter()
         .chain(&manifest.settings)
         .map(|(name, value)| (setting_spelling(name), setting_text(value)));
-    platform
-        .chain(settings)
-        .chain(column_facts(manifest))
-        .collect()
+    platform.chain(settings).chain(column_facts(manifest)).collect()
 }
 
 /// Settings of each model, enhancer, noise profile and variant. The camera of a profile is given by its name.

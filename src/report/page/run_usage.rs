@@ -5,8 +5,8 @@ use std::collections::BTreeSet;
 
 use crate::types::{ChoiceDetail, TrialRef, Usage};
 
-/// Usage of a run's trials at endpoints: requests, tokens, bytes of images, latency, and the model names that the servers returned.
-/// Built-in models need no endpoint.
+/// Usage of a run's trials at endpoints: requests, tokens, bytes of images, latency, and the model names that the
+/// servers returned. Built-in models need no endpoint.
 #[derive(Debug, Clone, Default)]
 pub struct RunUsage {
     /// Number of trials of models at endpoints.
@@ -17,7 +17,8 @@ pub struct RunUsage {
     prompt_tokens: u64,
     completion_tokens: u64,
     image_bytes: u64,
-    /// Median and 95 % quantile of the duration of each trial's last request, in milliseconds; `None` if no duration is known.
+    /// Median and 95 % quantile of the duration of each trial's last request, in milliseconds; `None` if no duration is
+    /// known.
     latency: Option<[u64; 2]>,
     /// Model names that the servers returned.
     served: BTreeSet<String>,
@@ -38,15 +39,9 @@ impl RunUsage {
             let tokens: Usage = trial.usage().unwrap_or_default();
             usage.trials += 1;
             usage.requests += u64::from(trial.attempts());
-            usage.prompt_tokens = usage
-                .prompt_tokens
-                .saturating_add(tokens.prompt_tokens.unwrap_or(0));
-            usage.completion_tokens = usage
-                .completion_tokens
-                .saturating_add(tokens.completion_tokens.unwrap_or(0));
-            usage.image_bytes = usage
-                .image_bytes
-                .saturating_add(trial.images().map_or(0, |images| images.bytes));
+            usage.prompt_tokens = usage.prompt_tokens.saturating_add(tokens.prompt_tokens.unwrap_or(0));
+            usage.completion_tokens = usage.completion_tokens.saturating_add(tokens.completion_tokens.unwrap_or(0));
+            usage.image_bytes = usage.image_bytes.saturating_add(trial.images().map_or(0, |images| images.bytes));
             latencies.extend(trial.latency_ms().map(|ms| ms as u32));
             if let Some(model) = trial.served_model()
                 && !usage.served.contains(model)
@@ -78,23 +73,12 @@ impl RunUsage {
                     ),
                 },
             ),
-            (
-                "tokens",
-                format!(
-                    "{} of prompts, {} of replies",
-                    self.prompt_tokens, self.completion_tokens
-                ),
-            ),
+            ("tokens", format!("{} of prompts, {} of replies", self.prompt_tokens, self.completion_tokens)),
             ("image bytes", self.image_bytes.to_string()),
-            (
-                "latency",
-                format!("median {median}, 95 % within {quantile_95}"),
-            ),
+            ("latency", format!("median {median}, 95 % within {quantile_95}")),
             ("served as", served.join(", ")),
         ];
-        rows.into_iter()
-            .map(|(name, value)| (name.to_owned(), value))
-            .collect()
+        rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
 }
 
@@ -113,12 +97,7 @@ mod tests {
 
     #[test]
     fn one_trial_is_singular() {
-        let usage = RunUsage {
-            requests: 1,
-            trials: 1,
-            built_in: 1,
-            ..RunUsage::default()
-        };
+        let usage = RunUsage { requests: 1, trials: 1, built_in: 1, ..RunUsage::default() };
         let expected = "1 for 1 trial; 1 trial of built-in models took none";
         assert_eq!(usage.facts()[0].1, expected);
     }

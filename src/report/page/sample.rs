@@ -10,7 +10,8 @@ use darkqa_score::model_in_condition::ModelInCondition;
 /// Maximum number of replies on a page (chosen): they fit on a page of 12 MB, and a browser loads them in two seconds.
 const MAX_REPLIES: usize = 200_000;
 
-/// Strongest effect of darkness and enhancement on the answers to an item, over all models. The variants are in order of precedence.
+/// Strongest effect of darkness and enhancement on the answers to an item, over all models. The variants are in order
+/// of precedence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum AnswerChange {
     /// Right in the dark, and wrong after an enhancer.
@@ -28,8 +29,8 @@ fn max_items(grid: &Grid<'_>) -> usize {
     MAX_REPLIES / grid.subjects.len().max(1)
 }
 
-/// Draws a sample of the items; `None` if all of them fit on the page. The strata of family and answer change have equal shares; small
-/// strata are kept in full. The sample depends only on the names of the questions.
+/// Draws a sample of the items; `None` if all of them fit on the page. The strata of family and answer change have
+/// equal shares; small strata are kept in full. The sample depends only on the names of the questions.
 pub(super) fn sample<'a>(grid: &Grid<'a>) -> Option<Grid<'a>> {
     let max = max_items(grid);
     (grid.items.len() > max).then(|| grid.select_items(&selection(grid, max)))
@@ -54,10 +55,7 @@ fn selection(grid: &Grid<'_>, max: usize) -> Vec<bool> {
         let name = format!("{} {}", item.asked.question, item.asked.repeat);
         // Sorting by digest draws items at random, but reproducibly.
         let draw = (Digest::from_bytes(name.as_bytes()), index);
-        strata
-            .entry((&item.asked.family, change))
-            .or_default()
-            .push(draw);
+        strata.entry((&item.asked.family, change)).or_default().push(draw);
     }
     for draws in strata.values_mut() {
         draws.sort_unstable();
@@ -69,10 +67,7 @@ fn selection(grid: &Grid<'_>, max: usize) -> Vec<bool> {
     strata.sort_by_key(Vec::len);
     let mut strata_left = strata.len();
     for draws in strata {
-        let share = items_left
-            .div_ceil(strata_left)
-            .min(draws.len())
-            .min(items_left);
+        let share = items_left.div_ceil(strata_left).min(draws.len()).min(items_left);
         for (_, index) in &draws[..share] {
             selected[*index] = true;
         }
@@ -94,12 +89,7 @@ fn answer_changes(grid: &Grid<'_>) -> Vec<AnswerChange> {
         let [if_lost, if_gained] = if base.enhancer.take().is_some() {
             [AnswerChange::Harmed, AnswerChange::Rescued]
         } else {
-            base = ModelInCondition::with_images(
-                &condition.model,
-                AxisLevel::L0,
-                &condition.variant,
-                None,
-            );
+            base = ModelInCondition::with_images(&condition.model, AxisLevel::L0, &condition.variant, None);
             [AnswerChange::Lost, AnswerChange::Stable]
         };
         let Some(base) = grid.find_up_to_group(&base) else {

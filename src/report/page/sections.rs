@@ -30,24 +30,14 @@ pub(super) fn sections<'a>(
     sections
         .iter()
         .filter_map(|&(id, title, note, figure_names)| {
-            let figures: Vec<&Figure> = figures
-                .iter()
-                .filter(|figure| figure_names.contains(&figure.name))
-                .collect();
+            let figures: Vec<&Figure> = figures.iter().filter(|figure| figure_names.contains(&figure.name)).collect();
             let samples = match id {
                 ENHANCERS => samples(thumbnails),
                 _ => Vec::new(),
             };
             let tables = tables::page_tables(tables, id);
             let has_content = !tables.is_empty() || !figures.is_empty() || !samples.is_empty();
-            has_content.then_some(PageSection {
-                id,
-                title,
-                note,
-                figures,
-                samples,
-                tables,
-            })
+            has_content.then_some(PageSection { id, title, note, figures, samples, tables })
         })
         .collect()
 }

@@ -56,24 +56,18 @@ struct Row<'a> {
 }
 
 impl Strip {
-    /// Builds the strip of the first frame with thumbnails. The question is the one whose answers change most between L0 and the other
-    /// images. `None` without thumbnails at several levels.
+    /// Builds the strip of the first frame with thumbnails. The question is the one whose answers change most between
+    /// L0 and the other images. `None` without thumbnails at several levels.
     ///
     /// # Errors
     /// If the question cannot be read.
     pub(super) fn new(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<Option<Self>> {
-        let thumbnails: Vec<&Thumbnail> = inputs
-            .thumbnails
-            .iter()
-            .filter(|thumbnail| thumbnail.condition.level().belongs_to(Axis::LIGHT))
-            .collect();
+        let thumbnails: Vec<&Thumbnail> =
+            inputs.thumbnails.iter().filter(|thumbnail| thumbnail.condition.level().belongs_to(Axis::LIGHT)).collect();
         let Some(frame) = thumbnails.iter().map(|thumbnail| &thumbnail.frame).min() else {
             return Ok(None);
         };
-        let levels: BTreeSet<AxisLevel> = thumbnails
-            .iter()
-            .map(|thumbnail| thumbnail.condition.level())
-            .collect();
+        let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(|thumbnail| thumbnail.condition.level()).collect();
         let rows = rows(grid, &thumbnails);
         let models = models(grid);
         // `max_by_key` returns the last maximum, so the order is reversed to prefer the first item.
@@ -104,10 +98,7 @@ impl Strip {
         Ok(Some(Self {
             question: question.unwrap_or_else(|| asked.question.to_string()),
             truth: truth.cloned().unwrap_or_default(),
-            rows: rows
-                .iter()
-                .map(|row| row.strip_row(grid, &models, item, frame, &thumbnails, &levels))
-                .collect(),
+            rows: rows.iter().map(|row| row.strip_row(grid, &models, item, frame, &thumbnails, &levels)).collect(),
             levels: levels.iter().map(AxisLevel::to_string).collect(),
         }))
     }
@@ -115,30 +106,12 @@ impl Strip {
 
 impl<'a> Row<'a> {
     /// Trial of an item with a model at a level of this row.
-    fn trial(
-        &'a self,
-        grid: &'a Grid<'a>,
-        model: &'a str,
-        item: usize,
-        level: AxisLevel,
-    ) -> StripTrial<'a> {
-        StripTrial {
-            grid,
-            model,
-            item,
-            level,
-            row: self,
-        }
+    fn trial(&'a self, grid: &'a Grid<'a>, model: &'a str, item: usize, level: AxisLevel) -> StripTrial<'a> {
+        StripTrial { grid, model, item, level, row: self }
     }
 
     /// True if a model answers an item right at L0, but wrong at a level.
-    fn has_lost_answer(
-        &self,
-        grid: &Grid<'_>,
-        models: &[&str],
-        item: usize,
-        level: AxisLevel,
-    ) -> bool {
+    fn has_lost_answer(&self, grid: &Grid<'_>, models: &[&str], item: usize, level: AxisLevel) -> bool {
         models.iter().any(|model| {
             self.trial(grid, model, item, level).is_right() == Some(false)
                 && self.trial(grid, model, item, AxisLevel::L0).is_right() == Some(true)
@@ -156,30 +129,20 @@ impl<'a> Row<'a> {
         levels: &BTreeSet<AxisLevel>,
     ) -> StripRow {
         let cells = levels.iter().map(|level| {
-            let thumbnail = thumbnails
-                .iter()
-                .find(|thumbnail| thumbnail.frame == *frame && self.contains(thumbnail, *level))?;
+            let thumbnail =
+                thumbnails.iter().find(|thumbnail| thumbnail.frame == *frame && self.contains(thumbnail, *level))?;
             let answers: Vec<Answer> = models
                 .iter()
-                .filter_map(|model| {
-                    self.trial(grid, model, item, *level)
-                        .answer(models.len() > 1)
-                })
+                .filter_map(|model| self.trial(grid, model, item, *level).answer(models.len() > 1))
                 .collect();
-            let texts: Vec<String> = answers
-                .iter()
-                .map(|answer| format!("{} {}", answer.sign, answer.text))
-                .collect();
+            let texts: Vec<String> = answers.iter().map(|answer| format!("{} {}", answer.sign, answer.text)).collect();
             Some(StripCell {
                 url: thumbnail.small.clone(),
                 alt: format!("{frame} at {}: {}", thumbnail.condition, texts.join(", ")),
                 answers,
             })
         });
-        StripRow {
-            name: light(&self.variant, self.enhancer),
-            cells: cells.collect(),
-        }
+        StripRow { name: light(&self.variant, self.enhancer), cells: cells.collect() }
     }
 
     /// True if a thumbnail belongs to this row at a level. The clean frame belongs to each row of raw images.
@@ -191,7 +154,8 @@ impl<'a> Row<'a> {
     }
 }
 
-/// Rows of a strip: another variant such as exposure drop alone, the main variant, and the main variant with each enhancer.
+/// Rows of a strip: another variant such as exposure drop alone, the main variant, and the main variant with each
+/// enhancer.
 fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
     let Some(main) = grid.main_variant() else {
         return Vec::new();
@@ -204,29 +168,20 @@ fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
         })
         .filter(|(variant, _)| variant.is_degraded())
         .collect();
-    let other_variant = lights
-        .iter()
-        .find(|(variant, enhancer)| *variant != main && enhancer.is_none());
+    let other_variant = lights.iter().find(|(variant, enhancer)| *variant != main && enhancer.is_none());
     let main_variant = lights.iter().filter(|(variant, _)| *variant == main);
     other_variant
         .into_iter()
         .chain(main_variant)
         .take(MAX_ROWS)
-        .map(|(variant, enhancer)| Row {
-            variant: variant.clone(),
-            enhancer: *enhancer,
-        })
+        .map(|(variant, enhancer)| Row { variant: variant.clone(), enhancer: *enhancer })
         .collect()
 }
 
 /// First models that were shown images.
 fn models<'a>(grid: &'a Grid<'_>) -> Vec<&'a str> {
-    let mut models: Vec<&str> = grid
-        .subjects
-        .iter()
-        .filter(|subject| subject.level.is_some())
-        .map(|subject| &*subject.model)
-        .collect();
+    let mut models: Vec<&str> =
+        grid.subjects.iter().filter(|subject| subject.level.is_some()).map(|subject| &*subject.model).collect();
     models.dedup();
     let pooled = pooled_models(models.iter().copied());
     models.retain(|model| pooled.contains(model));
@@ -247,16 +202,12 @@ struct StripTrial<'a> {
 impl StripTrial<'_> {
     /// Result with or without an enhancer; `None` if the model was not asked in this condition.
     fn result(self, enhancer: Option<&EnhancerName>) -> Option<TrialResult> {
-        let subject =
-            ModelInCondition::with_images(self.model, self.level, &self.row.variant, enhancer);
-        Some(
-            self.grid
-                .result(self.grid.find_up_to_group(&subject)?, self.item),
-        )
+        let subject = ModelInCondition::with_images(self.model, self.level, &self.row.variant, enhancer);
+        Some(self.grid.result(self.grid.find_up_to_group(&subject)?, self.item))
     }
 
-    /// True if the answer by strict parsing is right; `None` without a reply or a true choice. At L0, the raw frame counts even in a row
-    /// with an enhancer.
+    /// True if the answer by strict parsing is right; `None` without a reply or a true choice. At L0, the raw frame
+    /// counts even in a row with an enhancer.
     fn is_right(self) -> Option<bool> {
         let enhancer = self.row.enhancer.filter(|_| self.level != AxisLevel::L0);
         let reading = self.result(enhancer)?.reading(ParsingMode::Strict)?;
@@ -285,14 +236,6 @@ impl StripTrial<'_> {
                 }
             }
         };
-        Some(Answer {
-            class,
-            sign,
-            text: if has_name {
-                format!("{}: {text}", self.model)
-            } else {
-                text.to_owned()
-            },
-        })
+        Some(Answer { class, sign, text: if has_name { format!("{}: {text}", self.model) } else { text.to_owned() } })
     }
 }

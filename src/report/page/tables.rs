@@ -56,9 +56,8 @@ pub(crate) fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTab
         .iter()
         .filter(|table| table.section == section)
         .map(|table| {
-            let (mut folded, mut visible): (Vec<&TableRow>, Vec<&TableRow>) = table
-                .rows_in(TableFormat::Page)
-                .partition(|row| is_undetected(row));
+            let (mut folded, mut visible): (Vec<&TableRow>, Vec<&TableRow>) =
+                table.rows_in(TableFormat::Page).partition(|row| is_undetected(row));
             if folded.len() < MIN_FOLDED_ROWS {
                 folded.clear();
                 visible = table.rows_in(TableFormat::Page).collect();
@@ -67,10 +66,8 @@ pub(crate) fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTab
             PageTable {
                 caption: &table.caption,
                 folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
-                unshown: (!folded.is_empty()).then(|| FoldedRows {
-                    summary: summary(table, &folded),
-                    rows: page_rows(table, &folded),
-                }),
+                unshown: (!folded.is_empty())
+                    .then(|| FoldedRows { summary: summary(table, &folded), rows: page_rows(table, &folded) }),
                 foot: table.foot.as_deref(),
                 head: table
                     .columns
@@ -116,14 +113,10 @@ fn page_rows<'a>(table: &'a Table, rows: &[&'a TableRow]) -> Vec<PageRow<'a>> {
 
 /// First difference in a row, with its text.
 fn difference(table: &Table, row: &TableRow) -> Option<(Estimate, String)> {
-    table
-        .cells(row)
-        .find_map(|(column, cell)| match (column.kind, cell) {
-            (ColumnKind::Points, TableCell::Estimate(difference)) => {
-                Some((*difference, words(column.kind, cell)))
-            }
-            _ => None,
-        })
+    table.cells(row).find_map(|(column, cell)| match (column.kind, cell) {
+        (ColumnKind::Points, TableCell::Estimate(difference)) => Some((*difference, words(column.kind, cell))),
+        _ => None,
+    })
 }
 
 /// Number of rows without a detected effect, and the largest difference among them with the names in its row.
@@ -148,10 +141,7 @@ fn summary(table: &Table, rows: &[&TableRow]) -> String {
         })
         .filter(|name| !name.is_empty())
         .collect();
-    format!(
-        "{count}; the largest difference is {text} ({})",
-        names.join(", ")
-    )
+    format!("{count}; the largest difference is {text} ({})", names.join(", "))
 }
 
 /// Cell for the template.
@@ -159,15 +149,10 @@ fn page_cell(kind: ColumnKind, cell: &TableCell) -> PageCell {
     let class = match (kind, cell) {
         (_, TableCell::Below(_)) => "below",
         (_, TableCell::Significance(Significance::Better)) => "better",
-        (_, TableCell::Significance(Significance::Worse))
-        | (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
+        (_, TableCell::Significance(Significance::Worse)) | (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
         (_, TableCell::Significance(_)) => "unshown",
         (ColumnKind::Text, _) => "text",
         _ => "",
     };
-    PageCell {
-        text: words(kind, cell),
-        ends: interval(kind, cell).map(ends).unwrap_or_default(),
-        class,
-    }
+    PageCell { text: words(kind, cell), ends: interval(kind, cell).map(ends).unwrap_or_default(), class }
 }

@@ -45,8 +45,7 @@ impl MeasureRow {
     fn text(&self, set: usize) -> String {
         match self.quartiles[set] {
             Some(quartiles) => {
-                let [low, middle, high] =
-                    quartiles.map(|value| format!("{value:.*}", self.decimals));
+                let [low, middle, high] = quartiles.map(|value| format!("{value:.*}", self.decimals));
                 format!("{middle} ({low} to {high})")
             }
             None => "–".to_owned(),
@@ -77,34 +76,18 @@ impl AppearanceComparison {
     pub(crate) fn new(sets: [(&str, &[FrameAppearance]); 2]) -> Self {
         let looks = sets.map(|(_, looks)| looks);
         let mut rows = vec![
-            MeasureRow::new(looks, "mean linear light, EV of white", 2, |look| {
-                Some(look.light_ev)
-            }),
-            MeasureRow::new(looks, "pixels at edges, %", 1, |look| {
-                Some(100.0 * look.edges)
-            }),
+            MeasureRow::new(looks, "mean linear light, EV of white", 2, |look| Some(look.light_ev)),
+            MeasureRow::new(looks, "pixels at edges, %", 1, |look| Some(100.0 * look.edges)),
             MeasureRow::new(looks, "segments", 0, |look| look.segments.map(|n| n as f64)),
-            MeasureRow::new(looks, "depth, median, m", 2, |look| {
-                look.depth.map(|[_, m, _]| m)
-            }),
-            MeasureRow::new(looks, "depth, 90 % less 10 %, m", 2, |look| {
-                look.depth.map(|[near, _, far]| far - near)
-            }),
+            MeasureRow::new(looks, "depth, median, m", 2, |look| look.depth.map(|[_, m, _]| m)),
+            MeasureRow::new(looks, "depth, 90 % less 10 %, m", 2, |look| look.depth.map(|[near, _, far]| far - near)),
         ];
         rows.extend(Color::ALL.iter().enumerate().map(|(place, color)| {
             let measure = format!("{} pixels, %", color.name());
             MeasureRow::new(looks, &measure, 1, |look| Some(100.0 * look.colors[place]))
         }));
-        rows.push(MeasureRow::new(
-            looks,
-            "pixels of no colour's name, %",
-            1,
-            |look| Some(100.0 * look.colors[NONE]),
-        ));
-        Self {
-            sets: sets.map(|(name, looks)| (name.to_owned(), looks.len())),
-            rows,
-        }
+        rows.push(MeasureRow::new(looks, "pixels of no colour's name, %", 1, |look| Some(100.0 * look.colors[NONE])));
+        Self { sets: sets.map(|(name, looks)| (name.to_owned(), looks.len())), rows }
     }
 
     /// Formats the table for the terminal.
@@ -132,13 +115,7 @@ mod tests {
     use super::*;
 
     fn look(light_ev: f64, segments: Option<usize>) -> FrameAppearance {
-        FrameAppearance {
-            light_ev,
-            edges: 0.25,
-            colors: [0.0; 12],
-            segments,
-            depth: None,
-        }
+        FrameAppearance { light_ev, edges: 0.25, colors: [0.0; 12], segments, depth: None }
     }
 
     #[test]

@@ -12,7 +12,8 @@ use crate::types::Family;
 use darkqa_score::answers::checks::{Checks, agreements, shares};
 use darkqa_score::estimate::Estimate;
 
-/// Table of wrong and ambiguous questions by person and family, with a line on the agreement of each two people; empty without checks.
+/// Table of wrong and ambiguous questions by person and family, with a line on the agreement of each two people; empty
+/// without checks.
 #[must_use]
 pub(crate) fn text(checks: &Checks) -> String {
     if checks.is_empty() {
@@ -25,12 +26,8 @@ pub(crate) fn text(checks: &Checks) -> String {
             name.to_owned()
         })
         .column(Count, "terminal questions", |share| share.wrong.n)
-        .column(Text, "terminal wrong % [95 %]", |share| {
-            with_interval(share.wrong)
-        })
-        .column(Text, "terminal ambiguous % [95 %]", |share| {
-            with_interval(share.ambiguous)
-        })
+        .column(Text, "terminal wrong % [95 %]", |share| with_interval(share.wrong))
+        .column(Text, "terminal ambiguous % [95 %]", |share| with_interval(share.ambiguous))
         .build();
     let mut text = terminal::table(&[table]);
     for pair in agreements(checks) {
@@ -40,9 +37,7 @@ pub(crate) fn text(checks: &Checks) -> String {
             (Some(kappa), None) => {
                 format!("{kappa:.2}, without an interval, because they vary in too few scenes")
             }
-            (None, _) => {
-                "undefined, because one of them found all questions right, or none".to_owned()
-            }
+            (None, _) => "undefined, because one of them found all questions right, or none".to_owned(),
         };
         // Writing to a string cannot fail.
         let _ = writeln!(

@@ -1,4 +1,5 @@
-//! Reports on a set of questions: statistics as a table, as files and as a figure, checks by people, and comparison with another set.
+//! Reports on a set of questions: statistics as a table, as files and as a figure, checks by people, and comparison
+//! with another set.
 
 pub(crate) mod against;
 pub(crate) mod checks;
@@ -23,7 +24,8 @@ use darkqa_score::answers::checks::Checks;
 /// Maximum number of reasons in a row of the table.
 const MAX_REASONS: usize = 3;
 
-/// Table for the terminal: questions by family, with the scores of answering without images and the number of valid candidates.
+/// Table for the terminal: questions by family, with the scores of answering without images and the number of valid
+/// candidates.
 #[must_use]
 pub(crate) fn table(summary: &QuestionSummary) -> String {
     let families = Family::PAPER.iter().filter_map(|family| {
@@ -37,21 +39,13 @@ pub(crate) fn table(summary: &QuestionSummary) -> String {
         .column(Count, "terminal questions", |(_, candidates)| {
             candidates.map_or(summary.questions, |counts| counts.asked as usize)
         })
-        .column(Count, "terminal chance %", |(family, _)| {
-            baseline_text(summary, family, |base| base.chance)
-        })
-        .column(Count, "terminal majority %", |(family, _)| {
-            baseline_text(summary, family, |base| base.majority as f64)
-        })
-        .column(Count, "terminal prior %", |(family, _)| {
-            baseline_text(summary, family, |base| base.prior)
-        })
+        .column(Count, "terminal chance %", |(family, _)| baseline_text(summary, family, |base| base.chance))
+        .column(Count, "terminal majority %", |(family, _)| baseline_text(summary, family, |base| base.majority as f64))
+        .column(Count, "terminal prior %", |(family, _)| baseline_text(summary, family, |base| base.prior))
         .column(Count, "terminal candidates that hold", |(_, candidates)| {
             candidates.map_or(String::new(), |counts| counts.viable.to_string())
         })
-        .column(Text, "terminal why others do not", |(_, candidates)| {
-            candidates.map_or(String::new(), reasons)
-        })
+        .column(Text, "terminal why others do not", |(_, candidates)| candidates.map_or(String::new(), reasons))
         .build();
     let notes: String = notes(summary).into_iter().map(|note| note + "\n").collect();
     terminal::table(&[table]) + &notes
@@ -59,31 +53,18 @@ pub(crate) fn table(summary: &QuestionSummary) -> String {
 
 /// Score of a way to answer without images, in percent. `right` reads the expected number of right answers.
 fn baseline_text(summary: &QuestionSummary, family: &str, right: fn(&Baselines) -> f64) -> String {
-    let baselines = summary
-        .baselines
-        .get(family)
-        .filter(|baselines| baselines.questions > 0);
-    baselines.map_or("–".to_owned(), |baselines| {
-        format!(
-            "{:.1}",
-            100.0 * right(baselines) / baselines.questions as f64
-        )
-    })
+    let baselines = summary.baselines.get(family).filter(|baselines| baselines.questions > 0);
+    baselines
+        .map_or("–".to_owned(), |baselines| format!("{:.1}", 100.0 * right(baselines) / baselines.questions as f64))
 }
 
 /// Most frequent reasons for rejected candidates, with counts.
 fn reasons(candidates: &CandidateCounts) -> String {
-    let mut rejected: Vec<(String, u64)> = candidates
-        .rejections
-        .iter()
-        .map(|(reason, count)| (variant_words(reason), *count))
-        .collect();
+    let mut rejected: Vec<(String, u64)> =
+        candidates.rejections.iter().map(|(reason, count)| (variant_words(reason), *count)).collect();
     rejected.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-    let reasons: Vec<String> = rejected
-        .iter()
-        .take(MAX_REASONS)
-        .map(|(reason, count)| format!("{reason} {count}"))
-        .collect();
+    let reasons: Vec<String> =
+        rejected.iter().take(MAX_REASONS).map(|(reason, count)| format!("{reason} {count}")).collect();
     reasons.join(", ")
 }
 
@@ -99,31 +80,20 @@ fn notes(summary: &QuestionSummary) -> Vec<String> {
     let unbalanced: u64 = candidates.clone().map(|counts| counts.unbalanced).sum();
     let rejected: u64 = candidates.map(|counts| counts.rejected).sum();
     if unbalanced > 0 {
-        notes.push(format!(
-            "{unbalanced} more were left out to even out the answers (--balance {})",
-            summary.balance
-        ));
+        notes.push(format!("{unbalanced} more were left out to even out the answers (--balance {})", summary.balance));
     }
     if rejected > 0 {
         notes.push(format!("{rejected} more were rejected by a person"));
     }
     let [both, same] = summary.room_agreement;
     if both > 0 {
-        notes.push(format!(
-            "rooms: {same} of {both} that are both seen and stated agree"
-        ));
+        notes.push(format!("rooms: {same} of {both} that are both seen and stated agree"));
     }
     if summary.dark > 0 {
-        notes.push(format!(
-            "too dark to ask about: {}",
-            counted(summary.dark, "frame")
-        ));
+        notes.push(format!("too dark to ask about: {}", counted(summary.dark, "frame")));
     }
     if summary.failed > 0 {
-        notes.push(format!(
-            "no questions, because measuring failed: {}",
-            counted(summary.failed, "frame")
-        ));
+        notes.push(format!("no questions, because measuring failed: {}", counted(summary.failed, "frame")));
     }
     if !summary.unknown.is_empty() {
         let ids: Vec<String> = summary.unknown.keys().take(8).map(u16::to_string).collect();
@@ -162,14 +132,8 @@ pub(crate) fn json(
     checks: &Checks,
     against: Option<&AppearanceComparison>,
 ) -> Result<String> {
-    let file = SummaryFile {
-        summary,
-        checks: (!checks.is_empty()).then(|| checks::json(checks)),
-        against,
-    };
-    serde_json::to_string_pretty(&file)
-        .map(|text| text + "\n")
-        .map_err(|e| Error::data("statistics", e))
+    let file = SummaryFile { summary, checks: (!checks.is_empty()).then(|| checks::json(checks)), against };
+    serde_json::to_string_pretty(&file).map(|text| text + "\n").map_err(|e| Error::data("statistics", e))
 }
 
 /// Writes all counts as CSV with the columns `table, row, column, count`.

@@ -51,15 +51,17 @@ impl<'a> ReviewItem<'a> {
 /// Data of the page's script.
 #[derive(Serialize)]
 struct ReviewPage<'a> {
-    /// Digest of the question ids. The browser keeps a person's results under it and the person's name until they are saved.
+    /// Digest of the question ids. The browser keeps a person's results under it and the person's name until they are
+    /// saved.
     set: Digest,
     items: &'a [ReviewItem<'a>],
 }
 
 /// Renders the page as one HTML file.
 ///
-/// The page shows each question with its image and asks for the person's own answer. Only then does it show the generated answer with its
-/// evidence, so that the answer does not influence the person. It saves lines of JSON under the person's name.
+/// The page shows each question with its image and asks for the person's own answer. Only then does it show the
+/// generated answer with its evidence, so that the answer does not influence the person. It saves lines of JSON under
+/// the person's name.
 ///
 /// # Errors
 /// If the questions cannot be serialized.
@@ -88,11 +90,7 @@ mod tests {
             group: None,
             evidence: json!({ "segments": [] }),
         };
-        let generated = GeneratedQuestion {
-            question,
-            about: String::new(),
-            scene: String::new(),
-        };
+        let generated = GeneratedQuestion { question, about: String::new(), scene: String::new() };
         let page = page(&[ReviewItem::new(&generated, "a.png".into(), [4, 3])]).unwrap();
         assert!(!page.contains(PLACEHOLDER));
         assert_eq!(page.to_lowercase().matches("</script").count(), 1);

@@ -135,8 +135,7 @@ impl RealismSummary {
     ) -> Result<Self> {
         let drops: Vec<f64> = pairs.iter().map(|pair| f64::from(pair.drop)).collect();
         let exposures: Vec<&ImageComparison> = pairs.iter().map(|pair| &pair.exposure).collect();
-        let (Some(drop), Some(exposure)) = (Mean::from_values(&drops), MethodRow::new(&exposures))
-        else {
+        let (Some(drop), Some(exposure)) = (Mean::from_values(&drops), MethodRow::new(&exposures)) else {
             return Err(Error::data("pairs", "none of them could be compared"));
         };
         Ok(Self {
@@ -176,18 +175,13 @@ impl RealismSummary {
     /// The paper's table, with a row for each way to synthesize the images.
     fn methods_table(&self) -> String {
         let exposure = ("exposure drop alone".to_owned(), &self.exposure);
-        let noise = self
-            .noise
-            .iter()
-            .map(|row| (format!("with sensor noise, {}", row.method), &row.images));
+        let noise = self.noise.iter().map(|row| (format!("with sensor noise, {}", row.method), &row.images));
         let mut builder = TableBuilder::new("realism", std::iter::once(exposure).chain(noise))
             .column(Text, "terminal", |(name, _)| name.clone())
             .column(Text, "terminal PSNR dB", |(_, row)| mean_text(&row.psnr, 2))
             .column(Text, "terminal SSIM", |(_, row)| mean_text(&row.ssim, 4))
             .column(Text, "terminal D_KL", |(_, row)| mean_text(&row.kl, 3))
-            .column(Text, "terminal bins empty", |(_, row)| {
-                mean_text(&row.empty_bins, 1)
-            });
+            .column(Text, "terminal bins empty", |(_, row)| mean_text(&row.empty_bins, 1));
         if self.kl_other_rule.is_some() {
             let name = "terminal D_KL (other rule)";
             builder = builder.column(Text, name, |(_, row)| mean_text(&row.kl_other, 3));
@@ -198,18 +192,10 @@ impl RealismSummary {
     /// Table of the mean differences between noise and exposure drop alone, paired by image.
     fn differences_table(&self) -> String {
         let table = TableBuilder::new("differences", &self.noise)
-            .column(Text, "terminal noise − exposure drop alone", |row| {
-                row.method.to_string()
-            })
-            .column(Text, "terminal PSNR dB", |row| {
-                difference_text(&row.differences.psnr, 2)
-            })
-            .column(Text, "terminal SSIM", |row| {
-                difference_text(&row.differences.ssim, 4)
-            })
-            .column(Text, "terminal D_KL", |row| {
-                difference_text(&row.differences.kl, 3)
-            })
+            .column(Text, "terminal noise − exposure drop alone", |row| row.method.to_string())
+            .column(Text, "terminal PSNR dB", |row| difference_text(&row.differences.psnr, 2))
+            .column(Text, "terminal SSIM", |row| difference_text(&row.differences.ssim, 4))
+            .column(Text, "terminal D_KL", |row| difference_text(&row.differences.kl, 3))
             .column(Count, "terminal pairs", |row| row.differences.psnr.n)
             .build();
         terminal::table(&[table])
@@ -224,9 +210,7 @@ impl RealismSummary {
         if let Some(rule) = &self.kl_other_rule {
             notes.push(format!("other rule: {rule}"));
         }
-        notes.push(
-            "exposure drop alone has no residual: its D_KL shows the rule, not noise".to_owned(),
-        );
+        notes.push("exposure drop alone has no residual: its D_KL shows the rule, not noise".to_owned());
         notes.push(
             "D_KL is least with more noise than a picture has, because residuals also hold misalignment and tone: --fit goes by the spread of smooth blocks, never by D_KL"
                 .to_owned(),

@@ -3,9 +3,7 @@
 use serde::Serialize;
 
 use darkqa_score::photographs::realism::mean::Mean;
-use darkqa_score::photographs::realism::{
-    ImageComparison, NoiseComparison, NoiseMethod, PairComparison,
-};
+use darkqa_score::photographs::realism::{ImageComparison, NoiseComparison, NoiseMethod, PairComparison};
 
 /// Means over pairs for one way to synthesize the low-light images.
 #[derive(Debug, Serialize)]
@@ -69,10 +67,8 @@ impl NoiseRow {
             .iter()
             .enumerate()
             .filter_map(|(index, noise)| {
-                let comparisons: Vec<(&ImageComparison, &NoiseComparison)> = pairs
-                    .iter()
-                    .filter_map(|pair| Some((&pair.exposure, pair.noise.get(index)?)))
-                    .collect();
+                let comparisons: Vec<(&ImageComparison, &NoiseComparison)> =
+                    pairs.iter().filter_map(|pair| Some((&pair.exposure, pair.noise.get(index)?))).collect();
                 Self::new(&noise.method, &comparisons)
             })
             .collect()
@@ -81,10 +77,8 @@ impl NoiseRow {
     fn new(method: &NoiseMethod, pairs: &[(&ImageComparison, &NoiseComparison)]) -> Option<Self> {
         let images: Vec<&ImageComparison> = pairs.iter().map(|(_, noise)| &noise.image).collect();
         let clean: Vec<f64> = pairs.iter().map(|(_, noise)| noise.clean_psnr).collect();
-        let differences: Vec<[f64; 3]> = pairs
-            .iter()
-            .map(|(exposure, noise)| noise.image.differences(exposure))
-            .collect();
+        let differences: Vec<[f64; 3]> =
+            pairs.iter().map(|(exposure, noise)| noise.image.differences(exposure)).collect();
         let [psnr, ssim, kl] = [0, 1, 2].map(|index: usize| {
             let values: Vec<f64> = differences.iter().map(|values| values[index]).collect();
             Mean::from_values(&values)
@@ -93,11 +87,7 @@ impl NoiseRow {
             method: method.clone(),
             images: MethodRow::new(&images)?,
             clean_psnr: Mean::from_values(&clean)?,
-            differences: Differences {
-                psnr: psnr?,
-                ssim: ssim?,
-                kl: kl?,
-            },
+            differences: Differences { psnr: psnr?, ssim: ssim?, kl: kl? },
         })
     }
 }
@@ -134,10 +124,7 @@ mod tests {
             (&[f64::NEG_INFINITY, 1.0], "−∞"),
             (&[f64::INFINITY, 1.0], "+∞"),
         ] {
-            assert_eq!(
-                difference_text(&Mean::from_values(numbers).unwrap(), 2),
-                text
-            );
+            assert_eq!(difference_text(&Mean::from_values(numbers).unwrap(), 2), text);
         }
     }
 }

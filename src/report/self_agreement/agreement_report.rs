@@ -20,18 +20,9 @@ pub(crate) struct AgreementReport<'a> {
 
 impl<'a> AgreementReport<'a> {
     /// Writes the sentences and the tables of a report. `enhancer_rows` describe the use of each enhancer.
-    pub(crate) fn new(
-        found: &'a SelfAgreement<'a>,
-        alerts: Vec<Alert>,
-        enhancer_rows: &[EnhancerRow],
-    ) -> Self {
+    pub(crate) fn new(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>, enhancer_rows: &[EnhancerRow]) -> Self {
         let mut tables = with_training(tables::tables(found), &found.grid.listing);
         tables.extend(enhancers(enhancer_rows));
-        Self {
-            sentences: self_agreement(found),
-            found,
-            alerts,
-            tables,
-        }
+        Self { sentences: self_agreement(found), found, alerts, tables }
     }
 }

@@ -11,7 +11,8 @@ use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::estimate::Estimate;
 
-/// Draws agreement by level with its floor, and the evidence kept, each with a panel for each variant. Empty if only one level was asked.
+/// Draws agreement by level with its floor, and the evidence kept, each with a panel for each variant. Empty if only
+/// one level was asked.
 ///
 /// # Errors
 /// If a figure cannot be drawn.
@@ -26,12 +27,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
         counted(found.grid.clusters, &found.unit.to_string()),
         unit = found.unit
     );
-    let agreement = panels(
-        found,
-        &ladder,
-        |cell| cell.agreement,
-        |panel| panel.extend(floors(found)),
-    );
+    let agreement = panels(found, &ladder, |cell| cell.agreement, |panel| panel.extend(floors(found)));
     let evidence = panels(
         found,
         &ladder,
@@ -63,12 +59,7 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
         if panels.is_empty() {
             continue;
         }
-        let chart = Chart {
-            measure,
-            panels,
-            columns: 2,
-            note: note.clone(),
-        };
+        let chart = Chart { measure, panels, columns: 2, note: note.clone() };
         figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
     }
     Ok(figures)
@@ -76,13 +67,11 @@ pub(super) fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
 
 /// True if a curve of the panel has a point.
 fn has_points(panel: &Panel) -> bool {
-    panel
-        .lines
-        .iter()
-        .any(|line| matches!(&line.content, LineContent::Curve(points) if !points.is_empty()))
+    panel.lines.iter().any(|line| matches!(&line.content, LineContent::Curve(points) if !points.is_empty()))
 }
 
-/// One panel for each variant, raw or with one enhancer, with a line for each model. `add` adds further lines to a panel.
+/// One panel for each variant, raw or with one enhancer, with a line for each model. `add` adds further lines to a
+/// panel.
 fn panels(
     found: &SelfAgreement<'_>,
     ladder: &Ladder<'_, AgreementCell>,
@@ -106,11 +95,7 @@ fn panels(
         .into_iter()
         .map(|(title, mut lines)| {
             add(&mut lines);
-            Panel {
-                title: format!("{title}, n {}", found.items()),
-                lines,
-                model: None,
-            }
+            Panel { title: format!("{title}, n {}", found.items()), lines, model: None }
         })
         .collect()
 }
@@ -121,10 +106,8 @@ fn line(
     cells: &SeriesByLevel<'_, AgreementCell>,
     value: impl Fn(&AgreementCell) -> Option<Estimate>,
 ) -> PlotLine {
-    let points: Vec<(AxisLevel, Estimate)> = cells
-        .iter()
-        .filter_map(|(level, cell)| Some((*level, value(cell)?)))
-        .collect();
+    let points: Vec<(AxisLevel, Estimate)> =
+        cells.iter().filter_map(|(level, cell)| Some((*level, value(cell)?))).collect();
     PlotLine {
         name: series.model.to_owned(),
         style: style(found, series.model),

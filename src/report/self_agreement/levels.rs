@@ -51,7 +51,8 @@ impl Measure {
         }
     }
 
-    /// Table cell of the measure. At L0, entropy and unusable replies are of the first replies, agreement is of the repeated ones.
+    /// Table cell of the measure. At L0, entropy and unusable replies are of the first replies, agreement is of the
+    /// repeated ones.
     fn cell(self, found: &SelfAgreement<'_>, cell: &AgreementCell) -> TableCell {
         let is_light = cell.role() == CellRole::Ceiling;
         let light = found.light_of(&cell.subject.model).filter(|_| is_light);
@@ -81,13 +82,9 @@ impl Measure {
         }
     }
 
-    /// True if the measure is meaningful for a series: informative questions only if some questions are not informative, refusals only if
-    /// they occur, and "cannot tell" only if the questions have this choice.
-    fn applies_to(
-        self,
-        found: &SelfAgreement<'_>,
-        cells: &SeriesByLevel<'_, AgreementCell>,
-    ) -> bool {
+    /// True if the measure is meaningful for a series: informative questions only if some questions are not
+    /// informative, refusals only if they occur, and "cannot tell" only if the questions have this choice.
+    fn applies_to(self, found: &SelfAgreement<'_>, cells: &SeriesByLevel<'_, AgreementCell>) -> bool {
         let mut cells = cells.values();
         match self {
             Self::Refused => cells.any(|cell| {
@@ -110,24 +107,16 @@ fn decimals(value: Option<f64>) -> TableCell {
         return TableCell::Missing;
     };
     let text = format!("{value:.2}");
-    TableCell::Text(if text == "-0.00" {
-        "0.00".to_owned()
-    } else {
-        text.replace('-', "−")
-    })
+    TableCell::Text(if text == "-0.00" { "0.00".to_owned() } else { text.replace('-', "−") })
 }
 
 /// Share of some replies in percent; missing without replies.
 fn share_of_replies(count: usize, replies: usize) -> TableCell {
-    (replies > 0)
-        .then(|| TableCell::Text(percent(count as f64 / replies as f64)))
-        .into()
+    (replies > 0).then(|| TableCell::Text(percent(count as f64 / replies as f64))).into()
 }
 
 fn share(share: Option<Estimate>) -> TableCell {
-    share.map_or(TableCell::Missing, |share| {
-        TableCell::Text(percent(share.value))
-    })
+    share.map_or(TableCell::Missing, |share| TableCell::Text(percent(share.value)))
 }
 
 /// Row of the table.
@@ -182,33 +171,18 @@ fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, Agreeme
             });
         }
     }
-    let by = if axis == Axis::LIGHT {
-        "level".to_owned()
-    } else {
-        format!("{} of {}", axis.title, axis.cause)
-    };
-    let caption =
-        format!("Agreement with its own answer at L0 by {by}, and the measures to read with it");
+    let by = if axis == Axis::LIGHT { "level".to_owned() } else { format!("{} of {}", axis.title, axis.cause) };
+    let caption = format!("Agreement with its own answer at L0 by {by}, and the measures to read with it");
     let mut table = TableBuilder::new(AGREEMENT, rows)
         .page("agreement", &caption)
         .group(|row| Some(row.series.clone()))
-        .column(Text, "terminal | page measure | latex Measure", |row| {
-            row.measure.name()
-        });
-    let has_enhanced_clean = ladder
-        .series
-        .iter()
-        .any(|(series, cells)| series.is_enhanced() && cells.contains_key(&AxisLevel::L0));
+        .column(Text, "terminal | page measure | latex Measure", |row| row.measure.name());
+    let has_enhanced_clean =
+        ladder.series.iter().any(|(series, cells)| series.is_enhanced() && cells.contains_key(&AxisLevel::L0));
     let (again, first) = if has_enhanced_clean {
-        (
-            "",
-            "L0: the same images asked again, the ceiling; in a row with an enhancer, these images enhanced",
-        )
+        ("", "L0: the same images asked again, the ceiling; in a row with an enhancer, these images enhanced")
     } else {
-        (
-            " again",
-            "L0 again: the same images asked again, the ceiling",
-        )
+        (" again", "L0 again: the same images asked again, the ceiling")
     };
     for (index, level) in levels.iter().enumerate() {
         let again = if *level == AxisLevel::L0 { again } else { "" };
@@ -231,9 +205,7 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
     let mut notes = Vec::new();
     for model in found.models() {
         if let Some(light) = found.light_of(model) {
-            let read = light.read.map_or("no reply".to_owned(), |read| {
-                format!("{} %", percent(read.value))
-            });
+            let read = light.read.map_or("no reply".to_owned(), |read| format!("{} %", percent(read.value)));
             let (informative, all) = found.informative(model);
             notes.push(format!(
                 "{model} at L0: an answer to {read} of {} questions; {informative} of {all} questions of the bank are informative",
@@ -243,9 +215,8 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
         let mut cells = found.whole().filter(|cell| cell.subject.model == model);
         let floor = cells.clone().find(|cell| cell.role() == CellRole::Floor);
         if let Some((cell, share)) = floor.and_then(|cell| Some((cell, cell.agreement?))) {
-            let kappa = cell.kappa.map_or("not defined".to_owned(), |kappa| {
-                format!("{:.2}", kappa.value).replace('-', "−")
-            });
+            let kappa =
+                cell.kappa.map_or("not defined".to_owned(), |kappa| format!("{:.2}", kappa.value).replace('-', "−"));
             let entropy = cell.entropies[1].map_or("–".to_owned(), |h| format!("{h:.2}"));
             notes.push(format!(
                 "{model} without images, the floor: {}, κ {kappa}, entropy {entropy}",
@@ -253,12 +224,9 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
             ));
         }
         let reason = cells.find_map(|cell| cell.evidence?.err());
-        notes.extend(reason.map(|reason| {
-            format!(
-                "{model}: evidence kept is not given: {}",
-                no_evidence_reason(reason)
-            )
-        }));
+        notes.extend(
+            reason.map(|reason| format!("{model}: evidence kept is not given: {}", no_evidence_reason(reason))),
+        );
     }
     notes
 }
@@ -266,9 +234,7 @@ pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
 /// Text for the reason why the evidence kept is unknown.
 pub(super) fn no_evidence_reason(reason: NoEvidence) -> String {
     match reason {
-        NoEvidence::NotAgain => {
-            "the images at L0 were not asked about again (--repeats)".to_owned()
-        }
+        NoEvidence::NotAgain => "the images at L0 were not asked about again (--repeats)".to_owned(),
         NoEvidence::NotBlind => "it was not asked without images".to_owned(),
         NoEvidence::Close(distance) => format!(
             "the ceiling is {} points above the floor, and {} are needed",

@@ -1,7 +1,8 @@
-//! Report on questions without true answers: its files ([`products`]), its summary ([`summary`]) and its text ([`text()`]).
+//! Report on questions without true answers: its files ([`products`]), its summary ([`summary`]) and its text
+//! ([`text()`]).
 //!
-//! The measure is agreement with the model's own answer at L0. Reports always give it with its floor, its ceiling and other measures that
-//! are needed to interpret it, and never call it accuracy.
+//! The measure is agreement with the model's own answer at L0. Reports always give it with its floor, its ceiling and
+//! other measures that are needed to interpret it, and never call it accuracy.
 
 mod agreement_report;
 mod figures;
@@ -37,10 +38,7 @@ use crate::types::Truths;
 ///
 /// # Errors
 /// If a file cannot be made.
-pub(crate) fn products<'a>(
-    report: &'a AgreementReport<'a>,
-    inputs: &PageInputs<'a>,
-) -> Result<Vec<(String, Vec<u8>)>> {
+pub(crate) fn products<'a>(report: &'a AgreementReport<'a>, inputs: &PageInputs<'a>) -> Result<Vec<(String, Vec<u8>)>> {
     let figures = figures::figures(report.found)?;
     let groups = FindingGroups::new(&report.sentences);
     let content = PageContent {
@@ -73,9 +71,7 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
         counted(found.grid.clusters, "cluster")
     );
     let readings = NoiseProfiles::new(&found.grid.subjects);
-    std::iter::once(facts)
-        .chain(readings.open_question())
-        .collect()
+    std::iter::once(facts).chain(readings.open_question()).collect()
 }
 
 /// Content for a Markdown report.
@@ -119,15 +115,8 @@ struct Head<'a> {
 ///
 /// # Errors
 /// If the document cannot be serialized.
-pub(crate) fn summary(
-    report: &AgreementReport<'_>,
-    runs: SummaryRuns<'_>,
-    length: ReportLength,
-) -> Result<String> {
-    let own_answers = report
-        .tables
-        .iter()
-        .find(|table| table.name == tables::OWN_ANSWERS);
+pub(crate) fn summary(report: &AgreementReport<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String> {
+    let own_answers = report.tables.iter().find(|table| table.name == tables::OWN_ANSWERS);
     let head = Head {
         runs: runs.head("darkqa.self-agreement/1"),
         measure: AGREEMENT,

@@ -40,18 +40,8 @@ pub(super) const SECTIONS: [Section; 8] = [
          agreement there is harm, unless the photographs were taken in the dark.",
         &[],
     ),
-    (
-        "answers",
-        "What changes in the dark",
-        "Answers against those at L0, not against the truth.",
-        &[],
-    ),
-    (
-        "comparisons",
-        "Comparisons",
-        "Each paired by item, in percentage points of agreement.",
-        &[],
-    ),
+    ("answers", "What changes in the dark", "Answers against those at L0, not against the truth.", &[]),
+    ("comparisons", "Comparisons", "Each paired by item, in percentage points of agreement.", &[]),
     (
         "health",
         "Parse health",

@@ -19,11 +19,7 @@ use darkqa_score::accuracies::Health;
 
 /// Renders the report as text. `runs` are the manifests with the folders of their runs.
 #[must_use]
-pub(crate) fn text(
-    report: &AgreementReport<'_>,
-    runs: &[(&RunManifest, &Path)],
-    length: ReportLength,
-) -> String {
+pub(crate) fn text(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
     let groups = FindingGroups::new(&report.sentences);
     let mut text = findings(&head(report), &report.alerts, &groups, length, HOW_TO_READ);
     match length {

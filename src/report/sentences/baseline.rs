@@ -11,26 +11,16 @@ use darkqa_score::significance::Significance;
 /// Maximum number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;
 
-/// The detected differences of each model from the run `old`; a single sentence if no difference is detected. `random` and the observer
-/// are left out if other models exist.
-pub(crate) fn against_baseline(
-    rows: &[BaselineRow],
-    old: &str,
-    unit: ClusterUnit,
-) -> Vec<Sentence> {
+/// The detected differences of each model from the run `old`; a single sentence if no difference is detected. `random`
+/// and the observer are left out if other models exist.
+pub(crate) fn against_baseline(rows: &[BaselineRow], old: &str, unit: ClusterUnit) -> Vec<Sentence> {
     let judged = models_under_test(rows.iter().map(|row| &*row.subject.model));
-    let rows: Vec<&BaselineRow> = rows
-        .iter()
-        .filter(|row| judged.contains(&*row.subject.model))
-        .collect();
+    let rows: Vec<&BaselineRow> = rows.iter().filter(|row| judged.contains(&*row.subject.model)).collect();
     let mut sentences = Vec::new();
     for model_rows in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
         for verdict in [Significance::Worse, Significance::Better] {
-            let detected: Vec<&BaselineRow> = model_rows
-                .iter()
-                .copied()
-                .filter(|row| row.significance == verdict)
-                .collect();
+            let detected: Vec<&BaselineRow> =
+                model_rows.iter().copied().filter(|row| row.significance == verdict).collect();
             sentences.extend(detected_difference(&detected, old, unit));
         }
     }
@@ -45,19 +35,13 @@ pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
     too_few(rows, &mut Numbers::new(unit))
 }
 
-/// The reason why no verdict is possible: missing replies, too few shared questions, or too few clusters for a small p-value.
+/// The reason why no verdict is possible: missing replies, too few shared questions, or too few clusters for a small
+/// p-value.
 fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
-    let shared = rows
-        .iter()
-        .map(|row| row.paired.difference.n)
-        .max()
-        .unwrap_or(0);
+    let shared = rows.iter().map(|row| row.paired.difference.n).max().unwrap_or(0);
     let most_missing = rows
         .iter()
-        .filter(|row| {
-            row.significance == Significance::Missing
-                || row.paired.missing > row.paired.difference.n
-        })
+        .filter(|row| row.significance == Significance::Missing || row.paired.missing > row.paired.difference.n)
         .max_by_key(|row| row.paired.missing);
     if let Some(row) = most_missing {
         format!(
@@ -69,12 +53,7 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     } else if shared < MIN_PAIRS {
         format!(
             "no condition shares more than {}, and {} are needed",
-            numbers.count("n", shared)
-                + if shared == 1 {
-                    " question"
-                } else {
-                    " questions"
-                },
+            numbers.count("n", shared) + if shared == 1 { " question" } else { " questions" },
             numbers.count("needed", MIN_PAIRS)
         )
     } else {
@@ -91,11 +70,7 @@ fn detected_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> O
     let largest = largest(rows, |row| row.paired.difference)?;
     let mut numbers = Numbers::new(unit);
     let verdict = largest.significance;
-    let word = if verdict == Significance::Worse {
-        "worse"
-    } else {
-        "better"
-    };
+    let word = if verdict == Significance::Worse { "worse" } else { "better" };
     let up_to = if rows.len() > 1 { "up to " } else { "" };
     let text = format!(
         "{} is {word} than in {old} at {}, by {up_to}{} points.",
@@ -107,7 +82,8 @@ fn detected_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> O
     Some(numbers.sentence("baseline", verdict.into(), text, detail))
 }
 
-/// The sentence if no difference is detected, with the largest difference; or if no verdict or no comparison is possible.
+/// The sentence if no difference is detected, with the largest difference; or if no verdict or no comparison is
+/// possible.
 fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
     let mut numbers = Numbers::new(unit);
     if rows.is_empty() {
@@ -115,11 +91,7 @@ fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
         let detail = "no model answered the same question about the same image in both".to_owned();
         return numbers.sentence("baseline", Tone::Note, text, detail);
     }
-    let possible: Vec<&BaselineRow> = rows
-        .iter()
-        .copied()
-        .filter(|row| row.significance.is_decided())
-        .collect();
+    let possible: Vec<&BaselineRow> = rows.iter().copied().filter(|row| row.significance.is_decided()).collect();
     let Some(largest) = largest(&possible, |row| row.paired.difference) else {
         let text = format!("No verdict against {old} is possible.");
         let detail = too_few(rows, &mut numbers);
@@ -130,10 +102,7 @@ fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
     let noun = if possible.len() == 1 { "row" } else { "rows" };
     let without = match rows.len() - possible.len() {
         0 => String::new(),
-        more => format!(
-            " ({} more without a verdict)",
-            numbers.count("without", more)
-        ),
+        more => format!(" ({} more without a verdict)", numbers.count("without", more)),
     };
     let detail = format!(
         "{compared} {noun} of model and condition compared{without}; largest: {} at {}, {}{}",
@@ -151,23 +120,16 @@ fn detectable(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     let least = losses.clone().fold(1.0, f64::min);
     let most = losses.fold(0.0, f64::max);
     let power = numbers.number("power", 100.0 * POWER, 0);
-    let [least, most] = [("detectable", least), ("detectable_everywhere", most)]
-        .map(|(name, loss)| numbers.percent(name, loss));
-    let range = if least == most {
-        format!("{least} points")
-    } else {
-        format!("{least} points somewhere, {most} everywhere")
-    };
+    let [least, most] =
+        [("detectable", least), ("detectable_everywhere", most)].map(|(name, loss)| numbers.percent(name, loss));
+    let range =
+        if least == most { format!("{least} points") } else { format!("{least} points somewhere, {most} everywhere") };
     format!("; a true loss is detected with {power} % probability from {range}")
 }
 
 /// The names of the first conditions, and the number of further ones.
 fn conditions(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
-    let names: Vec<String> = rows
-        .iter()
-        .take(MAX_NAMED)
-        .map(|row| row.subject.condition())
-        .collect();
+    let names: Vec<String> = rows.iter().take(MAX_NAMED).map(|row| row.subject.condition()).collect();
     let names = names.join(", ");
     match rows.len().saturating_sub(MAX_NAMED) {
         0 => names,

@@ -15,8 +15,8 @@ use darkqa_score::significance::Significance;
 /// Second side of a comparison if the same models answered with images and without.
 const WITHOUT: &str = "without images";
 
-/// Reports the levels at which the models are right less often with images than without. If none has a verdict, [`format_alone`]
-/// reports a loss that only the strict parsing detects.
+/// Reports the levels at which the models are right less often with images than without. If none has a verdict,
+/// [`format_alone`] reports a loss that only the strict parsing detects.
 pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let detected = with_verdict(findings, Significance::Worse);
     let Some(largest) = PooledFinding::largest(&detected) else {
@@ -43,10 +43,7 @@ pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<S
 /// Second side of a pooled finding, in words.
 fn pooled_second_side(finding: &PooledFinding) -> String {
     let blind_models = &finding.blind_models;
-    if blind_models
-        .iter()
-        .all(|model| finding.models.contains(model))
-    {
+    if blind_models.iter().all(|model| finding.models.contains(model)) {
         return WITHOUT.to_owned();
     }
     match &blind_models[..] {
@@ -75,10 +72,8 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
         return Some(format);
     }
     let mut numbers = Numbers::new(findings.unit);
-    let (with, without) = (
-        numbers.percent("with", finding.strict.first),
-        numbers.percent("without", finding.strict.second),
-    );
+    let (with, without) =
+        (numbers.percent("with", finding.strict.first), numbers.percent("without", finding.strict.second));
     let text = match finding.claim() {
         Claim::Detected(Significance::Better) => format!(
             "At L0 images add {} points{}: {with} % with them, {without} % without.",
@@ -102,9 +97,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
                     against(finding)
                 )
             } else {
-                format!(
-                    "No gain by images was detected at L0: {with} % with them, {without} % without."
-                )
+                format!("No gain by images was detected at L0: {with} % with them, {without} % without.")
             }
         }
     };
@@ -112,51 +105,31 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     Some(numbers.sentence("images", Tone::from(finding.claim()), text, detail))
 }
 
-/// Comparisons between raw images of a variant and no images, for each model whose findings are pooled: by family, and over all families
-/// if there are several models.
+/// Comparisons between raw images of a variant and no images, for each model whose findings are pooled: by family, and
+/// over all families if there are several models.
 pub(super) fn by_family<'f>(findings: &'f Findings<'_>, variant: &Variant) -> Vec<&'f Comparison> {
     findings
         .comparisons
         .iter()
-        .filter(|comparison| {
-            comparison.first.variant == *variant && findings.is_tested_against_blind(comparison)
-        })
+        .filter(|comparison| comparison.first.variant == *variant && findings.is_tested_against_blind(comparison))
         .collect()
 }
 
-/// Reports the family and the model with the largest loss from images, and the number of models with a loss in that family. `all`
-/// contains the comparisons of all models and families. `None` without a loss, or if the findings over all families (`pooled`) already
-/// report a loss of this model alone.
-pub(super) fn in_a_family(
-    all: &[&Comparison],
-    pooled: &[&PooledFinding],
-    unit: ClusterUnit,
-) -> Option<Sentence> {
-    let worst = all
-        .iter()
-        .copied()
-        .filter(|comparison| is_below(comparison))
-        .min_by(|a, b| {
-            let [a, b] = [a, b].map(|comparison| comparison.strict.paired.difference.value);
-            a.total_cmp(&b)
-        })?;
+/// Reports the family and the model with the largest loss from images, and the number of models with a loss in that
+/// family. `all` contains the comparisons of all models and families. `None` without a loss, or if the findings over
+/// all families (`pooled`) already report a loss of this model alone.
+pub(super) fn in_a_family(all: &[&Comparison], pooled: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
+    let worst = all.iter().copied().filter(|comparison| is_below(comparison)).min_by(|a, b| {
+        let [a, b] = [a, b].map(|comparison| comparison.strict.paired.difference.value);
+        a.total_cmp(&b)
+    })?;
     let model = &worst.first.model;
-    if with_verdict(pooled, Significance::Worse)
-        .iter()
-        .any(|finding| finding.models == [&**model])
-    {
+    if with_verdict(pooled, Significance::Worse).iter().any(|finding| finding.models == [&**model]) {
         return None;
     }
-    let in_family: Vec<&Comparison> = all
-        .iter()
-        .copied()
-        .filter(|comparison| comparison.family == worst.family)
-        .collect();
-    let below: Vec<&Comparison> = in_family
-        .iter()
-        .copied()
-        .filter(|comparison| is_below(comparison))
-        .collect();
+    let in_family: Vec<&Comparison> =
+        all.iter().copied().filter(|comparison| comparison.family == worst.family).collect();
+    let below: Vec<&Comparison> = in_family.iter().copied().filter(|comparison| is_below(comparison)).collect();
     let models_below = model_count(&below);
     let mut numbers = Numbers::new(unit);
     let family = capitalised(family_name(worst.family.as_ref()));
@@ -165,11 +138,7 @@ pub(super) fn in_a_family(
         let at = levels_below(&in_family, worst);
         format!("{family}: {model} is less often right than {than} at {at}.")
     } else {
-        let than = if below.iter().all(|comparison| is_own(comparison)) {
-            WITHOUT
-        } else {
-            "a model without images"
-        };
+        let than = if below.iter().all(|comparison| is_own(comparison)) { WITHOUT } else { "a model without images" };
         let fallen = numbers.count("fallen", models_below);
         let models = numbers.count("models", model_count(&in_family));
         format!("{family}: {fallen} of {models} models are less often right than {than}.")
@@ -180,10 +149,7 @@ pub(super) fn in_a_family(
 
 /// Number of different models on the first sides of comparisons.
 fn model_count(comparisons: &[&Comparison]) -> usize {
-    let models: BTreeSet<&str> = comparisons
-        .iter()
-        .map(|comparison| &*comparison.first.model)
-        .collect();
+    let models: BTreeSet<&str> = comparisons.iter().map(|comparison| &*comparison.first.model).collect();
     models.len()
 }
 
@@ -199,49 +165,31 @@ fn is_own(comparison: &Comparison) -> bool {
 
 /// Second side of a comparison of images with no images, in words.
 fn second_side(comparison: &Comparison) -> String {
-    if is_own(comparison) {
-        WITHOUT.to_owned()
-    } else {
-        format!("{} without images", comparison.second.model)
-    }
+    if is_own(comparison) { WITHOUT.to_owned() } else { format!("{} without images", comparison.second.model) }
 }
 
-/// Levels at which the model of a comparison is below the second side. Only comparisons of the same two models count, because a model
-/// without blind replies is compared with every model that has some.
+/// Levels at which the model of a comparison is below the second side. Only comparisons of the same two models count,
+/// because a model without blind replies is compared with every model that has some.
 fn levels_below(in_family: &[&Comparison], comparison: &Comparison) -> String {
     let same_models: Vec<&Comparison> = in_family
         .iter()
         .copied()
-        .filter(|other| {
-            other.first.model == comparison.first.model
-                && other.second.model == comparison.second.model
-        })
+        .filter(|other| other.first.model == comparison.first.model && other.second.model == comparison.second.model)
         .collect();
-    let below: Vec<&Comparison> = same_models
-        .iter()
-        .copied()
-        .filter(|comparison| is_below(comparison))
-        .collect();
+    let below: Vec<&Comparison> = same_models.iter().copied().filter(|comparison| is_below(comparison)).collect();
     level_runs(&levels(&below), &levels(&same_models))
 }
 
 /// Levels of the first sides of comparisons, sorted and without duplicates.
 fn levels(comparisons: &[&Comparison]) -> Vec<AxisLevel> {
-    let levels: BTreeSet<AxisLevel> = comparisons
-        .iter()
-        .filter_map(|comparison| comparison.first.level)
-        .collect();
+    let levels: BTreeSet<AxisLevel> = comparisons.iter().filter_map(|comparison| comparison.first.level).collect();
     levels.into_iter().collect()
 }
 
 /// Effect, interval, p and n of a comparison of images with no images.
 fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<String> {
     let (model, level) = (&comparison.first.model, comparison.first.level?);
-    let against = if is_own(comparison) {
-        String::new()
-    } else {
-        format!(" against {}", comparison.second.model)
-    };
+    let against = if is_own(comparison) { String::new() } else { format!(" against {}", comparison.second.model) };
     let tested = &comparison.strict;
     let paired = &tested.paired;
     numbers.at(&level);
@@ -249,7 +197,5 @@ fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<S
     let p = numbers.p("p", tested.p_report.unwrap_or(tested.holm));
     let n = numbers.count("n", paired.difference.n);
     let clusters = numbers.clusters(paired.clusters);
-    Some(format!(
-        "{model} at {level}{against}: {difference}, {p}; n = {n} in {clusters}"
-    ))
+    Some(format!("{model} at {level}{against}: {difference}, {p}; n = {n} in {clusters}"))
 }

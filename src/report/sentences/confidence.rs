@@ -18,22 +18,18 @@ pub(super) struct Confidence<'f> {
 }
 
 impl<'f> Confidence<'f> {
-    /// The calibrations with raw images at the darkest level of a variant, for the models of the pooled findings. Models with few replies
-    /// are left out, and all models if there are few clusters, because their intervals are too wide.
+    /// The calibrations with raw images at the darkest level of a variant, for the models of the pooled findings.
+    /// Models with few replies are left out, and all models if there are few clusters, because their intervals are too
+    /// wide.
     pub(super) fn all(findings: &'f Findings<'_>, variant: &Variant) -> Vec<Self> {
         if findings.grid.clusters < MIN_CLUSTERS {
             return Vec::new();
         }
         let models = findings.models_of(variant);
-        let rows = findings
-            .calibrations
-            .iter()
-            .filter(|row| row.replies >= MIN_CONFIDENT_REPLIES);
+        let rows = findings.calibrations.iter().filter(|row| row.replies >= MIN_CONFIDENT_REPLIES);
         let dark = rows.clone().filter(|row| {
             let subject = &row.subject;
-            subject.variant == *variant
-                && subject.enhancer.is_none()
-                && models.contains(&&*subject.model)
+            subject.variant == *variant && subject.enhancer.is_none() && models.contains(&&*subject.model)
         });
         let Some(level) = dark.clone().filter_map(|row| row.subject.level).max() else {
             return Vec::new();
@@ -42,14 +38,7 @@ impl<'f> Confidence<'f> {
             .map(|dark| {
                 let model = &*dark.subject.model;
                 let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
-                Self {
-                    model,
-                    level,
-                    dark,
-                    clean: rows
-                        .clone()
-                        .find(|row| row.subject.matches_up_to_group(&clean)),
-                }
+                Self { model, level, dark, clean: rows.clone().find(|row| row.subject.matches_up_to_group(&clean)) }
             })
             .collect()
     }
@@ -65,14 +54,12 @@ impl<'f> Confidence<'f> {
     }
 }
 
-/// The sentence about the model whose confidence is furthest above its accuracy. Both tests, of overconfidence and of its growth since L0,
-/// are corrected over all sentences.
+/// The sentence about the model whose confidence is furthest above its accuracy. Both tests, of overconfidence and of
+/// its growth since L0, are corrected over all sentences.
 pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Sentence> {
     let most = all.iter().copied().max_by(|a, b| {
         let [value, other] = [a, b].map(|one| one.dark.overconfidence.estimate.value);
-        a.is_overconfident()
-            .cmp(&b.is_overconfident())
-            .then(value.total_cmp(&other))
+        a.is_overconfident().cmp(&b.is_overconfident()).then(value.total_cmp(&other))
     })?;
     let mut numbers = Numbers::new(unit);
     let (model, level) = (most.model, most.level);

@@ -2,9 +2,7 @@
 
 use super::format::format_alone;
 use super::lights::{Topic, findings_of_kind, mean_findings};
-use super::pooled::{
-    curve, detail, lower_or_higher, mean_levels, reservation, runs, unconfirmed, with_verdict,
-};
+use super::pooled::{curve, detail, lower_or_higher, mean_levels, reservation, runs, unconfirmed, with_verdict};
 use super::sample::WIDE;
 use super::sentence::{Numbers, Sentence, Tone, capitalised};
 use super::undecided::{Undecided, silent_levels};
@@ -18,14 +16,11 @@ use darkqa_score::significance::Significance;
 
 /// The cost of darkness, or of another cause, in each topic.
 pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
-    Topic::all(findings)
-        .iter()
-        .flat_map(|topic| topic_sentences(findings, topic))
-        .collect()
+    Topic::all(findings).iter().flat_map(|topic| topic_sentences(findings, topic)).collect()
 }
 
-/// The cost of darkness with each light of a topic, then with each other variant whose detected effect no light of the same runs shows.
-/// If the verdicts differ, the sentences name their variants.
+/// The cost of darkness with each light of a topic, then with each other variant whose detected effect no light of the
+/// same runs shows. If the verdicts differ, the sentences name their variants.
 fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> {
     let Topic { lights, others, .. } = topic;
     let unit = findings.unit;
@@ -70,9 +65,7 @@ impl<'f> CostOfDarkness<'f> {
     fn new(findings: &'f Findings<'_>, variant: &Variant) -> Self {
         Self {
             levels: findings_of_kind(findings, PooledKind::Darkness, variant),
-            mean: mean_findings(findings, PooledKind::Darkness, variant)
-                .into_iter()
-                .next(),
+            mean: mean_findings(findings, PooledKind::Darkness, variant).into_iter().next(),
             silent: silent_levels(findings, variant),
         }
     }
@@ -97,16 +90,12 @@ fn overlap(one: &Variant, other: &Variant) -> bool {
     RunGroup::overlap(one.group.as_ref(), other.group.as_ref())
 }
 
-/// The verdict over all levels: a loss if any level has one, otherwise a gain, otherwise not detected; `None` if no level can have a
-/// verdict.
+/// The verdict over all levels: a loss if any level has one, otherwise a gain, otherwise not detected; `None` if no
+/// level can have a verdict.
 fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
-    [
-        Significance::Worse,
-        Significance::Better,
-        Significance::NotShown,
-    ]
-    .into_iter()
-    .find(|verdict| !with_verdict(levels, *verdict).is_empty())
+    [Significance::Worse, Significance::Better, Significance::NotShown]
+        .into_iter()
+        .find(|verdict| !with_verdict(levels, *verdict).is_empty())
 }
 
 /// The detected verdict of a mean over levels; `None` if nothing is detected.
@@ -125,9 +114,9 @@ fn name(variant: &Variant) -> String {
     }
 }
 
-/// The cost of darkness with one variant: at the darkest level where it is detected, otherwise as the mean over the darker levels if that
-/// is detected, otherwise that missing replies allow no verdict, otherwise that nothing was detected. `silent` are the levels at which no
-/// question has all replies. The sentence begins with `name`.
+/// The cost of darkness with one variant: at the darkest level where it is detected, otherwise as the mean over the
+/// darker levels if that is detected, otherwise that missing replies allow no verdict, otherwise that nothing was
+/// detected. `silent` are the levels at which no question has all replies. The sentence begins with `name`.
 pub(super) fn with_variant(
     levels: &[&PooledFinding],
     mean: Option<&PooledFinding>,
@@ -146,9 +135,7 @@ pub(super) fn with_variant(
         return Some(over_levels(mean, levels, mean_verdict, name, numbers));
     }
     let cause = levels.first()?.level.axis().unwrap_or(Axis::LIGHT).cause;
-    if !is_shown
-        && let Some(mut sentence) = undecided.sentence("darkness", &cause.to_lowercase(), unit)
-    {
+    if !is_shown && let Some(mut sentence) = undecided.sentence("darkness", &cause.to_lowercase(), unit) {
         sentence.text = match name {
             None => sentence.text,
             Some(name) => format!("{name}: {}", sentence.text),
@@ -167,27 +154,17 @@ pub(super) fn with_variant(
                 darkest.level,
                 numbers.percent("L0", darkest.strict.second)
             ),
-            format!(
-                "; a loss is shown at {}{}",
-                runs(&found, levels),
-                curve(levels, &mut numbers)
-            ),
+            format!("; a loss is shown at {}{}", runs(&found, levels), curve(levels, &mut numbers)),
         ),
         Significance::Better => (
-            format!(
-                "at {} accuracy is {} points higher than at L0.",
-                darkest.level,
-                numbers.size("gain", size)
-            ),
+            format!("at {} accuracy is {} points higher than at L0.", darkest.level, numbers.size("gain", size)),
             format!("; at {}{}", darkest.level, curve(levels, &mut numbers)),
         ),
         _ => {
             if let Some(format) = format_alone(levels, unit) {
                 return Some(format);
             }
-            let text = if let Some(unconfirmed) =
-                unconfirmed(darkest.claim(), darkest.strict.difference)
-            {
+            let text = if let Some(unconfirmed) = unconfirmed(darkest.claim(), darkest.strict.difference) {
                 format!(
                     "at {} accuracy is {} points {} than at L0{unconfirmed}.",
                     darkest.level,
@@ -195,10 +172,7 @@ pub(super) fn with_variant(
                     lower_or_higher(size),
                 )
             } else {
-                format!(
-                    "no loss by {cause} was detected at any level{}.",
-                    possible_loss(&found, &mut numbers)
-                )
+                format!("no loss by {cause} was detected at any level{}.", possible_loss(&found, &mut numbers))
             };
             let reservation = reservation(darkest, &mut numbers);
             (text, format!("; at {}{reservation}", darkest.level))
@@ -240,20 +214,15 @@ fn over_levels(
             numbers.percent("L0", mean.strict.second)
         )
     } else {
-        format!(
-            "over {at} accuracy is {} points higher on average than at L0.",
-            numbers.size("gain", size)
-        )
+        format!("over {at} accuracy is {} points higher on average than at L0.", numbers.size("gain", size))
     };
-    let more = format!(
-        "; mean of {at}, no level alone is shown{}",
-        curve(levels, &mut numbers)
-    );
+    let more = format!("; mean of {at}, no level alone is shown{}", curve(levels, &mut numbers));
     let detail = detail(mean, &mut numbers, &more);
     numbers.sentence("darkness", verdict.into(), begin_with(name, &text), detail)
 }
 
-/// The largest loss that the intervals do not exclude, if it is large, so that a small sample is not mistaken for good night vision.
+/// The largest loss that the intervals do not exclude, if it is large, so that a small sample is not mistaken for good
+/// night vision.
 fn possible_loss(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
     let Some(finding) = levels.iter().min_by(|a, b| {
         let [a, b] = [a, b].map(|finding| finding.strict.difference.low);

@@ -6,8 +6,8 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::significance::Significance;
 
-/// The largest finding that only the strict parsing detects, among those for which readable replies explain at least half of the
-/// difference.
+/// The largest finding that only the strict parsing detects, among those for which readable replies explain at least
+/// half of the difference.
 pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let strict_only: Vec<&PooledFinding> = levels
         .iter()
@@ -20,11 +20,7 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
         .collect();
     let largest = PooledFinding::largest(&strict_only)?;
     let is_loss = largest.claim() == Claim::StrictOnly(Significance::Worse);
-    let (more, effect) = if is_loss {
-        ("fewer", "loss")
-    } else {
-        ("more", "gain")
-    };
+    let (more, effect) = if is_loss { ("fewer", "loss") } else { ("more", "gain") };
     let level = largest.level;
     let place = match (largest.kind, &largest.enhancer) {
         (PooledKind::Enhancer, Some(enhancer)) => format!("With {enhancer} at {level}"),
@@ -41,13 +37,10 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
         "{place}, {readable} % {more} replies keep to the answer format; no {effect} of accuracy was detected ({lenient})."
     );
     let who = models(&largest.models, &mut numbers);
-    let [here, there] = [("kept", 0), ("kept_else", 1)]
-        .map(|(name, side)| numbers.percent(name, largest.format[side]));
+    let [here, there] = [("kept", 0), ("kept_else", 1)].map(|(name, side)| numbers.percent(name, largest.format[side]));
     let strict = numbers.difference("", largest.strict.difference);
     let p = numbers.p("p", largest.strict.p_report.unwrap_or(1.0));
     let sample = numbers.sample(largest);
-    let detail = format!(
-        "{who}: {here} % keep to it, {there} % without; strict parsing {strict}, {p}; {sample}"
-    );
+    let detail = format!("{who}: {here} % keep to it, {there} % without; strict parsing {strict}, {p}; {sample}");
     Some(numbers.sentence("format", Tone::Note, text, detail))
 }

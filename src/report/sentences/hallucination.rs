@@ -14,11 +14,7 @@ use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Significance;
 
 /// The rate of a false answer at the darkest level with a detected increase.
-pub(super) fn false_answers(
-    levels: &[&PooledFinding],
-    answer: FalseAnswer,
-    unit: ClusterUnit,
-) -> Option<Sentence> {
+pub(super) fn false_answers(levels: &[&PooledFinding], answer: FalseAnswer, unit: ClusterUnit) -> Option<Sentence> {
     let detected = with_verdict(levels, Significance::Worse);
     let worst = detected.last()?;
     let mut numbers = Numbers::new(unit);
@@ -53,34 +49,21 @@ impl<'f> TopAnswer<'f> {
         let grid = &findings.grid;
         let models = findings.models_of(variant);
         let is_included = |subject: &ModelInCondition| {
-            subject.variant == *variant
-                && subject.enhancer.is_none()
-                && models.contains(&&*subject.model)
+            subject.variant == *variant && subject.enhancer.is_none() && models.contains(&&*subject.model)
         };
-        let Some(level) = grid
-            .subjects
-            .iter()
-            .filter(|subject| is_included(subject))
-            .filter_map(|subject| subject.level)
-            .max()
+        let Some(level) =
+            grid.subjects.iter().filter(|subject| is_included(subject)).filter_map(|subject| subject.level).max()
         else {
             return Vec::new();
         };
         findings
             .confusions
             .iter()
-            .filter(|confusion| {
-                is_included(&confusion.subject) && confusion.subject.level == Some(level)
-            })
+            .filter(|confusion| is_included(&confusion.subject) && confusion.subject.level == Some(level))
             .filter_map(|confusion| {
                 let subject = &confusion.subject;
                 let collapse = confusion.collapse.as_ref()?;
-                Some(Self {
-                    model: &subject.model,
-                    family: &confusion.family,
-                    level,
-                    collapse,
-                })
+                Some(Self { model: &subject.model, family: &confusion.family, level, collapse })
             })
             .collect()
     }
@@ -91,32 +74,21 @@ impl<'f> TopAnswer<'f> {
     }
 }
 
-/// Reports the model and family in which one answer exceeds its true share the most. `None` unless an answer is detected to be more
-/// frequent than at L0, in both parsings and after the correction over all sentences.
+/// Reports the model and family in which one answer exceeds its true share the most. `None` unless an answer is
+/// detected to be more frequent than at L0, in both parsings and after the correction over all sentences.
 pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<Sentence> {
     let detected = answers.iter().filter(|answer| answer.collapse.is_shown());
-    let largest = detected.clone().reduce(|largest, next| {
-        if next.excess() > largest.excess() {
-            next
-        } else {
-            largest
-        }
-    })?;
-    let of_family = answers
-        .iter()
-        .filter(|answer| answer.family == largest.family);
-    let collapsed = detected
-        .clone()
-        .filter(|answer| answer.family == largest.family);
+    let largest =
+        detected.clone().reduce(|largest, next| if next.excess() > largest.excess() { next } else { largest })?;
+    let of_family = answers.iter().filter(|answer| answer.family == largest.family);
+    let collapsed = detected.clone().filter(|answer| answer.family == largest.family);
     let mut numbers = Numbers::new(unit);
     let (level, model, top) = (largest.level, largest.model, &largest.collapse.top);
     let name = family_name(Some(largest.family));
     let share = numbers.percent("share", largest.collapse.share.value);
     let truth = numbers.percent("true_share", largest.collapse.truth);
     let text = match (collapsed.count(), of_family.count()) {
-        (_, 1) => format!(
-            "At {level} {share} % of the replies about {name} are “{top}”, which is true of {truth} %."
-        ),
+        (_, 1) => format!("At {level} {share} % of the replies about {name} are “{top}”, which is true of {truth} %."),
         (1, _) => format!(
             "At {level} {share} % of the replies of {model} about {name} are “{top}”, which is true of {truth} %."
         ),
@@ -133,11 +105,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
         .collect();
     let others: Vec<&str> = others.into_iter().collect();
     let detail = collapse_detail(largest, &mut numbers);
-    let detail = if others.is_empty() {
-        detail
-    } else {
-        format!("{detail}; also in {}", others.join(", "))
-    };
+    let detail = if others.is_empty() { detail } else { format!("{detail}; also in {}", others.join(", ")) };
     Some(numbers.sentence("collapse", Tone::Worse, text, detail))
 }
 

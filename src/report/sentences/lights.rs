@@ -26,24 +26,18 @@ impl<'f> Topic<'f> {
         let variants: Vec<&Variant> = findings.grid.variants().into_iter().collect();
         for group in variants.chunk_by(|a, b| a.kind.map(Kind::root) == b.kind.map(Kind::root)) {
             let last = group.last().map(|variant| variant.kind);
-            let (lights, others) = group
-                .iter()
-                .copied()
-                .partition(|variant| Some(variant.kind) == last);
+            let (lights, others) = group.iter().copied().partition(|variant| Some(variant.kind) == last);
             let shares_levels = topics
                 .iter()
                 .flat_map(|topic| &topic.lights)
                 .any(|other| other.kind.map(Kind::axis) == group[0].kind.map(Kind::axis));
-            topics.push(Self {
-                lights,
-                others,
-                shares_levels,
-            });
+            topics.push(Self { lights, others, shares_levels });
         }
         topics
     }
 
-    /// Adds the name of the variant to a sentence, if the topic has several lights or shares its levels with another topic.
+    /// Adds the name of the variant to a sentence, if the topic has several lights or shares its levels with another
+    /// topic.
     pub(super) fn add_light(&self, variant: &Variant, mut sentence: Sentence) -> Sentence {
         if self.lights.len() > 1 || self.shares_levels {
             let light = light(variant, None);
@@ -63,11 +57,7 @@ pub(super) fn in_each_light(
     for topic in Topic::all(findings) {
         for variant in &topic.lights {
             let about_light = about(findings, variant);
-            sentences.extend(
-                about_light
-                    .into_iter()
-                    .map(|sentence| topic.add_light(variant, sentence)),
-            );
+            sentences.extend(about_light.into_iter().map(|sentence| topic.add_light(variant, sentence)));
         }
     }
     sentences
@@ -79,15 +69,11 @@ pub(super) fn mean_findings<'f>(
     kind: PooledKind,
     variant: &Variant,
 ) -> Vec<&'f PooledFinding> {
-    findings
-        .averaged
-        .iter()
-        .filter(|mean| mean.kind == kind && mean.variant == *variant)
-        .collect()
+    findings.averaged.iter().filter(|mean| mean.kind == kind && mean.variant == *variant).collect()
 }
 
-/// The findings of one kind and variant over all families of the kind, in the order of enhancers and levels. The findings about an
-/// enhancer are left out if none of them can have a verdict.
+/// The findings of one kind and variant over all families of the kind, in the order of enhancers and levels. The
+/// findings about an enhancer are left out if none of them can have a verdict.
 pub(super) fn findings_of_kind<'f>(
     findings: &'f Findings<'_>,
     kind: PooledKind,
@@ -97,15 +83,8 @@ pub(super) fn findings_of_kind<'f>(
         .pooled
         .iter()
         .filter(|finding| {
-            finding.kind == kind
-                && finding.family.as_ref() == kind.only_family()
-                && finding.variant == *variant
+            finding.kind == kind && finding.family.as_ref() == kind.only_family() && finding.variant == *variant
         })
         .collect();
-    of_kind
-        .chunk_by(|a, b| a.enhancer == b.enhancer)
-        .filter(|set| !is_impossible(set))
-        .flatten()
-        .copied()
-        .collect()
+    of_kind.chunk_by(|a, b| a.enhancer == b.enhancer).filter(|set| !is_impossible(set)).flatten().copied().collect()
 }

@@ -1,10 +1,11 @@
 //! Findings in words: [`Sentence`]s that claim no more than their tests detected.
 //!
-//! Each sentence combines typed results with fixed wording. The terminal, the page, `summary.json` and `tables.tex` show the
-//! same strings. Rules:
+//! Each sentence combines typed results with fixed wording. The terminal, the page, `summary.json` and `tables.tex`
+//! show the same strings. Rules:
 //!
-//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “less often right”, only if p is below 0.05 after the correction
-//!   over the tests of all sentences, in the strict and in the lenient parsing, with the same direction.
+//! - A sentence has a sign, and the words “costs”, “harms”, “helps” and “less often right”, only if p is below 0.05
+//!   after the correction over the tests of all sentences, in the strict and in the lenient parsing, with the same
+//!   direction.
 //! - If only the strict parsing detects a difference, the sentence is about the answer format.
 //! - If nothing is detected, the sentence states so, with the interval. It never states that there is no difference.
 //! - A sentence is about the models of the run and names their number; it makes no claim about models in general.
@@ -48,11 +49,7 @@ use darkqa_score::findings::Findings;
 /// The line below the sentences that explains their signs, p-values and intervals.
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
     let has_baseline = sentences.iter().any(|sentence| sentence.kind == "baseline");
-    let old_run = if has_baseline {
-        ", and 5 % more for the old run"
-    } else {
-        ""
-    };
+    let old_run = if has_baseline { ", and 5 % more for the old run" } else { "" };
     format!(
         "Signs and p are corrected over all tests behind these sentences: a report without any effect has a sign with a probability of \
          5 % at most{old_run}. A sign holds in the strict and the lenient parsing. An interval is of one test: it leaves out 0 if and \
@@ -89,8 +86,8 @@ fn about_light(findings: &Findings<'_>, variant: &Variant) -> Vec<Sentence> {
     let unit = findings.unit;
     let [noise, enhancers, blind] = [PooledKind::Noise, PooledKind::Enhancer, PooledKind::Blind]
         .map(|kind| findings_of_kind(findings, kind, variant));
-    let [noise_means, enhancer_means] = [PooledKind::Noise, PooledKind::Enhancer]
-        .map(|kind| mean_findings(findings, kind, variant));
+    let [noise_means, enhancer_means] =
+        [PooledKind::Noise, PooledKind::Enhancer].map(|kind| mean_findings(findings, kind, variant));
     let mut sentences = Vec::new();
     sentences.extend(pooled::noise(&noise, &noise_means, unit));
     sentences.extend(pooled::enhancers(&enhancers, &enhancer_means, unit));

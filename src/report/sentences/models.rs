@@ -11,9 +11,10 @@ use darkqa_score::estimate::largest;
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 
-/// The model with the highest mean accuracy in the dark, and the models that it was not detected to be better than; or all models that
-/// share that accuracy. If another model is detected to be better at some level and the leader at another, the sentence reports these
-/// levels instead. The leader “sees” only if it is detected to be above its own replies without images, or above chance.
+/// The model with the highest mean accuracy in the dark, and the models that it was not detected to be better than; or
+/// all models that share that accuracy. If another model is detected to be better at some level and the leader at
+/// another, the sentence reports these levels instead. The leader “sees” only if it is detected to be above its own
+/// replies without images, or above chance.
 pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let best = findings.best.as_ref().filter(|best| best.is_possible())?;
     let lenient = findings.lenient_best.as_ref()?;
@@ -25,11 +26,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let leaders = leaders(best);
     let crossing = DetectedCrossing::new(best, lenient);
     let is_best = findings.detected_best().is_some();
-    let blind = if best.gain.is_against_blind {
-        "its own replies without images"
-    } else {
-        "chance"
-    };
+    let blind = if best.gain.is_against_blind { "its own replies without images" } else { "chance" };
     let (tone, text) = if let Some(crossing) = &crossing {
         (Tone::Note, crossing.text())
     } else if is_best && best.gain.is_detected() && lenient.gain.is_detected() {
@@ -65,17 +62,10 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let test = if let Some(crossing) = &crossing {
         crossing.detail(&mut numbers)
     } else {
-        let pair = best
-            .pairs
-            .iter()
-            .find(|pair| pair.first == leader.model && pair.second == second.model)?;
+        let pair = best.pairs.iter().find(|pair| pair.first == leader.model && pair.second == second.model)?;
         let difference = numbers.difference("", pair.difference);
         let p = numbers.p("p", best.p_report.unwrap_or(pair.holm));
-        let parsing = if best.is_detected() && !is_best {
-            ", detected in the strict parsing alone"
-        } else {
-            ""
-        };
+        let parsing = if best.is_detected() && !is_best { ", detected in the strict parsing alone" } else { "" };
         let gain = if is_best {
             let gain = numbers.difference("_gain", best.gain.difference);
             let p = numbers.p("p_gain", best.gain.p_report.unwrap_or(best.gain.p));
@@ -91,10 +81,8 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
         [] => String::new(),
         models => format!("; without {}, which answered less", models.join(", ")),
     };
-    let detail = format!(
-        "{} over {over}: {value} % [{ends}]{loss}; {test}; n = {items} in {clusters}{without}",
-        leader.model
-    );
+    let detail =
+        format!("{} over {over}: {value} % [{ends}]{loss}; {test}; n = {items} in {clusters}{without}", leader.model);
     let sentence = numbers.sentence("best", tone, text, detail);
     let topics = Topic::all(findings);
     Some(match topics.first() {
@@ -106,11 +94,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
 /// The models with the highest mean accuracy in the dark: the leader, and those with the same accuracy.
 fn leaders(best: &BestInTheDark) -> Vec<String> {
     let highest = best.leader().mean.value;
-    best.models
-        .iter()
-        .filter(|other| highest - other.mean.value < ROUNDING)
-        .map(|other| other.model.clone())
-        .collect()
+    best.models.iter().filter(|other| highest - other.mean.value < ROUNDING).map(|other| other.model.clone()).collect()
 }
 
 /// Maximum rounding error of equal means (chosen).
@@ -126,7 +110,8 @@ struct DetectedCrossing<'b> {
 }
 
 impl<'b> DetectedCrossing<'b> {
-    /// The levels that are detected in both parsings with the same direction; `None` unless both models are better at some level.
+    /// The levels that are detected in both parsings with the same direction; `None` unless both models are better at
+    /// some level.
     fn new(strict: &'b BestInTheDark, lenient: &BestInTheDark) -> Option<Self> {
         let (crossing, other) = (strict.crossing.as_ref()?, lenient.crossing.as_ref()?);
         if (&crossing.light, &crossing.dark) != (&other.light, &other.dark) {
@@ -142,28 +127,17 @@ impl<'b> DetectedCrossing<'b> {
             })
             .map(|(level, _)| level);
         let (light, dark): (Vec<_>, Vec<_>) = detected.partition(|level| level.lead.value > 0.0);
-        (!light.is_empty() && !dark.is_empty()).then_some(Self {
-            crossing,
-            light,
-            dark,
-        })
+        (!light.is_empty() && !dark.is_empty()).then_some(Self { crossing, light, dark })
     }
 
     fn text(&self) -> String {
         let all: Vec<AxisLevel> = self.crossing.levels.iter().map(|one| one.level).collect();
-        let [light, dark] = [&self.light, &self.dark]
-            .map(|levels| levels.iter().map(|one| one.level).collect::<Vec<_>>());
-        let rest: Vec<AxisLevel> = all
-            .iter()
-            .copied()
-            .filter(|level| !light.contains(level) && !dark.contains(level))
-            .collect();
+        let [light, dark] =
+            [&self.light, &self.dark].map(|levels| levels.iter().map(|one| one.level).collect::<Vec<_>>());
+        let rest: Vec<AxisLevel> =
+            all.iter().copied().filter(|level| !light.contains(level) && !dark.contains(level)).collect();
         let [light, dark, rest] = [light, dark, rest].map(|levels| level_runs(&levels, &all));
-        let not_told_apart = if rest.is_empty() {
-            String::new()
-        } else {
-            format!("; not told apart at {rest}")
-        };
+        let not_told_apart = if rest.is_empty() { String::new() } else { format!("; not told apart at {rest}") };
         let (first, second) = (&self.crossing.light, &self.crossing.dark);
         format!("{first} is better at {light}, {second} at {dark}{not_told_apart}.")
     }
@@ -196,12 +170,10 @@ pub(crate) fn dark_levels(best: &BestInTheDark) -> String {
     level_runs(&best.levels, &best.asked)
 }
 
-/// Two families of which one is detected to lose more than the other at the darkest level, if a loss over all families is detected there.
+/// Two families of which one is detected to lose more than the other at the darkest level, if a loss over all families
+/// is detected there.
 pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sentence> {
-    let contrast = findings
-        .contrasts
-        .iter()
-        .find(|found| found.variant == *variant && found.is_detected())?;
+    let contrast = findings.contrasts.iter().find(|found| found.variant == *variant && found.is_detected())?;
     let at_darkest = |family: Option<&Family>| {
         findings.pooled.iter().find(|finding| {
             finding.kind == PooledKind::Darkness
@@ -211,10 +183,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
         })
     };
     let whole = at_darkest(None)?;
-    let (most, least) = (
-        at_darkest(Some(&contrast.most))?,
-        at_darkest(Some(&contrast.least))?,
-    );
+    let (most, least) = (at_darkest(Some(&contrast.most))?, at_darkest(Some(&contrast.least))?);
     let (of_most, of_least) = (most.strict.difference, least.strict.difference);
     if whole.claim() != Claim::Detected(Significance::Worse) || of_most.value >= 0.0 {
         return None;
@@ -233,15 +202,10 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
     let difference = numbers.difference("", test.difference);
     let p = numbers.p("p", test.p_report.unwrap_or(test.p));
     let pairs = numbers.count("pairs", contrast.pairs);
-    let [of_most, of_least] = [("_most", of_most), ("_least", of_least)]
-        .map(|(at, difference)| numbers.difference(at, difference));
-    let sample = [("n_most", most), ("n_least", least)]
-        .map(|(name, finding)| numbers.count(name, finding.items));
-    let of_pairs = if contrast.pairs == 1 {
-        "the only pair".to_owned()
-    } else {
-        format!("one of {pairs} pairs")
-    };
+    let [of_most, of_least] =
+        [("_most", of_most), ("_least", of_least)].map(|(at, difference)| numbers.difference(at, difference));
+    let sample = [("n_most", most), ("n_least", least)].map(|(name, finding)| numbers.count(name, finding.items));
+    let of_pairs = if contrast.pairs == 1 { "the only pair".to_owned() } else { format!("one of {pairs} pairs") };
     let detail = format!(
         "{of_most}, n = {}, against {of_least}, n = {}: difference {difference}, {p}; {of_pairs} of families",
         sample[0], sample[1]

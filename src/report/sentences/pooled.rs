@@ -13,7 +13,8 @@ use darkqa_score::significance::Significance;
 /// Maximum number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;
 
-/// A detected effect that is reported in one sentence: at several levels, or as a mean over levels at none of which it is detected.
+/// A detected effect that is reported in one sentence: at several levels, or as a mean over levels at none of which it
+/// is detected.
 struct DetectedEffect<'f> {
     /// The finding at the level with the largest effect, or the mean.
     largest: &'f PooledFinding,
@@ -35,28 +36,13 @@ impl<'f> DetectedEffect<'f> {
     }
 
     /// The effect at all levels with a verdict, and each mean with that verdict if none of its levels has it.
-    fn all(
-        levels: &[&'f PooledFinding],
-        means: &[&'f PooledFinding],
-        verdict: Significance,
-    ) -> Vec<Self> {
+    fn all(levels: &[&'f PooledFinding], means: &[&'f PooledFinding], verdict: Significance) -> Vec<Self> {
         let detected = with_verdict(levels, verdict);
         let means = with_verdict(means, verdict)
             .into_iter()
-            .filter(|mean| {
-                !detected
-                    .iter()
-                    .any(|finding| mean.mean_over.contains(&finding.level))
-            })
-            .map(|mean| Self {
-                largest: mean,
-                at: mean_levels(mean, levels),
-                has_several_levels: true,
-            });
-        Self::levels(levels, verdict)
-            .into_iter()
-            .chain(means)
-            .collect()
+            .filter(|mean| !detected.iter().any(|finding| mean.mean_over.contains(&finding.level)))
+            .map(|mean| Self { largest: mean, at: mean_levels(mean, levels), has_several_levels: true });
+        Self::levels(levels, verdict).into_iter().chain(means).collect()
     }
 
     /// The size in words: `up to 5.0 points`, `5.0 points` for one level, or `5.0 points on average`.
@@ -77,11 +63,7 @@ impl<'f> DetectedEffect<'f> {
 
     /// The level, or the levels of the mean, as `; at L4` or `; mean of L4–L5`.
     fn place(&self) -> String {
-        if self.is_mean() {
-            format!("; mean of {}", self.at)
-        } else {
-            format!("; at {}", self.largest.level)
-        }
+        if self.is_mean() { format!("; mean of {}", self.at) } else { format!("; at {}", self.largest.level) }
     }
 }
 
@@ -92,46 +74,33 @@ pub(super) fn mean_levels(mean: &PooledFinding, levels: &[&PooledFinding]) -> St
 }
 
 /// The levels at which nothing is detected, neither alone nor as a part of a mean.
-fn undetected<'f>(
-    levels: &[&'f PooledFinding],
-    means: &[&PooledFinding],
-) -> Vec<&'f PooledFinding> {
+fn undetected<'f>(levels: &[&'f PooledFinding], means: &[&PooledFinding]) -> Vec<&'f PooledFinding> {
     with_verdict(levels, Significance::NotShown)
         .into_iter()
         .filter(|finding| {
-            !means.iter().any(|mean| {
-                matches!(mean.claim(), Claim::Detected(_))
-                    && mean.mean_over.contains(&finding.level)
-            })
+            !means
+                .iter()
+                .any(|mean| matches!(mean.claim(), Claim::Detected(_)) && mean.mean_over.contains(&finding.level))
         })
         .collect()
 }
 
-/// The difference in accuracy between noise and the exposure drop alone: a sentence for each verdict, at the level with the largest
-/// difference, or as a mean over levels. The two variants also differ in contrast, so this is not an effect of noise alone.
-pub(super) fn noise(
-    levels: &[&PooledFinding],
-    means: &[&PooledFinding],
-    unit: ClusterUnit,
-) -> Vec<Sentence> {
+/// The difference in accuracy between noise and the exposure drop alone: a sentence for each verdict, at the level with
+/// the largest difference, or as a mean over levels. The two variants also differ in contrast, so this is not an effect
+/// of noise alone.
+pub(super) fn noise(levels: &[&PooledFinding], means: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentence> {
     let mut sentences = Vec::new();
-    for (verdict, word) in [
-        (Significance::Worse, "lower"),
-        (Significance::Better, "higher"),
-    ] {
+    for (verdict, word) in [(Significance::Worse, "lower"), (Significance::Better, "higher")] {
         for effect in DetectedEffect::all(levels, means, verdict) {
             let mut numbers = Numbers::new(unit);
-            let size = effect
-                .size(&mut numbers)
-                .replace(" points", &format!(" points {word}"));
+            let size = effect.size(&mut numbers).replace(" points", &format!(" points {word}"));
             let (at, more) = if effect.is_mean() {
                 (effect.at.clone(), effect.place())
             } else {
                 let at = effect.largest.level.to_string();
                 (at, format!("; shown at {}", effect.at))
             };
-            let text =
-                format!("With noise, accuracy is {size} than by the exposure drop alone ({at}).");
+            let text = format!("With noise, accuracy is {size} than by the exposure drop alone ({at}).");
             let more = more + &curve(levels, &mut numbers);
             let detail = detail(effect.largest, &mut numbers, &more);
             sentences.push(numbers.sentence("noise", verdict.into(), text, detail));
@@ -161,49 +130,30 @@ pub(super) fn noise(
             largest.level
         )
     } else {
-        "No difference in accuracy between noise and the exposure drop alone was detected."
-            .to_owned()
+        "No difference in accuracy between noise and the exposure drop alone was detected.".to_owned()
     };
-    let more = format!(
-        "; largest at {}{}",
-        largest.level,
-        reservation(largest, &mut numbers)
-    );
+    let more = format!("; largest at {}{}", largest.level, reservation(largest, &mut numbers));
     let detail = detail(largest, &mut numbers, &more);
     vec![numbers.sentence("noise", Tone::NotShown, text, detail)]
 }
 
 /// The effects of each enhancer: a sentence for each verdict, with its levels.
-pub(super) fn enhancers(
-    all: &[&PooledFinding],
-    means: &[&PooledFinding],
-    unit: ClusterUnit,
-) -> Vec<Sentence> {
+pub(super) fn enhancers(all: &[&PooledFinding], means: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentence> {
     let mut sentences = Vec::new();
     for levels in all.chunk_by(|a, b| a.enhancer == b.enhancer) {
-        let own: Vec<&PooledFinding> = means
-            .iter()
-            .copied()
-            .filter(|mean| mean.enhancer == levels[0].enhancer)
-            .collect();
-        let detected = [Significance::Worse, Significance::Better]
-            .into_iter()
-            .flat_map(|verdict| {
-                DetectedEffect::all(levels, &own, verdict)
-                    .into_iter()
-                    .filter_map(move |effect| enhancer(&effect, levels, verdict, unit))
-            });
+        let own: Vec<&PooledFinding> =
+            means.iter().copied().filter(|mean| mean.enhancer == levels[0].enhancer).collect();
+        let detected = [Significance::Worse, Significance::Better].into_iter().flat_map(|verdict| {
+            DetectedEffect::all(levels, &own, verdict)
+                .into_iter()
+                .filter_map(move |effect| enhancer(&effect, levels, verdict, unit))
+        });
         let undecided = levels[0]
             .enhancer
             .as_ref()
             .and_then(|name| Undecided::new(levels, &[]).sentence("enhancer", name.as_str(), unit));
         let no_effect = no_effect(&undetected(levels, &own), levels, unit);
-        sentences.extend(
-            detected
-                .chain(undecided)
-                .chain(no_effect)
-                .take(MAX_PER_ENHANCER),
-        );
+        sentences.extend(detected.chain(undecided).chain(no_effect).take(MAX_PER_ENHANCER));
     }
     sentences
 }
@@ -237,11 +187,7 @@ fn enhancer(
 }
 
 /// The sentence about the levels at which no effect of an enhancer is detected, among all of its levels.
-fn no_effect(
-    undetected: &[&PooledFinding],
-    levels: &[&PooledFinding],
-    unit: ClusterUnit,
-) -> Option<Sentence> {
+fn no_effect(undetected: &[&PooledFinding], levels: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let largest = PooledFinding::largest(undetected)?;
     let name = largest.enhancer.as_ref()?;
     if let Some(format) = format_alone(undetected, unit) {
@@ -259,16 +205,13 @@ fn no_effect(
     } else {
         format!("{name} at {at}: no effect detected.")
     };
-    let more = format!(
-        "; largest at {}{}",
-        largest.level,
-        reservation(largest, &mut numbers)
-    );
+    let more = format!("; largest at {}{}", largest.level, reservation(largest, &mut numbers));
     let detail = detail(largest, &mut numbers, &more);
     Some(numbers.sentence("enhancer", Tone::NotShown, text, detail))
 }
 
-/// True if a finding is about the observer alone, which has its own wording: evidence that it does not confirm may still be present.
+/// True if a finding is about the observer alone, which has its own wording: evidence that it does not confirm may
+/// still be present.
 fn is_observer(finding: &PooledFinding) -> bool {
     matches!(&finding.models[..], [one] if model_in_condition::is_observer(one))
 }
@@ -281,8 +224,9 @@ pub(super) fn lower_or_higher(difference: f64) -> &'static str {
     if difference < 0.0 { "lower" } else { "higher" }
 }
 
-/// The end of a sentence about an effect that does not count as detected although its interval excludes 0; `None` for other findings. The
-/// sentence reports such an effect, because "nothing was detected" next to the interval would look contradictory.
+/// The end of a sentence about an effect that does not count as detected although its interval excludes 0; `None` for
+/// other findings. The sentence reports such an effect, because "nothing was detected" next to the interval would look
+/// contradictory.
 pub(super) fn unconfirmed(claim: Claim, difference: Estimate) -> Option<&'static str> {
     let excludes_zero = difference.low > 0.0 || difference.high < 0.0;
     match claim {
@@ -292,31 +236,27 @@ pub(super) fn unconfirmed(claim: Claim, difference: Estimate) -> Option<&'static
     }
 }
 
-/// The reason why a finding does not count as detected, although its own test or its interval detects it; empty for other findings.
+/// The reason why a finding does not count as detected, although its own test or its interval detects it; empty for
+/// other findings.
 pub(super) fn reservation(finding: &PooledFinding, numbers: &mut Numbers) -> String {
     let strict = &finding.strict;
     let difference = strict.difference;
     match finding.claim() {
         Claim::Detected(_) | Claim::Impossible | Claim::Missing => String::new(),
         Claim::StrictOnly(_) => ", detected in the strict parsing alone".to_owned(),
-        Claim::InOwnSet => format!(
-            ", detected only if no other finding is counted ({})",
-            numbers.p("own_p", strict.holm)
-        ),
+        Claim::InOwnSet => {
+            format!(", detected only if no other finding is counted ({})", numbers.p("own_p", strict.holm))
+        }
         Claim::Open if difference.low <= 0.0 && difference.high >= 0.0 => String::new(),
-        Claim::Open => format!(
-            ", not detected after correction (uncorrected {})",
-            numbers.p("uncorrected_p", strict.p)
-        ),
+        Claim::Open => {
+            format!(", not detected after correction (uncorrected {})", numbers.p("uncorrected_p", strict.p))
+        }
     }
 }
 
-/// The findings with a verdict in both parsings and after the correction over all sentences. A finding that could have a verdict but has
-/// none counts as [`Significance::NotShown`], unless the missing replies decide it.
-pub(super) fn with_verdict<'f>(
-    levels: &[&'f PooledFinding],
-    verdict: Significance,
-) -> Vec<&'f PooledFinding> {
+/// The findings with a verdict in both parsings and after the correction over all sentences. A finding that could have
+/// a verdict but has none counts as [`Significance::NotShown`], unless the missing replies decide it.
+pub(super) fn with_verdict<'f>(levels: &[&'f PooledFinding], verdict: Significance) -> Vec<&'f PooledFinding> {
     levels
         .iter()
         .copied()
@@ -330,17 +270,13 @@ pub(super) fn with_verdict<'f>(
 
 /// The levels of `some` findings in words, as a part of those of `all`.
 pub(super) fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
-    let [some, all] = [some, all].map(|findings| {
-        findings
-            .iter()
-            .map(|finding| finding.level)
-            .collect::<Vec<AxisLevel>>()
-    });
+    let [some, all] =
+        [some, all].map(|findings| findings.iter().map(|finding| finding.level).collect::<Vec<AxisLevel>>());
     level_runs(&some, &all)
 }
 
-/// The differences at all levels, beside one that is quoted because its test detected it: chosen so, it is on average larger than the true
-/// one. Empty for a single level.
+/// The differences at all levels, beside one that is quoted because its test detected it: chosen so, it is on average
+/// larger than the true one. Empty for a single level.
 pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
     if levels.len() < 2 {
         return String::new();
@@ -353,11 +289,7 @@ pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut Numbers) -> String 
             numbers.points(&name, finding.strict.difference.value)
         })
         .collect();
-    format!(
-        "; at {}: {}",
-        level_runs(&all, &all),
-        differences.join(", ")
-    )
+    format!("; at {}: {}", level_runs(&all, &all), differences.join(", "))
 }
 
 /// Effect, interval, p and n of a finding, with `more` before n.

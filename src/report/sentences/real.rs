@@ -1,4 +1,5 @@
-//! Sentences about photographs in the dark: their cost, their difference from synthetic images, and the effect of enhancers.
+//! Sentences about photographs in the dark: their cost, their difference from synthetic images, and the effect of
+//! enhancers.
 
 use super::pooled::{lower_or_higher, unconfirmed};
 use super::sentence::{Numbers, Sentence, Tone};
@@ -10,8 +11,8 @@ use darkqa_score::model_in_condition::models_under_test;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 use darkqa_score::significance::Significance;
 
-/// Sentences about each model and each photograph: compared with the lit frame, with synthetic images of the same darkness, and with the
-/// enhanced photograph.
+/// Sentences about each model and each photograph: compared with the lit frame, with synthetic images of the same
+/// darkness, and with the enhanced photograph.
 pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
     let models = models_under_test(findings.grid.subjects.iter().map(|subject| &*subject.model));
     let mut sentences = Vec::new();
@@ -34,10 +35,7 @@ pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
                 sentences.push(against_synthetic(row, unit));
             }
         }
-        for row in rows
-            .iter()
-            .filter(|row| row.kind == ComparisonKind::RealEnhanced)
-        {
+        for row in rows.iter().filter(|row| row.kind == ComparisonKind::RealEnhanced) {
             sentences.push(enhanced(row, unit));
         }
     }
@@ -53,11 +51,7 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
     let model = &row.first.model;
     let text = match verdict(row) {
         Significance::Worse | Significance::Better => {
-            let does = if verdict(row) == Significance::Worse {
-                "loses"
-            } else {
-                "gains"
-            };
+            let does = if verdict(row) == Significance::Worse { "loses" } else { "gains" };
             let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{place}, {model} {does} {size} points against the light.")
         }
@@ -79,21 +73,13 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let (name, size) = (row.first.condition(), row.strict.paired.difference.value);
     let text = match verdict(row) {
         Significance::Worse | Significance::Better => {
-            let harder = if verdict(row) == Significance::Worse {
-                "harder"
-            } else {
-                "easier"
-            };
+            let harder = if verdict(row) == Significance::Worse { "harder" } else { "easier" };
             let size = numbers.size("effect", size);
             format!("{name} is {harder} for {model} than {synthetic} ({level}), by {size} points.")
         }
         _ => match unconfirmed_size(row, &mut numbers) {
-            Some((size, end)) => format!(
-                "With {name}, accuracy of {model} is {size} than {synthetic} ({level}){end}."
-            ),
-            None => format!(
-                "It is not shown that {name} is harder or easier for {model} than {synthetic} ({level})."
-            ),
+            Some((size, end)) => format!("With {name}, accuracy of {model} is {size} than {synthetic} ({level}){end}."),
+            None => format!("It is not shown that {name} is harder or easier for {model} than {synthetic} ({level})."),
         },
     };
     sentence("real against synthetic", row, numbers, text)
@@ -109,11 +95,7 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let (model, raw) = (&row.first.model, row.second.condition());
     let text = match verdict(row) {
         Significance::Worse | Significance::Better => {
-            let does = if verdict(row) == Significance::Worse {
-                "harms"
-            } else {
-                "helps"
-            };
+            let does = if verdict(row) == Significance::Worse { "harms" } else { "helps" };
             let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{name} {does} {model} with {raw}, by {size} points.")
         }
@@ -152,10 +134,6 @@ fn sentence(kind: &'static str, row: &Comparison, mut numbers: Numbers, text: St
     let n = numbers.count("n", paired.difference.n);
     let clusters = numbers.clusters(paired.clusters);
     let detail = format!("{difference}, {p}, n = {n} in {clusters}");
-    let tone = if row.claim() == Claim::Impossible {
-        Tone::Note
-    } else {
-        Tone::from(verdict(row))
-    };
+    let tone = if row.claim() == Claim::Impossible { Tone::Note } else { Tone::from(verdict(row)) };
     numbers.sentence(kind, tone, text, detail)
 }

@@ -24,31 +24,19 @@ fn topic(kind: PooledKind, variant: &Variant, enhancer: Option<&EnhancerName>) -
 }
 
 /// The subject of findings of a kind with a variant, as `darkness (with noise)`.
-pub(super) fn topic_in_light(
-    kind: PooledKind,
-    variant: &Variant,
-    enhancer: Option<&EnhancerName>,
-) -> String {
-    format!(
-        "{} ({})",
-        topic(kind, variant, enhancer),
-        light(variant, None)
-    )
+pub(super) fn topic_in_light(kind: PooledKind, variant: &Variant, enhancer: Option<&EnhancerName>) -> String {
+    format!("{} ({})", topic(kind, variant, enhancer), light(variant, None))
 }
 
 /// True if no finding of a set can have a verdict, because there are too few clusters for a small corrected p-value.
 pub(super) fn is_impossible(set: &[&PooledFinding]) -> bool {
-    set.iter()
-        .all(|finding| !finding.strict.verdict.is_possible())
+    set.iter().all(|finding| !finding.strict.verdict.is_possible())
 }
 
-/// The topics without a possible verdict because of too few clusters; `None` if every topic can have one. If the same topic can have a
-/// verdict with another variant, the sentence names the variant.
+/// The topics without a possible verdict because of too few clusters; `None` if every topic can have one. If the same
+/// topic can have a verdict with another variant, the sentence names the variant.
 pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
-    let last = findings
-        .grid
-        .main_variant()
-        .and_then(|variant| variant.kind);
+    let last = findings.grid.main_variant().and_then(|variant| variant.kind);
     let whole: Vec<&PooledFinding> = findings
         .pooled
         .iter()
@@ -65,8 +53,7 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
         }
         let mut topic = topic(first.kind, &first.variant, first.enhancer.as_ref());
         let is_possible_elsewhere = with.iter().any(|other| {
-            (other[0].kind, &other[0].enhancer) == (first.kind, &first.enhancer)
-                && other[0].variant.kind.is_some()
+            (other[0].kind, &other[0].enhancer) == (first.kind, &first.enhancer) && other[0].variant.kind.is_some()
         });
         if is_possible_elsewhere {
             topic = format!("{topic} {}", light(&first.variant, None));
@@ -74,10 +61,7 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
         if !topics.contains(&topic) {
             topics.push(topic);
         }
-        least.extend(
-            set.iter()
-                .map(|finding| (finding.least_holm, finding.clusters)),
-        );
+        least.extend(set.iter().map(|finding| (finding.least_holm, finding.clusters)));
     }
     if let Some(best) = findings.best.as_ref().filter(|best| !best.is_possible()) {
         topics.push("the best model".to_owned());
@@ -95,8 +79,8 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
     Some(numbers.sentence("no verdict", Tone::Note, text, detail))
 }
 
-/// The half-widths of the narrowest and the widest interval, if the widest exceeds [`WIDE`]. This is not the power of the tests, which
-/// depends on more than the intervals.
+/// The half-widths of the narrowest and the widest interval, if the widest exceeds [`WIDE`]. This is not the power of
+/// the tests, which depends on more than the intervals.
 pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     // Missing replies may widen an interval without end, and have a sentence of their own.
     let whole = all.iter().filter(|finding| {
@@ -104,18 +88,13 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
             && finding.kind != PooledKind::EnhancerPair
             && finding.strict.verdict != Significance::Missing
     });
-    let which = if whole
-        .clone()
-        .all(|finding| finding.strict.verdict.is_possible())
-    {
+    let which = if whole.clone().all(|finding| finding.strict.verdict.is_possible()) {
         "the findings"
     } else {
         "the findings that may have a verdict"
     };
     let whole = whole.filter(|finding| finding.strict.verdict.is_possible());
-    let narrowest = whole
-        .clone()
-        .min_by(|a, b| half_width(a).total_cmp(&half_width(b)))?;
+    let narrowest = whole.clone().min_by(|a, b| half_width(a).total_cmp(&half_width(b)))?;
     let widest = whole.max_by(|a, b| half_width(a).total_cmp(&half_width(b)))?;
     if half_width(widest) <= WIDE {
         return None;
@@ -123,11 +102,7 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
     let mut numbers = Numbers::new(unit);
     let [least, most] = [("narrowest", narrowest), ("widest", widest)]
         .map(|(name, finding)| numbers.number(name, 100.0 * half_width(finding), 0));
-    let range = if least == most {
-        most
-    } else {
-        format!("{least} to {most}")
-    };
+    let range = if least == most { most } else { format!("{least} to {most}") };
     let text = format!(
         "With {} the intervals of {which} reach about {range} points to each side.",
         numbers.clusters(widest.clusters)
@@ -141,8 +116,9 @@ fn half_width(finding: &PooledFinding) -> f64 {
     (finding.strict.difference.high - finding.strict.difference.low) / 2.0
 }
 
-/// The models that are left out of findings, because they answered fewer questions than others. Findings with the same levels and
-/// models share a sentence. False answers are skipped, because they leave out the same models as the cost of darkness.
+/// The models that are left out of findings, because they answered fewer questions than others. Findings with the same
+/// levels and models share a sentence. False answers are skipped, because they leave out the same models as the cost of
+/// darkness.
 pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
     let mut grouped: Vec<(&ModelsLeftOut, Vec<String>)> = Vec::new();
     for set in &findings.left_out {
@@ -150,9 +126,9 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
             continue;
         }
         let about = topic_in_light(set.kind, &set.variant, set.enhancer.as_ref());
-        let same = grouped.iter_mut().find(|(other, _)| {
-            runs(other) == runs(set) && other.models == set.models && other.items == set.items
-        });
+        let same = grouped
+            .iter_mut()
+            .find(|(other, _)| runs(other) == runs(set) && other.models == set.models && other.items == set.items);
         match same {
             Some((_, topics)) => topics.push(about),
             None => grouped.push((set, vec![about])),
@@ -170,10 +146,7 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
             };
             if set.is_more {
                 let were = if is_one { "was" } else { "were" };
-                let text = format!(
-                    "Only {models} {were} asked at {}: no mean is made there.",
-                    runs(set)
-                );
+                let text = format!("Only {models} {were} asked at {}: no mean is made there.", runs(set));
                 let detail = format!("left out of the findings about {}", listed(&topics));
                 return numbers.sentence("left out", Tone::Note, text, detail);
             }

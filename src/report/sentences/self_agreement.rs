@@ -50,15 +50,11 @@ fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     );
     let detail = "--request constrain=choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
     let numbers = Numbers::new(found.unit);
-    numbers.sentence(
-        "no_answer_in_the_light",
-        Tone::Note,
-        text,
-        detail.to_owned(),
-    )
+    numbers.sentence("no_answer_in_the_light", Tone::Note, text, detail.to_owned())
 }
 
-/// The sentence for a model whose answer to each question is the same for nearly all images, so that no verdict is possible.
+/// The sentence for a model whose answer to each question is the same for nearly all images, so that no verdict is
+/// possible.
 fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let mut numbers = Numbers::new(found.unit);
     let (_, all) = found.informative(model);
@@ -66,11 +62,7 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
     let text = format!(
         "The questions do not show what {model} sees: at L0 it answers each of the {all} alike for 95 % of the images or more."
     );
-    let images = found
-        .questions
-        .iter()
-        .filter(|question| question.model == model)
-        .map(|question| question.images);
+    let images = found.questions.iter().filter(|question| question.model == model).map(|question| question.images);
     let (least, greatest) = (images.clone().min(), images.max());
     let fewest = numbers.count("fewest_images", least.unwrap_or_default());
     let most = numbers.count("most_images", greatest.unwrap_or_default());
@@ -89,10 +81,7 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
 /// The agreement of each pair of models at L0.
 fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let models = models_under_test(found.models());
-    let pairs = found
-        .between
-        .iter()
-        .filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
+    let pairs = found.between.iter().filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
     pairs.map(|pair| {
         let mut numbers = Numbers::new(found.unit);
         let same = numbers.percent("same", pair.same.value);
@@ -124,11 +113,7 @@ fn variants(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<Variant> {
 }
 
 fn enhancers(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<EnhancerName> {
-    found
-        .whole()
-        .filter(|cell| cell.subject.model == model)
-        .filter_map(|cell| cell.subject.enhancer.clone())
-        .collect()
+    found.whole().filter(|cell| cell.subject.model == model).filter_map(|cell| cell.subject.enhancer.clone()).collect()
 }
 
 /// The comparisons of one kind of a model, over all families.
@@ -158,29 +143,18 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
     let ceiling = cells.clone().find(|cell| cell.role() == CellRole::Ceiling);
     let floor = cells.find(|cell| cell.role() == CellRole::Floor);
     let mut references = Vec::new();
-    for (name, words, cell) in [
-        ("ceiling", "asked again at L0", ceiling),
-        ("floor", "without an image", floor),
-    ] {
+    for (name, words, cell) in [("ceiling", "asked again at L0", ceiling), ("floor", "without an image", floor)] {
         if let Some(share) = cell.and_then(|cell| cell.agreement) {
-            references.push(format!(
-                "{words} to {} %",
-                numbers.percent(name, share.value)
-            ));
+            references.push(format!("{words} to {} %", numbers.percent(name, share.value)));
         }
     }
-    let references = if references.is_empty() {
-        String::new()
-    } else {
-        format!("; {}", references.join(", "))
-    };
+    let references = if references.is_empty() { String::new() } else { format!("; {}", references.join(", ")) };
     let text = format!(
         "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{references}{}.",
         light(variant, None),
         half_lost(found, dark, &mut numbers)
     );
-    let test = compared(found, ComparisonKind::Level, model)
-        .find(|comparison| comparison.first == dark.subject);
+    let test = compared(found, ComparisonKind::Level, model).find(|comparison| comparison.first == dark.subject);
     let detail = darkness_detail(found, dark, level, test, &mut numbers);
     let tone = test.map_or(Tone::Note, |test| test.claim().into());
     Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
@@ -189,9 +163,10 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
 /// The end of the sentence: where half of the evidence is lost; empty if that is unknown or beyond the darkest level.
 fn half_lost(found: &SelfAgreement<'_>, dark: &AgreementCell, numbers: &mut Numbers) -> String {
     let subject = &dark.subject;
-    let curve = found.curves.iter().find(|curve| {
-        curve.model == subject.model && curve.variant == subject.variant && curve.enhancer.is_none()
-    });
+    let curve = found
+        .curves
+        .iter()
+        .find(|curve| curve.model == subject.model && curve.variant == subject.variant && curve.enhancer.is_none());
     match curve.and_then(|curve| curve.threshold.as_ref().ok()) {
         Some(threshold) if threshold.value.is_finite() => {
             let axis = subject.level.and_then(AxisLevel::axis);
@@ -225,9 +200,7 @@ fn darkness_detail(
     if let [Some(clean), Some(here)] = dark.entropies {
         let clean = numbers.number("entropy_light", clean, 2);
         let here = numbers.number("entropy", here, 2);
-        parts.push(format!(
-            "entropy of its answers {clean} at L0, {here} at {level}"
-        ));
+        parts.push(format!("entropy of its answers {clean} at L0, {here} at {level}"));
     }
     if let Some(test) = test {
         let difference = numbers.difference("", test.strict.paired.difference);
@@ -240,22 +213,14 @@ fn darkness_detail(
     }
     let (informative, all) = found.informative(model);
     if informative < all {
-        let (informative, all) = (
-            numbers.count("informative", informative),
-            numbers.count("questions", all),
-        );
+        let (informative, all) = (numbers.count("informative", informative), numbers.count("questions", all));
         parts.push(format!("{informative} of {all} questions are informative"));
     }
     parts.join(", ")
 }
 
 /// The effect of an enhancer on a model's agreement with its answers at L0, over the levels of a variant.
-fn enhanced(
-    found: &SelfAgreement<'_>,
-    model: &str,
-    variant: &Variant,
-    enhancer: &EnhancerName,
-) -> Option<Sentence> {
+fn enhanced(found: &SelfAgreement<'_>, model: &str, variant: &Variant, enhancer: &EnhancerName) -> Option<Sentence> {
     let own: Vec<&Comparison> = compared(found, ComparisonKind::Enhancer, model)
         .filter(|comparison| {
             let subject = &comparison.first;
@@ -264,11 +229,8 @@ fn enhanced(
         .collect();
     let levels: Vec<AxisLevel> = own.iter().filter_map(|c| c.first.level).collect();
     let [better, worse] = [Significance::Better, Significance::Worse].map(|significance| {
-        let detected: Vec<AxisLevel> = own
-            .iter()
-            .filter(|c| c.claim() == Claim::Detected(significance))
-            .filter_map(|c| c.first.level)
-            .collect();
+        let detected: Vec<AxisLevel> =
+            own.iter().filter(|c| c.claim() == Claim::Detected(significance)).filter_map(|c| c.first.level).collect();
         (!detected.is_empty()).then(|| level_runs(&detected, &levels))
     });
     let strongest = own.iter().max_by(|one, other| {
@@ -284,22 +246,14 @@ fn enhanced(
     numbers.about(enhancer);
     let level = strongest.first.level?;
     let difference = numbers.difference("", strongest.strict.paired.difference);
-    let p = numbers.p(
-        "p",
-        strongest.strict.p_report.unwrap_or(strongest.strict.holm),
-    );
-    let against = if level == AxisLevel::L0 {
-        "L0 asked again"
-    } else {
-        "raw"
-    };
-    let detail =
-        format!("largest at {level}: {difference} points of agreement against {against}, {p}");
+    let p = numbers.p("p", strongest.strict.p_report.unwrap_or(strongest.strict.holm));
+    let against = if level == AxisLevel::L0 { "L0 asked again" } else { "raw" };
+    let detail = format!("largest at {level}: {difference} points of agreement against {against}, {p}");
     Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))
 }
 
-/// The effect of an enhancer on the answers of a model to images of a variant; `better` and `worse` are the levels at which the answers
-/// become more and less like those at L0.
+/// The effect of an enhancer on the answers of a model to images of a variant; `better` and `worse` are the levels at
+/// which the answers become more and less like those at L0.
 fn level_effects(
     enhancer: &EnhancerName,
     model: &str,
@@ -308,44 +262,34 @@ fn level_effects(
     worse: Option<String>,
 ) -> (Tone, String) {
     match (better, worse) {
-        (Some(levels), None) => (
-            Tone::Better,
-            format!("{enhancer} brings answers of {model} back at {levels} ({variant})."),
-        ),
-        (None, Some(levels)) if levels == "L0" => (
-            Tone::Worse,
-            format!(
-                "{enhancer} changes answers of {model} in the light: harm where nothing was dark."
-            ),
-        ),
-        (None, Some(levels)) => (
-            Tone::Worse,
-            format!(
-                "{enhancer} takes {model} further from its answers at L0 at {levels} ({variant})."
-            ),
-        ),
+        (Some(levels), None) => {
+            (Tone::Better, format!("{enhancer} brings answers of {model} back at {levels} ({variant})."))
+        }
+        (None, Some(levels)) if levels == "L0" => {
+            (Tone::Worse, format!("{enhancer} changes answers of {model} in the light: harm where nothing was dark."))
+        }
+        (None, Some(levels)) => {
+            (Tone::Worse, format!("{enhancer} takes {model} further from its answers at L0 at {levels} ({variant})."))
+        }
         (Some(better), Some(worse)) => (
             Tone::Note,
             format!(
                 "{enhancer} brings answers of {model} back at {better}, and changes others at {worse} ({variant})."
             ),
         ),
-        (None, None) => (
-            Tone::NotShown,
-            format!("{enhancer}: no effect on answers of {model} was detected ({variant})."),
-        ),
+        (None, None) => {
+            (Tone::NotShown, format!("{enhancer}: no effect on answers of {model} was detected ({variant})."))
+        }
     }
 }
 
-/// The effect of an enhancer on the answers of a model to photographs in the dark. L0 is also dark here, so a change of an answer is
-/// neither help nor harm.
+/// The effect of an enhancer on the answers of a model to photographs in the dark. L0 is also dark here, so a change of
+/// an answer is neither help nor harm.
 fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
     match change {
         Claim::Detected(Significance::Worse) => (
             Tone::Note,
-            format!(
-                "{enhancer} changes answers of {model} to these photographs: whether for the better is not known."
-            ),
+            format!("{enhancer} changes answers of {model} to these photographs: whether for the better is not known."),
         ),
         Claim::Detected(_) => (
             Tone::Note,
@@ -353,36 +297,26 @@ fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (T
                 "{model} answers with {enhancer} as at L0, more often than the same photographs asked about again."
             ),
         ),
-        _ => (
-            Tone::NotShown,
-            format!(
-                "{enhancer}: no effect on answers of {model} to these photographs was detected."
-            ),
-        ),
+        _ => {
+            (Tone::NotShown, format!("{enhancer}: no effect on answers of {model} to these photographs was detected."))
+        }
     }
 }
 
 /// The share of "cannot tell" replies at L0 and at the darkest level, if the questions offer that choice.
 fn cannot_tell_shares(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence> {
-    let light = found
-        .light_of(model)
-        .filter(|light| light.offers_cannot_tell)?;
+    let light = found.light_of(model).filter(|light| light.offers_cannot_tell)?;
     let dark = found
         .whole()
-        .filter(|cell| {
-            cell.subject.model == model
-                && cell.role() == CellRole::Other
-                && cell.subject.enhancer.is_none()
-        })
+        .filter(|cell| cell.subject.model == model && cell.role() == CellRole::Other && cell.subject.enhancer.is_none())
         .max_by_key(|cell| cell.subject.level)?;
     let (level, share) = (dark.subject.level?, dark.cannot_tell?);
     let mut numbers = Numbers::new(found.unit);
     let in_light = light.cannot_tell as f64 / light.replies().max(1) as f64;
     let in_light = numbers.percent("light", in_light);
     let here = numbers.percent("share", share.value);
-    let text = format!(
-        "{model} says “cannot tell” to {in_light} % of the questions at L0, and to {here} % at {level}."
-    );
+    let text =
+        format!("{model} says “cannot tell” to {in_light} % of the questions at L0, and to {here} % at {level}.");
     let ends = numbers.share_ends("", share);
     let n = numbers.count("n", share.n);
     let detail = format!("[{ends}] % at {level}, n = {n}");
@@ -398,14 +332,8 @@ mod tests {
     fn missing_effect_names_enhancer_first() {
         let lift = EnhancerName::new("lift").unwrap();
         let (_, text) = level_effects(&lift, "m", "with noise", None, None);
-        assert_eq!(
-            text,
-            "lift: no effect on answers of m was detected (with noise)."
-        );
+        assert_eq!(text, "lift: no effect on answers of m was detected (with noise).");
         let (_, text) = photograph_effects(&lift, "m", Claim::Open);
-        assert_eq!(
-            text,
-            "lift: no effect on answers of m to these photographs was detected."
-        );
+        assert_eq!(text, "lift: no effect on answers of m to these photographs was detected.");
     }
 }

@@ -135,11 +135,7 @@ pub(super) struct Numbers {
 impl Numbers {
     /// An empty builder; `unit` names the clusters.
     pub(super) fn new(unit: ClusterUnit) -> Self {
-        Self {
-            values: BTreeMap::new(),
-            unit,
-            scope: Scope::default(),
-        }
+        Self { values: BTreeMap::new(), unit, scope: Scope::default() }
     }
 
     /// Sets the level, or the levels, of the difference.
@@ -153,21 +149,8 @@ impl Numbers {
     }
 
     /// The sentence with these numbers.
-    pub(super) fn sentence(
-        self,
-        kind: &'static str,
-        tone: Tone,
-        text: String,
-        detail: String,
-    ) -> Sentence {
-        Sentence {
-            kind,
-            tone,
-            text,
-            detail,
-            values: self.values,
-            scope: self.scope,
-        }
+    pub(super) fn sentence(self, kind: &'static str, tone: Tone, text: String, detail: String) -> Sentence {
+        Sentence { kind, tone, text, detail, values: self.values, scope: self.scope }
     }
 
     /// A count, with thousands separators.
@@ -211,13 +194,8 @@ impl Numbers {
 
     /// A difference in points with its interval, as `−4.8 [−8.5, −1.0]`. The names end in `at`.
     pub(super) fn difference(&mut self, at: &str, difference: Estimate) -> String {
-        let ends = [
-            ("difference", difference.value),
-            ("low", difference.low),
-            ("high", difference.high),
-        ];
-        let [value, low, high] =
-            ends.map(|(name, value)| self.points(&format!("{name}{at}"), value));
+        let ends = [("difference", difference.value), ("low", difference.low), ("high", difference.high)];
+        let [value, low, high] = ends.map(|(name, value)| self.points(&format!("{name}{at}"), value));
         format!("{value} [{low}, {high}]")
     }
 
@@ -228,8 +206,7 @@ impl Numbers {
             Some(bound) => ("<", bound),
             None => ("=", &*text),
         };
-        self.values
-            .insert(name.to_owned(), number.parse().unwrap_or(value));
+        self.values.insert(name.to_owned(), number.parse().unwrap_or(value));
         format!("p {sign} {number}")
     }
 
@@ -239,13 +216,11 @@ impl Numbers {
         counted(count, &self.unit.to_string())
     }
 
-    /// The numbers of questions and clusters of a finding, with the questions left out and an approximate p-value's method.
+    /// The numbers of questions and clusters of a finding, with the questions left out and an approximate p-value's
+    /// method.
     pub(super) fn sample(&mut self, finding: &PooledFinding) -> String {
         let items = self.count("n", finding.items);
-        let mut parts = vec![format!(
-            "n = {items} in {}",
-            self.clusters(finding.clusters)
-        )];
+        let mut parts = vec![format!("n = {items} in {}", self.clusters(finding.clusters))];
         let all = finding.items + finding.dropped;
         // Above 5 % the reader should know that the tables include more questions.
         if 20 * finding.dropped > all {
@@ -281,22 +256,14 @@ fn with_separators(number: usize) -> String {
 pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
     match names {
         [one] => one.clone(),
-        several => format!(
-            "mean of these {} models",
-            numbers.count("models", several.len())
-        ),
+        several => format!("mean of these {} models", numbers.count("models", several.len())),
     }
 }
 
 /// A text with its first letter in upper case.
 pub(crate) fn capitalised(text: &str) -> String {
     let mut letters = text.chars();
-    letters
-        .next()
-        .into_iter()
-        .flat_map(char::to_uppercase)
-        .chain(letters)
-        .collect()
+    letters.next().into_iter().flat_map(char::to_uppercase).chain(letters).collect()
 }
 
 /// Levels in words; levels that are neighbours in `all` become a range, as `L1–L3, L5`.
@@ -325,8 +292,7 @@ mod tests {
         assert_eq!(numbers.percent("share", 0.0625), "6.2");
         assert_eq!(numbers.points("effect", -0.0625), "−6.2");
         assert_eq!(numbers.number("kappa", -0.001, 2), "0.00");
-        let values = [("effect", -6.2), ("kappa", 0.0), ("share", 6.2)]
-            .map(|(name, value)| (name.to_owned(), value));
+        let values = [("effect", -6.2), ("kappa", 0.0), ("share", 6.2)].map(|(name, value)| (name.to_owned(), value));
         assert_eq!(numbers.values, BTreeMap::from(values));
     }
 }

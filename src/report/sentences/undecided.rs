@@ -24,11 +24,7 @@ impl<'f> Undecided<'f> {
     pub(super) fn new(levels: &[&'f PooledFinding], silent: &[AxisLevel]) -> Self {
         Self {
             levels: levels.to_vec(),
-            open: levels
-                .iter()
-                .copied()
-                .filter(|finding| finding.claim() == Claim::Missing)
-                .collect(),
+            open: levels.iter().copied().filter(|finding| finding.claim() == Claim::Missing).collect(),
             silent: silent.to_vec(),
         }
     }
@@ -48,26 +44,15 @@ impl<'f> Undecided<'f> {
     }
 
     /// The sentence about these levels; `None` without any. `about` completes "no verdict on".
-    pub(super) fn sentence(
-        &self,
-        kind: &'static str,
-        about: &str,
-        unit: ClusterUnit,
-    ) -> Option<Sentence> {
+    pub(super) fn sentence(&self, kind: &'static str, about: &str, unit: ClusterUnit) -> Option<Sentence> {
         let mut numbers = Numbers::new(unit);
         let mut reasons = Vec::new();
         let mut details = Vec::new();
-        let worst = self
-            .open
-            .iter()
-            .max_by(|a, b| missing_share(a).total_cmp(&missing_share(b)));
+        let worst = self.open.iter().max_by(|a, b| missing_share(a).total_cmp(&missing_share(b)));
         if let Some(worst) = worst {
             numbers.at(&worst.level);
             let share = numbers.percent("missing", missing_share(worst));
-            reasons.push(format!(
-                "{share} % of the questions lack a reply at {}",
-                worst.level
-            ));
+            reasons.push(format!("{share} % of the questions lack a reply at {}", worst.level));
             let who = models(&worst.models, &mut numbers);
             let difference = numbers.difference("", worst.strict.difference);
             details.push(format!(
@@ -85,12 +70,7 @@ impl<'f> Undecided<'f> {
         let undetected: Vec<AxisLevel> = self
             .levels
             .iter()
-            .filter(|finding| {
-                !matches!(
-                    finding.claim(),
-                    Claim::Detected(_) | Claim::Impossible | Claim::Missing
-                )
-            })
+            .filter(|finding| !matches!(finding.claim(), Claim::Detected(_) | Claim::Impossible | Claim::Missing))
             .map(|finding| finding.level)
             .collect();
         if !undetected.is_empty() {
@@ -99,11 +79,7 @@ impl<'f> Undecided<'f> {
             details.push(format!("nothing was detected at {at}"));
         }
         details.extend(worst.map(|worst| numbers.sample(worst)));
-        let text = format!(
-            "No verdict on {about} is possible at {}: {}.",
-            self.at(),
-            listed(&reasons)
-        );
+        let text = format!("No verdict on {about} is possible at {}: {}.", self.at(), listed(&reasons));
         Some(numbers.sentence(kind, Tone::Note, text, details.join("; ")))
     }
 }
@@ -119,9 +95,7 @@ pub(super) fn silent_levels(findings: &Findings<'_>, variant: &Variant) -> Vec<A
         .pooled
         .iter()
         .filter(|finding| {
-            finding.kind == PooledKind::Darkness
-                && finding.family.is_none()
-                && finding.variant == *variant
+            finding.kind == PooledKind::Darkness && finding.family.is_none() && finding.variant == *variant
         })
         .map(|finding| finding.level)
         .collect();

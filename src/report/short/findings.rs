@@ -36,13 +36,7 @@ pub(crate) fn findings(
             text += &row(title, finding);
         }
         let all = counted(groups.count(), "finding");
-        return text
-            + &wrapped(
-                " ",
-                &format!("All {all}, and how to read them: --findings"),
-                " ",
-            )
-            + "\n";
+        return text + &wrapped(" ", &format!("All {all}, and how to read them: --findings"), " ") + "\n";
     }
     for group in groups.all() {
         text += &styled_lines::heading(group.title);

@@ -25,16 +25,9 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
             None => {
                 let once = report.findings.summary.chance_of_questions;
                 let once = once.map(|once| {
-                    format!(
-                        " over all orders of choices ({} with each question once)",
-                        percent(once.value)
-                    )
+                    format!(" over all orders of choices ({} with each question once)", percent(once.value))
                 });
-                format!(
-                    "chance {}{}",
-                    percent(share.value),
-                    once.unwrap_or_default()
-                )
+                format!("chance {}{}", percent(share.value), once.unwrap_or_default())
             }
             Some(_) if parts.is_empty() => {
                 format!("without images: {} {}", subject.model, with_interval(share))
@@ -56,18 +49,9 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
         let line = "95 %: how far the widest interval of the row reaches down and up";
         text += &wrapped(" ", line, " ");
     }
-    let lenient: usize = report
-        .findings
-        .health
-        .iter()
-        .map(|health| health.lenient_only)
-        .sum();
+    let lenient: usize = report.findings.health.iter().map(|health| health.lenient_only).sum();
     if lenient > 0 {
-        let replies = if lenient == 1 {
-            "reply is"
-        } else {
-            "replies are"
-        };
+        let replies = if lenient == 1 { "reply is" } else { "replies are" };
         let line = format!("{lenient} more {replies} read by the lenient parsing alone: --full");
         text += &wrapped(" ", &line, " ");
     }
@@ -81,14 +65,11 @@ pub(super) fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyC
     text
 }
 
-/// Line that defines the observer, with the score of its standing control in each run; empty if the observer is not in the report.
+/// Line that defines the observer, with the score of its standing control in each run; empty if the observer is not in
+/// the report.
 fn observer_control(report: &ChoiceReport<'_>) -> String {
     let findings = report.findings;
-    let is_shown = findings
-        .grid
-        .subjects
-        .iter()
-        .any(|subject| is_observer(&subject.model));
+    let is_shown = findings.grid.subjects.iter().any(|subject| is_observer(&subject.model));
     let controls = findings.observer.standing_controls();
     let Some(first) = controls.first().filter(|_| is_shown) else {
         return String::new();
@@ -109,12 +90,11 @@ fn observer_control(report: &ChoiceReport<'_>) -> String {
     wrapped(" ", &line, " ")
 }
 
-/// Explanations of the marks of models, training data of enhancers, and a line for each model with the facts that the user gave about it.
+/// Explanations of the marks of models, training data of enhancers, and a line for each model with the facts that the
+/// user gave about it.
 pub(super) fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
     let listing = &report.findings.grid.listing;
-    let mut text = listing
-        .footnote(models.iter().copied())
-        .map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
+    let mut text = listing.footnote(models.iter().copied()).map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
     for (enhancer, training) in listing.trainings() {
         text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");
     }

@@ -27,14 +27,9 @@ impl NameColumn {
         Self { width, ambiguous }
     }
 
-    /// Formats a row: name, values, and the reach of the widest interval. A name that is ambiguous when shortened gets its own line above
-    /// the values.
-    pub(super) fn line(
-        &self,
-        name: &str,
-        values: impl Iterator<Item = String>,
-        reach: &str,
-    ) -> String {
+    /// Formats a row: name, values, and the reach of the widest interval. A name that is ambiguous when shortened gets
+    /// its own line above the values.
+    pub(super) fn line(&self, name: &str, values: impl Iterator<Item = String>, reach: &str) -> String {
         let width = self.width;
         let mut text = String::new();
         let mut short = shorten_middle(name, width);
@@ -42,9 +37,7 @@ impl NameColumn {
             text = format!(" {name}\n");
             short.clear();
         }
-        let values: String = values
-            .map(|value| format!("{value:>LEVEL_WIDTH$}"))
-            .collect();
+        let values: String = values.map(|value| format!("{value:>LEVEL_WIDTH$}")).collect();
         let line = format!(" {short:<width$}{values}  {reach}");
         text + line.trim_end() + "\n"
     }
@@ -58,8 +51,7 @@ mod tests {
     fn ambiguous_names_are_not_shortened() {
         let names = ["vision-one-instruct", "vision-two-instruct", "raw"];
         let column = NameColumn::new(names.into_iter(), 12);
-        let [first, second, third] =
-            names.map(|name| column.line(name, ["50.0".to_owned()].into_iter(), "−1 +2"));
+        let [first, second, third] = names.map(|name| column.line(name, ["50.0".to_owned()].into_iter(), "−1 +2"));
         assert_eq!(first, " vision-one-instruct\n                50.0  −1 +2\n");
         assert_ne!(first, second);
         assert_eq!(third, " raw            50.0  −1 +2\n");

@@ -1,7 +1,7 @@
 //! Lines of a terminal report with coloured signs: [`alert`], [`summary`], [`sentence`], [`heading`] and [`table`].
 //!
-//! Colours are ANSI sequences; the code that prints a text removes them if the terminal has no colours. A sign or a word always has the
-//! same meaning as the colour.
+//! Colours are ANSI sequences; the code that prints a text removes them if the terminal has no colours. A sign or a
+//! word always has the same meaning as the colour.
 
 use clap::builder::styling::{AnsiColor, Style};
 
@@ -13,19 +13,14 @@ use crate::types::text::escape_hidden;
 
 /// Wrapped text of an alert with its sign.
 pub(super) fn alert(alert: &Alert) -> String {
-    style_start(
-        &wrapped("! ", &escape_hidden(&alert.text), "  "),
-        1,
-        colour(AnsiColor::Yellow),
-    )
+    style_start(&wrapped("! ", &escape_hidden(&alert.text), "  "), 1, colour(AnsiColor::Yellow))
 }
 
 /// Wrapped text of a sentence with its sign, and its detail below.
 pub(super) fn sentence(sentence: &Sentence) -> String {
     let first = format!(" {}  ", sentence.tone.sign());
     let text = wrapped(&first, &escape_hidden(&sentence.text), "    ");
-    colour_sign(&text, 2, sentence.tone)
-        + &wrapped("    ", &escape_hidden(&sentence.detail), "    ")
+    colour_sign(&text, 2, sentence.tone) + &wrapped("    ", &escape_hidden(&sentence.detail), "    ")
 }
 
 /// Applies the colour of a tone to the first `end` characters, at the end of which the sign is.
@@ -62,10 +57,7 @@ fn colour(colour: AnsiColor) -> Style {
 
 /// Applies a style to the first `count` characters of a text.
 fn style_start(text: &str, count: usize, style: Style) -> String {
-    let end = text
-        .char_indices()
-        .nth(count)
-        .map_or(text.len(), |(index, _)| index);
+    let end = text.char_indices().nth(count).map_or(text.len(), |(index, _)| index);
     let (start, rest) = text.split_at(end);
     format!("{style}{start}{style:#}{rest}")
 }

@@ -40,14 +40,7 @@ impl BoardCell {
     /// Cell with a text, which is also its sort key.
     pub(super) fn text(text: &str) -> Self {
         let text = readable(text);
-        Self {
-            key: text.clone(),
-            text,
-            small: Vec::new(),
-            class: "text",
-            link: String::new(),
-            is_header: false,
-        }
+        Self { key: text.clone(), text, small: Vec::new(), class: "text", link: String::new(), is_header: false }
     }
 
     /// Cell of a table, with its interval below.
@@ -69,12 +62,7 @@ impl BoardCell {
         };
         // The script cannot sort infinity; a huge number takes its place.
         let key = number.map(|number| number.clamp(-1e300, 1e300).to_string());
-        Self {
-            small: small.into_iter().collect(),
-            class: "",
-            key: key.unwrap_or_default(),
-            ..Self::text(&text)
-        }
+        Self { small: small.into_iter().collect(), class: "", key: key.unwrap_or_default(), ..Self::text(&text) }
     }
 
     /// Sets the sort key.
@@ -95,11 +83,7 @@ impl BoardCell {
 
     /// Makes the cell a row header with a link.
     pub(super) fn into_header(self, link: String) -> Self {
-        Self {
-            link,
-            is_header: true,
-            ..self
-        }
+        Self { link, is_header: true, ..self }
     }
 }
 

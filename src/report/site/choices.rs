@@ -48,17 +48,9 @@ impl ChoiceRow {
 
     /// Key of the initial order: by rank, then by area; rows without a rank come last.
     pub(crate) fn sort_key(&self) -> (usize, usize, bool, i64) {
-        let rank = self.rank.unwrap_or(RankRange {
-            first: usize::MAX,
-            last: usize::MAX,
-        });
+        let rank = self.rank.unwrap_or(RankRange { first: usize::MAX, last: usize::MAX });
         let area = self.area.map_or(0.0, |area| area.value);
-        (
-            rank.first,
-            rank.last,
-            self.is_reference(),
-            -(area * 1e9) as i64,
-        )
+        (rank.first, rank.last, self.is_reference(), -(area * 1e9) as i64)
     }
 
     fn rank_text(&self) -> String {
@@ -70,30 +62,19 @@ impl ChoiceRow {
     }
 
     fn below_text(&self, separator: &str) -> String {
-        self.below
-            .iter()
-            .map(ToString::to_string)
-            .collect::<Vec<_>>()
-            .join(separator)
+        self.below.iter().map(ToString::to_string).collect::<Vec<_>>().join(separator)
     }
 }
 
 /// Rows of a run's models with images, in the main variant of its report. All numbers are the same as in the report.
-pub(crate) fn choice_rows(
-    findings: &Findings<'_>,
-    variant: &Variant,
-    run: &RunLink,
-) -> Vec<ChoiceRow> {
+pub(crate) fn choice_rows(findings: &Findings<'_>, variant: &Variant, run: &RunLink) -> Vec<ChoiceRow> {
     let mut models: Vec<&str> = Vec::new();
     for subject in &findings.grid.subjects {
         if subject.view == Some(View::Image) && !models.contains(&&*subject.model) {
             models.push(&subject.model);
         }
     }
-    models
-        .into_iter()
-        .map(|model| row(findings, variant, model, run))
-        .collect()
+    models.into_iter().map(|model| row(findings, variant, model, run)).collect()
 }
 
 fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -> ChoiceRow {
@@ -105,41 +86,30 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
         cell.accuracy
     });
     let curve: Option<&Curve> = findings.curves.iter().find(|curve| {
-        curve.model == model
-            && curve.variant == *variant
-            && curve.enhancer.is_none()
-            && curve.family.is_none()
+        curve.model == model && curve.variant == *variant && curve.enhancer.is_none() && curve.family.is_none()
     });
     let darkest = curve.map(|curve| curve.summary.darkest);
     let comparisons: Vec<&Comparison> = findings
         .comparisons
         .iter()
         .filter(|comparison| {
-            comparison.family.is_none()
-                && comparison.first.model == model
-                && comparison.first.variant == *variant
+            comparison.family.is_none() && comparison.first.model == model && comparison.first.variant == *variant
         })
         .collect();
-    let change = comparisons.iter().find(|comparison| {
-        comparison.kind == ComparisonKind::Level && comparison.first.level == darkest
-    });
-    let gain = comparisons
+    let change = comparisons
         .iter()
-        .filter(|comparison| comparison.kind == ComparisonKind::Enhancer)
-        .max_by(|a, b| {
-            let [a, b] = [a, b].map(|gain| gain.strict.paired.difference.value);
-            a.total_cmp(&b)
-        });
+        .find(|comparison| comparison.kind == ComparisonKind::Level && comparison.first.level == darkest);
+    let gain = comparisons.iter().filter(|comparison| comparison.kind == ComparisonKind::Enhancer).max_by(|a, b| {
+        let [a, b] = [a, b].map(|gain| gain.strict.paired.difference.value);
+        a.total_cmp(&b)
+    });
     let below = grid.subjects.iter().filter(|subject| {
         subject.model == model
             && subject.variant == *variant
             && subject.enhancer.is_none()
             && !findings.below_blind(subject, None).is_empty()
     });
-    let health = findings
-        .health
-        .iter()
-        .filter(|health| health.subject.model == model);
+    let health = findings.health.iter().filter(|health| health.subject.model == model);
     ChoiceRow {
         model: model.to_owned(),
         run: run.clone(),
@@ -155,9 +125,7 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
             Some((enhancer, gain.first.level?, difference, gain.verdict()))
         }),
         below: below.filter_map(|subject| subject.level).collect(),
-        unread: health.fold([0, 0], |[unread, all], health| {
-            [unread + health.unreadable(), all + health.replies]
-        }),
+        unread: health.fold([0, 0], |[unread, all], health| [unread + health.unreadable(), all + health.replies]),
     }
 }
 
@@ -165,40 +133,21 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
 pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -> Table {
     TableBuilder::new("leaderboard", rows)
         .column(Count, "csv group", |_| number)
-        .column(Count, "csv rank_first", |row| {
-            row.rank.map(|rank| rank.first)
-        })
+        .column(Count, "csv rank_first", |row| row.rank.map(|rank| rank.first))
         .column(Count, "csv rank_last", |row| row.rank.map(|rank| rank.last))
         .column(Text, "csv model", |row| row.model.clone())
         .column(Text, "csv run", |row| row.run.name.clone())
         .column(Share, "csv l0 l0_low l0_high n", |row| row.clean)
         .column(Share, "csv area area_low area_high area_n", |row| row.area)
-        .column(Text, "csv darkest", |row| {
-            row.darkest.map(|level| level.to_string())
-        })
-        .column(
-            Points,
-            "csv change change_low change_high change_n",
-            |row| row.change.map(|(change, _)| change),
-        )
+        .column(Text, "csv darkest", |row| row.darkest.map(|level| level.to_string()))
+        .column(Points, "csv change change_low change_high change_n", |row| row.change.map(|(change, _)| change))
         .column(Text, "csv change_shown", |row| {
-            row.change
-                .map(|(_, verdict)| verdict.is_some_and(Significance::is_shown).to_string())
+            row.change.map(|(_, verdict)| verdict.is_some_and(Significance::is_shown).to_string())
         })
-        .column(
-            Threshold,
-            "csv threshold_ev threshold_low threshold_high",
-            |row| threshold(row),
-        )
-        .column(Text, "csv best_enhancer", |row| {
-            row.gain.as_ref().map(|(enhancer, ..)| enhancer.clone())
-        })
-        .column(Text, "csv best_level", |row| {
-            row.gain.as_ref().map(|(_, level, ..)| level.to_string())
-        })
-        .column(Points, "csv gain gain_low gain_high gain_n", |row| {
-            row.gain.as_ref().map(|(.., gain, _)| *gain)
-        })
+        .column(Threshold, "csv threshold_ev threshold_low threshold_high", |row| threshold(row))
+        .column(Text, "csv best_enhancer", |row| row.gain.as_ref().map(|(enhancer, ..)| enhancer.clone()))
+        .column(Text, "csv best_level", |row| row.gain.as_ref().map(|(_, level, ..)| level.to_string()))
+        .column(Points, "csv gain gain_low gain_high gain_n", |row| row.gain.as_ref().map(|(.., gain, _)| *gain))
         .column(Text, "csv gain_shown", |row| {
             let gain = row.gain.as_ref();
             gain.map(|(.., verdict)| verdict.is_some_and(Significance::is_shown).to_string())
@@ -242,53 +191,37 @@ const HEAD: [&str; 12] = [
 
 /// Table for the page.
 pub(super) fn board(rows: &[ChoiceRow]) -> BoardTable {
-    BoardTable {
-        head: HEAD.map(str::to_owned).to_vec(),
-        rows: rows.iter().map(board_row).collect(),
-    }
+    BoardTable { head: HEAD.map(str::to_owned).to_vec(), rows: rows.iter().map(board_row).collect() }
 }
 
 fn board_row(row: &ChoiceRow) -> BoardRow {
     let rank_key = row.rank.map(|rank| rank.first * 1000 + rank.last);
-    let rank = BoardCell::text(&row.rank_text())
-        .with_key(rank_key.map_or_else(String::new, |key| key.to_string()));
-    let run = if row.is_reference() {
-        format!("{}, for comparison", row.run.name)
-    } else {
-        row.run.name.clone()
-    };
+    let rank = BoardCell::text(&row.rank_text()).with_key(rank_key.map_or_else(String::new, |key| key.to_string()));
+    let run = if row.is_reference() { format!("{}, for comparison", row.run.name) } else { row.run.name.clone() };
     let n = row.clean.map(|clean| clean.n);
     let change = match (&row.change, row.darkest) {
-        (Some((change, verdict)), Some(darkest)) => {
-            difference(*change, *verdict, &darkest.to_string())
-        }
+        (Some((change, verdict)), Some(darkest)) => difference(*change, *verdict, &darkest.to_string()),
         _ => BoardCell::new(Points, &TableCell::Missing),
     };
     let gain = match &row.gain {
-        Some((enhancer, level, gain, verdict)) => {
-            difference(*gain, *verdict, &format!("{enhancer}, {level}"))
-        }
+        Some((enhancer, level, gain, verdict)) => difference(*gain, *verdict, &format!("{enhancer}, {level}")),
         None => BoardCell::new(Points, &TableCell::Missing),
     };
     let threshold = match &row.threshold {
-        Some(Err(reason)) => BoardCell::new(Threshold, &TableCell::Missing)
-            .with_line(&missing_threshold_reason(reason)),
+        Some(Err(reason)) => {
+            BoardCell::new(Threshold, &TableCell::Missing).with_line(&missing_threshold_reason(reason))
+        }
         _ => BoardCell::new(Threshold, &threshold(row)),
     };
     let [unread, replies] = row.unread;
     let unread_share = unread as f64 / replies.max(1) as f64;
-    let below = BoardCell::text(&row.below_text(", ")).with_key(
-        row.below
-            .first()
-            .map_or_else(String::new, |level| level.value().to_string()),
-    );
+    let below = BoardCell::text(&row.below_text(", "))
+        .with_key(row.below.first().map_or_else(String::new, |level| level.value().to_string()));
     BoardRow {
         words: format!("{} {}", row.model, row.run.name).to_lowercase(),
         cells: vec![
             rank.with_class("rank"),
-            BoardCell::text(&row.model)
-                .with_line(&run)
-                .into_header(row.run.path()),
+            BoardCell::text(&row.model).with_line(&run).into_header(row.run.path()),
             BoardCell::new(Count, &TableCell::from(n)),
             BoardCell::new(Share, &TableCell::from(row.clean)),
             BoardCell::new(Share, &TableCell::from(row.area)),
@@ -307,15 +240,11 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
 /// Cell with a difference in points, its interval, and its condition. A difference that was not detected is marked.
 fn difference(difference: Estimate, verdict: Option<Significance>, condition: &str) -> BoardCell {
     let ends = format!("[{}, {}]", points(difference.low), points(difference.high));
-    let cell = BoardCell::text(&points(difference.value))
-        .with_key(difference.value.to_string())
-        .with_line(&ends);
+    let cell = BoardCell::text(&points(difference.value)).with_key(difference.value.to_string()).with_line(&ends);
     match verdict {
         Some(Significance::Better) => cell.with_line(condition).with_class("better"),
         Some(Significance::Worse) => cell.with_line(condition).with_class("worse"),
         None => cell.with_line(condition).with_class("unshown"),
-        _ => cell
-            .with_line(&format!("{condition}, not shown"))
-            .with_class("unshown"),
+        _ => cell.with_line(&format!("{condition}, not shown")).with_class("unshown"),
     }
 }

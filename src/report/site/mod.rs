@@ -50,12 +50,7 @@ struct SiteData<'a> {
 /// # Errors
 /// If a file cannot be made.
 pub(crate) fn products(site: Site) -> Result<Vec<(String, Vec<u8>)>> {
-    let tables: Vec<Table> = site
-        .groups
-        .iter()
-        .zip(1..)
-        .map(|(group, number)| table(number, group))
-        .collect();
+    let tables: Vec<Table> = site.groups.iter().zip(1..).map(|(group, number)| table(number, group)).collect();
     // Tables of the same name share a file.
     let mut by_name = tables.clone();
     by_name.sort_by_key(|table| table.name);
@@ -89,11 +84,7 @@ fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
             kind,
             title: &group.title,
             digests: &group.digests,
-            shared: group
-                .shared
-                .iter()
-                .map(|(name, value)| [&**name, &**value])
-                .collect(),
+            shared: group.shared.iter().map(|(name, value)| [&**name, &**value]).collect(),
             differs: group.differs.as_ref(),
             ranking,
             rows: Rows::new(table),

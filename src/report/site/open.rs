@@ -34,16 +34,9 @@ struct LevelScore {
 
 /// Rows of a run over all its questions. The clean frames are L0 of every variant without an enhancer.
 pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
-    let cells: Vec<&OpenCell> = summary
-        .cells
-        .iter()
-        .filter(|cell| cell.group == Group::All)
-        .collect();
-    let with_images: Vec<&OpenCell> = cells
-        .iter()
-        .copied()
-        .filter(|cell| cell.subject.view == Some(View::Image))
-        .collect();
+    let cells: Vec<&OpenCell> = summary.cells.iter().filter(|cell| cell.group == Group::All).collect();
+    let with_images: Vec<&OpenCell> =
+        cells.iter().copied().filter(|cell| cell.subject.view == Some(View::Image)).collect();
     let mut all_series = Vec::new();
     for cell in &with_images {
         let subject = &cell.subject;
@@ -55,9 +48,8 @@ pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
     let mut rows = Vec::new();
     for (model, variant, enhancer) in &all_series {
         let is_clean = variant.is_untouched() && enhancer.is_none();
-        let has_other_series = all_series
-            .iter()
-            .any(|other| other.0 == *model && (other.1 != *variant || other.2 != *enhancer));
+        let has_other_series =
+            all_series.iter().any(|other| other.0 == *model && (other.1 != *variant || other.2 != *enhancer));
         if is_clean && has_other_series {
             continue;
         }
@@ -65,23 +57,16 @@ pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
             .iter()
             .filter(|cell| {
                 let subject = &cell.subject;
-                let is_in_series =
-                    subject.variant == **variant && subject.enhancer.as_ref() == *enhancer;
+                let is_in_series = subject.variant == **variant && subject.enhancer.as_ref() == *enhancer;
                 let is_clean = subject.variant.is_untouched() && subject.enhancer.is_none();
                 subject.model == **model && (is_in_series || is_clean && enhancer.is_none())
             })
             .filter_map(|cell| {
-                let score = LevelScore {
-                    score: cell.score,
-                    scored: cell.scored(),
-                    planned: cell.planned,
-                };
+                let score = LevelScore { score: cell.score, scored: cell.scored(), planned: cell.planned };
                 Some((cell.subject.level?, score))
             })
             .collect();
-        let blind = cells
-            .iter()
-            .find(|cell| cell.subject.view == Some(View::Blind) && cell.subject.model == **model);
+        let blind = cells.iter().find(|cell| cell.subject.view == Some(View::Blind) && cell.subject.model == **model);
         rows.push(OpenRow {
             model: (*model).clone(),
             run: run.clone(),
@@ -113,12 +98,7 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[OpenRow]) -> 
     });
     let blind = rows.iter().filter_map(|row| {
         let score = row.blind?;
-        Some(FileRow {
-            row,
-            level: "blind".to_owned(),
-            score: Some(score),
-            planned: score.n,
-        })
+        Some(FileRow { row, level: "blind".to_owned(), score: Some(score), planned: score.n })
     });
     TableBuilder::new("openeqa", levels.chain(blind))
         .column(Count, "csv group", |_| number)
@@ -139,22 +119,13 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[OpenRow]) -> 
 
 /// Table for the page.
 pub(super) fn board(rows: &[OpenRow]) -> BoardTable {
-    let levels: BTreeSet<AxisLevel> = rows
-        .iter()
-        .flat_map(|row| row.levels.keys().copied())
-        .collect();
+    let levels: BTreeSet<AxisLevel> = rows.iter().flat_map(|row| row.levels.keys().copied()).collect();
     let has_blind = rows.iter().any(|row| row.blind.is_some());
     let mut head = vec!["model".to_owned(), "light".to_owned(), "scored".to_owned()];
     head.extend(levels.iter().map(ToString::to_string));
     head.extend(has_blind.then(|| "without images".to_owned()));
     head.extend(["date", "version"].map(str::to_owned));
-    BoardTable {
-        rows: rows
-            .iter()
-            .map(|row| board_row(row, &levels, has_blind))
-            .collect(),
-        head,
-    }
+    BoardTable { rows: rows.iter().map(|row| board_row(row, &levels, has_blind)).collect(), head }
 }
 
 /// Row for the page, with a cell for each level, and one without images if `has_blind`.
@@ -162,13 +133,9 @@ fn board_row(row: &OpenRow, levels: &BTreeSet<AxisLevel>, has_blind: bool) -> Bo
     let scored: usize = row.levels.values().map(|level| level.scored).sum();
     let planned: usize = row.levels.values().map(|level| level.planned).sum();
     let mut cells = vec![
-        BoardCell::text(&row.model)
-            .with_line(&row.run.name)
-            .into_header(row.run.path()),
+        BoardCell::text(&row.model).with_line(&row.run.name).into_header(row.run.path()),
         BoardCell::text(&row.light),
-        BoardCell::text(&format!("{scored} of {planned}"))
-            .with_key(scored.to_string())
-            .with_class(""),
+        BoardCell::text(&format!("{scored} of {planned}")).with_key(scored.to_string()).with_class(""),
     ];
     for level in levels {
         let cell = match row.levels.get(level) {
@@ -182,8 +149,5 @@ fn board_row(row: &OpenRow, levels: &BTreeSet<AxisLevel>, has_blind: bool) -> Bo
     }
     cells.push(BoardCell::text(&row.run.date));
     cells.push(BoardCell::text(&row.run.version));
-    BoardRow {
-        words: format!("{} {}", row.model, row.run.name).to_lowercase(),
-        cells,
-    }
+    BoardRow { words: format!("{} {}", row.model, row.run.name).to_lowercase(), cells }
 }

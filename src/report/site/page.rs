@@ -14,10 +14,7 @@ use crate::types::text::counted;
 const PAGE: &str = include_str!("index.html");
 const OWN_STYLE: &str = include_str!("site.css");
 /// Script of the page: the names and theme shared by all pages, then sorting and filtering of the tables.
-const SCRIPT: &str = concat!(
-    include_str!("../page/script/base.js"),
-    include_str!("site.js")
-);
+const SCRIPT: &str = concat!(include_str!("../page/script/base.js"), include_str!("site.js"));
 
 /// Note on tables of open questions: their rows are not ranked.
 const NOT_RANKED: &str = "Scores are in %, over the answers that were marked. These rows are not ranked: scores of open answers have no test of one model against another here.";
@@ -66,26 +63,13 @@ pub(super) fn index(site: &Site, downloads: &[String]) -> Result<String> {
     let others = site
         .others
         .iter()
-        .map(|(run, why)| ExcludedRun {
-            name: readable(&run.name),
-            link: run.path(),
-            why: readable(why),
-        })
+        .map(|(run, why)| ExcludedRun { name: readable(&run.name), link: run.path(), why: readable(why) })
         .collect();
     render(
         PAGE,
         Page {
-            facts: format!(
-                "{} in {}",
-                counted(site.pages.len(), "run"),
-                counted(site.groups.len(), "table")
-            ),
-            groups: site
-                .groups
-                .iter()
-                .zip(1..)
-                .map(|(group, id)| page_table(group, id))
-                .collect(),
+            facts: format!("{} in {}", counted(site.pages.len(), "run"), counted(site.groups.len(), "table")),
+            groups: site.groups.iter().zip(1..).map(|(group, id)| page_table(group, id)).collect(),
             others,
             downloads,
             data: DATA,
@@ -111,11 +95,7 @@ fn page_table(group: &SiteGroup, id: usize) -> PageTable<'_> {
             let lines = differs.lines.iter().map(|line| readable(line)).collect();
             (differs.from, lines)
         }),
-        shared: group
-            .shared
-            .iter()
-            .map(|(name, value)| [readable(name), readable(value)])
-            .collect(),
+        shared: group.shared.iter().map(|(name, value)| [readable(name), readable(value)]).collect(),
         table,
     }
 }
@@ -123,11 +103,7 @@ fn page_table(group: &SiteGroup, id: usize) -> PageTable<'_> {
 /// First 8 characters of each digest of a group, on one line.
 fn digests(group: &SiteGroup) -> String {
     let digests = &group.digests;
-    let named = [
-        ("questions", &digests.questions),
-        ("light", &digests.light),
-        ("prompts", &digests.prompts),
-    ];
+    let named = [("questions", &digests.questions), ("light", &digests.light), ("prompts", &digests.prompts)];
     named
         .iter()
         .filter(|(_, digest)| !digest.is_empty())

@@ -6,28 +6,16 @@ use darkqa_score::answers::confusion::{Collapse, Confusion, Hallucination};
 use darkqa_score::findings::Findings;
 
 pub(super) fn answers(findings: &Findings<'_>) -> Vec<Table> {
-    vec![
-        hallucination(&findings.hallucinations),
-        collapse(&findings.confusions),
-        confusion(&findings.confusions),
-    ]
+    vec![hallucination(&findings.hallucinations), collapse(&findings.confusions), confusion(&findings.confusions)]
 }
 
 fn hallucination(rates: &[Hallucination]) -> Table {
     TableBuilder::new("hallucination", rates)
         .subject(|rates| &rates.subject, ToString::to_string)
-        .column(Share, "csv false_positive fp_low fp_high", |rates| {
-            rates.false_positive
-        })
-        .column(Count, "csv fp_n", |rates| {
-            rates.false_positive.map_or(0, |rate| rate.n)
-        })
-        .column(Share, "csv false_negative fn_low fn_high", |rates| {
-            rates.false_negative
-        })
-        .column(Count, "csv fn_n", |rates| {
-            rates.false_negative.map_or(0, |rate| rate.n)
-        })
+        .column(Share, "csv false_positive fp_low fp_high", |rates| rates.false_positive)
+        .column(Count, "csv fp_n", |rates| rates.false_positive.map_or(0, |rate| rate.n))
+        .column(Share, "csv false_negative fn_low fn_high", |rates| rates.false_negative)
+        .column(Count, "csv fn_n", |rates| rates.false_negative.map_or(0, |rate| rate.n))
         .build()
 }
 
@@ -37,21 +25,13 @@ pub(crate) fn commonest_answers<'a>(
     caption: &str,
     confusions: &'a [Confusion],
 ) -> TableBuilder<(&'a Confusion, &'a Collapse)> {
-    let collapses = confusions
-        .iter()
-        .filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
+    let collapses = confusions.iter().filter_map(|confusion| Some((confusion, confusion.collapse.as_ref()?)));
     TableBuilder::new(name, collapses)
         .page("answers", caption)
         .subject(|(confusion, _)| &confusion.subject, ToString::to_string)
         .family(|(confusion, _)| Some(&confusion.family))
-        .column(Text, "csv top_answer | page given most often", |(_, c)| {
-            c.top.clone()
-        })
-        .column(
-            Share,
-            "csv top_share top_low top_high | page given in % [95 %]",
-            |(_, c)| c.share,
-        )
+        .column(Text, "csv top_answer | page given most often", |(_, c)| c.top.clone())
+        .column(Share, "csv top_share top_low top_high | page given in % [95 %]", |(_, c)| c.share)
 }
 
 fn collapse(confusions: &[Confusion]) -> Table {
@@ -59,16 +39,8 @@ fn collapse(confusions: &[Confusion]) -> Table {
     commonest_answers("collapse", caption, confusions)
         .column(Percent, "csv true_share | page true in %", |(_, c)| c.truth)
         .column(Number, "csv guess_share", |(_, c)| c.guess)
-        .column(
-            Number,
-            "csv entropy_bits | page entropy in bits",
-            |(_, c)| c.entropy,
-        )
-        .column(
-            Number,
-            "csv true_entropy_bits | page of the truth",
-            |(_, c)| c.true_entropy,
-        )
+        .column(Number, "csv entropy_bits | page entropy in bits", |(_, c)| c.entropy)
+        .column(Number, "csv true_entropy_bits | page of the truth", |(_, c)| c.true_entropy)
         .column(Count, "csv n | page n", |(_, c)| c.share.n)
         .column(Text, "csv shown", |(_, c)| c.is_shown().to_string())
         .build()
@@ -89,24 +61,15 @@ struct ConfusionCell<'a> {
     count: usize,
 }
 
-/// Confusion matrix as a table: the number of replies for each expected answer and each answer given to it. The answer given is empty if
-/// none could be parsed. `expected_head` is the head of the column of expected answers.
-pub(crate) fn counted_answers(
-    name: &'static str,
-    expected_head: &'static str,
-    confusions: &[Confusion],
-) -> Table {
+/// Confusion matrix as a table: the number of replies for each expected answer and each answer given to it. The answer
+/// given is empty if none could be parsed. `expected_head` is the head of the column of expected answers.
+pub(crate) fn counted_answers(name: &'static str, expected_head: &'static str, confusions: &[Confusion]) -> Table {
     let mut cells = Vec::new();
     for confusion in confusions {
         for (expected, row) in confusion.counts.iter().enumerate() {
             for (given, &count) in row.iter().enumerate() {
                 if count > 0 {
-                    cells.push(ConfusionCell {
-                        confusion,
-                        expected,
-                        given,
-                        count,
-                    });
+                    cells.push(ConfusionCell { confusion, expected, given, count });
                 }
             }
         }
@@ -114,12 +77,8 @@ pub(crate) fn counted_answers(
     TableBuilder::new(name, cells)
         .subject(|cell| &cell.confusion.subject, ToString::to_string)
         .family(|cell| Some(&cell.confusion.family))
-        .column(Text, expected_head, |cell| {
-            cell.confusion.labels[cell.expected].clone()
-        })
-        .column(Text, "csv given", |cell| {
-            cell.confusion.labels.get(cell.given).cloned()
-        })
+        .column(Text, expected_head, |cell| cell.confusion.labels[cell.expected].clone())
+        .column(Text, "csv given", |cell| cell.confusion.labels.get(cell.given).cloned())
         .column(Count, "csv count", |cell| cell.count)
         .build()
 }

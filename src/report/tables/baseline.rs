@@ -16,64 +16,31 @@ pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
                       | latex Difference [95\\,\\%]";
     let builder = TableBuilder::new(BASELINE, rows)
         .page(BASELINE, &format!("New less {old}"))
-        .column(
-            Text,
-            "csv model | terminal model | page model | latex Model",
-            |row| row.subject.model.clone(),
-        )
-        .column(
-            Text,
-            "csv condition | terminal condition | page condition | latex Condition",
-            |row| row.subject.condition(),
-        )
-        .column(Count, "csv n | terminal n | page n | latex $n$", |row| {
-            row.paired.difference.n
+        .column(Text, "csv model | terminal model | page model | latex Model", |row| row.subject.model.clone())
+        .column(Text, "csv condition | terminal condition | page condition | latex Condition", |row| {
+            row.subject.condition()
         })
+        .column(Count, "csv n | terminal n | page n | latex $n$", |row| row.paired.difference.n)
         .column(Count, "csv other_images", |row| row.other_images)
         .column(Percent, "csv old | page old in %", |row| row.paired.second)
         .column(Percent, "csv new | page new in %", |row| row.paired.first)
         .column(Points, difference, |row| row.paired.difference)
-        .column(
-            Count,
-            "csv only_new | terminal only new | page only new | latex Only new",
-            |row| row.paired.gained,
-        )
-        .column(
-            Count,
-            "csv only_old | terminal only old | page only old | latex Only old",
-            |row| row.paired.lost,
-        )
+        .column(Count, "csv only_new | terminal only new | page only new | latex Only new", |row| row.paired.gained)
+        .column(Count, "csv only_old | terminal only old | page only old | latex Only old", |row| row.paired.lost)
         .column(P, "csv p", |row| row.paired.p)
-        .column(
-            P,
-            "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
-            |row| row.holm,
-        );
+        .column(P, "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)", |row| row.holm);
     let mut table = reply_columns(builder)
-        .column(
-            ColumnKind::Significance,
-            "csv verdict | terminal | page | latex",
-            |row| row.significance,
-        )
+        .column(ColumnKind::Significance, "csv verdict | terminal | page | latex", |row| row.significance)
         .build();
     table.heading = Some(format!("New less {old}, paired by question and image"));
-    table.latex = Some(format!(
-        "New less {}, paired by question, in percentage points.",
-        escape(old)
-    ));
-    let too_few = rows
-        .iter()
-        .filter(|row| row.significance == Significance::TooFew)
-        .count();
+    table.latex = Some(format!("New less {}, paired by question, in percentage points.", escape(old)));
+    let too_few = rows.iter().filter(|row| row.significance == Significance::TooFew).count();
     if too_few > 0 {
-        let line =
-            format!("too few: fewer than {MIN_PAIRS} items are shared, so no verdict is given");
+        let line = format!("too few: fewer than {MIN_PAIRS} items are shared, so no verdict is given");
         table.notes.push(line);
     }
     if rows.is_empty() {
-        table.notes.push(format!(
-            "no model answered the same item about the same image in {old}"
-        ));
+        table.notes.push(format!("no model answered the same item about the same image in {old}"));
     }
     table
 }
@@ -93,12 +60,8 @@ fn reply_columns(builder: TableBuilder<&BaselineRow>) -> TableBuilder<&BaselineR
         .column(Count, "csv failed_new", |row| row.sides[0].failed)
         .column(Number, "csv cost_old", |row| row.sides[1].cost)
         .column(Number, "csv cost_new", |row| row.sides[0].cost)
-        .column(Count, "terminal unread | page unread", |row| {
-            old_and_new(row, |side| side.unread)
-        })
-        .column(Count, "terminal failed | page failed", |row| {
-            old_and_new(row, |side| side.failed)
-        })
+        .column(Count, "terminal unread | page unread", |row| old_and_new(row, |side| side.unread))
+        .column(Count, "terminal failed | page failed", |row| old_and_new(row, |side| side.failed))
         .column(Number, "terminal cost in $ | page cost in $", |row| {
             let [new, old] = row.sides.map(|side| side.cost);
             match new.zip(old) {

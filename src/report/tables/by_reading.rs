@@ -9,13 +9,11 @@ use crate::types::degradations::Kind;
 use crate::types::text::counted;
 use crate::types::{AxisLevel, ProfileName};
 use darkqa_score::accuracies::Curve;
-use darkqa_score::comparisons::{
-    FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect,
-};
+use darkqa_score::comparisons::{FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect};
 use darkqa_score::findings::Findings;
 
-/// Two tables: the file has a row for each finding and profile; the report has a row for each finding and a column for each profile.
-/// Empty unless several noise profiles were tested.
+/// Two tables: the file has a row for each finding and profile; the report has a row for each finding and a column for
+/// each profile. Empty unless several noise profiles were tested.
 pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
     let found = &findings.by_profile;
     let Some(first) = found.first() else {
@@ -27,39 +25,19 @@ pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
 
 /// Table for the file.
 fn file_table(found: &[FindingByProfile]) -> Table {
-    let rows = found
-        .iter()
-        .flat_map(|finding| finding.effects.iter().map(move |effect| (finding, effect)));
+    let rows = found.iter().flat_map(|finding| finding.effects.iter().map(move |effect| (finding, effect)));
     TableBuilder::new("readings", rows)
         .column(Text, "csv model", |(finding, _)| subject(finding))
         .column(Text, "csv finding", |(finding, _)| finding.claim.name())
-        .column(Text, "csv enhancer", |(finding, _)| {
-            finding.claim.enhancer().map(ToString::to_string)
-        })
-        .column(Text, "csv family", |(finding, _)| {
-            finding.claim.family().map(ToString::to_string)
-        })
-        .column(Text, "csv levels", |(finding, _)| {
-            level_names(&finding.levels, ";")
-        })
+        .column(Text, "csv enhancer", |(finding, _)| finding.claim.enhancer().map(ToString::to_string))
+        .column(Text, "csv family", |(finding, _)| finding.claim.family().map(ToString::to_string))
+        .column(Text, "csv levels", |(finding, _)| level_names(&finding.levels, ";"))
         .column(Text, "csv blind", |(finding, _)| finding.blind.clone())
-        .column(Text, "csv reading", |(_, effect)| {
-            effect.profile.to_string()
-        })
-        .column(Number, "csv effect low high n", |(_, reading)| {
-            reading.effect.map(|effect| effect.difference)
-        })
-        .column(P, "csv p", |(_, reading)| {
-            reading.effect.map(|effect| effect.p)
-        })
-        .column(P, "csv p_holm", |(_, reading)| {
-            reading.effect.map(|effect| effect.holm)
-        })
-        .column(Text, "csv verdict", |(_, reading)| {
-            reading
-                .effect
-                .map_or("not asked", |effect| effect.support.word())
-        })
+        .column(Text, "csv reading", |(_, effect)| effect.profile.to_string())
+        .column(Number, "csv effect low high n", |(_, reading)| reading.effect.map(|effect| effect.difference))
+        .column(P, "csv p", |(_, reading)| reading.effect.map(|effect| effect.p))
+        .column(P, "csv p_holm", |(_, reading)| reading.effect.map(|effect| effect.holm))
+        .column(Text, "csv verdict", |(_, reading)| reading.effect.map_or("not asked", |effect| effect.support.word()))
         .column(Text, "csv holds", |(finding, _)| finding.robustness.word())
         .column(Count, "csv dropped", |(finding, _)| finding.dropped)
         .build()
@@ -89,13 +67,8 @@ fn report_table(findings: &Findings<'_>, readings: &[&ProfileName]) -> Table {
         rows.push(Row::Thresholds(&same_model[0], curves));
     }
     let mut table = TableBuilder::new("readings", &rows)
-        .page(
-            "readings",
-            "Findings by noise profile, in percentage points [95 %]",
-        )
-        .column(Text, "terminal model | page model", |row| {
-            subject(row.finding())
-        })
+        .page("readings", "Findings by noise profile, in percentage points [95 %]")
+        .column(Text, "terminal model | page model", |row| subject(row.finding()))
         .column(Text, "terminal finding | page finding", |row| match row {
             Row::Finding(finding) => title(finding),
             Row::Thresholds(..) => "the break (threshold EV)".to_owned(),
@@ -128,7 +101,8 @@ fn report_table(findings: &Findings<'_>, readings: &[&ProfileName]) -> Table {
             Row::Thresholds(..) => TableCell::Blank,
         })
         .build();
-    let heading = "Does each finding hold under every noise profile? Effects in percentage points [95 %], on the same items";
+    let heading =
+        "Does each finding hold under every noise profile? Effects in percentage points [95 %], on the same items";
     table.heading = Some(heading.to_owned());
     table.notes = notes(found);
     table
@@ -151,10 +125,7 @@ fn noise_curves<'f>(findings: &'f Findings<'_>, finding: &FindingByProfile) -> V
 
 /// Threshold with its interval under one noise profile, in words.
 fn threshold(curves: &[&Curve], reading: &ProfileName) -> String {
-    let Some(curve) = curves
-        .iter()
-        .find(|curve| curve.variant.reading.as_ref() == Some(reading))
-    else {
+    let Some(curve) = curves.iter().find(|curve| curve.variant.reading.as_ref() == Some(reading)) else {
         return "not asked".to_owned();
     };
     let darkest = curve.summary.darkest.value();
@@ -162,10 +133,7 @@ fn threshold(curves: &[&Curve], reading: &ProfileName) -> String {
         |_| "not known".to_owned(),
         |threshold| {
             let value = stops(threshold.value, darkest);
-            format!(
-                "{value} [{}]",
-                reach(threshold.low, threshold.high, darkest)
-            )
+            format!("{value} [{}]", reach(threshold.low, threshold.high, darkest))
         },
     )
 }
@@ -190,11 +158,7 @@ fn effect(effect: Option<&TestedEffect>) -> String {
 
 /// Number of items that the effects are computed on.
 fn items(finding: &FindingByProfile) -> usize {
-    finding
-        .effects
-        .iter()
-        .find_map(|effect| Some(effect.effect?.difference.n))
-        .unwrap_or(0)
+    finding.effects.iter().find_map(|effect| Some(effect.effect?.difference.n)).unwrap_or(0)
 }
 
 fn level_names(levels: &[AxisLevel], separator: &str) -> String {
@@ -215,24 +179,15 @@ fn title(finding: &FindingByProfile) -> String {
     let levels = &finding.levels;
     match &finding.claim {
         NoiseHypothesis::NoiseCompounds(None) => {
-            format!(
-                "noise compounds the drop, {}: exposure drop − with noise",
-                span(levels, 5)
-            )
+            format!("noise compounds the drop, {}: exposure drop − with noise", span(levels, 5))
         }
         NoiseHypothesis::NoiseCompounds(Some(level)) => format!("· at {level}"),
         NoiseHypothesis::DarknessCosts => "darkness costs: L5 with noise − L0".to_owned(),
         NoiseHypothesis::EnhancerHarms(name) => {
-            format!(
-                "{name} harms where light is left, {}: enhanced − raw",
-                span(levels, 3)
-            )
+            format!("{name} harms where light is left, {}: enhanced − raw", span(levels, 3))
         }
         NoiseHypothesis::EnhancerHelps(name) => {
-            format!(
-                "{name} helps in the dark, {}: enhanced − raw",
-                span(levels, 2)
-            )
+            format!("{name} helps in the dark, {}: enhanced − raw", span(levels, 2))
         }
         NoiseHypothesis::BelowBlind(family, level) => {
             let other = finding.blind.as_ref();
@@ -273,16 +228,14 @@ fn profiles_with_support(finding: &FindingByProfile, support: Support) -> Vec<St
         .map(|(profile, effect)| match support {
             Support::Holds => profile.to_string(),
             Support::Opposite | Support::Open => {
-                format!(
-                    "{profile} ({} points)",
-                    ends_in_points(effect.difference).replace(", ", " to ")
-                )
+                format!("{profile} ({} points)", ends_in_points(effect.difference).replace(", ", " to "))
             }
         })
         .collect()
 }
 
-/// Finding under each noise profile, as in `Noise compounds the drop: holds under paper, eld; open under physical (−1.2 to +5.0 points).`
+/// Finding under each noise profile, as in `Noise compounds the drop: holds under paper, eld; open under physical (−1.2
+/// to +5.0 points).`
 fn sentence(finding: &FindingByProfile) -> String {
     let not_asked: Vec<String> = finding
         .effects
@@ -291,14 +244,8 @@ fn sentence(finding: &FindingByProfile) -> String {
         .map(|in_profile| in_profile.profile.to_string())
         .collect();
     let parts: Vec<String> = [
-        (
-            "holds under",
-            profiles_with_support(finding, Support::Holds),
-        ),
-        (
-            "the opposite under",
-            profiles_with_support(finding, Support::Opposite),
-        ),
+        ("holds under", profiles_with_support(finding, Support::Holds)),
+        ("the opposite under", profiles_with_support(finding, Support::Opposite)),
         ("open under", profiles_with_support(finding, Support::Open)),
         ("not asked under", not_asked),
     ]
@@ -312,26 +259,24 @@ fn sentence(finding: &FindingByProfile) -> String {
 /// One sentence for each finding that some noise profile decides, and a note on items left out.
 fn notes(found: &[FindingByProfile]) -> Vec<String> {
     let models: BTreeSet<String> = found.iter().map(subject).collect();
-    let mut notes: Vec<String> = found
-        .iter()
-        .filter(|finding| {
-            let is_detail = matches!(finding.claim, NoiseHypothesis::NoiseCompounds(Some(_)));
-            finding.robustness != Robustness::Open && !is_detail
-        })
-        .map(|finding| {
-            if models.len() > 1 {
-                format!("{}: {}", subject(finding), sentence(finding))
-            } else {
-                sentence(finding)
-            }
-        })
-        .collect();
+    let mut notes: Vec<String> =
+        found
+            .iter()
+            .filter(|finding| {
+                let is_detail = matches!(finding.claim, NoiseHypothesis::NoiseCompounds(Some(_)));
+                finding.robustness != Robustness::Open && !is_detail
+            })
+            .map(|finding| {
+                if models.len() > 1 {
+                    format!("{}: {}", subject(finding), sentence(finding))
+                } else {
+                    sentence(finding)
+                }
+            })
+            .collect();
     let dropped = found.iter().map(|finding| finding.dropped).max();
     if let Some(dropped) = dropped.filter(|dropped| *dropped > 0) {
-        notes.push(format!(
-            "left out because a side has no reply: up to {}",
-            counted(dropped, "item")
-        ));
+        notes.push(format!("left out because a side has no reply: up to {}", counted(dropped, "item")));
     }
     notes
 }
@@ -347,12 +292,7 @@ mod tests {
         EffectInProfile {
             profile: ProfileName::new(reading).unwrap(),
             effect: Some(TestedEffect {
-                difference: Estimate {
-                    value: f64::midpoint(low, high),
-                    low,
-                    high,
-                    n: 9,
-                },
+                difference: Estimate { value: f64::midpoint(low, high), low, high, n: 9 },
                 support,
                 p: 0.01,
                 holm: 0.02,
@@ -381,14 +321,10 @@ mod tests {
             sentence(&finding),
             "Noise compounds the drop: holds under paper, eld; open under physical (−1.2 to +5.0 points)."
         );
-        assert_eq!(
-            effect(finding.effects[2].effect.as_ref()),
-            "+1.9 [−1.2, +5.0] open"
-        );
+        assert_eq!(effect(finding.effects[2].effect.as_ref()), "+1.9 [−1.2, +5.0] open");
         finding.effects[1] = effect_in("eld", -0.4, -0.2, Support::Opposite);
         finding.effects[2].effect = None;
-        finding.claim =
-            NoiseHypothesis::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());
+        finding.claim = NoiseHypothesis::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());
         assert_eq!(
             sentence(&finding),
             "ruas harms at L5: holds under paper; the opposite under eld (−40.0 to −20.0 points); not asked under physical."

@@ -50,47 +50,30 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
             |row| row.overconfidence.estimate,
         );
     let ratio_columns: [(&str, ColumnValue); 6] = [
-        (
-            "csv ece ece_low ece_high | terminal calibration error | page calibration error [95 %]",
-            |row| row.error,
-        ),
-        (
-            "csv brier brier_low brier_high | page Brier score [95 %]",
-            |row| Some(row.brier),
-        ),
-        (
-            "csv brier_skill brier_skill_low brier_skill_high | terminal Brier skill | page Brier skill [95 %]",
-            |row| Some(row.skill),
-        ),
-        ("csv nll nll_low nll_high | page −ln p [95 %]", |row| {
-            Some(row.nll)
+        ("csv ece ece_low ece_high | terminal calibration error | page calibration error [95 %]", |row| row.error),
+        ("csv brier brier_low brier_high | page Brier score [95 %]", |row| Some(row.brier)),
+        ("csv brier_skill brier_skill_low brier_skill_high | terminal Brier skill | page Brier skill [95 %]", |row| {
+            Some(row.skill)
         }),
-        (
-            "csv auroc auroc_low auroc_high | terminal AUROC | page AUROC [95 %]",
-            |row| row.auroc.map(|Auc { estimate, .. }| estimate),
-        ),
-        (
-            "csv blind_shift blind_shift_low blind_shift_high | terminal blind shift | page blind shift [95 %]",
-            |row| row.blind_shift,
-        ),
+        ("csv nll nll_low nll_high | page −ln p [95 %]", |row| Some(row.nll)),
+        ("csv auroc auroc_low auroc_high | terminal AUROC | page AUROC [95 %]", |row| {
+            row.auroc.map(|Auc { estimate, .. }| estimate)
+        }),
+        ("csv blind_shift blind_shift_low blind_shift_high | terminal blind shift | page blind shift [95 %]", |row| {
+            row.blind_shift
+        }),
     ];
     for (heads, value) in ratio_columns {
         table = table.column(Ratio, heads, move |row| value(row));
     }
     let mut table = table
-        .column(Percent, "csv risk_100 | page risk in %", |row| {
-            row.risk.at_100
-        })
+        .column(Percent, "csv risk_100 | page risk in %", |row| row.risk.at_100)
         .column(Percent, "csv risk_80 | page at 80 %", |row| row.risk.at_80)
         .column(Percent, "csv risk_50 | page at 50 %", |row| row.risk.at_50)
-        .column(Number, "csv aurc | page area under risk", |row| {
-            row.risk.area
+        .column(Number, "csv aurc | page area under risk", |row| row.risk.area)
+        .column(Share, "csv over_orders over_orders_low over_orders_high | page over all orders in % [95 %]", |row| {
+            row.over_orders
         })
-        .column(
-            Share,
-            "csv over_orders over_orders_low over_orders_high | page over all orders in % [95 %]",
-            |row| row.over_orders,
-        )
         .build();
     table.heading = Some(format!(
         "Confidence (mean greatest probability of a choice) against accuracy in %, with 95 % intervals by {}",
@@ -103,10 +86,7 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
 fn condition(subject: &ModelInCondition) -> String {
     match subject.level {
         None => "without images".to_owned(),
-        Some(level) => format!(
-            "{level}, {}",
-            light(&subject.variant, subject.enhancer.as_ref())
-        ),
+        Some(level) => format!("{level}, {}", light(&subject.variant, subject.enhancer.as_ref())),
     }
 }
 
@@ -121,41 +101,24 @@ struct BinRow<'a> {
 /// Table of the bins of the reliability diagram.
 fn reliability(all: &[Calibration]) -> Table {
     let rows = all.iter().flat_map(|row| {
-        row.bins.iter().zip(1..).map(|(bin, number)| BinRow {
-            subject: &row.subject,
-            number,
-            bin: *bin,
-        })
+        row.bins.iter().zip(1..).map(|(bin, number)| BinRow { subject: &row.subject, number, bin: *bin })
     });
     TableBuilder::new("reliability", rows)
         .subject(|row: &BinRow<'_>| row.subject, ToString::to_string)
         .column(Count, "csv bin", |row| row.number)
         .column(Number, "csv confidence", |row| row.bin.confidence)
-        .column(Share, "csv accuracy accuracy_low accuracy_high n", |row| {
-            row.bin.accuracy
-        })
+        .column(Share, "csv accuracy accuracy_low accuracy_high n", |row| row.bin.accuracy)
         .build()
 }
 
 /// Table of probabilities by the position of a choice.
 fn positions(all: &[Calibration]) -> Table {
-    let rows = all
-        .iter()
-        .flat_map(|row| row.positions.iter().map(|share| (&row.subject, *share)));
+    let rows = all.iter().flat_map(|row| row.positions.iter().map(|share| (&row.subject, *share)));
     let mut table = TableBuilder::new("positions", rows)
         .page(CONFIDENCE, "Probability by the place of a choice")
-        .subject(
-            |row: &(&ModelInCondition, PositionShare)| row.0,
-            ToString::to_string,
-        )
-        .column(Text, "csv letter | page letter", |row| {
-            TableCell::from(letter(row.1.position).to_string())
-        })
-        .column(
-            Percent,
-            "csv probability | page mean probability in %",
-            |row| row.1.p,
-        )
+        .subject(|row: &(&ModelInCondition, PositionShare)| row.0, ToString::to_string)
+        .column(Text, "csv letter | page letter", |row| TableCell::from(letter(row.1.position).to_string()))
+        .column(Percent, "csv probability | page mean probability in %", |row| row.1.p)
         .column(Percent, "csv true | page true in %", |row| row.1.truth)
         .column(Count, "csv n | page n", |row| row.1.n)
         .build();

@@ -1,4 +1,5 @@
-//! Tables of paired differences and their tests. Each kind of comparison has a table over all families and one by family.
+//! Tables of paired differences and their tests. Each kind of comparison has a table over all families and one by
+//! family.
 
 use super::pooled::too_few_clusters;
 use super::sections::{ENHANCERS, REAL};
@@ -19,11 +20,7 @@ const MAX_ROWS: usize = 40;
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = tables_by_kind(&findings.comparisons, findings.unit, accuracy_titles);
     for kind in ComparisonKind::ALL {
-        let all: Vec<&Comparison> = findings
-            .comparisons
-            .iter()
-            .filter(|comparison| comparison.kind == kind)
-            .collect();
+        let all: Vec<&Comparison> = findings.comparisons.iter().filter(|comparison| comparison.kind == kind).collect();
         tables.push(table(kind, "", &all, ParsingMode::Lenient).in_files_only());
     }
     tables
@@ -37,15 +34,9 @@ pub(crate) fn agreement_comparisons(
 ) -> Vec<Table> {
     let mut tables = tables_by_kind(comparisons, unit, agreement_titles);
     for table in &mut tables {
-        let caption = format!(
-            "{}, paired by question, in percentage points.",
-            table.caption
-        );
+        let caption = format!("{}, paired by question, in percentage points.", table.caption);
         table.latex = table.latex.as_ref().map(|_| caption);
-        table.columns.push(Column {
-            kind: Text,
-            heads: "csv measure".into(),
-        });
+        table.columns.push(Column { kind: Text, heads: "csv measure".into() });
         for row in &mut table.rows {
             for cell in &mut row.cells {
                 // An answer that differs from the one at L0 is not necessarily worse.
@@ -77,15 +68,12 @@ fn tables_by_kind(
             .filter(|comparison| comparison.kind == kind)
             .partition(|comparison| comparison.family.is_none());
         let (caption, heading) = titles(kind);
-        let least_p_values = overall
-            .iter()
-            .map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
+        let least_p_values =
+            overall.iter().map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
         let clusters_note = too_few_clusters(least_p_values, &unit.to_string());
         let mut overall_table = table(kind, caption, &overall, ParsingMode::Strict);
-        overall_table.is_folded = !matches!(
-            kind,
-            ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced
-        );
+        overall_table.is_folded =
+            !matches!(kind, ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced);
         if !overall.is_empty() {
             overall_table.heading = heading.map(str::to_owned);
             if kind == ComparisonKind::Enhancer {
@@ -114,26 +102,15 @@ fn accuracy_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>)
             "Sensor noise less exposure drop alone",
             Some("Sensor noise against exposure drop alone, paired by question"),
         ),
-        ComparisonKind::Enhancer => (
-            "Enhanced less raw",
-            Some("Enhanced against raw, paired by question"),
-        ),
-        ComparisonKind::EnhancerPair => (
-            "One enhancer less another",
-            Some("One enhancer against another, paired by question"),
-        ),
-        ComparisonKind::Model => (
-            "Model less model",
-            Some("Model against model, paired by question"),
-        ),
-        ComparisonKind::Blind => (
-            "With images less without",
-            Some("With images against without, paired by question"),
-        ),
-        ComparisonKind::Light => (
-            "Light less light",
-            Some("One light against another, same model, paired by question"),
-        ),
+        ComparisonKind::Enhancer => ("Enhanced less raw", Some("Enhanced against raw, paired by question")),
+        ComparisonKind::EnhancerPair => {
+            ("One enhancer less another", Some("One enhancer against another, paired by question"))
+        }
+        ComparisonKind::Model => ("Model less model", Some("Model against model, paired by question")),
+        ComparisonKind::Blind => ("With images less without", Some("With images against without, paired by question")),
+        ComparisonKind::Light => {
+            ("Light less light", Some("One light against another, same model, paired by question"))
+        }
         ComparisonKind::RealSynthetic => (
             "Photographed in the dark less synthetic",
             Some("Photographed in the dark against synthetic, paired by question"),
@@ -158,19 +135,17 @@ fn agreement_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>
             "Agreement with sensor noise less exposure drop alone",
             Some("Agreement with sensor noise against exposure drop alone, paired by question"),
         ),
-        ComparisonKind::Enhancer => (
-            "Agreement of enhanced less raw",
-            Some("Agreement of enhanced against raw, paired by question"),
-        ),
+        ComparisonKind::Enhancer => {
+            ("Agreement of enhanced less raw", Some("Agreement of enhanced against raw, paired by question"))
+        }
         ComparisonKind::EnhancerPair => (
             "Agreement with one enhancer less another",
             Some("Agreement with one enhancer against another, paired by question"),
         ),
         ComparisonKind::Model => ("Model less model", None),
-        ComparisonKind::Blind => (
-            "Agreement with images less without",
-            Some("Agreement with images against without, paired by question"),
-        ),
+        ComparisonKind::Blind => {
+            ("Agreement with images less without", Some("Agreement with images against without, paired by question"))
+        }
         ComparisonKind::Light => (
             "Agreement in one light less another",
             Some("Agreement in one light against another, same model, paired by question"),
@@ -188,15 +163,10 @@ fn agreement_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>
 
 /// Note with the number of rows whose sides share too few items for a verdict; `None` if all share enough.
 fn too_few_items(comparisons: &[&Comparison]) -> Option<String> {
-    let count = comparisons
-        .iter()
-        .filter(|comparison| comparison.is_too_small())
-        .count();
+    let count = comparisons.iter().filter(|comparison| comparison.is_too_small()).count();
     (count > 0).then(|| {
         let rows = counted(count, "row");
-        format!(
-            "too few: fewer than {MIN_PAIRS} items are shared in {rows}, so no verdict is given"
-        )
+        format!("too few: fewer than {MIN_PAIRS} items are shared in {rows}, so no verdict is given")
     })
 }
 
@@ -208,9 +178,7 @@ fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &
     if kind == ComparisonKind::Blind {
         // The terminal compares blind models with raw images only. The file also has the enhanced images.
         shown.retain(|index| comparisons[*index].first.enhancer.is_none());
-        let all_are_better = shown
-            .iter()
-            .all(|index| comparisons[*index].verdict() == Some(Significance::Better));
+        let all_are_better = shown.iter().all(|index| comparisons[*index].verdict() == Some(Significance::Better));
         if !shown.is_empty() && all_are_better {
             let line = format!("better in all {} conditions", shown.len());
             table.notes.push(line);
@@ -230,27 +198,19 @@ fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &
     }
 }
 
-fn table(
-    kind: ComparisonKind,
-    caption: &str,
-    comparisons: &[&Comparison],
-    mode: ParsingMode,
-) -> Table {
+fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison], mode: ParsingMode) -> Table {
     let section = match kind {
         ComparisonKind::Enhancer | ComparisonKind::EnhancerPair => ENHANCERS,
         ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced => REAL,
         _ => "comparisons",
     };
-    let builder =
-        TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
+    let builder = TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
     let has_models_under_test = comparisons.iter().any(|one| !one.first.is_reference());
     let builder = number_columns(subject_columns(builder, kind, has_models_under_test), mode);
     builder
-        .column(
-            ColumnKind::Significance,
-            "csv verdict | terminal | page | latex",
-            |comparison| TableCell::verdict(comparison.verdict()),
-        )
+        .column(ColumnKind::Significance, "csv verdict | terminal | page | latex", |comparison| {
+            TableCell::verdict(comparison.verdict())
+        })
         .column(Text, "csv shown", |comparison| {
             let verdict = comparison.verdict();
             verdict.is_some_and(Significance::is_shown).to_string()
@@ -266,100 +226,56 @@ fn subject_columns(
 ) -> TableBuilder<&Comparison> {
     let builder = builder
         .column(Text, "csv kind", |comparison| comparison.kind.name())
-        .column(Text, "csv model", |comparison| {
-            comparison.first.model.clone()
-        })
+        .column(Text, "csv model", |comparison| comparison.first.model.clone())
         .column(Text, "latex Model", move |comparison| {
             let is_reference = comparison.first.is_reference() && has_models_under_test;
             marked_reference(comparison.first.model.clone(), is_reference)
         })
-        .column(Text, "csv condition | latex Condition", |comparison| {
-            comparison.first.condition()
-        })
-        .column(Text, "csv against_model", |comparison| {
-            comparison.second.model.clone()
-        })
-        .column(Text, "csv against_condition", |comparison| {
-            comparison.second.condition()
-        })
-        .column(Text, "terminal model | page model", |comparison| {
-            comparison.first.model.clone()
-        })
-        .column(Text, "terminal condition | page condition", |comparison| {
-            comparison.first.condition()
-        });
+        .column(Text, "csv condition | latex Condition", |comparison| comparison.first.condition())
+        .column(Text, "csv against_model", |comparison| comparison.second.model.clone())
+        .column(Text, "csv against_condition", |comparison| comparison.second.condition())
+        .column(Text, "terminal model | page model", |comparison| comparison.first.model.clone())
+        .column(Text, "terminal condition | page condition", |comparison| comparison.first.condition());
     let builder = match kind {
         ComparisonKind::EnhancerPair
         | ComparisonKind::Model
         | ComparisonKind::Blind
         | ComparisonKind::Light
         | ComparisonKind::RealSynthetic => {
-            builder.column(Text, "terminal less | page less", |comparison| {
-                second_side_label(comparison)
-            })
+            builder.column(Text, "terminal less | page less", |comparison| second_side_label(comparison))
         }
         // No column for the second side: the kind of comparison determines it.
-        ComparisonKind::Level
-        | ComparisonKind::Variant
-        | ComparisonKind::Enhancer
-        | ComparisonKind::RealEnhanced => builder,
+        ComparisonKind::Level | ComparisonKind::Variant | ComparisonKind::Enhancer | ComparisonKind::RealEnhanced => {
+            builder
+        }
     };
     builder.family(|comparison| comparison.family.as_ref())
 }
 
-fn number_columns(
-    builder: TableBuilder<&Comparison>,
-    mode: ParsingMode,
-) -> TableBuilder<&Comparison> {
+fn number_columns(builder: TableBuilder<&Comparison>, mode: ParsingMode) -> TableBuilder<&Comparison> {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";
     builder
-        .column(Count, "csv n | terminal n", |comparison| {
-            comparison.parsed(mode).paired.difference.n
-        })
-        .column(Number, "csv first", |comparison| {
-            comparison.parsed(mode).paired.first
-        })
-        .column(Percent, "csv second | latex Raw", |comparison| {
-            comparison.parsed(mode).paired.second
-        })
-        .column(Percent, "latex Enhanced", |comparison| {
-            comparison.parsed(mode).paired.first
-        })
-        .column(Points, difference, |comparison| {
-            comparison.parsed(mode).paired.difference
-        })
+        .column(Count, "csv n | terminal n", |comparison| comparison.parsed(mode).paired.difference.n)
+        .column(Number, "csv first", |comparison| comparison.parsed(mode).paired.first)
+        .column(Percent, "csv second | latex Raw", |comparison| comparison.parsed(mode).paired.second)
+        .column(Percent, "latex Enhanced", |comparison| comparison.parsed(mode).paired.first)
+        .column(Points, difference, |comparison| comparison.parsed(mode).paired.difference)
         .column(Count, "latex Rescued / harmed", |comparison| {
-            format!(
-                "{} / {}",
-                comparison.parsed(mode).paired.gained,
-                comparison.parsed(mode).paired.lost
-            )
+            format!("{} / {}", comparison.parsed(mode).paired.gained, comparison.parsed(mode).paired.lost)
         })
-        .column(
-            Count,
-            "csv only_first | terminal only first | page only first",
-            |comparison| comparison.parsed(mode).paired.gained,
-        )
-        .column(
-            Count,
-            "csv only_second | terminal only second | page only second",
-            |comparison| comparison.parsed(mode).paired.lost,
-        )
-        .column(Count, "page n", |comparison| {
-            comparison.parsed(mode).paired.difference.n
+        .column(Count, "csv only_first | terminal only first | page only first", |comparison| {
+            comparison.parsed(mode).paired.gained
         })
-        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| {
-            comparison.parsed(mode).paired.mcnemar
+        .column(Count, "csv only_second | terminal only second | page only second", |comparison| {
+            comparison.parsed(mode).paired.lost
         })
-        .column(P, "csv p | page p", |comparison| {
-            comparison.parsed(mode).paired.p
+        .column(Count, "page n", |comparison| comparison.parsed(mode).paired.difference.n)
+        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| comparison.parsed(mode).paired.mcnemar)
+        .column(P, "csv p | page p", |comparison| comparison.parsed(mode).paired.p)
+        .column(P, "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)", |comparison| {
+            comparison.parsed(mode).holm
         })
-        .column(
-            P,
-            "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)",
-            |comparison| comparison.parsed(mode).holm,
-        )
 }
 
 /// Model or condition of the second side, or both, without what the first side shares.
@@ -368,10 +284,7 @@ fn second_side_label(comparison: &Comparison) -> String {
     match (first.model != second.model, comparison.kind) {
         (true, ComparisonKind::Light) => name(second),
         (true, _) => second.model.clone(),
-        (false, ComparisonKind::EnhancerPair) => second
-            .enhancer
-            .as_ref()
-            .map_or_else(String::new, ToString::to_string),
+        (false, ComparisonKind::EnhancerPair) => second.enhancer.as_ref().map_or_else(String::new, ToString::to_string),
         (false, ComparisonKind::Light | ComparisonKind::RealSynthetic) => second.condition(),
         (false, _) => String::new(),
     }

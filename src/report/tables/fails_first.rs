@@ -1,5 +1,6 @@
-//! Tables of the levels at which question families lose, and of the frames that keep the fewest right answers, under each noise profile:
-//! [`fails_first`]. Both are lists, not findings: no test compares one family or frame with another.
+//! Tables of the levels at which question families lose, and of the frames that keep the fewest right answers, under
+//! each noise profile: [`fails_first`]. Both are lists, not findings: no test compares one family or frame with
+//! another.
 
 use std::collections::BTreeMap;
 
@@ -23,15 +24,11 @@ pub(super) fn fails_first(findings: &Findings<'_>) -> [Table; 2] {
     [families(findings), frames(findings)]
 }
 
-/// A row for each family and a column for each variant. The rows are in the order of families, because a family with more questions reaches
-/// a small p at a lighter level.
+/// A row for each family and a column for each variant. The rows are in the order of families, because a family with
+/// more questions reaches a small p at a lighter level.
 fn families(findings: &Findings<'_>) -> Table {
-    let variants: Vec<(&Variant, BTreeMap<&Family, &PooledFinding>)> = findings
-        .grid
-        .variants()
-        .into_iter()
-        .map(|variant| (variant, first_losses(findings, variant)))
-        .collect();
+    let variants: Vec<(&Variant, BTreeMap<&Family, &PooledFinding>)> =
+        findings.grid.variants().into_iter().map(|variant| (variant, first_losses(findings, variant))).collect();
     let mut families: Vec<&Family> = findings.grid.groups().into_iter().flatten().collect();
     if families.len() < 2 {
         families.clear();
@@ -41,23 +38,16 @@ fn families(findings: &Findings<'_>) -> Table {
             "families",
             "First level with a loss from L0 in each family, in points: a list, no comparison of families",
         )
-        .column(Text, "terminal family | page family", |family| {
-            family_name(Some(family)).to_owned()
-        });
+        .column(Text, "terminal family | page family", |family| family_name(Some(family)).to_owned());
     for (variant, losses) in variants {
         let name = light(variant, None);
-        let heads = ColumnHeads {
-            terminal: vec![name.clone()],
-            page: Some(name),
-            ..ColumnHeads::default()
-        };
+        let heads = ColumnHeads { terminal: vec![name.clone()], page: Some(name), ..ColumnHeads::default() };
         builder = builder.column(Text, heads, move |family| {
             losses.get(family).map_or_else(
                 || "no level".to_owned(),
                 |loss| {
                     let difference = loss.strict.difference;
-                    let [value, low, high] =
-                        [difference.value, difference.low, difference.high].map(points);
+                    let [value, low, high] = [difference.value, difference.low, difference.high].map(points);
                     format!("{}: {value} [{low}, {high}]", loss.level)
                 },
             )
@@ -75,12 +65,9 @@ fn families(findings: &Findings<'_>) -> Table {
     table
 }
 
-/// Loss of each family at the first level where a loss is detected in a variant. One correction (Holm) covers the tests of all families and
-/// levels of the variant, so that the many tests do not make a family fail by chance.
-fn first_losses<'f>(
-    findings: &'f Findings<'_>,
-    variant: &Variant,
-) -> BTreeMap<&'f Family, &'f PooledFinding> {
+/// Loss of each family at the first level where a loss is detected in a variant. One correction (Holm) covers the tests
+/// of all families and levels of the variant, so that the many tests do not make a family fail by chance.
+fn first_losses<'f>(findings: &'f Findings<'_>, variant: &Variant) -> BTreeMap<&'f Family, &'f PooledFinding> {
     let tested: Vec<(&Family, &PooledFinding)> = findings
         .pooled
         .iter()
@@ -118,10 +105,7 @@ impl FrameAnswers {
 
     /// First level at which at most half of the right answers are still right.
     fn half_lost_level(&self) -> Option<AxisLevel> {
-        self.kept
-            .iter()
-            .find(|(_, kept)| 2 * **kept <= self.right)
-            .map(|(level, _)| *level)
+        self.kept.iter().find(|(_, kept)| 2 * **kept <= self.right).map(|(level, _)| *level)
     }
 }
 
@@ -134,37 +118,20 @@ struct FrameRow<'f> {
 
 /// Frames that keep the fewest right answers in each variant of raw images.
 fn frames(findings: &Findings<'_>) -> Table {
-    let rows = findings
-        .grid
-        .variants()
-        .into_iter()
-        .flat_map(|variant| frame_rows(findings, variant));
+    let rows = findings.grid.variants().into_iter().flat_map(|variant| frame_rows(findings, variant));
     let mut table = TableBuilder::new("frames_first", rows)
-        .page(
-            "accuracy",
-            "Frames with the fewest right answers of L0 kept in the dark: a list, not a finding",
-        )
+        .page("accuracy", "Frames with the fewest right answers of L0 kept in the dark: a list, not a finding")
         .group(|row| Some(light(row.variant, None)))
-        .column(Text, "terminal frame | page frame", |row| {
-            row.frame.to_string()
-        })
-        .column(Count, "terminal right at L0 | page right at L0", |row| {
-            row.answers.right
-        })
-        .column(
-            Percent,
-            "terminal kept % | page kept in the dark, %",
-            |row| row.answers.kept_share(),
-        )
+        .column(Text, "terminal frame | page frame", |row| row.frame.to_string())
+        .column(Count, "terminal right at L0 | page right at L0", |row| row.answers.right)
+        .column(Percent, "terminal kept % | page kept in the dark, %", |row| row.answers.kept_share())
         .column(Text, "terminal half lost at | page half lost at", |row| {
             row.answers.half_lost_level().map(|level| level.to_string())
         })
         .build();
     if !table.rows.is_empty() {
         table.heading = Some("Frames with the fewest right answers kept in the dark".to_owned());
-        table.foot = Some(
-            "a list, not a finding: of many frames, some keep few answers by chance".to_owned(),
-        );
+        table.foot = Some("a list, not a finding: of many frames, some keep few answers by chance".to_owned());
     }
     table
 }
@@ -174,11 +141,7 @@ fn frame_rows<'f>(findings: &'f Findings<'_>, variant: &'f Variant) -> Vec<Frame
     let mut rows: Vec<FrameRow<'_>> = answers(findings, variant)
         .into_iter()
         .filter(|(_, answers)| answers.right >= MIN_RIGHT && answers.half_lost_level().is_some())
-        .map(|(frame, answers)| FrameRow {
-            variant,
-            frame,
-            answers,
-        })
+        .map(|(frame, answers)| FrameRow { variant, frame, answers })
         .collect();
     rows.sort_by(|one, other| {
         let (one, other) = (one.answers.kept_share(), other.answers.kept_share());
@@ -189,18 +152,13 @@ fn frame_rows<'f>(findings: &'f Findings<'_>, variant: &'f Variant) -> Vec<Frame
 }
 
 /// Counts the answers of the pooled models for each frame.
-fn answers<'f>(
-    findings: &'f Findings<'_>,
-    variant: &Variant,
-) -> BTreeMap<&'f FrameId, FrameAnswers> {
+fn answers<'f>(findings: &'f Findings<'_>, variant: &Variant) -> BTreeMap<&'f FrameId, FrameAnswers> {
     let grid = &findings.grid;
     let models = findings.models_of(variant);
     let mut by_frame: BTreeMap<&FrameId, FrameAnswers> = BTreeMap::new();
     for failure in &findings.first_failures {
         let curve = &failure.curve;
-        let is_pooled = curve.variant == *variant
-            && curve.enhancer.is_none()
-            && models.contains(&&*curve.model);
+        let is_pooled = curve.variant == *variant && curve.enhancer.is_none() && models.contains(&&*curve.model);
         let [(_, clean), dark @ ..] = &curve.subjects[..] else {
             continue;
         };

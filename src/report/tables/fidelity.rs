@@ -19,48 +19,25 @@ pub(super) fn fidelity(findings: Option<&FidelityFindings>) -> Option<Table> {
     let mut table = TableBuilder::new("fidelity", &findings.conditions)
         .page("fidelity", caption)
         .column(Text, "csv condition", |row| condition(row))
-        .column(Text, "csv level | terminal level | page level", |row| {
-            row.level.to_string()
-        })
+        .column(Text, "csv level | terminal level | page level", |row| row.level.to_string())
         .column(Text, "csv variant", |row| row.variant.to_string())
-        .column(Text, "csv enhancer", |row| {
-            TableCell::from(row.enhancer.as_ref().map(ToString::to_string))
-        })
-        .column(Text, "terminal light | page light", |row| {
-            light(&row.variant, row.enhancer.as_ref())
-        })
+        .column(Text, "csv enhancer", |row| TableCell::from(row.enhancer.as_ref().map(ToString::to_string)))
+        .column(Text, "terminal light | page light", |row| light(&row.variant, row.enhancer.as_ref()))
         .column(Count, "csv images | page images", |row| row.images)
-        .column(
-            Number,
-            "csv psnr | terminal PSNR in dB | page PSNR in dB",
-            |row| row.means[0],
-        )
-        .column(Number, "csv ssim | terminal SSIM | page SSIM", |row| {
-            row.means[1]
-        })
+        .column(Number, "csv psnr | terminal PSNR in dB | page PSNR in dB", |row| row.means[0])
+        .column(Number, "csv ssim | terminal SSIM | page SSIM", |row| row.means[1])
         .column(Count, "csv n", |row| row.replies)
-        .column(
-            Percent,
-            "csv accuracy | terminal right in % | page right in %",
-            |row| row.accuracy,
-        )
+        .column(Percent, "csv accuracy | terminal right in % | page right in %", |row| row.accuracy)
         .column(Count, "page n", |row| row.replies);
     for (index, (csv, name)) in MEASURES.into_iter().enumerate() {
-        let heads = format!(
-            "csv {csv}_auc {csv}_auc_low {csv}_auc_high | terminal AUC of {name} | page AUC of {name} [95 %]"
-        );
+        let heads =
+            format!("csv {csv}_auc {csv}_auc_low {csv}_auc_high | terminal AUC of {name} | page AUC of {name} [95 %]");
         table = table
-            .column(Ratio, &*heads, move |row| {
-                row.predicts[index].map(|prediction| prediction.auc.estimate)
-            })
-            .column(P, &*format!("csv {csv}_p"), move |row| {
-                row.predicts[index].map(|prediction| prediction.auc.p)
-            })
-            .column(
-                P,
-                &*format!("csv {csv}_p_holm | page p (Holm)"),
-                move |row| row.predicts[index].map(|prediction| prediction.holm),
-            );
+            .column(Ratio, &*heads, move |row| row.predicts[index].map(|prediction| prediction.auc.estimate))
+            .column(P, &*format!("csv {csv}_p"), move |row| row.predicts[index].map(|prediction| prediction.auc.p))
+            .column(P, &*format!("csv {csv}_p_holm | page p (Holm)"), move |row| {
+                row.predicts[index].map(|prediction| prediction.holm)
+            });
     }
     let mut table = table.build();
     table.is_folded = true;
@@ -86,11 +63,7 @@ pub(crate) fn notes(findings: &FidelityFindings) -> Vec<String> {
     let is_detected = findings.p_report.is_some_and(|p| p < ALPHA);
     for (index, (_, name)) in MEASURES.into_iter().enumerate() {
         // The sentences test PSNR alone.
-        notes.push(within_note(
-            name,
-            findings.within[index],
-            is_detected && index == 0,
-        ));
+        notes.push(within_note(name, findings.within[index], is_detected && index == 0));
         if let Some(correlation) = findings.between[index] {
             let correlation = format!("{correlation:+.2}").replace('-', "−");
             notes.push(format!(
@@ -109,10 +82,7 @@ fn within_note(name: &str, auc: Option<Auc>, is_detected: bool) -> String {
             "within conditions, too few right or wrong answers or clusters to know whether {name} tells them apart"
         );
     };
-    let numbers = format!(
-        "AUC {:.2} [{:.2}, {:.2}]",
-        estimate.value, estimate.low, estimate.high
-    );
+    let numbers = format!("AUC {:.2} [{:.2}, {:.2}]", estimate.value, estimate.low, estimate.high);
     if is_detected && estimate.value > 0.5 {
         format!("within conditions, {name} tells right from wrong answers: {numbers}")
     } else if is_detected {

@@ -1,4 +1,5 @@
-//! File of first failing levels, with a row for each item and curve: [`write_flips`]. The table can be large, so it is written in parts.
+//! File of first failing levels, with a row for each item and curve: [`write_flips`]. The table can be large, so it is
+//! written in parts.
 
 use std::io::Write;
 use std::ops::Range;
@@ -23,9 +24,7 @@ const PART_ROWS: usize = 4096;
 pub(crate) fn write_flips(findings: &Findings<'_>, out: &mut dyn Write) -> Result<()> {
     let items = findings.grid.items.len();
     let parts = findings.first_failures.iter().flat_map(|failure| {
-        (0..items)
-            .step_by(PART_ROWS)
-            .map(move |start| part(findings, failure, start..items.min(start + PART_ROWS)))
+        (0..items).step_by(PART_ROWS).map(move |start| part(findings, failure, start..items.min(start + PART_ROWS)))
     });
     csv::write(out, parts)
 }
@@ -36,15 +35,11 @@ fn part(findings: &Findings<'_>, failure: &FirstFailure, items: Range<usize>) ->
     let rows = items.map(|item| (grid.items[item].asked, failure.first(grid, item)));
     let curve = &failure.curve;
     TableBuilder::new("flips", rows)
-        .column(Text, "csv question", |(asked, _)| {
-            asked.question.to_string()
-        })
+        .column(Text, "csv question", |(asked, _)| asked.question.to_string())
         .column(Text, "csv frame", |(asked, _)| asked.frame.to_string())
         .family(|(asked, _)| Some(&*asked.family))
         .column(Count, "csv repeat", |(asked, _)| asked.repeat as usize)
         .curve(|_| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
-        .column(Text, "csv first_failing", |(_, first)| {
-            first.map(|level| level.to_string())
-        })
+        .column(Text, "csv first_failing", |(_, first)| first.map(|level| level.to_string()))
         .build()
 }

@@ -49,12 +49,8 @@ pub(crate) fn health(health: &[Health]) -> Table {
         .column(Count, "csv replies | page replies", |health| health.replies)
         .column(Count, "csv read", |health| health.read)
         .column(Count, "csv lenient_only", |health| health.lenient_only)
-        .column(Count, "page read", |health| {
-            count_with_share(health, health.read)
-        })
-        .column(Count, "page lenient alone", |health| {
-            count_with_share(health, health.lenient_only)
-        })
+        .column(Count, "page read", |health| count_with_share(health, health.read))
+        .column(Count, "page lenient alone", |health| count_with_share(health, health.lenient_only))
         .column(Count, "page other form", |health| {
             // An imported record may have both a choice and a reason.
             (health.replies - health.read).saturating_sub(health.unread_for(&OTHER))
@@ -62,22 +58,15 @@ pub(crate) fn health(health: &[Health]) -> Table {
         .column(Count, "page refused or filtered", |health| {
             health.unread_for(&[UnreadReason::Refused, UnreadReason::Filtered])
         })
-        .column(Count, "page truncated", |health| {
-            health.unread_for(&[UnreadReason::Truncated])
-        })
-        .column(Count, "page empty", |health| {
-            health.unread_for(&[UnreadReason::Empty])
-        })
+        .column(Count, "page truncated", |health| health.unread_for(&[UnreadReason::Truncated]))
+        .column(Count, "page empty", |health| health.unread_for(&[UnreadReason::Empty]))
         .column(Failures, "page failed", |health| health.failures());
     for (reason, name) in UnreadReason::ALL.into_iter().zip(UNREAD) {
-        builder = builder.column(Count, &*format!("csv {name}"), |health| {
-            health.unread_for(&[reason])
-        });
+        builder = builder.column(Count, &*format!("csv {name}"), |health| health.unread_for(&[reason]));
     }
     for (kind, name) in FailureKind::ALL.into_iter().zip(FAILED) {
-        builder = builder.column(Count, &*format!("csv {name}"), |health| {
-            health.failed.get(&kind).copied().unwrap_or(0)
-        });
+        builder =
+            builder.column(Count, &*format!("csv {name}"), |health| health.failed.get(&kind).copied().unwrap_or(0));
     }
     builder.build()
 }

@@ -16,10 +16,8 @@ use darkqa_score::findings::Findings;
 pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = summary_tables(findings, &findings.summary, "");
     if let Some(common) = &findings.common {
-        let items = format!(
-            " on the {} that all models with images answered",
-            counted(common.shared_questions, "question")
-        );
+        let items =
+            format!(" on the {} that all models with images answered", counted(common.shared_questions, "question"));
         for mut table in summary_tables(findings, &common.summary, &items) {
             table.latex = Some(format!("Accuracy in \\%{items}."));
             tables.push(table);
@@ -64,21 +62,13 @@ fn axis_table(
         .column(Count, "terminal n", |line| replies(line))
         .column(Count, "terminal unparsed", |line| {
             let strict = line.sum(|cell| cell.unparsed).to_string();
-            let lenient = line
-                .sum(|cell| lenient_cell(summary, cell).map_or(0, |cell| cell.unparsed))
-                .to_string();
+            let lenient = line.sum(|cell| lenient_cell(summary, cell).map_or(0, |cell| cell.unparsed)).to_string();
             format!("{strict}{}", differing(&strict, &lenient))
         })
-        .column(Count, "terminal failed", |line| {
-            line.sum(|cell| cell.failed)
-        })
+        .column(Count, "terminal failed", |line| line.sum(|cell| cell.failed))
         .build();
     add_detail_rows(&mut table, ladder);
-    let of = if axis == Axis::LIGHT {
-        String::new()
-    } else {
-        format!(" by {} of {}", axis.title, axis.cause)
-    };
+    let of = if axis == Axis::LIGHT { String::new() } else { format!(" by {} of {}", axis.title, axis.cause) };
     table.heading = Some(if items.is_empty() {
         format!(
             "Accuracy in %{of}: strict (lenient where it differs); n replies at each level; 95 %: how far the widest interval reaches down and up"
@@ -95,15 +85,8 @@ fn axis_table(
 }
 
 /// Result of lenient parsing for the subject and family of a strict result.
-fn lenient_cell<'a>(
-    summary: &'a AccuracySummary,
-    strict: &AccuracyCell,
-) -> Option<&'a AccuracyCell> {
-    summary.cell(
-        &strict.subject,
-        strict.family.as_ref(),
-        ParsingMode::Lenient,
-    )
+fn lenient_cell<'a>(summary: &'a AccuracySummary, strict: &AccuracyCell) -> Option<&'a AccuracyCell> {
+    summary.cell(&strict.subject, strict.family.as_ref(), ParsingMode::Lenient)
 }
 
 /// Table cell of an accuracy by strict parsing, with lenient parsing where it was computed.
@@ -143,8 +126,9 @@ fn range_of_missing(cell: &AccuracyCell) -> Option<String> {
 /// Name of a detail of accuracies, and its text for an accuracy.
 type DetailRow = (&'static str, fn(&AccuracyCell) -> Option<String>);
 
-/// Adds rows below each series, where they have a value: the share of questions that was right every time, the range of accuracies that
-/// the missing replies allow, and the accuracy with all true answers weighted alike. Only the terminal has these rows.
+/// Adds rows below each series, where they have a value: the share of questions that was right every time, the range of
+/// accuracies that the missing replies allow, and the accuracy with all true answers weighted alike. Only the terminal
+/// has these rows.
 fn add_detail_rows(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
     let details: [DetailRow; 3] = [
         ("  balanced", |cell| cell.balanced.map(percent)),
@@ -159,18 +143,11 @@ fn add_detail_rows(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
             if cells.values().all(|cell| value(cell).is_none()) {
                 continue;
             }
-            let values = ladder.levels.iter().map(|level| {
-                match cells.get(level).and_then(|cell| value(cell)) {
-                    Some(value) => TableCell::Text(value),
-                    None => TableCell::Blank,
-                }
+            let values = ladder.levels.iter().map(|level| match cells.get(level).and_then(|cell| value(cell)) {
+                Some(value) => TableCell::Text(value),
+                None => TableCell::Blank,
             });
-            let names = [
-                TableCell::Blank,
-                name.into(),
-                TableCell::Blank,
-                TableCell::Blank,
-            ];
+            let names = [TableCell::Blank, name.into(), TableCell::Blank, TableCell::Blank];
             let row = TableRow {
                 cells: names.into_iter().chain(values).collect(),
                 group: table.rows[index].group.clone(),
@@ -184,15 +161,9 @@ fn add_detail_rows(table: &mut Table, ladder: &Ladder<'_, AccuracyCell>) {
 
 /// Notes below the table: models without images, chance, and reasons for unreadable replies.
 fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<String> {
-    let (chance, blind): (Vec<&AccuracyCell>, Vec<&AccuracyCell>) = ladder
-        .without_level
-        .iter()
-        .map(|(_, cell)| *cell)
-        .partition(|cell| cell.subject.view.is_none());
-    let mut notes: Vec<String> = blind
-        .into_iter()
-        .map(|cell| note_without_images(summary, cell))
-        .collect();
+    let (chance, blind): (Vec<&AccuracyCell>, Vec<&AccuracyCell>) =
+        ladder.without_level.iter().map(|(_, cell)| *cell).partition(|cell| cell.subject.view.is_none());
+    let mut notes: Vec<String> = blind.into_iter().map(|cell| note_without_images(summary, cell)).collect();
     let mut all = summary.family_cells(None, ParsingMode::Strict);
     let (unit, units) = if all.any(|cell| cell.always.is_some()) {
         ("order of choices", "orders of choices")
@@ -206,10 +177,7 @@ fn notes(summary: &AccuracySummary, ladder: &Ladder<'_, AccuracyCell>) -> Vec<St
     }));
     notes.extend(summary.chance_of_questions.map(|once| {
         let share = 100.0 * once.value;
-        format!(
-            "chance with each question once, as the paper counts: {share:.2} over {}",
-            counted(once.n, "question")
-        )
+        format!("chance with each question once, as the paper counts: {share:.2} over {}", counted(once.n, "question"))
     }));
     notes.extend(unread_note(summary));
     notes
@@ -221,8 +189,7 @@ fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String
     let accuracy = text + &interval.unwrap_or_default();
     let always = always_right(cell).map(|share| format!(", right every time {share}"));
     let unparsed = cell.unparsed.to_string();
-    let lenient =
-        lenient_cell(summary, cell).map(|cell| differing(&unparsed, &cell.unparsed.to_string()));
+    let lenient = lenient_cell(summary, cell).map(|cell| differing(&unparsed, &cell.unparsed.to_string()));
     format!(
         "{} without images: {accuracy}, n {}{}, unparsed {unparsed}{}, failed {}",
         cell.subject.model,
@@ -236,10 +203,7 @@ fn note_without_images(summary: &AccuracySummary, cell: &AccuracyCell) -> String
 /// Note with the number of unreadable replies by reason, for reasons that do not concern the form of the answer.
 pub(crate) fn unread_note(summary: &AccuracySummary) -> Option<String> {
     let reasons = [
-        (
-            UnreadReason::Truncated,
-            "cut at the token limit (--max-tokens)",
-        ),
+        (UnreadReason::Truncated, "cut at the token limit (--max-tokens)"),
         (UnreadReason::Refused, "refused"),
         (UnreadReason::Filtered, "withheld by a filter"),
         (UnreadReason::Empty, "empty"),
@@ -251,15 +215,10 @@ pub(crate) fn unread_note(summary: &AccuracySummary) -> Option<String> {
             Some(format!("{count} {what}"))
         })
         .collect();
-    let unparsed =
-        (!counts.is_empty()).then(|| format!("of the unparsed replies {}", counts.join(", ")));
+    let unparsed = (!counts.is_empty()).then(|| format!("of the unparsed replies {}", counts.join(", ")));
     let cannot_tell = summary.unread.get(&UnreadReason::CannotTell);
     let people = cannot_tell.map(|count| {
-        let answers = if *count == 1 {
-            "answer of people is"
-        } else {
-            "answers of people are"
-        };
+        let answers = if *count == 1 { "answer of people is" } else { "answers of people are" };
         format!("{count} {answers} “I cannot tell”, which counts as wrong and not as unparsed")
     });
     let parts: Vec<String> = unparsed.into_iter().chain(people).collect();

@@ -95,12 +95,8 @@ impl<T> TableBuilder<T> {
         variant: impl Fn(&Variant) -> String,
     ) -> Self {
         self.column(Text, "csv model", |row| subject(row).model.clone())
-            .column(Text, "csv view", |row| {
-                TableCell::from(subject(row).view.map(|view| view.to_string()))
-            })
-            .column(Text, "csv level", |row| {
-                TableCell::from(subject(row).level.map(|level| level.to_string()))
-            })
+            .column(Text, "csv view", |row| TableCell::from(subject(row).view.map(|view| view.to_string())))
+            .column(Text, "csv level", |row| TableCell::from(subject(row).level.map(|level| level.to_string())))
             .column(Text, "csv variant", |row| variant(&subject(row).variant))
             .column(Text, "csv enhancer", |row| {
                 TableCell::from(subject(row).enhancer.as_ref().map(ToString::to_string))
@@ -108,12 +104,9 @@ impl<T> TableBuilder<T> {
             .column(Text, "page subject", |row| name(subject(row)))
     }
 
-    /// Adds columns for the models' group, in files if any model has one, and for the facts that the user gave about models.
-    pub(crate) fn model_facts(
-        mut self,
-        listing: &ModelListing,
-        subject: impl Fn(&T) -> &ModelInCondition,
-    ) -> Self {
+    /// Adds columns for the models' group, in files if any model has one, and for the facts that the user gave about
+    /// models.
+    pub(crate) fn model_facts(mut self, listing: &ModelListing, subject: impl Fn(&T) -> &ModelInCondition) -> Self {
         if listing.has_groups() {
             self = self.column(Text, "csv model_group", |row| {
                 TableCell::from(listing.group(&subject(row).model).map(str::to_owned))
@@ -123,11 +116,7 @@ impl<T> TableBuilder<T> {
             let head = format!("csv {}", column.word());
             self = self.column(Text, &*head, |row| {
                 let fact = listing.cell(*column, &subject(row).model);
-                TableCell::from(
-                    Some(fact)
-                        .filter(|fact| !fact.is_empty())
-                        .map(str::to_owned),
-                )
+                TableCell::from(Some(fact).filter(|fact| !fact.is_empty()).map(str::to_owned))
             });
         }
         self
@@ -135,24 +124,17 @@ impl<T> TableBuilder<T> {
 
     /// Adds columns for the model, variant and enhancer of a row's curve.
     fn curve(self, curve: impl Fn(&T) -> (&str, &Variant, Option<&EnhancerName>)) -> Self {
-        self.column(Text, "csv model | terminal model | page model", |row| {
-            curve(row).0.to_owned()
-        })
-        .column(Text, "csv variant", |row| curve(row).1.to_string())
-        .column(Text, "csv enhancer", |row| {
-            curve(row).2.map(ToString::to_string)
-        })
+        self.column(Text, "csv model | terminal model | page model", |row| curve(row).0.to_owned())
+            .column(Text, "csv variant", |row| curve(row).1.to_string())
+            .column(Text, "csv enhancer", |row| curve(row).2.map(ToString::to_string))
     }
 
     /// Adds columns for the family of a row; no family stands for all families together.
     pub(crate) fn family(self, row_family: impl Fn(&T) -> Option<&Family>) -> Self {
-        self.column(Text, "csv family", |row| {
-            row_family(row)
-                .map_or(Family::TOTAL, Family::name)
-                .to_owned()
-        })
-        .column(Text, "page family", |row| {
-            family(row_family(row)).to_owned()
-        })
+        self.column(Text, "csv family", |row| row_family(row).map_or(Family::TOTAL, Family::name).to_owned()).column(
+            Text,
+            "page family",
+            |row| family(row_family(row)).to_owned(),
+        )
     }
 }

@@ -15,8 +15,7 @@ const HEADING: &str = "Known-signal observer (given the untouched frame; not a m
 const MIN_ALIKE: f64 = 0.5;
 
 /// Formats for readers, as opposed to CSV files.
-const READER_FORMATS: [TableFormat; 3] =
-    [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex];
+const READER_FORMATS: [TableFormat; 3] = [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex];
 
 pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
     let observer = &findings.observer;
@@ -24,14 +23,11 @@ pub(super) fn observer(findings: &Findings<'_>) -> Vec<Table> {
         return Vec::new();
     }
     let mut table = conditions(observer);
-    table.heading = Some(format!(
-        "{HEADING}: expected score in % with its 95 % interval, a guess among k choices counts 1/k"
-    ));
+    table.heading =
+        Some(format!("{HEADING}: expected score in % with its 95 % interval, a guess among k choices counts 1/k"));
     if !observer.is_hidden() && observer.is_asked() {
-        let control = observer
-            .standing_controls()
-            .first()
-            .map(|control| format!(" Control: {}.", control_text(control)));
+        let control =
+            observer.standing_controls().first().map(|control| format!(" Control: {}.", control_text(control)));
         table.latex = Some(format!(
             "{HEADING}: expected score in \\% with its 95\\,\\% interval. A guess among $k$ choices counts $1/k$.{}",
             control.unwrap_or_default()
@@ -55,42 +51,30 @@ fn conditions(observer: &ObserverSummary) -> Table {
         .page("observer", HEADING)
         .column(Text, "csv model", |cell| cell.subject.model.clone())
         .column(Text, "csv condition", |cell| cell.subject.condition())
-        .column(
-            Text,
-            "terminal condition | page condition | latex Condition",
-            |cell| {
-                // If several runs are compared, each may have its own observer.
-                let run = cell.subject.model.strip_prefix(OBSERVER).unwrap_or_default();
-                cell.subject.condition() + run
-            },
-        )
+        .column(Text, "terminal condition | page condition | latex Condition", |cell| {
+            // If several runs are compared, each may have its own observer.
+            let run = cell.subject.model.strip_prefix(OBSERVER).unwrap_or_default();
+            cell.subject.condition() + run
+        })
         .column(
             Share,
             "csv score low high | terminal expected score | page expected score in % [95 %] | latex Expected score",
             |cell| cell.score,
         )
-        .column(Percent, "csv chance | terminal chance | page chance in % | latex Chance", |cell| {
-            cell.chance
+        .column(Percent, "csv chance | terminal chance | page chance in % | latex Chance", |cell| cell.chance)
+        .column(Share, "terminal control | page control in % [95 %] | latex Control", |cell| {
+            observer.control_of(cell).map(|control| control.score)
         })
-        .column(
-            Share,
-            "terminal control | page control in % [95 %] | latex Control",
-            |cell| observer.control_of(cell).map(|control| control.score),
-        )
         .column(
             Percent,
             "csv from_evidence | terminal from evidence | page answers from evidence in % | latex From evidence",
             |cell| cell.evidence,
         )
-        .column(
-            Percent,
-            "csv things_seen | terminal things seen | page things seen in % | latex Things seen",
-            |cell| cell.seen,
-        )
-        .column(Percent, "csv things_detected | page detected in %", |cell| cell.detected)
-        .column(Percent, "csv r2 | terminal R² | page R² in % | latex $R^2$", |cell| {
-            cell.explained
+        .column(Percent, "csv things_seen | terminal things seen | page things seen in % | latex Things seen", |cell| {
+            cell.seen
         })
+        .column(Percent, "csv things_detected | page detected in %", |cell| cell.detected)
+        .column(Percent, "csv r2 | terminal R² | page R² in % | latex $R^2$", |cell| cell.explained)
         .column(Count, "csv n | terminal n | page n | latex $n$", |cell| cell.score.n)
         .build()
 }
@@ -99,27 +83,11 @@ fn conditions(observer: &ObserverSummary) -> Table {
 fn controls(observer: &ObserverSummary) -> Table {
     let mut table = TableBuilder::new("observer", &observer.controls)
         .page("observer", "Controls of the observer, over all conditions")
-        .column(Text, "terminal control | page control", |cell| {
-            cell.subject.model.clone()
-        })
-        .column(
-            Share,
-            "terminal expected score | page expected score in % [95 %]",
-            |cell| cell.score,
-        )
-        .column(Percent, "terminal chance | page chance in %", |cell| {
-            cell.chance
-        })
-        .column(
-            Percent,
-            "terminal from evidence | page answers from evidence in %",
-            |cell| cell.evidence,
-        )
-        .column(
-            Percent,
-            "terminal things seen | page things seen in %",
-            |cell| cell.seen,
-        )
+        .column(Text, "terminal control | page control", |cell| cell.subject.model.clone())
+        .column(Share, "terminal expected score | page expected score in % [95 %]", |cell| cell.score)
+        .column(Percent, "terminal chance | page chance in %", |cell| cell.chance)
+        .column(Percent, "terminal from evidence | page answers from evidence in %", |cell| cell.evidence)
+        .column(Percent, "terminal things seen | page things seen in %", |cell| cell.seen)
         .column(Count, "terminal n | page n", |cell| cell.score.n)
         .build();
     table.heading = Some("Controls of the observer, over all conditions".to_owned());
@@ -132,8 +100,7 @@ pub(crate) fn notes(observer: &ObserverSummary) -> Vec<String> {
         return Vec::new();
     }
     if let Some(control) = observer.failed_controls().next() {
-        let [value, low, high] =
-            [control.score.value, control.score.low, control.score.high].map(percent);
+        let [value, low, high] = [control.score.value, control.score.low, control.score.high].map(percent);
         let place = match control.subject.level {
             Some(_) => format!("at {}", control.subject.condition()),
             None => "over all conditions".to_owned(),

@@ -4,12 +4,7 @@ use super::baseline::BASELINE;
 use super::calibration::CONFIDENCE;
 
 /// Section of the page: id, title, text below the title, and names of its figures.
-pub(crate) type Section = (
-    &'static str,
-    &'static str,
-    &'static str,
-    &'static [&'static str],
-);
+pub(crate) type Section = (&'static str, &'static str, &'static str, &'static [&'static str]);
 
 /// All sections of the page in order.
 pub(crate) const SECTIONS: [Section; 15] = [
@@ -20,12 +15,7 @@ pub(crate) const SECTIONS: [Section; 15] = [
          costs are of all trials.",
         &[],
     ),
-    (
-        "accuracy",
-        "Accuracy in the dark",
-        "",
-        &["accuracy", "variants", "photographed"],
-    ),
+    ("accuracy", "Accuracy in the dark", "", &["accuracy", "variants", "photographed"]),
     (
         "thresholds",
         "Darkness threshold",

@@ -25,12 +25,7 @@ pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
     let Some(score) = &findings.strict else {
         return Vec::new();
     };
-    let mut all = table(
-        findings,
-        score,
-        "All questions of a group right, in %",
-        |family| family.is_none(),
-    );
+    let mut all = table(findings, score, "All questions of a group right, in %", |family| family.is_none());
     all.heading = Some(
         "All questions of a group right, in % of the complete groups, with 95 % intervals; accuracy of the same subject beside it"
             .to_owned(),
@@ -49,28 +44,20 @@ pub(crate) fn strict_groups(findings: &Findings<'_>) -> Vec<Table> {
 /// Remarks on the groups, below the table.
 fn foot(score: &StrictScore) -> Option<String> {
     let most = score.cells.iter().map(|cell| cell.incomplete).max();
-    let joined = score
-        .cells
-        .iter()
-        .any(|cell| cell.clusters == 1 && cell.share.is_some_and(|share| share.n > 1));
+    let joined = score.cells.iter().any(|cell| cell.clusters == 1 && cell.share.is_some_and(|share| share.n > 1));
     let facts = [
-        (score.single > 0).then(|| {
-            format!("{} of one question, whose strict score is accuracy", counted(score.single, "group"))
-        }),
-        (score.across_frames > 0)
-            .then(|| format!("{} about several frames", counted(score.across_frames, "group"))),
+        (score.single > 0)
+            .then(|| format!("{} of one question, whose strict score is accuracy", counted(score.single, "group"))),
+        (score.across_frames > 0).then(|| format!("{} about several frames", counted(score.across_frames, "group"))),
         (score.never_complete > 0).then(|| {
             format!(
                 "{} of which questions of the set are left out or not drawn, complete for no model",
                 counted(score.never_complete, "group")
             )
         }),
-        most.filter(|most| *most > 0).map(|_| {
-            "incomplete groups, of which a question was not asked or has no reply, are not scored".to_owned()
-        }),
-        joined.then(|| {
-            "where all groups share frames, intervals take them as independent".to_owned()
-        }),
+        most.filter(|most| *most > 0)
+            .map(|_| "incomplete groups, of which a question was not asked or has no reply, are not scored".to_owned()),
+        joined.then(|| "where all groups share frames, intervals take them as independent".to_owned()),
     ];
     let facts: Vec<String> = facts.into_iter().flatten().collect();
     (!facts.is_empty()).then(|| facts.join("; "))
@@ -82,11 +69,7 @@ fn table(
     caption: &str,
     is_shown: impl Fn(Option<&Family>) -> bool,
 ) -> Table {
-    let cells = score
-        .cells
-        .iter()
-        .filter(|cell| is_shown(cell.family.as_ref()))
-        .map(Line::Cell);
+    let cells = score.cells.iter().filter(|cell| is_shown(cell.family.as_ref())).map(Line::Cell);
     let chance = score
         .chance
         .iter()
@@ -96,14 +79,10 @@ fn table(
     let builder = TableBuilder::new("groups", lines)
         .page("groups", caption)
         .subject(Line::subject, |variant| variant.word().into_owned())
-        .column(
-            Text,
-            "terminal subject | latex Subject",
-            |line| match line {
-                Line::Cell(cell) => format!("{} {}", cell.subject.model, cell.subject.condition()),
-                Line::Chance(..) => CHANCE.to_owned(),
-            },
-        )
+        .column(Text, "terminal subject | latex Subject", |line| match line {
+            Line::Cell(cell) => format!("{} {}", cell.subject.model, cell.subject.condition()),
+            Line::Chance(..) => CHANCE.to_owned(),
+        })
         .family(Line::family)
         .column(Text, "csv mode", |line| match line {
             Line::Cell(cell) if cell.mode == ParsingMode::Lenient => "lenient",
@@ -112,20 +91,11 @@ fn table(
     let builder = number_columns(builder, findings, score)
         .column(Text, "csv reading", |line| reading(line.subject()))
         .model_facts(&findings.grid.listing, Line::subject);
-    let has_light = score
-        .cells
-        .iter()
-        .any(|cell| run_group(&cell.subject).is_some());
-    let mut builder = if has_light {
-        builder.column(Text, "csv light", |line| run_group(line.subject()))
-    } else {
-        builder
-    };
+    let has_light = score.cells.iter().any(|cell| run_group(&cell.subject).is_some());
+    let mut builder =
+        if has_light { builder.column(Text, "csv light", |line| run_group(line.subject())) } else { builder };
     for format in [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex] {
-        builder = builder.hide(
-            format,
-            |line| matches!(line, Line::Cell(cell) if cell.mode == ParsingMode::Lenient),
-        );
+        builder = builder.hide(format, |line| matches!(line, Line::Cell(cell) if cell.mode == ParsingMode::Lenient));
     }
     builder.build()
 }
@@ -136,32 +106,20 @@ fn number_columns<'a>(
     score: &StrictScore,
 ) -> TableBuilder<Line<'a>> {
     builder
-        .column(
-            Count,
-            "csv n | terminal groups | page groups | latex Groups",
-            |line| line.share().map_or(0, |share| share.n),
-        )
-        .column(Count, "csv right", |line| {
-            line.cell().map(|cell| cell.right)
+        .column(Count, "csv n | terminal groups | page groups | latex Groups", |line| {
+            line.share().map_or(0, |share| share.n)
         })
-        .column(
-            Count,
-            "csv incomplete | terminal incomplete | page incomplete | latex Incomplete",
-            |line| count(line, |cell| cell.incomplete),
-        )
-        .column(Count, "csv clusters", |line| {
-            line.cell().map(|cell| cell.clusters)
+        .column(Count, "csv right", |line| line.cell().map(|cell| cell.right))
+        .column(Count, "csv incomplete | terminal incomplete | page incomplete | latex Incomplete", |line| {
+            count(line, |cell| cell.incomplete)
         })
-        .column(
-            Share,
-            "csv value low high | terminal all right | page all right [95 %] | latex All right",
-            |line| match line {
+        .column(Count, "csv clusters", |line| line.cell().map(|cell| cell.clusters))
+        .column(Share, "csv value low high | terminal all right | page all right [95 %] | latex All right", |line| {
+            match line {
                 Line::Cell(cell) => TableCell::from(cell.share),
-                Line::Chance(chance, _) => {
-                    chance.share.map_or(TableCell::Missing, TableCell::Guess)
-                }
-            },
-        )
+                Line::Chance(chance, _) => chance.share.map_or(TableCell::Missing, TableCell::Guess),
+            }
+        })
         .column(Percent, "terminal lenient | page lenient", |line| {
             let lenient = line.cell().and_then(|cell| score.lenient(cell));
             match line {
@@ -169,26 +127,18 @@ fn number_columns<'a>(
                 Line::Chance(..) => TableCell::Blank,
             }
         })
-        .column(
-            Percent,
-            "terminal accuracy | page accuracy | latex Accuracy",
-            |line| {
-                let cell = findings
-                    .summary
-                    .family_cells(line.family(), ParsingMode::Strict)
-                    .find(|cell| match line {
-                        Line::Cell(group_cell) => cell.subject == group_cell.subject,
-                        Line::Chance(..) => cell.subject.view.is_none(),
-                    });
-                Some(cell?.accuracy?.value)
-            },
-        )
+        .column(Percent, "terminal accuracy | page accuracy | latex Accuracy", |line| {
+            let cell = findings.summary.family_cells(line.family(), ParsingMode::Strict).find(|cell| match line {
+                Line::Cell(group_cell) => cell.subject == group_cell.subject,
+                Line::Chance(..) => cell.subject.view.is_none(),
+            });
+            Some(cell?.accuracy?.value)
+        })
 }
 
 /// Table cell with a count; blank for chance.
 fn count(line: &Line<'_>, count: impl Fn(&GroupCell) -> usize) -> TableCell {
-    line.cell()
-        .map_or(TableCell::Blank, |cell| count(cell).into())
+    line.cell().map_or(TableCell::Blank, |cell| count(cell).into())
 }
 
 impl Line<'_> {
@@ -223,21 +173,10 @@ impl Line<'_> {
 
 /// Name of a subject's run group; `None` if it has none.
 fn run_group(subject: &ModelInCondition) -> Option<String> {
-    subject
-        .variant
-        .group
-        .as_ref()
-        .map(RunGroup::name)
-        .map(str::to_owned)
+    subject.variant.group.as_ref().map(RunGroup::name).map(str::to_owned)
 }
 
 /// Subject that stands for guessing.
 fn chance_subject() -> ModelInCondition {
-    ModelInCondition {
-        model: CHANCE.to_owned(),
-        view: None,
-        level: None,
-        variant: Variant::NONE,
-        enhancer: None,
-    }
+    ModelInCondition { model: CHANCE.to_owned(), view: None, level: None, variant: Variant::NONE, enhancer: None }
 }

@@ -8,26 +8,17 @@ use darkqa_score::choice::ParsingMode;
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {
     let builder = TableBuilder::new("subjects", summary.family_cells(None, ParsingMode::Strict))
-        .page(
-            "accuracy",
-            "Accuracy of every subject, all families together",
-        )
+        .page("accuracy", "Accuracy of every subject, all families together")
         .column(Text, "page model", |cell| cell.subject.model.clone())
         .column(Text, "page condition", |cell| match cell.subject.view {
             None => "guessing".to_owned(),
             Some(_) => cell.subject.condition(),
         })
-        .column(Share, "page accuracy in % [95 %]", |cell| {
-            match (cell.subject.view, cell.accuracy) {
-                (None, Some(chance)) => TableCell::Guess(chance),
-                (_, accuracy) => TableCell::from(accuracy),
-            }
+        .column(Share, "page accuracy in % [95 %]", |cell| match (cell.subject.view, cell.accuracy) {
+            (None, Some(chance)) => TableCell::Guess(chance),
+            (_, accuracy) => TableCell::from(accuracy),
         })
-        .column(Percent, "page lenient", |cell| {
-            summary
-                .cell(&cell.subject, None, ParsingMode::Lenient)?
-                .accuracy
-        })
+        .column(Percent, "page lenient", |cell| summary.cell(&cell.subject, None, ParsingMode::Lenient)?.accuracy)
         .column(Count, "page n", |cell| cell.replies())
         .column(Count, "page not readable", |cell| cell.unparsed)
         .column(Count, "page failed", |cell| cell.failed);

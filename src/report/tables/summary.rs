@@ -17,9 +17,7 @@ pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Tabl
             ParsingMode::Lenient => "lenient",
         })
         .column(Count, "csv n", |cell| cell.replies())
-        .column(Count, "csv right", |cell| {
-            cell.subject.view.map(|_| cell.right)
-        })
+        .column(Count, "csv right", |cell| cell.subject.view.map(|_| cell.right))
         .column(Count, "csv unparsed", |cell| cell.unparsed)
         .column(Count, "csv failed", |cell| cell.failed)
         .column(Share, "csv value low high", |cell| cell.accuracy);
@@ -40,14 +38,11 @@ pub(crate) fn summary(summary: &AccuracySummary, listing: &ModelListing) -> Tabl
     } else {
         builder
     };
-    let builder = builder
-        .column(Text, "csv reading", |cell| reading(&cell.subject))
-        .model_facts(listing, |cell| &cell.subject);
+    let builder =
+        builder.column(Text, "csv reading", |cell| reading(&cell.subject)).model_facts(listing, |cell| &cell.subject);
     if summary.cells.iter().any(|cell| run_group(cell).is_some()) {
         // Runs have different images of the same condition, so each row states its run group.
-        return builder
-            .column(Text, "csv light", |cell| run_group(cell))
-            .build();
+        return builder.column(Text, "csv light", |cell| run_group(cell)).build();
     }
     builder.build()
 }

@@ -16,11 +16,7 @@ use darkqa_score::threshold::{CurveSummary, NoThreshold, SparseLevel};
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
     for axis in Axis::ALL {
-        let curves: Vec<&Curve> = findings
-            .curves
-            .iter()
-            .filter(|curve| curve.axis() == axis)
-            .collect();
+        let curves: Vec<&Curve> = findings.curves.iter().filter(|curve| curve.axis() == axis).collect();
         // The light tables are kept even if empty: light is the main axis of a run.
         if !curves.is_empty() || axis == Axis::LIGHT {
             tables.extend(axis_tables(findings, axis, curves));
@@ -95,13 +91,9 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -
     TableBuilder::new(titles.file, curves)
         .page("thresholds", caption)
         .curve(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
-        .column(Text, "terminal light | page light", |curve| {
-            light(&curve.variant, curve.enhancer.as_ref())
-        })
+        .column(Text, "terminal light | page light", |curve| light(&curve.variant, curve.enhancer.as_ref()))
         .family(|curve| curve.family.as_ref())
-        .column(Number, titles.darkest_column, |curve| {
-            curve.parsed(mode).darkest.value()
-        })
+        .column(Number, titles.darkest_column, |curve| curve.parsed(mode).darkest.value())
         .column(Threshold, titles.threshold_columns, |curve| {
             let darkest = curve.parsed(mode).darkest.value();
             match &curve.parsed(mode).threshold {
@@ -109,22 +101,12 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -
                 Err(reason) => TableCell::Unknown(missing_threshold_reason(reason)),
             }
         })
-        .column(
-            Share,
-            "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]",
-            |curve| curve.parsed(mode).area,
-        )
-        .column(
-            Percent,
-            "csv floor | terminal floor | page floor in %",
-            |curve| curve.parsed(mode).floor,
-        )
-        .column(Text, "csv floor_of | terminal of | page of", |curve| {
-            curve.floor.name()
+        .column(Share, "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]", |curve| {
+            curve.parsed(mode).area
         })
-        .column(Text, titles.range_column, |curve| {
-            format!("0–{}", curve.parsed(mode).darkest.value())
-        })
+        .column(Percent, "csv floor | terminal floor | page floor in %", |curve| curve.parsed(mode).floor)
+        .column(Text, "csv floor_of | terminal of | page of", |curve| curve.floor.name())
+        .column(Text, titles.range_column, |curve| format!("0–{}", curve.parsed(mode).darkest.value()))
         .column(Text, "csv reason", |curve| csv_reason(curve.parsed(mode)))
         .column(Text, "csv mode", |_| mode.name())
         .build()
@@ -151,39 +133,23 @@ fn thin_level_text(level: &SparseLevel) -> String {
 
 /// Reason for a missing threshold, and the levels left out, separated by semicolons; empty if neither applies.
 fn csv_reason(summary: &CurveSummary) -> String {
-    let left_out = summary
-        .left_out
-        .iter()
-        .map(|level| format!("left out: {}", thin_level_text(level)));
-    let unknown = summary
-        .threshold
-        .as_ref()
-        .err()
-        .map(missing_threshold_reason);
+    let left_out = summary.left_out.iter().map(|level| format!("left out: {}", thin_level_text(level)));
+    let unknown = summary.threshold.as_ref().err().map(missing_threshold_reason);
     let reasons: Vec<String> = unknown.into_iter().chain(left_out).collect();
     reasons.join("; ")
 }
 
-/// Notes on the curves of all families together: the minimum data for a threshold if a curve lacks it, and the levels that each curve
-/// leaves out.
+/// Notes on the curves of all families together: the minimum data for a threshold if a curve lacks it, and the levels
+/// that each curve leaves out.
 fn notes(curves: &[&Curve]) -> Vec<String> {
     let curves = curves.iter().filter(|curve| curve.family.is_none());
-    let needs_data = curves
-        .clone()
-        .any(|curve| matches!(curve.summary.threshold, Err(NoThreshold::Thin(_))));
-    let requirement =
-        needs_data.then(|| format!("a threshold needs {}", SparseLevel::requirement()));
-    let left_out = curves
-        .filter(|curve| !curve.summary.left_out.is_empty())
-        .map(|curve| {
-            let light = light(&curve.variant, curve.enhancer.as_ref());
-            let levels: Vec<String> = curve.summary.left_out.iter().map(thin_level_text).collect();
-            format!(
-                "left out of {}, {light}: {}",
-                curve.model,
-                levels.join(", ")
-            )
-        });
+    let needs_data = curves.clone().any(|curve| matches!(curve.summary.threshold, Err(NoThreshold::Thin(_))));
+    let requirement = needs_data.then(|| format!("a threshold needs {}", SparseLevel::requirement()));
+    let left_out = curves.filter(|curve| !curve.summary.left_out.is_empty()).map(|curve| {
+        let light = light(&curve.variant, curve.enhancer.as_ref());
+        let levels: Vec<String> = curve.summary.left_out.iter().map(thin_level_text).collect();
+        format!("left out of {}, {light}: {}", curve.model, levels.join(", "))
+    });
     requirement.into_iter().chain(left_out).collect()
 }
 
@@ -193,18 +159,16 @@ const PROPOSED_LEVELS: usize = 3;
 /// Minimum step between proposed levels, in EV; smaller steps are narrower than the intervals of thresholds.
 const MIN_STEP: f64 = 0.25;
 
-/// Note that proposes levels around the light thresholds of all curves without enhancement. `None` if the existing levels are already
-/// close, a threshold is beyond the darkest level, or no threshold is known.
+/// Note that proposes levels around the light thresholds of all curves without enhancement. `None` if the existing
+/// levels are already close, a threshold is beyond the darkest level, or no threshold is known.
 ///
-/// The proposed levels are the same for all models and items. Choosing levels for each model by its answers would gain little, because
-/// the spread between items causes most of the error, and it would compare models at different levels.
+/// The proposed levels are the same for all models and items. Choosing levels for each model by its answers would gain
+/// little, because the spread between items causes most of the error, and it would compare models at different levels.
 fn finer_levels_note(findings: &Findings<'_>) -> Option<String> {
     let intervals: Vec<[f64; 2]> = findings
         .curves
         .iter()
-        .filter(|curve| {
-            curve.family.is_none() && curve.enhancer.is_none() && curve.axis() == Axis::LIGHT
-        })
+        .filter(|curve| curve.family.is_none() && curve.enhancer.is_none() && curve.axis() == Axis::LIGHT)
         .filter_map(|curve| {
             let threshold = curve.summary.threshold.as_ref().ok()?;
             Some([threshold.low, threshold.high])
@@ -218,24 +182,18 @@ fn finer_levels_note(findings: &Findings<'_>) -> Option<String> {
         .filter(|level| level.axis().is_none_or(|axis| axis == Axis::LIGHT))
         .collect();
     let drops: Vec<f64> = levels.iter().map(|level| level.value()).collect();
-    let proposed: Vec<String> = levels_between(&intervals, &drops)?
-        .iter()
-        .map(ToString::to_string)
-        .collect();
+    let proposed: Vec<String> = levels_between(&intervals, &drops)?.iter().map(ToString::to_string).collect();
     Some(format!(
         "for a finer threshold, add {} EV to --levels and ask again with --resume: all models, all items, these levels alone",
         proposed.join(", ")
     ))
 }
 
-/// Proposed exposure drops in EV, evenly spaced between the two existing `drops` that enclose all `intervals`. `drops` is in ascending
-/// order. `None` if nothing encloses the intervals or the step is too small.
+/// Proposed exposure drops in EV, evenly spaced between the two existing `drops` that enclose all `intervals`. `drops`
+/// is in ascending order. `None` if nothing encloses the intervals or the step is too small.
 fn levels_between(intervals: &[[f64; 2]], drops: &[f64]) -> Option<Vec<f64>> {
-    let (low, high) = intervals
-        .iter()
-        .fold((f64::INFINITY, 0.0_f64), |(low, high), ends| {
-            (low.min(ends[0]), high.max(ends[1]))
-        });
+    let (low, high) =
+        intervals.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), ends| (low.min(ends[0]), high.max(ends[1])));
     let below = drops.iter().rev().find(|drop| **drop <= low)?;
     let above = drops.iter().find(|drop| **drop >= high)?;
     let step = (above - below) / (PROPOSED_LEVELS + 1) as f64;
@@ -254,15 +212,9 @@ mod tests {
     #[test]
     fn proposed_levels_surround_the_thresholds() {
         let ladder = [0.0, 2.0, 4.0, 6.0, 7.5, 9.0];
-        assert_eq!(
-            levels_between(&[[2.2, 3.9]], &ladder),
-            Some(vec![2.5, 3.0, 3.5])
-        );
+        assert_eq!(levels_between(&[[2.2, 3.9]], &ladder), Some(vec![2.5, 3.0, 3.5]));
         // The intervals span two steps; the level between the steps already exists.
-        assert_eq!(
-            levels_between(&[[2.2, 3.0], [5.0, 5.5]], &ladder),
-            Some(vec![3.0, 5.0])
-        );
+        assert_eq!(levels_between(&[[2.2, 3.0], [5.0, 5.5]], &ladder), Some(vec![3.0, 5.0]));
         // No proposal: a threshold beyond the darkest level, no known threshold, and a step below the minimum.
         assert_eq!(levels_between(&[[8.0, f64::INFINITY]], &ladder), None);
         assert_eq!(levels_between(&[], &ladder), None);

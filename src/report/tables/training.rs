@@ -7,10 +7,7 @@ use crate::types::ModelListing;
 /// Adds a note on the training data of an enhancer, if known, to each table that has its results.
 pub(crate) fn with_training(mut tables: Vec<Table>, listing: &ModelListing) -> Vec<Table> {
     for (enhancer, training) in listing.trainings() {
-        for table in tables
-            .iter_mut()
-            .filter(|table| has_results(table, enhancer))
-        {
+        for table in tables.iter_mut().filter(|table| has_results(table, enhancer)) {
             let line = format!("{enhancer}: {training}");
             table.foot = Some(match table.foot.take() {
                 Some(foot) => format!("{foot}; {line}"),

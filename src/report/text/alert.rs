@@ -86,8 +86,5 @@ pub enum AlertKind {
 /// The alerts as lines of the terminal, each marked with `!`; empty without an alert.
 #[must_use]
 pub(crate) fn lines(alerts: &[Alert]) -> String {
-    alerts
-        .iter()
-        .map(|alert| line("! ", &alert.text, "  "))
-        .collect()
+    alerts.iter().map(|alert| line("! ", &alert.text, "  ")).collect()
 }

@@ -1,4 +1,5 @@
-//! Tables as CSV ([`files`]), with texts that spreadsheets do not run as formulas ([`escape_formula`]). Numbers have all their digits.
+//! Tables as CSV ([`files`]), with texts that spreadsheets do not run as formulas ([`escape_formula`]). Numbers have
+//! all their digits.
 
 use std::borrow::{Borrow, Cow};
 use std::io::Write;
@@ -24,10 +25,7 @@ pub(crate) enum CsvField<'a> {
     Plain(f64),
 }
 
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a reference"
-)]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn plain<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(number)
 }
@@ -42,11 +40,7 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
         TableCell::Number(number) => fields[0] = CsvField::Number(*number),
         TableCell::Significance(verdict) => {
             // `tied` is kept for one release; the column `shown` states its meaning.
-            let word = if verdict.is_shown() || *verdict == Significance::Missing {
-                verdict.word()
-            } else {
-                "tied"
-            };
+            let word = if verdict.is_shown() || *verdict == Significance::Missing { verdict.word() } else { "tied" };
             fields[0] = CsvField::Text(word);
             fields[1] = CsvField::Text(if verdict.is_shown() { "true" } else { "false" });
         }
@@ -69,18 +63,14 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
 
 /// Escapes a text for a cell of a CSV file, so that no spreadsheet runs it as a formula.
 ///
-/// Spreadsheets run text that begins with `=`, `+`, `-`, `@`, a tab or a carriage return as a formula, also after spaces and in quoted
-/// cells (OWASP, “CSV Injection”). An apostrophe is put before such a text. The same is done if apostrophes precede such a character, so
-/// that removing one apostrophe always restores the text. Numbers are not changed. Tabs and hidden characters become codes such as
-/// `⟨U+001B⟩`; line breaks are kept.
+/// Spreadsheets run text that begins with `=`, `+`, `-`, `@`, a tab or a carriage return as a formula, also after
+/// spaces and in quoted cells (OWASP, “CSV Injection”). An apostrophe is put before such a text. The same is done if
+/// apostrophes precede such a character, so that removing one apostrophe always restores the text. Numbers are not
+/// changed. Tabs and hidden characters become codes such as `⟨U+001B⟩`; line breaks are kept.
 pub(crate) fn escape_formula(text: &str) -> Cow<'_, str> {
     // Some readers interpret a tab within a cell as the end of the cell.
     let visible = escape_where(text, |c| c == '\t' || is_hidden(c));
-    if begins_formula(text) {
-        Cow::Owned(format!("'{visible}"))
-    } else {
-        visible
-    }
+    if begins_formula(text) { Cow::Owned(format!("'{visible}")) } else { visible }
 }
 
 /// True if a spreadsheet may run a text as a formula, with or without apostrophes before it.
@@ -92,12 +82,11 @@ fn begins_formula(text: &str) -> bool {
 
 /// True if a text is a number in digits, but not for `-inf` or a sum.
 fn is_number(text: &str) -> bool {
-    text.chars()
-        .all(|c| c.is_ascii_digit() || ".eE+-".contains(c))
-        && text.parse::<f64>().is_ok()
+    text.chars().all(|c| c.is_ascii_digit() || ".eE+-".contains(c)) && text.parse::<f64>().is_ok()
 }
 
-/// The names and contents of the CSV files of all tables with CSV columns and at least one row. Tables with the same name share a file.
+/// The names and contents of the CSV files of all tables with CSV columns and at least one row. Tables with the same
+/// name share a file.
 ///
 /// # Errors
 /// If one cannot be written.
@@ -112,7 +101,8 @@ pub(crate) fn files(tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
     Ok(files)
 }
 
-/// The content of one file with all these tables, which have the same columns: a header and rows. Empty without rows or columns.
+/// The content of one file with all these tables, which have the same columns: a header and rows. Empty without rows or
+/// columns.
 ///
 /// # Errors
 /// If the file cannot be written.
@@ -126,10 +116,7 @@ pub(crate) fn csv(parts: &[Table]) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// If they cannot be written.
-pub(crate) fn write<T: Borrow<Table>>(
-    out: impl Write,
-    parts: impl IntoIterator<Item = T>,
-) -> Result<()> {
+pub(crate) fn write<T: Borrow<Table>>(out: impl Write, parts: impl IntoIterator<Item = T>) -> Result<()> {
     let mut file = ::csv::Writer::from_writer(out);
     let mut has_header = false;
     for table in parts {
@@ -141,14 +128,11 @@ pub(crate) fn write<T: Borrow<Table>>(
             }
             if !has_header {
                 let names = names.clone().map(|name| escape_formula(name).into_owned());
-                file.write_record(names)
-                    .map_err(|e| Error::data("CSV", e))?;
+                file.write_record(names).map_err(|e| Error::data("CSV", e))?;
                 has_header = true;
             }
-            let cells: Vec<CsvField<'_>> = table
-                .cells(row)
-                .flat_map(|(column, cell)| fields(cell, column.heads.csv.len()))
-                .collect();
+            let cells: Vec<CsvField<'_>> =
+                table.cells(row).flat_map(|(column, cell)| fields(cell, column.heads.csv.len())).collect();
             let texts: Vec<Cow<'_, str>> = cells.iter().map(safe_text).collect();
             let row: Vec<CsvField<'_>> = cells
                 .iter()
@@ -206,9 +190,7 @@ mod tests {
 
     #[test]
     fn other_texts_and_numbers_are_kept() {
-        for plain in [
-            "", "a=1", "-4.8", "+3", "-1e-7", "'quoted'", "it's", "−4.8", "L3-noise", "a\nb",
-        ] {
+        for plain in ["", "a=1", "-4.8", "+3", "-1e-7", "'quoted'", "it's", "−4.8", "L3-noise", "a\nb"] {
             assert_eq!(escape_formula(plain), plain);
         }
     }

@@ -6,7 +6,8 @@ use crate::types::text::counted;
 use crate::types::{FrameId, SentImages};
 use darkqa_score::grid::Grid;
 
-/// The number of frames that were asked about, as `3 frames (2 of 2 to 4 images)` if some questions show several images.
+/// The number of frames that were asked about, as `3 frames (2 of 2 to 4 images)` if some questions show several
+/// images.
 pub(crate) fn frames(grid: &Grid<'_>) -> String {
     let mut images = BTreeMap::<&FrameId, usize>::new();
     for (place, item) in grid.items.iter().enumerate() {

@@ -23,12 +23,7 @@ pub(crate) struct Series<'a> {
 
 impl<'a> Series<'a> {
     fn new(subject: &'a ModelInCondition, place: usize) -> Self {
-        Self {
-            place,
-            model: &subject.model,
-            enhancer: subject.enhancer.as_ref(),
-            variant: &subject.variant,
-        }
+        Self { place, model: &subject.model, enhancer: subject.enhancer.as_ref(), variant: &subject.variant }
     }
 
     /// True if the images are enhanced.
@@ -45,9 +40,7 @@ impl<'a> Series<'a> {
     /// The variant and the enhancer in words; for photographs also their darkness.
     pub(crate) fn light(&self, pairs: &[PairDarkness]) -> String {
         let words = light(self.variant, self.enhancer);
-        let pair = pairs
-            .iter()
-            .find(|pair| Some(&pair.name) == self.variant.photograph());
+        let pair = pairs.iter().find(|pair| Some(&pair.name) == self.variant.photograph());
         match pair {
             None => words,
             Some(pair) => words.replacen("(real)", &format!("(real, {})", pair.short()), 1),
@@ -103,11 +96,7 @@ impl<'a, C> Ladder<'a, C> {
 
     /// Adds the darkness of the photographs, and the light of the set, which decides the label of L0.
     pub(crate) fn with_pairs(self, findings: &'a Findings<'_>) -> Self {
-        Self {
-            pairs: &findings.pairs,
-            set: findings.set.light,
-            ..self
-        }
+        Self { pairs: &findings.pairs, set: findings.set.light, ..self }
     }
 
     /// The variant and the enhancer of a series in words.
@@ -132,13 +121,12 @@ impl<'a, C> Ladder<'a, C> {
         self.models.iter().position(|known| *known == model)
     }
 
-    /// Adds the cells of the clean frames to every series of the same model without an enhancer, and those of the enhanced clean
-    /// frames to every series with that enhancer. They stay a separate series only if the model has no such series.
+    /// Adds the cells of the clean frames to every series of the same model without an enhancer, and those of the
+    /// enhanced clean frames to every series with that enhancer. They stay a separate series only if the model has no
+    /// such series.
     pub(crate) fn with_clean(mut self) -> Self {
-        let (clean, mut degraded): (BTreeMap<_, _>, BTreeMap<_, _>) = self
-            .series
-            .into_iter()
-            .partition(|(series, _)| series.variant.is_untouched());
+        let (clean, mut degraded): (BTreeMap<_, _>, BTreeMap<_, _>) =
+            self.series.into_iter().partition(|(series, _)| series.variant.is_untouched());
         for (series, cells) in clean {
             let mut same_model = degraded
                 .iter_mut()
@@ -165,12 +153,7 @@ impl<'a, C> Ladder<'a, C> {
             .map(|axis| {
                 let ladder = Self {
                     models: self.models.clone(),
-                    levels: self
-                        .levels
-                        .iter()
-                        .copied()
-                        .filter(|level| level.belongs_to(axis))
-                        .collect(),
+                    levels: self.levels.iter().copied().filter(|level| level.belongs_to(axis)).collect(),
                     series: self
                         .series
                         .iter()
@@ -186,30 +169,22 @@ impl<'a, C> Ladder<'a, C> {
             .collect()
     }
 
-    /// The cell of a series at L0, after [`with_clean`](Self::with_clean). For an enhancer without clean frames, the cell without an
-    /// enhancer.
+    /// The cell of a series at L0, after [`with_clean`](Self::with_clean). For an enhancer without clean frames, the
+    /// cell without an enhancer.
     pub(crate) fn l0_cell(&self, series: &Series<'_>) -> Option<&'a C> {
         let raw = self.series.iter().filter(|(other, _)| {
             let is_clean = other.variant.is_untouched();
             let groups = [*other, series].map(|series| series.variant.group.as_ref());
             (other.model, other.enhancer) == (series.model, None)
-                && (other.variant == series.variant
-                    || is_clean && RunGroup::overlap(groups[0], groups[1]))
+                && (other.variant == series.variant || is_clean && RunGroup::overlap(groups[0], groups[1]))
         });
-        let mut cells = self
-            .series
-            .get(series)
-            .into_iter()
-            .chain(raw.map(|(_, cells)| cells));
+        let mut cells = self.series.get(series).into_iter().chain(raw.map(|(_, cells)| cells));
         cells.find_map(|cells| cells.get(&AxisLevel::L0).copied())
     }
 
     /// The rows of a table: the series of each model, and below them the model without images; chance at the end.
     pub(crate) fn rows(&'a self) -> Vec<LadderRow<'a, C>> {
-        let series = self
-            .series
-            .iter()
-            .map(|(series, cells)| (series.place, LadderRow::Series(series, cells)));
+        let series = self.series.iter().map(|(series, cells)| (series.place, LadderRow::Series(series, cells)));
         let without_level = self.without_level.iter().map(|&(subject, cell)| {
             let place = subject.view.and_then(|_| self.place(&subject.model));
             let row = LadderRow::WithoutLevel(subject, cell);
@@ -221,26 +196,19 @@ impl<'a, C> Ladder<'a, C> {
         rows.into_iter().map(|(_, row)| row).collect()
     }
 
-    /// A table with a row for each series and a column for each level, with the groups, marks and extra columns of the models. The page and
-    /// LaTeX also have a row for each subject without a level.
+    /// A table with a row for each series and a column for each level, with the groups, marks and extra columns of the
+    /// models. The page and LaTeX also have a row for each subject without a level.
     pub(crate) fn table(
         &'a self,
         name: &'static str,
         listing: &ModelListing,
         cell: impl Fn(Option<&C>) -> TableCell,
     ) -> TableBuilder<LadderRow<'a, C>> {
-        let has_models_under_test = self
-            .models
-            .iter()
-            .any(|model| !is_reference(model) && *model != CHANCE);
+        let has_models_under_test = self.models.iter().any(|model| !is_reference(model) && *model != CHANCE);
         let mut table = TableBuilder::new(name, self.rows())
-            .hide(TableFormat::Terminal, |line| {
-                matches!(line, LadderRow::WithoutLevel(..))
-            })
+            .hide(TableFormat::Terminal, |line| matches!(line, LadderRow::WithoutLevel(..)))
             .group(|line| listing.group(line.model()).map(str::to_owned))
-            .column(Text, "page model | terminal model", |line| {
-                listing.label(line.model())
-            })
+            .column(Text, "page model | terminal model", |line| listing.label(line.model()))
             .column(Text, "page light | terminal light", |line| line.light(self))
             .column(Text, "latex Model", |line| {
                 let is_reference = is_reference(line.model()) && has_models_under_test;
@@ -268,9 +236,7 @@ impl<'a, C> Ladder<'a, C> {
         for column in listing.columns() {
             let head = column.head();
             let heads = format!("page {head} | terminal {head} | latex {head}");
-            table = table.column(Text, &*heads, |line| {
-                listing.cell(*column, line.model()).to_owned()
-            });
+            table = table.column(Text, &*heads, |line| listing.cell(*column, line.model()).to_owned());
         }
         table.foot(listing.footnote(self.models.iter().copied()))
     }

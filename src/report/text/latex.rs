@@ -65,10 +65,7 @@ pub(crate) const MAX_ROWS: usize = 40;
 
 /// A table as one or more floats of at most [`MAX_ROWS`] rows, no wider than the text.
 fn table(caption: &str, table: &Table) -> String {
-    let columns = table
-        .columns
-        .iter()
-        .filter(|column| column.heads.latex.is_some());
+    let columns = table.columns.iter().filter(|column| column.heads.latex.is_some());
     let alignments: String = columns
         .clone()
         .map(|column| match column.kind {
@@ -87,10 +84,7 @@ fn table(caption: &str, table: &Table) -> String {
             (heading, line(cells))
         })
         .collect();
-    let foot = table
-        .foot
-        .as_deref()
-        .map(|foot| format!("\n  {{\\footnotesize {}}}\n", escape(foot)));
+    let foot = table.foot.as_deref().map(|foot| format!("\n  {{\\footnotesize {}}}\n", escape(foot)));
     let mut text = String::new();
     let parts = rows.len().div_ceil(MAX_ROWS).max(1);
     for part in 0..parts {
@@ -127,10 +121,7 @@ fn body(rows: &[(Option<&str>, String)], width: usize) -> String {
             }
             if !heading.is_empty() {
                 let heading = escape(heading);
-                let _ = writeln!(
-                    text,
-                    "    \\multicolumn{{{width}}}{{l}}{{\\textit{{{heading}}}}} \\\\"
-                );
+                let _ = writeln!(text, "    \\multicolumn{{{width}}}{{l}}{{\\textit{{{heading}}}}} \\\\");
             }
         }
         text += row;

@@ -14,15 +14,11 @@ pub(crate) struct NoiseProfiles(BTreeSet<ProfileName>);
 
 impl NoiseProfiles {
     pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {
-        Self(
-            subjects
-                .into_iter()
-                .filter_map(|subject| subject.variant.reading.clone())
-                .collect(),
-        )
+        Self(subjects.into_iter().filter_map(|subject| subject.variant.reading.clone()).collect())
     }
 
-    /// A note that other noise profiles were not run, with the flags to run them; `None` without noise or with several noise profiles.
+    /// A note that other noise profiles were not run, with the flags to run them; `None` without noise or with several
+    /// noise profiles.
     pub(crate) fn open_question(&self) -> Option<String> {
         let mut readings = self.0.iter();
         let (Some(only), None) = (readings.next(), readings.next()) else {
@@ -49,10 +45,7 @@ mod tests {
             assert_eq!(profiles(conditions).open_question(), None, "{conditions:?}");
         }
         let several = profiles(&["L3-noise@eld", "L3-noise"]);
-        assert_eq!(
-            serde_json::to_string(&several).unwrap(),
-            r#"["paper","eld"]"#
-        );
+        assert_eq!(serde_json::to_string(&several).unwrap(), r#"["paper","eld"]"#);
     }
 
     fn profiles(conditions: &[&str]) -> NoiseProfiles {

@@ -1,9 +1,10 @@
-//! The outcome of a trial in words: [`outcome`], the reason why a reply was not read ([`unread_reason`]), and why no reply came
-//! ([`failure_reason`]).
+//! The outcome of a trial in words: [`outcome`], the reason why a reply was not read ([`unread_reason`]), and why no
+//! reply came ([`failure_reason`]).
 
 use crate::types::{FailureKind, Record, TrialOutcome, UnreadReason};
 
-/// The outcome of a trial of a question with choices, by the strict parsing: `✓ right`, `not read (cut at the token limit)`.
+/// The outcome of a trial of a question with choices, by the strict parsing: `✓ right`, `not read (cut at the token
+/// limit)`.
 pub(crate) fn outcome(record: &Record) -> String {
     match record.detail.outcome {
         TrialOutcome::Right => "✓ right".to_owned(),
@@ -61,13 +62,10 @@ mod tests {
 
     #[test]
     fn reasons_have_different_words() {
-        let reasons: std::collections::BTreeSet<&str> =
-            UnreadReason::ALL.into_iter().map(unread_reason).collect();
+        let reasons: std::collections::BTreeSet<&str> = UnreadReason::ALL.into_iter().map(unread_reason).collect();
         assert_eq!(reasons.len(), UnreadReason::ALL.len());
-        let kinds: std::collections::BTreeSet<String> = FailureKind::ALL
-            .into_iter()
-            .map(|kind| failure_reason(kind, None))
-            .collect();
+        let kinds: std::collections::BTreeSet<String> =
+            FailureKind::ALL.into_iter().map(|kind| failure_reason(kind, None)).collect();
         assert_eq!(kinds.len(), FailureKind::ALL.len());
         let status = failure_reason(FailureKind::RateLimit, Some(429));
         assert_eq!(status, "refused by a rate limit, HTTP 429");

@@ -7,7 +7,8 @@ use crate::types::text::escape_hidden;
 /// Maximum number of characters of a text on a page.
 const MAX_CHARS: usize = 4_000;
 
-/// Escapes hidden characters as codes such as ⟨U+202E⟩, and cuts a text of more than [`MAX_CHARS`] characters, with a note at its end.
+/// Escapes hidden characters as codes such as ⟨U+202E⟩, and cuts a text of more than [`MAX_CHARS`] characters, with a
+/// note at its end.
 #[must_use]
 pub(crate) fn readable(text: &str) -> String {
     let cut = text.char_indices().nth(MAX_CHARS);

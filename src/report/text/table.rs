@@ -1,5 +1,5 @@
-//! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. Cells contain unformatted numbers, which each output formats: the
-//! modules `csv`, `latex` and `terminal`, and the JSON and the page of a report.
+//! One table of a report: [`Table`], its [`Column`]s and [`TableCell`]s. Cells contain unformatted numbers, which each
+//! output formats: the modules `csv`, `latex` and `terminal`, and the JSON and the page of a report.
 
 use darkqa_score::estimate::Estimate;
 use darkqa_score::significance::Significance;
@@ -19,8 +19,8 @@ pub struct Table {
     pub caption: String,
     /// True if the page shows the table folded. Long tables are always folded.
     pub is_folded: bool,
-    /// Line above it in the terminal, which may be empty; `None` if it is not printed. Tables with the same name and heading are
-    /// printed as one.
+    /// Line above it in the terminal, which may be empty; `None` if it is not printed. Tables with the same name and
+    /// heading are printed as one.
     pub heading: Option<String>,
     /// Lines below it in the terminal.
     pub notes: Vec<String>,
@@ -48,10 +48,7 @@ pub struct TableRow {
 impl TableRow {
     /// An empty row with capacity for the cells of any table.
     fn with_capacity() -> Self {
-        Self {
-            cells: Vec::with_capacity(12),
-            ..Self::default()
-        }
+        Self { cells: Vec::with_capacity(12), ..Self::default() }
     }
 }
 
@@ -73,7 +70,8 @@ pub struct Column {
 /// The names of a column by format. A format without a name leaves the column out.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ColumnHeads {
-    /// Names in CSV and JSON. With several names, an estimate fills them with its value, the ends of its interval, and n.
+    /// Names in CSV and JSON. With several names, an estimate fills them with its value, the ends of its interval, and
+    /// n.
     pub csv: Vec<String>,
     /// Names in the terminal. With two names, a difference fills them with its value and its interval.
     pub terminal: Vec<String>,
@@ -180,8 +178,8 @@ impl<C: Into<Self>> From<Option<C>> for TableCell {
     }
 }
 
-/// Names by format, for example `csv low high | terminal difference, 95 % interval | page difference [95 %]`. Names for CSV are
-/// separated by a space, names for the terminal by a comma.
+/// Names by format, for example `csv low high | terminal difference, 95 % interval | page difference [95 %]`. Names for
+/// CSV are separated by a space, names for the terminal by a comma.
 impl From<&str> for ColumnHeads {
     fn from(names: &str) -> Self {
         let mut heads = Self::default();
@@ -198,7 +196,8 @@ impl From<&str> for ColumnHeads {
     }
 }
 
-/// Builder of a table from items, one for each row. Columns are added one by one, and each computes its cells from the items.
+/// Builder of a table from items, one for each row. Columns are added one by one, and each computes its cells from the
+/// items.
 pub(crate) struct TableBuilder<T> {
     table: Table,
     items: Vec<T>,
@@ -207,11 +206,7 @@ pub(crate) struct TableBuilder<T> {
 impl<T> TableBuilder<T> {
     pub(crate) fn new(name: &'static str, items: impl IntoIterator<Item = T>) -> Self {
         let items: Vec<T> = items.into_iter().collect();
-        let table = Table {
-            name,
-            rows: items.iter().map(|_| TableRow::with_capacity()).collect(),
-            ..Table::default()
-        };
+        let table = Table { name, rows: items.iter().map(|_| TableRow::with_capacity()).collect(), ..Table::default() };
         Self { table, items }
     }
 
@@ -276,9 +271,7 @@ impl Table {
 
     /// True if the table is written to a CSV file.
     pub(crate) fn has_file(&self) -> bool {
-        self.columns
-            .iter()
-            .any(|column| !column.heads.csv.is_empty())
+        self.columns.iter().any(|column| !column.heads.csv.is_empty())
     }
 
     /// Removes the CSV columns, so that the table is not written to a file.
@@ -291,17 +284,12 @@ impl Table {
 
     /// The rows that a format shows.
     pub(crate) fn rows_in(&self, format: TableFormat) -> impl Iterator<Item = &TableRow> {
-        self.rows
-            .iter()
-            .filter(move |row| !row.hidden_in.contains(&format))
+        self.rows.iter().filter(move |row| !row.hidden_in.contains(&format))
     }
 
-    /// The rows that a format shows. The first row of a group has its heading, and the first row after a group an empty heading; all other
-    /// rows have `None`.
-    pub(crate) fn headed_rows_in(
-        &self,
-        format: TableFormat,
-    ) -> impl Iterator<Item = (Option<&str>, &TableRow)> {
+    /// The rows that a format shows. The first row of a group has its heading, and the first row after a group an empty
+    /// heading; all other rows have `None`.
+    pub(crate) fn headed_rows_in(&self, format: TableFormat) -> impl Iterator<Item = (Option<&str>, &TableRow)> {
         let mut above: Option<&str> = None;
         self.rows_in(format).map(move |row| {
             let group = row.group.as_deref();
@@ -312,10 +300,7 @@ impl Table {
     }
 
     /// The cells of a row with their columns.
-    pub(crate) fn cells<'t>(
-        &'t self,
-        row: &'t TableRow,
-    ) -> impl Iterator<Item = (&'t Column, &'t TableCell)> + Clone {
+    pub(crate) fn cells<'t>(&'t self, row: &'t TableRow) -> impl Iterator<Item = (&'t Column, &'t TableCell)> + Clone {
         self.columns.iter().zip(&row.cells)
     }
 }
@@ -326,9 +311,7 @@ mod tests {
 
     #[test]
     fn a_column_has_a_name_in_each_format() {
-        let heads = ColumnHeads::from(
-            "csv d low high | terminal difference, 95 % interval | page | latex $d$",
-        );
+        let heads = ColumnHeads::from("csv d low high | terminal difference, 95 % interval | page | latex $d$");
         assert_eq!(heads.csv, ["d", "low", "high"]);
         assert_eq!(heads.terminal, ["difference", "95 % interval"]);
         assert_eq!(heads.page.as_deref(), Some(""));
@@ -340,19 +323,11 @@ mod tests {
     fn rows_can_be_hidden_in_a_format() {
         let table = TableBuilder::new("t", [1_usize, 2])
             .column(ColumnKind::Count, "csv n", |n| *n)
-            .column(ColumnKind::Text, "page word", |n| {
-                (*n == 1).then_some("one")
-            })
+            .column(ColumnKind::Text, "page word", |n| (*n == 1).then_some("one"))
             .hide(TableFormat::Page, |n| *n == 2)
             .build();
-        assert_eq!(
-            table.rows[0].cells,
-            [TableCell::Count(1), TableCell::from("one")]
-        );
-        assert_eq!(
-            table.rows[1].cells,
-            [TableCell::Count(2), TableCell::Missing]
-        );
+        assert_eq!(table.rows[0].cells, [TableCell::Count(1), TableCell::from("one")]);
+        assert_eq!(table.rows[1].cells, [TableCell::Count(2), TableCell::Missing]);
         assert_eq!(table.rows_in(TableFormat::Page).count(), 1);
         assert_eq!(table.rows_in(TableFormat::Terminal).count(), 2);
     }

@@ -5,7 +5,8 @@ const DEFAULT: usize = 80;
 /// Minimum width in columns that is assumed; chosen.
 const MIN: usize = 60;
 
-/// The width of the output in columns: the variable `COLUMNS`, otherwise the width of the terminal, otherwise 80; at least 60.
+/// The width of the output in columns: the variable `COLUMNS`, otherwise the width of the terminal, otherwise 80; at
+/// least 60.
 pub(crate) fn columns() -> usize {
     std::env::var("COLUMNS")
         .ok()

@@ -11,7 +11,8 @@ pub(crate) fn light(variant: &Variant, enhancer: Option<&EnhancerName>) -> Strin
     light_with(variant, enhancer.map(EnhancerName::as_str))
 }
 
-/// Title of a variant and its enhancer, like [`light`], with a display name for the enhancer. A group of runs is appended.
+/// Title of a variant and its enhancer, like [`light`], with a display name for the enhancer. A group of runs is
+/// appended.
 pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
     let (title, group) = (variant.title(), variant.group_suffix());
     match enhancer {
@@ -20,7 +21,8 @@ pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
     }
 }
 
-/// Display name of a question family: the paper's name for its five families, the family's own name for others. `None` is all families.
+/// Display name of a question family: the paper's name for its five families, the family's own name for others. `None`
+/// is all families.
 pub(crate) fn family(family: Option<&Family>) -> &str {
     match family {
         None => "all families",
@@ -40,11 +42,7 @@ pub(crate) fn name(subject: &ModelInCondition) -> String {
 
 /// Name of a model in figures and LaTeX tables, which is marked if it is a reference beside models under test.
 pub(crate) fn marked_reference(name: String, is_reference: bool) -> String {
-    if is_reference {
-        format!("{name} (reference)")
-    } else {
-        name
-    }
+    if is_reference { format!("{name} (reference)") } else { name }
 }
 
 /// Shortens a name to `width` characters by replacing its middle with `…`. Shorter names are unchanged.
@@ -55,11 +53,7 @@ pub(crate) fn shorten_middle(name: &str, width: usize) -> String {
     }
     let (head, tail) = (width.div_ceil(2) - 1, width / 2);
     let tail_start = chars.len() - tail;
-    chars[..head]
-        .iter()
-        .chain(&['…'])
-        .chain(&chars[tail_start..])
-        .collect()
+    chars[..head].iter().chain(&['…']).chain(&chars[tail_start..]).collect()
 }
 
 /// A share (0 to 1) in percent, with one decimal and no percent sign.
@@ -71,7 +65,8 @@ pub(crate) fn percent(share: f64) -> String {
     }
 }
 
-/// The ends of the interval of a share in percent, with one decimal, or as many as it takes to print an interval that has a width.
+/// The ends of the interval of a share in percent, with one decimal, or as many as it takes to print an interval that
+/// has a width.
 pub(crate) fn share_ends(low: f64, high: f64) -> [String; 2] {
     let decimals = share_decimals(low, high);
     [low, high].map(|end| match decimals {
@@ -80,7 +75,8 @@ pub(crate) fn share_ends(low: f64, high: f64) -> [String; 2] {
     })
 }
 
-/// Number of decimals with which the ends of an interval of a share, in percent, differ; 1 for an interval without a width.
+/// Number of decimals with which the ends of an interval of a share, in percent, differ; 1 for an interval without a
+/// width.
 pub(crate) fn share_decimals(low: f64, high: f64) -> usize {
     (1..MAX_SHARE_DECIMALS)
         .find(|decimals| {
@@ -112,8 +108,8 @@ pub(crate) fn ends_in_points(difference: Estimate) -> String {
     format!("{}, {}", points(difference.low), points(difference.high))
 }
 
-/// A p-value with three decimals, or `< 0.001`. A value below 0.05 has as many decimals as it takes to stay below 0.05, because a result
-/// is detected if and only if p is below 0.05.
+/// A p-value with three decimals, or `< 0.001`. A value below 0.05 has as many decimals as it takes to stay below 0.05,
+/// because a result is detected if and only if p is below 0.05.
 pub(crate) fn p(value: f64) -> String {
     if value < 0.001 {
         return "< 0.001".to_owned();
@@ -130,25 +126,19 @@ pub(crate) fn p(value: f64) -> String {
 /// Maximum number of decimals of a p-value (chosen).
 const MAX_P_DECIMALS: usize = 7;
 
-/// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if the lower end is infinite (beyond the darkest level).
+/// Interval of an exposure drop in EV, such as `1.2 to 3.4`; `–` if the lower end is infinite (beyond the darkest
+/// level).
 pub(crate) fn reach(low: f64, high: f64, darkest: f64) -> String {
-    if low.is_infinite() {
-        "–".to_owned()
-    } else {
-        format!("{} to {}", stops(low, darkest), stops(high, darkest))
-    }
+    if low.is_infinite() { "–".to_owned() } else { format!("{} to {}", stops(low, darkest), stops(high, darkest)) }
 }
 
 /// An exposure drop in EV with one decimal. An infinite drop is `>` and the drop of the darkest level asked, in EV.
 pub(crate) fn stops(value: f64, darkest: f64) -> String {
-    if value.is_infinite() {
-        format!("> {darkest}")
-    } else {
-        format!("{value:.1}")
-    }
+    if value.is_infinite() { format!("> {darkest}") } else { format!("{value:.1}") }
 }
 
-/// A share in percent with its interval, such as `96.4 [93.0, 98.2]`; without an interval if the share is known exactly.
+/// A share in percent with its interval, such as `96.4 [93.0, 98.2]`; without an interval if the share is known
+/// exactly.
 pub(crate) fn with_interval(share: Estimate) -> String {
     let value = percent(share.value);
     if share.high <= share.low {
@@ -158,7 +148,8 @@ pub(crate) fn with_interval(share: Estimate) -> String {
     format!("{value} [{low}, {high}]")
 }
 
-/// Estimate of a cell that [`words`] formats without its interval: an accuracy, a score or an effect. `None` for other cells.
+/// Estimate of a cell that [`words`] formats without its interval: an accuracy, a score or an effect. `None` for other
+/// cells.
 pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     match (kind, cell) {
         (
@@ -173,7 +164,8 @@ pub(crate) fn interval(kind: ColumnKind, cell: &TableCell) -> Option<Estimate> {
     }
 }
 
-/// Largest lower and upper error bars of several estimates, in percentage points, such as `−7.7 +7.1`; empty without estimates.
+/// Largest lower and upper error bars of several estimates, in percentage points, such as `−7.7 +7.1`; empty without
+/// estimates.
 pub(crate) fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String {
     shares
         .map(|share| [share.value - share.low, share.high - share.value])
@@ -183,9 +175,7 @@ pub(crate) fn widest_reach_of(shares: impl Iterator<Item = Estimate>) -> String 
         })
         .map_or(String::new(), |widest| {
             let [down, up] = widest.map(percent);
-            format!("−{down} +{up}")
-                .replace("−0.0", "0.0")
-                .replace("+0.0", "0.0")
+            format!("−{down} +{up}").replace("−0.0", "0.0").replace("+0.0", "0.0")
         })
 }
 
@@ -203,12 +193,8 @@ pub(crate) fn words(kind: ColumnKind, cell: &TableCell) -> String {
         TableCell::Text(text) | TableCell::Unknown(text) => text.clone(),
         TableCell::Count(count) => count.to_string(),
         TableCell::Number(value) => format_number(kind, *value),
-        TableCell::Estimate(estimate) | TableCell::Below(estimate) => {
-            format_estimate(kind, *estimate)
-        }
-        TableCell::Guess(share) | TableCell::Strict(share, _) | TableCell::Changed(share, None) => {
-            percent(share.value)
-        }
+        TableCell::Estimate(estimate) | TableCell::Below(estimate) => format_estimate(kind, *estimate),
+        TableCell::Guess(share) | TableCell::Strict(share, _) | TableCell::Changed(share, None) => percent(share.value),
         TableCell::Changed(share, Some(change)) => {
             format!("{} ({})", percent(share.value), points(*change))
         }
@@ -235,8 +221,7 @@ fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
     if kind == ColumnKind::Share {
         return with_interval(estimate);
     }
-    let [value, low, high] =
-        [estimate.value, estimate.low, estimate.high].map(|number| format_number(kind, number));
+    let [value, low, high] = [estimate.value, estimate.low, estimate.high].map(|number| format_number(kind, number));
     match kind {
         ColumnKind::Percent | ColumnKind::Accuracy => value,
         _ => format!("{value} [{low}, {high}]"),
@@ -246,11 +231,7 @@ fn format_estimate(kind: ColumnKind, estimate: Estimate) -> String {
 /// Lists up to `most` names and the number of the remaining ones: `a, b and 3 more`.
 pub(crate) fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
     let (first, others) = names.split_at(names.len().min(most));
-    let first = first
-        .iter()
-        .map(AsRef::as_ref)
-        .collect::<Vec<_>>()
-        .join(", ");
+    let first = first.iter().map(AsRef::as_ref).collect::<Vec<_>>().join(", ");
     match others.len() {
         0 => first,
         more => format!("{first} and {more} more"),
@@ -285,12 +266,7 @@ mod tests {
 
     #[test]
     fn an_interval_of_a_share_has_a_width() {
-        let share = |low, high| Estimate {
-            value: low,
-            low,
-            high,
-            n: 20_000,
-        };
+        let share = |low, high| Estimate { value: low, low, high, n: 20_000 };
         assert_eq!(with_interval(share(0.0, 0.000_19)), "0.0 [0.00, 0.02]");
         assert_eq!(ends(share(0.999_999, 1.0)), "99.9999–100.0000");
         assert_eq!(with_interval(share(0.9, 1.0)), "90.0 [90.0, 100.0]");

@@ -5,8 +5,8 @@ use crate::report::text::width::columns;
 /// Maximum width of a line in characters.
 pub(crate) const WIDTH: usize = 80;
 
-/// Wraps a text at [`WIDTH`] characters, or at the width of a narrower terminal. The first line begins with `first`, the others with
-/// `rest`.
+/// Wraps a text at [`WIDTH`] characters, or at the width of a narrower terminal. The first line begins with `first`,
+/// the others with `rest`.
 pub(crate) fn wrapped(first: &str, text: &str, rest: &str) -> String {
     wrapped_to(WIDTH.min(columns()), first, text, rest)
 }

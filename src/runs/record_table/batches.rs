@@ -56,15 +56,9 @@ impl<D: TableDetail> RowBatches<D> {
         }
         let batch = &unread[..batch_length(unread)];
         let lines = self.log.lines(batch)?;
-        let records: Result<Vec<Record<D>>> = lines
-            .par_iter()
-            .map(|line| self.log.record::<D>(line))
-            .collect();
+        let records: Result<Vec<Record<D>>> = lines.par_iter().map(|line| self.log.record::<D>(line)).collect();
         self.read += batch.len();
-        let rows = records?
-            .into_iter()
-            .filter_map(|record| self.rows.row(record))
-            .collect();
+        let rows = records?.into_iter().filter_map(|record| self.rows.row(record)).collect();
         Ok(Some(rows))
     }
 }

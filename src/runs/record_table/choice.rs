@@ -2,9 +2,7 @@
 
 use std::path::Path;
 
-use super::common::{
-    column, image_columns, leading_columns, reply_columns, serialized_word, trailing_columns,
-};
+use super::common::{column, image_columns, leading_columns, reply_columns, serialized_word, trailing_columns};
 use super::row::{Row, SentImage, TableDetail};
 use crate::error::Result;
 use crate::store::CellKind::{Bool, Int8, Int32, Text};
@@ -69,18 +67,10 @@ type ChoiceRow = Row<ChoiceDetail>;
 /// Columns of the choices and the true choice.
 fn question_columns() -> Vec<Column<ChoiceRow>> {
     vec![
-        column("truth", Int8, MayBeNull, |row: &ChoiceRow| {
-            Cell::int(row.record.detail.truth)
-        }),
-        column("choice_count", Int8, Always, |row| {
-            Cell::int(Some(row.record.detail.choices.len()))
-        }),
-        column("repeat", Int32, MayBeNull, |row| {
-            Cell::int(Some(row.record.detail.repeat))
-        }),
-        column("answer", Text, MayBeNull, |row| {
-            choice_text(row, row.record.detail.truth)
-        }),
+        column("truth", Int8, MayBeNull, |row: &ChoiceRow| Cell::int(row.record.detail.truth)),
+        column("choice_count", Int8, Always, |row| Cell::int(Some(row.record.detail.choices.len()))),
+        column("repeat", Int32, MayBeNull, |row| Cell::int(Some(row.record.detail.repeat))),
+        column("answer", Text, MayBeNull, |row| choice_text(row, row.record.detail.truth)),
         column("choices", Text, Always, |row| {
             let choices = serde_json::to_string(&row.record.detail.choices);
             choices.map_or(Cell::Null, |choices| Cell::Text(choices.into()))
@@ -91,31 +81,15 @@ fn question_columns() -> Vec<Column<ChoiceRow>> {
 /// Columns of the strict and the lenient parsing of the reply.
 fn reading_columns() -> Vec<Column<ChoiceRow>> {
     vec![
-        column("strict", Int8, MayBeNull, |row: &ChoiceRow| {
-            Cell::int(chosen(row.record.detail.strict))
-        }),
-        column("lenient", Int8, MayBeNull, |row| {
-            Cell::int(chosen(row.record.detail.lenient))
-        }),
-        column("predicted", Text, MayBeNull, |row| {
-            choice_text(row, chosen(row.record.detail.strict))
-        }),
-        column("predicted_lenient", Text, MayBeNull, |row| {
-            choice_text(row, chosen(row.record.detail.lenient))
-        }),
-        column("right", Bool, MayBeNull, |row| {
-            right(row, row.record.detail.strict)
-        }),
-        column("right_lenient", Bool, MayBeNull, |row| {
-            right(row, row.record.detail.lenient)
-        }),
-        column("outcome", Text, Always, |row| {
-            serialized_word(&row.record.detail.outcome)
-        }),
+        column("strict", Int8, MayBeNull, |row: &ChoiceRow| Cell::int(chosen(row.record.detail.strict))),
+        column("lenient", Int8, MayBeNull, |row| Cell::int(chosen(row.record.detail.lenient))),
+        column("predicted", Text, MayBeNull, |row| choice_text(row, chosen(row.record.detail.strict))),
+        column("predicted_lenient", Text, MayBeNull, |row| choice_text(row, chosen(row.record.detail.lenient))),
+        column("right", Bool, MayBeNull, |row| right(row, row.record.detail.strict)),
+        column("right_lenient", Bool, MayBeNull, |row| right(row, row.record.detail.lenient)),
+        column("outcome", Text, Always, |row| serialized_word(&row.record.detail.outcome)),
         column("why", Text, MayBeNull, |row| why(row.record.detail.strict)),
-        column("why_lenient", Text, MayBeNull, |row| {
-            why(row.record.detail.lenient)
-        }),
+        column("why_lenient", Text, MayBeNull, |row| why(row.record.detail.lenient)),
     ]
 }
 

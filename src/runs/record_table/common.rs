@@ -1,4 +1,5 @@
-//! Columns in the tables of both experiments: [`leading_columns`], [`reply_columns`], [`image_columns`] and [`trailing_columns`].
+//! Columns in the tables of both experiments: [`leading_columns`], [`reply_columns`], [`image_columns`] and
+//! [`trailing_columns`].
 
 use serde::Serialize;
 use serde_json::Value;
@@ -15,12 +16,7 @@ pub(super) fn column<R>(
     presence: Presence,
     value: for<'r> fn(&'r R) -> Cell<'r>,
 ) -> Column<R> {
-    Column {
-        name,
-        kind,
-        presence,
-        value,
-    }
+    Column { name, kind, presence, value }
 }
 
 /// The text of a value as serialized in records; null if it is not serialized as a string.
@@ -38,40 +34,20 @@ fn double<'r>(number: Option<f64>) -> Cell<'r> {
 /// Columns of question, model and condition.
 pub(super) fn leading_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
-        column("key", Key, Always, |row: &Row<D>| {
-            Cell::Bytes(row.record.key.as_bytes())
-        }),
-        column("question", Text, Always, |row| {
-            Cell::text(Some(&row.record.question.0))
-        }),
-        column("frame", Text, Always, |row| {
-            Cell::text(Some(row.record.detail.frame()))
-        }),
+        column("key", Key, Always, |row: &Row<D>| Cell::Bytes(row.record.key.as_bytes())),
+        column("question", Text, Always, |row| Cell::text(Some(&row.record.question.0))),
+        column("frame", Text, Always, |row| Cell::text(Some(row.record.detail.frame()))),
         column("scene", Text, MayBeNull, |row| {
             let question = row.question.as_ref();
             Cell::text(question.and_then(|question| question.scene.as_deref()))
         }),
-        column("family", Text, Always, |row| {
-            Cell::text(Some(row.record.detail.family()))
-        }),
-        column("model", Text, Always, |row| {
-            Cell::text(Some(&row.record.model))
-        }),
-        column("view", Text, Always, |row| {
-            serialized_word(&row.record.view)
-        }),
-        column("condition", Text, MayBeNull, |row| {
-            Cell::text(row.condition.condition.as_deref())
-        }),
-        column("level", Text, MayBeNull, |row| {
-            Cell::text(row.condition.level.as_deref())
-        }),
-        column("variant", Text, Always, |row| {
-            Cell::text(Some(&row.condition.variant))
-        }),
-        column("enhancer", Text, MayBeNull, |row| {
-            Cell::text(row.condition.enhancer.as_deref())
-        }),
+        column("family", Text, Always, |row| Cell::text(Some(row.record.detail.family()))),
+        column("model", Text, Always, |row| Cell::text(Some(&row.record.model))),
+        column("view", Text, Always, |row| serialized_word(&row.record.view)),
+        column("condition", Text, MayBeNull, |row| Cell::text(row.condition.condition.as_deref())),
+        column("level", Text, MayBeNull, |row| Cell::text(row.condition.level.as_deref())),
+        column("variant", Text, Always, |row| Cell::text(Some(&row.condition.variant))),
+        column("enhancer", Text, MayBeNull, |row| Cell::text(row.condition.enhancer.as_deref())),
         column("ev", Double, MayBeNull, |row| double(row.condition.ev)),
     ]
 }
@@ -79,17 +55,11 @@ pub(super) fn leading_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
 /// Columns of the reply.
 pub(super) fn reply_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
-        column("reply", LongText, MayBeNull, |row: &Row<D>| {
-            Cell::text(row.record.reply.as_deref())
-        }),
-        column("refusal", LongText, MayBeNull, |row| {
-            Cell::text(row.record.refusal.as_deref())
-        }),
+        column("reply", LongText, MayBeNull, |row: &Row<D>| Cell::text(row.record.reply.as_deref())),
+        column("refusal", LongText, MayBeNull, |row| Cell::text(row.record.refusal.as_deref())),
         column("failure_kind", Text, MayBeNull, |row| {
             let failure = row.record.failure.as_ref();
-            failure.map_or(Cell::Null, |failure: &Failure| {
-                serialized_word(&failure.kind)
-            })
+            failure.map_or(Cell::Null, |failure: &Failure| serialized_word(&failure.kind))
         }),
         column("failure_status", Int16, MayBeNull, |row| {
             let failure = row.record.failure.as_ref();
@@ -103,22 +73,12 @@ pub(super) fn reply_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
             Some(Finish::Other(reason)) => Cell::text(Some(reason)),
             finish => serialized_word(finish),
         }),
-        column("served_model", Text, MayBeNull, |row| {
-            Cell::text(row.record.served_model.as_deref())
-        }),
+        column("served_model", Text, MayBeNull, |row| Cell::text(row.record.served_model.as_deref())),
         column("via", Text, Always, |row| serialized_word(&row.record.via)),
-        column("prompt_tokens", Int32, MayBeNull, |row| {
-            usage(row, |usage| usage.prompt_tokens)
-        }),
-        column("completion_tokens", Int32, MayBeNull, |row| {
-            usage(row, |usage| usage.completion_tokens)
-        }),
-        column("latency_ms", Int32, MayBeNull, |row| {
-            Cell::int(row.record.latency_ms)
-        }),
-        column("attempts", Int32, MayBeNull, |row| {
-            Cell::int(Some(row.record.attempts))
-        }),
+        column("prompt_tokens", Int32, MayBeNull, |row| usage(row, |usage| usage.prompt_tokens)),
+        column("completion_tokens", Int32, MayBeNull, |row| usage(row, |usage| usage.completion_tokens)),
+        column("latency_ms", Int32, MayBeNull, |row| Cell::int(row.record.latency_ms)),
+        column("attempts", Int32, MayBeNull, |row| Cell::int(Some(row.record.attempts))),
     ]
 }
 
@@ -133,38 +93,20 @@ pub(super) fn image_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
             let image = row.record.detail.image();
             image.map_or(Cell::Null, |image| Cell::Bytes(image.digest.as_bytes()))
         }),
-        column("image_bytes", Int32, MayBeNull, |row| {
-            Cell::int(row.record.detail.image().map(|image| image.bytes))
-        }),
-        column("image_width", Int32, MayBeNull, |row| {
-            Cell::int(row.record.detail.image().map(|image| image.width))
-        }),
-        column("image_height", Int32, MayBeNull, |row| {
-            Cell::int(row.record.detail.image().map(|image| image.height))
-        }),
-        column("image_format", Text, MayBeNull, |row| {
-            Cell::text(row.record.detail.image().map(|image| image.format))
-        }),
+        column("image_bytes", Int32, MayBeNull, |row| Cell::int(row.record.detail.image().map(|image| image.bytes))),
+        column("image_width", Int32, MayBeNull, |row| Cell::int(row.record.detail.image().map(|image| image.width))),
+        column("image_height", Int32, MayBeNull, |row| Cell::int(row.record.detail.image().map(|image| image.height))),
+        column("image_format", Text, MayBeNull, |row| Cell::text(row.record.detail.image().map(|image| image.format))),
     ]
 }
 
 /// Further columns of condition, tokens and endpoint, which were added later.
 pub(super) fn trailing_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     vec![
-        column("reading", Text, MayBeNull, |row: &Row<D>| {
-            Cell::text(row.condition.profile.as_deref())
-        }),
-        column("severity", Double, MayBeNull, |row| {
-            double(row.condition.severity)
-        }),
-        column("cached_tokens", Int32, MayBeNull, |row| {
-            usage(row, |usage| usage.cached_tokens)
-        }),
-        column("provider", Text, MayBeNull, |row| {
-            Cell::text(row.record.provider.as_deref())
-        }),
-        column("endpoint", Int32, MayBeNull, |row| {
-            Cell::int(row.record.endpoint)
-        }),
+        column("reading", Text, MayBeNull, |row: &Row<D>| Cell::text(row.condition.profile.as_deref())),
+        column("severity", Double, MayBeNull, |row| double(row.condition.severity)),
+        column("cached_tokens", Int32, MayBeNull, |row| usage(row, |usage| usage.cached_tokens)),
+        column("provider", Text, MayBeNull, |row| Cell::text(row.record.provider.as_deref())),
+        column("endpoint", Int32, MayBeNull, |row| Cell::int(row.record.endpoint)),
     ]
 }

@@ -1,4 +1,5 @@
-//! `records.parquet`, the records of a run as a table for other programs: [`update`] writes it. The log stays the source of truth.
+//! `records.parquet`, the records of a run as a table for other programs: [`update`] writes it. The log stays the
+//! source of truth.
 
 mod batches;
 mod choice;
@@ -21,7 +22,8 @@ use crate::types::{ChoiceDetail, OpenDetail};
 
 pub(crate) const RECORDS_PARQUET: &str = "records.parquet";
 
-/// Writes the table of the run in a folder, unless the existing one is up to date with the log. The records are not kept in memory.
+/// Writes the table of the run in a folder, unless the existing one is up to date with the log. The records are not
+/// kept in memory.
 ///
 /// # Errors
 /// If a record is broken, or the file cannot be written.

@@ -48,25 +48,15 @@ impl TableDetail for OpenDetail {
                 let images = row.record.detail.images.as_ref();
                 Cell::int(images.map(|images| images.images))
             }),
-            column("person", Text, MayBeNull, |row| {
-                Cell::text(row.record.detail.person.as_deref())
-            }),
+            column("person", Text, MayBeNull, |row| Cell::text(row.record.detail.person.as_deref())),
         ];
-        let parts = [
-            leading_columns(),
-            mark_columns(),
-            reply_columns(),
-            image_columns(),
-            trailing_columns(),
-            own,
-        ];
+        let parts = [leading_columns(), mark_columns(), reply_columns(), image_columns(), trailing_columns(), own];
         parts.into_iter().flatten().collect()
     }
 
     fn context(folder: &Path, manifest: &RunManifest, questions: &[RunQuestion]) -> Result<Marks> {
         let judge = text_setting(manifest, JUDGE).map(str::to_owned);
-        let protocol =
-            text_setting(manifest, PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
+        let protocol = text_setting(manifest, PROTOCOL).map_or(Ok(Protocol::Upstream), read_word)?;
         let names = RecordedNames::from_manifest(manifest);
         let mut marks = MarkIndex::new(questions);
         each_record(folder, |record: Record<Self>, _| {
@@ -80,11 +70,7 @@ impl TableDetail for OpenDetail {
                 marks.add(&record.question, answer, mark(reply, protocol));
             }
         })?;
-        Ok(Marks {
-            judge,
-            protocol,
-            by_answer: marks,
-        })
+        Ok(Marks { judge, protocol, by_answer: marks })
     }
 
     fn extra(context: &Marks, record: &Record<Self>) -> Option<MarkedAnswer> {
@@ -113,11 +99,7 @@ impl TableDetail for OpenDetail {
 impl Marks {
     /// The answer of a record, with its mark.
     fn marked_answer(&self, record: &Record<OpenDetail>) -> MarkedAnswer {
-        let state = if record.failed() {
-            AnswerState::Missing
-        } else {
-            answer_state(record, self.protocol)
-        };
+        let state = if record.failed() { AnswerState::Missing } else { answer_state(record, self.protocol) };
         let answer = match state {
             AnswerState::Missing => return unmarked(AnswerOutcome::Missing),
             AnswerState::Null => return unmarked(AnswerOutcome::Null),
@@ -129,20 +111,12 @@ impl Marks {
             Some(None) => AnswerOutcome::Unmarked,
             Some(Some(mark)) => AnswerOutcome::Marked(*mark),
         };
-        MarkedAnswer {
-            answer: Some(answer),
-            outcome,
-            judge: self.judge.clone().filter(|_| mark.is_some()),
-        }
+        MarkedAnswer { answer: Some(answer), outcome, judge: self.judge.clone().filter(|_| mark.is_some()) }
     }
 }
 
 fn unmarked(outcome: AnswerOutcome) -> MarkedAnswer {
-    MarkedAnswer {
-        answer: None,
-        outcome,
-        judge: None,
-    }
+    MarkedAnswer { answer: None, outcome, judge: None }
 }
 
 /// Columns of the true answer, the model's answer and its mark.
@@ -152,9 +126,7 @@ fn mark_columns() -> Vec<Column<Row<OpenDetail>>> {
             let question = row.question.as_ref();
             Cell::text(question.and_then(|question| question.answer.as_deref()))
         }),
-        column("predicted", LongText, MayBeNull, |row| {
-            Cell::text(row.extra.answer.as_deref())
-        }),
+        column("predicted", LongText, MayBeNull, |row| Cell::text(row.extra.answer.as_deref())),
         column("outcome", Text, Always, |row| {
             Cell::text(Some(match row.extra.outcome {
                 AnswerOutcome::Missing => "failed",
@@ -164,9 +136,7 @@ fn mark_columns() -> Vec<Column<Row<OpenDetail>>> {
                 AnswerOutcome::Marked(_) => "marked",
             }))
         }),
-        column("judge", Text, MayBeNull, |row| {
-            Cell::text(row.extra.judge.as_deref())
-        }),
+        column("judge", Text, MayBeNull, |row| Cell::text(row.extra.judge.as_deref())),
         column("mark", Int32, MayBeNull, |row| match row.extra.outcome {
             AnswerOutcome::Marked(mark) => Cell::int(Some(mark)),
             _ => Cell::Null,

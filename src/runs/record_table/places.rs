@@ -33,11 +33,7 @@ pub(super) fn ordered_places(
     questions: &[RunQuestion],
 ) -> Result<Vec<LinePlace>> {
     let names = RecordedNames::from_manifest(manifest);
-    let ids: HashMap<&QuestionId, u32> = questions
-        .iter()
-        .map(|question| &question.id)
-        .zip(1..)
-        .collect();
+    let ids: HashMap<&QuestionId, u32> = questions.iter().map(|question| &question.id).zip(1..).collect();
     let mut conditions = Numbering::<Option<Condition>>::default();
     let mut models = Numbering::<String>::default();
     let mut all = Vec::new();

@@ -31,7 +31,8 @@ impl StoredRun {
         Ok(Self { folder, kind })
     }
 
-    /// The records, one for each trial, with the columns and in the order of `records.parquet`. They are read in batches.
+    /// The records, one for each trial, with the columns and in the order of `records.parquet`. They are read in
+    /// batches.
     ///
     /// # Errors
     /// If a line of the run is broken.
@@ -67,13 +68,8 @@ pub struct RunRecord {
 impl Records {
     fn new<D: TableDetail>(folder: &Path) -> Result<Self> {
         let table = D::columns();
-        let columns: Arc<[Heading]> = table
-            .iter()
-            .map(|column| Heading {
-                name: column.name,
-                kind: column.kind,
-            })
-            .collect();
+        let columns: Arc<[Heading]> =
+            table.iter().map(|column| Heading { name: column.name, kind: column.kind }).collect();
         let mut batches = RowBatches::<D>::open(folder)?;
         let headings = Arc::clone(&columns);
         Ok(Self {
@@ -84,10 +80,7 @@ impl Records {
                     rows.iter()
                         .map(|row| RunRecord {
                             columns: Arc::clone(&headings),
-                            cells: table
-                                .iter()
-                                .map(|column| owned_cell((column.value)(row)))
-                                .collect(),
+                            cells: table.iter().map(|column| owned_cell((column.value)(row))).collect(),
                         })
                         .collect()
                 }))
@@ -130,10 +123,7 @@ impl RunRecord {
     /// If there is no such column, or its type is not text.
     pub fn text(&self, column: &str) -> Result<Option<&str>> {
         match self.cell(column)? {
-            (
-                Cell::Null,
-                CellKind::Text | CellKind::LongText | CellKind::Key | CellKind::Digest,
-            ) => Ok(None),
+            (Cell::Null, CellKind::Text | CellKind::LongText | CellKind::Key | CellKind::Digest) => Ok(None),
             (Cell::Text(text), _) => Ok(Some(text.as_ref())),
             _ => Err(other_type(column, "texts")),
         }
@@ -145,9 +135,7 @@ impl RunRecord {
     /// If there is no such column, or its type is not a number.
     pub fn number(&self, column: &str) -> Result<Option<f64>> {
         match self.cell(column)? {
-            (Cell::Null, CellKind::Int8 | CellKind::Int16 | CellKind::Int32 | CellKind::Double) => {
-                Ok(None)
-            }
+            (Cell::Null, CellKind::Int8 | CellKind::Int16 | CellKind::Int32 | CellKind::Double) => Ok(None),
             (Cell::Int(number), _) => Ok(Some(*number as f64)),
             (Cell::Double(number), _) => Ok(Some(*number)),
             _ => Err(other_type(column, "numbers")),

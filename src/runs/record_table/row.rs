@@ -8,9 +8,7 @@ use crate::error::Result;
 use crate::runs::renamed::rename_record;
 use crate::store::Column;
 use crate::types::manifests::{RecordedNames, RunManifest};
-use crate::types::{
-    Condition, ConditionColumns, Digest, QuestionId, Record, RunQuestion, Severity,
-};
+use crate::types::{Condition, ConditionColumns, Digest, QuestionId, Record, RunQuestion, Severity};
 use darkqa_score::answers::record::Detail;
 
 /// Record detail of an experiment with a table of records.
@@ -31,11 +29,7 @@ pub(super) trait TableDetail: Detail + Sync + 'static {
     ///
     /// # Errors
     /// If a record is broken.
-    fn context(
-        folder: &Path,
-        manifest: &RunManifest,
-        questions: &[RunQuestion],
-    ) -> Result<Self::Context>;
+    fn context(folder: &Path, manifest: &RunManifest, questions: &[RunQuestion]) -> Result<Self::Context>;
 
     /// The additional data of a record's row; `None` if the record has no row.
     fn extra(context: &Self::Context, record: &Record<Self>) -> Option<Self::Extra>;
@@ -115,11 +109,7 @@ impl<D: TableDetail> Rows<D> {
     ///
     /// # Errors
     /// If a record is broken.
-    pub(super) fn new(
-        folder: &Path,
-        manifest: &RunManifest,
-        questions: &[RunQuestion],
-    ) -> Result<Self> {
+    pub(super) fn new(folder: &Path, manifest: &RunManifest, questions: &[RunQuestion]) -> Result<Self> {
         let questions_by_id = questions
             .iter()
             .map(|question| {
@@ -146,15 +136,9 @@ impl<D: TableDetail> Rows<D> {
             Arc::clone(known)
         } else {
             let cells = Arc::new(ConditionCells::new(record.condition.as_ref()));
-            self.conditions
-                .insert(record.condition.clone(), Arc::clone(&cells));
+            self.conditions.insert(record.condition.clone(), Arc::clone(&cells));
             cells
         };
-        Some(Row {
-            question: self.questions.get(&record.question).map(Arc::clone),
-            condition,
-            extra,
-            record,
-        })
+        Some(Row { question: self.questions.get(&record.question).map(Arc::clone), condition, extra, record })
     }
 }

@@ -23,7 +23,8 @@ pub(super) struct PlanFile {
     pub(super) schema: String,
     /// Version of the program that wrote the plan.
     pub(super) version: String,
-    /// Data, questions and light, which must be the same in every run that uses the plan. Models and enhancers are not included.
+    /// Data, questions and light, which must be the same in every run that uses the plan. Models and enhancers are not
+    /// included.
     pub(super) identity: Identity,
     /// Digests of the other files, by name.
     pub(super) files: BTreeMap<String, Digest>,
@@ -69,12 +70,10 @@ impl PlanEstimate {
     /// The estimate of a plan whose frames take `cpu_seconds` of CPU time.
     pub(crate) fn new(forecast: &Forecast, cpu_seconds: f64) -> Self {
         let lines = &forecast.lines;
-        let tokens = lines.iter().try_fold(0.0, |sum, line| {
-            Some(sum + line.text_tokens + line.image_tokens? + line.reply_tokens)
-        });
-        let dollars = lines
+        let tokens = lines
             .iter()
-            .try_fold(0.0, |sum, line| Some(sum + line.dollars?));
+            .try_fold(0.0, |sum, line| Some(sum + line.text_tokens + line.image_tokens? + line.reply_tokens));
+        let dollars = lines.iter().try_fold(0.0, |sum, line| Some(sum + line.dollars?));
         Self {
             images: forecast.images,
             making_seconds: forecast.making_seconds,
@@ -90,8 +89,8 @@ impl PlanEstimate {
 /// Flags whose values may be secret.
 const SECRET_FLAGS: [&str; 2] = ["--header", "--extra-body"];
 
-/// Converts the words of a `plan` command to those of an evaluation. `None` if one of them may be secret: a header, a request field, or a
-/// URL with a password or a query.
+/// Converts the words of a `plan` command to those of an evaluation. `None` if one of them may be secret: a header, a
+/// request field, or a URL with a password or a query.
 pub(crate) fn recorded_command(words: &[String]) -> Option<Vec<String>> {
     if words.iter().any(|word| may_be_secret(word)) {
         return None;
@@ -129,18 +128,9 @@ mod tests {
     #[test]
     fn no_secret_is_recorded() {
         for (line, kept) in [
-            (
-                "plan --model a --shard 1/4 --out r",
-                Some("--model a --out r"),
-            ),
-            (
-                "--quiet plan --model plan --workers=3 --out r",
-                Some("--quiet --model plan --out r"),
-            ),
-            (
-                "plan --base-url http://h/v1 --model a",
-                Some("--base-url http://h/v1 --model a"),
-            ),
+            ("plan --model a --shard 1/4 --out r", Some("--model a --out r")),
+            ("--quiet plan --model plan --workers=3 --out r", Some("--quiet --model plan --out r")),
+            ("plan --base-url http://h/v1 --model a", Some("--base-url http://h/v1 --model a")),
             ("plan --base-url http://u:p@h/v1 --model a", None),
             ("plan --base-url=http://h/v1?key=3 --model a", None),
             ("plan --header X-Key:3 --model a", None),

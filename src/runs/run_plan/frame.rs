@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::data::Dataset;
 use crate::types::{Digest, FrameId};
 
-/// Estimated cost of all images and requests of a frame. It depends on the plan alone, so that every shard computes the same division.
+/// Estimated cost of all images and requests of a frame. It depends on the plan alone, so that every shard computes the
+/// same division.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub(crate) struct FrameCost {
     /// CPU time, in seconds.
@@ -64,9 +65,7 @@ impl PlannedFrame {
     ) -> Self {
         let path = dataset.image_file(frame);
         let metadata = path.and_then(|path| path.metadata().ok());
-        let modified = metadata
-            .as_ref()
-            .and_then(|metadata| metadata.modified().ok());
+        let modified = metadata.as_ref().and_then(|metadata| metadata.modified().ok());
         let (size, digest) = image;
         Self {
             frame: frame.clone(),

@@ -1,7 +1,7 @@
 //! The plan of a run, which `plan` writes once and every shard reads: [`RunPlan`].
 //!
-//! The plan contains the questions and the digests of the frames, so that a shard need not measure frames to make questions, and opens only
-//! its own frames. The folder of the plan is in the folder of the run.
+//! The plan contains the questions and the digests of the frames, so that a shard need not measure frames to make
+//! questions, and opens only its own frames. The folder of the plan is in the folder of the run.
 
 mod file;
 mod frame;
@@ -102,20 +102,13 @@ impl RunPlan {
         if !own.is_empty() {
             self.check_questions(dataset, own)?;
         }
-        if let Some(lost) = self
-            .frames
-            .iter()
-            .find(|frame| !dataset.has_frames(&frame.frame))
-        {
+        if let Some(lost) = self.frames.iter().find(|frame| !dataset.has_frames(&frame.frame)) {
             return Err(self.error(format!(
                 "the frame {:?} of the plan is not among the data any more; restore it, or write the plan again into another --out",
                 lost.frame.0
             )));
         }
-        self.questions
-            .par_iter()
-            .map(RunQuestion::to_question)
-            .collect()
+        self.questions.par_iter().map(RunQuestion::to_question).collect()
     }
 
     /// Checks that the questions of the data set are the planned ones.
@@ -152,18 +145,13 @@ impl RunPlan {
     ///
     /// # Errors
     /// If a frame has changed or is not planned; names the frame.
-    pub(crate) fn check_images<'a>(
-        &self,
-        images: impl IntoIterator<Item = (&'a FrameId, Digest)>,
-    ) -> Result<()> {
+    pub(crate) fn check_images<'a>(&self, images: impl IntoIterator<Item = (&'a FrameId, Digest)>) -> Result<()> {
         for (name, digest) in images {
             let planned = self.frame(name).map(|frame| frame.digest);
             let problem = match planned {
                 Some(Some(planned)) if planned == digest => continue,
                 Some(Some(_)) => "its image is not the one that was planned",
-                Some(None) => {
-                    "the plan was written for models that see no image, and has no digest of it"
-                }
+                Some(None) => "the plan was written for models that see no image, and has no digest of it",
                 None => "no question about it is planned",
             };
             return Err(Error::data(
@@ -199,10 +187,7 @@ impl RunPlan {
 
     /// Number of requests about the frames with these indices, to all models of the plan.
     pub(crate) fn request_count(&self, places: impl Iterator<Item = usize>) -> usize {
-        places
-            .filter_map(|place| self.frames.get(place))
-            .map(|frame| frame.cost.requests)
-            .sum()
+        places.filter_map(|place| self.frames.get(place)).map(|frame| frame.cost.requests).sum()
     }
 
     /// The indices of the frames of a shard.
@@ -210,23 +195,18 @@ impl RunPlan {
         let sources: Vec<WeightedSource> = self
             .frames
             .iter()
-            .map(|frame| WeightedSource {
-                scene: frame.scene.clone(),
-                cost: frame.cost.weight(),
-            })
+            .map(|frame| WeightedSource { scene: frame.scene.clone(), cost: frame.cost.weight() })
             .collect();
         shard_range(&sources, shard)
     }
 
-    /// A shard's share of the estimated cost, from 0 to 1: by dollars if all are known, else by tokens, else by requests.
+    /// A shard's share of the estimated cost, from 0 to 1: by dollars if all are known, else by tokens, else by
+    /// requests.
     pub(crate) fn cost_share(&self, shard: Shard) -> f64 {
         let own = self.shard_range(shard);
         let share_by = |cost: &dyn Fn(&FrameCost) -> Option<f64>| {
-            let sum = |frames: &[PlannedFrame]| {
-                frames
-                    .iter()
-                    .try_fold(0.0, |sum, frame| Some(sum + cost(&frame.cost)?))
-            };
+            let sum =
+                |frames: &[PlannedFrame]| frames.iter().try_fold(0.0, |sum, frame| Some(sum + cost(&frame.cost)?));
             let whole = sum(&self.frames)?;
             Some(sum(&self.frames[own.clone()])? / whole).filter(|_| whole > 0.0)
         };
@@ -236,15 +216,12 @@ impl RunPlan {
             .unwrap_or(0.0)
     }
 
-    /// The command of the run without `--shard`; `None` if the plan does not have it, or if models other than its own were asked.
+    /// The command of the run without `--shard`; `None` if the plan does not have it, or if models other than its own
+    /// were asked.
     pub(crate) fn command<'a>(&self, asked: impl Iterator<Item = &'a str>) -> Option<String> {
         let planned: BTreeSet<&str> = self.models.iter().map(|name| &**name).collect();
         let words = self.command.as_ref()?;
-        let command = words
-            .iter()
-            .map(|word| shell_word(word))
-            .collect::<Vec<_>>()
-            .join(" ");
+        let command = words.iter().map(|word| shell_word(word)).collect::<Vec<_>>().join(" ");
         (planned == asked.collect()).then(|| format!("darkqa-eval {command}"))
     }
 
@@ -258,10 +235,7 @@ impl RunPlan {
 ///
 /// # Errors
 /// If the file does not have the digest in `digests`, or a line cannot be parsed.
-fn read_lines<T: DeserializeOwned + Send>(
-    path: &Path,
-    digests: &BTreeMap<String, Digest>,
-) -> Result<Vec<T>> {
+fn read_lines<T: DeserializeOwned + Send>(path: &Path, digests: &BTreeMap<String, Digest>) -> Result<Vec<T>> {
     let bytes = reading::bytes(path)?;
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     if digests.get(&*name) != Some(&Digest::from_bytes(&bytes)) {
@@ -276,8 +250,6 @@ fn read_lines<T: DeserializeOwned + Send>(
         .par_iter()
         .enumerate()
         .filter(|(_, line)| !line.is_empty())
-        .map(|(index, line)| {
-            serde_json::from_slice(line).map_err(|e| Error::json_line(path, index + 1, &e))
-        })
+        .map(|(index, line)| serde_json::from_slice(line).map_err(|e| Error::json_line(path, index + 1, &e)))
         .collect()
 }

@@ -30,8 +30,8 @@ pub(crate) struct NewPlan {
 impl NewPlan {
     /// Writes the plan into the folder of a run, by renaming a temporary folder. Returns the folder of the plan.
     ///
-    /// If an earlier plan of the run has the same questions and frames, the new plan reuses the earlier costs. With new costs, frames could
-    /// move to other shards.
+    /// If an earlier plan of the run has the same questions and frames, the new plan reuses the earlier costs. With new
+    /// costs, frames could move to other shards.
     ///
     /// # Errors
     /// If the run has shards of an earlier plan with other questions or frames, or a file cannot be written.
@@ -46,10 +46,7 @@ impl NewPlan {
                     "the run has parts of another plan, with other questions or frames ({}); use another --out, or delete the parts",
                     shard.display()
                 );
-                return Err(Error::Run {
-                    path: folder,
-                    problem,
-                });
+                return Err(Error::Run { path: folder, problem });
             }
         }
         let questions = json_lines(&self.questions)?;
@@ -61,11 +58,7 @@ impl NewPlan {
             remove_folder(&unfinished)?;
         }
         fs::create_dir_all(&unfinished).map_err(|e| Error::file(&unfinished, "create", e))?;
-        for (name, content) in [
-            (QUESTIONS, &questions),
-            (FRAMES, &frames),
-            (PLAN_FILE, &file),
-        ] {
+        for (name, content) in [(QUESTIONS, &questions), (FRAMES, &frames), (PLAN_FILE, &file)] {
             let path = unfinished.join(name);
             File::create(&path)
                 .and_then(|mut file| {
@@ -85,11 +78,7 @@ impl NewPlan {
     fn has_same_content(&self, earlier: &RunPlan) -> bool {
         self.questions == earlier.questions
             && self.frames.len() == earlier.frames.len()
-            && self
-                .frames
-                .iter()
-                .zip(&earlier.frames)
-                .all(|(now, before)| now.is_same(before))
+            && self.frames.iter().zip(&earlier.frames).all(|(now, before)| now.is_same(before))
     }
 
     fn to_plan_file(&self, questions: &[u8], frames: &[u8], forecast: &Forecast) -> PlanFile {

@@ -26,22 +26,12 @@ impl Coverage {
     ///
     /// # Errors
     /// If the manifest of a shard has no sources, or the runs have different numbers of sources.
-    pub(super) fn from_shards<'a>(
-        shards: impl Iterator<Item = (Shard, &'a Path, &'a RunManifest)>,
-    ) -> Result<Self> {
-        let mut coverage = Self {
-            trials: Vec::new(),
-            unplanned: 0,
-            shards: Vec::new(),
-            overlaps: false,
-        };
+    pub(super) fn from_shards<'a>(shards: impl Iterator<Item = (Shard, &'a Path, &'a RunManifest)>) -> Result<Self> {
+        let mut coverage = Self { trials: Vec::new(), unplanned: 0, shards: Vec::new(), overlaps: false };
         for (shard, folder, manifest) in shards {
             let Some(part) = &manifest.part else {
                 let problem = "the part does not say which frames it has: an earlier version made it; run it again";
-                return Err(Error::Run {
-                    path: folder.to_owned(),
-                    problem: problem.to_owned(),
-                });
+                return Err(Error::Run { path: folder.to_owned(), problem: problem.to_owned() });
             };
             let place = part.place;
             if coverage.shards.is_empty() {
@@ -80,15 +70,12 @@ impl Coverage {
 
     /// Indices of the sources that are in no shard.
     pub(super) fn gaps(&self) -> impl Iterator<Item = usize> {
-        self.trials
-            .iter()
-            .enumerate()
-            .filter_map(|(place, trials)| trials.is_none().then_some(place))
+        self.trials.iter().enumerate().filter_map(|(place, trials)| trials.is_none().then_some(place))
     }
 
-    /// The shards that have the missing sources; if there are several divisions, those of the division with the fewest such shards.
-    /// `range` returns the indices of the sources of a shard, or `None` if they are unknown. Without them, the missing shards are known only
-    /// if all shards are from one division.
+    /// The shards that have the missing sources; if there are several divisions, those of the division with the fewest
+    /// such shards. `range` returns the indices of the sources of a shard, or `None` if they are unknown. Without them,
+    /// the missing shards are known only if all shards are from one division.
     pub(super) fn absent(&self, range: impl Fn(Shard) -> Option<Range<usize>>) -> Vec<Shard> {
         let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
         counts
@@ -97,9 +84,7 @@ impl Coverage {
                 Shard::all(*count)
                     .filter(|shard| match range(*shard) {
                         None => counts.len() == 1 && !self.shards.contains(shard),
-                        Some(mut places) => {
-                            places.any(|place| self.trials.get(place) == Some(&None))
-                        }
+                        Some(mut places) => places.any(|place| self.trials.get(place) == Some(&None)),
                     })
                     .collect::<Vec<Shard>>()
             })
@@ -108,7 +93,8 @@ impl Coverage {
             .unwrap_or_default()
     }
 
-    /// The sentence about the missing sources; `None` if none is missing. `absent` are the shards that have them, if known.
+    /// The sentence about the missing sources; `None` if none is missing. `absent` are the shards that have them, if
+    /// known.
     pub(super) fn missing(&self, absent: &[Shard]) -> Option<String> {
         if self.trials.iter().all(Option::is_some) {
             return None;
@@ -116,18 +102,11 @@ impl Coverage {
         if !absent.is_empty() {
             let verb = if absent.len() == 1 { " is" } else { "s are" };
             let names: Vec<String> = absent.iter().map(Shard::to_string).collect();
-            return Some(format!(
-                "{} shard{verb} missing: {}",
-                absent.len(),
-                names.join(", ")
-            ));
+            return Some(format!("{} shard{verb} missing: {}", absent.len(), names.join(", ")));
         }
         let mut gaps = String::new();
         let mut start = 0;
-        for run in self
-            .trials
-            .chunk_by(|one, next| one.is_some() == next.is_some())
-        {
+        for run in self.trials.chunk_by(|one, next| one.is_some() == next.is_some()) {
             if run[0].is_none() {
                 let comma = if gaps.is_empty() { "" } else { ", " };
                 let _ = match run.len() {
@@ -137,18 +116,14 @@ impl Coverage {
             }
             start += run.len();
         }
-        Some(format!(
-            "frames or walks {gaps} of {} are in no part",
-            self.trials.len()
-        ))
+        Some(format!("frames or walks {gaps} of {} are in no part", self.trials.len()))
     }
 
-    /// For each shard, true if notes about its sources are counted. If all shards of one division exist, only these are counted, each once;
-    /// otherwise all shards are.
+    /// For each shard, true if notes about its sources are counted. If all shards of one division exist, only these are
+    /// counted, each once; otherwise all shards are.
     pub(super) fn counted_once(&self) -> impl Iterator<Item = bool> {
         let counts: BTreeSet<NonZeroU32> = self.shards.iter().map(|shard| shard.count()).collect();
-        let is_whole =
-            |count: &NonZeroU32| Shard::all(*count).all(|shard| self.shards.contains(&shard));
+        let is_whole = |count: &NonZeroU32| Shard::all(*count).all(|shard| self.shards.contains(&shard));
         let whole = counts.into_iter().rev().find(is_whole);
         if whole.is_none() && self.overlaps {
             tracing::warn!(
@@ -182,8 +157,7 @@ mod tests {
             (shard.parse().unwrap(), manifest)
         }).collect();
         let parts = parts.iter();
-        Coverage::from_shards(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest)))
-            .unwrap()
+        Coverage::from_shards(parts.map(|(shard, manifest)| (*shard, Path::new("run"), manifest))).unwrap()
     }
 
     #[test]
@@ -197,10 +171,7 @@ mod tests {
         let mixed = coverage(&[("1/3", 0, &[4, 4]), ("5/6", 4, &[4])]);
         assert_eq!(mixed.absent(|_| None), []);
         let sentence = mixed.missing(&[]).unwrap();
-        assert!(
-            sentence.starts_with("frames or walks 3 to 4, 6 of 6 are in no part"),
-            "{sentence}"
-        );
+        assert!(sentence.starts_with("frames or walks 3 to 4, 6 of 6 are in no part"), "{sentence}");
         assert_eq!(mixed.trials(), 12);
         assert_eq!(mixed.gaps().collect::<Vec<_>>(), [2, 3, 5]);
         // If the sources of each shard are known, the division with the fewest missing shards is chosen.
@@ -228,11 +199,7 @@ mod tests {
         assert_eq!((overlapping.missing(&[]), overlapping.trials()), (None, 22));
         let counted: Vec<bool> = overlapping.counted_once().collect();
         assert_eq!(counted, [true, true, false]);
-        let together = coverage(&[
-            ("1/2", 0, &[4, 4, 4]),
-            ("2/3", 2, &[5, 4]),
-            ("3/3", 4, &[4, 2]),
-        ]);
+        let together = coverage(&[("1/2", 0, &[4, 4, 4]), ("2/3", 2, &[5, 4]), ("3/3", 4, &[4, 2])]);
         assert_eq!((together.missing(&[]), together.trials()), (None, 23));
         assert!(together.counted_once().all(|is_counted| is_counted));
     }

@@ -17,8 +17,8 @@ pub(crate) enum MissingShards {
     Accept,
 }
 
-/// Reads the plan in the parent folder of the shards. Returns `None` if there is none, or, with a warning, if its number of sources differs
-/// from that of the run.
+/// Reads the plan in the parent folder of the shards. Returns `None` if there is none, or, with a warning, if its
+/// number of sources differs from that of the run.
 ///
 /// # Errors
 /// If the plan cannot be read.
@@ -27,10 +27,7 @@ pub(super) fn plan(parts: &[StoredShard], coverage: &Coverage) -> Result<Option<
         return Ok(None);
     };
     let plan = RunPlan::read(run)?;
-    let Some(other) = plan
-        .as_ref()
-        .filter(|plan| plan.frame_count() != coverage.sources())
-    else {
+    let Some(other) = plan.as_ref().filter(|plan| plan.frame_count() != coverage.sources()) else {
         return Ok(plan);
     };
     tracing::warn!(
@@ -67,16 +64,10 @@ pub(super) fn check(
     match missing {
         MissingShards::Refuse => Err(Error::Run {
             path: first.folder.clone(),
-            problem: format!(
-                "{problem}{counts}; --partial merges the others; {}",
-                remedy(parts, plan, &absent)
-            ),
+            problem: format!("{problem}{counts}; --partial merges the others; {}", remedy(parts, plan, &absent)),
         }),
         MissingShards::Accept => {
-            tracing::warn!(
-                "{problem}{counts}; the summary covers only the others; {}",
-                remedy(parts, plan, &absent)
-            );
+            tracing::warn!("{problem}{counts}; the summary covers only the others; {}", remedy(parts, plan, &absent));
             Ok(true)
         }
     }
@@ -84,13 +75,9 @@ pub(super) fn check(
 
 /// Warns about each shard that is not complete, unless complete shards together have all its trials.
 pub(super) fn warn_unfinished(parts: &[StoredShard], plan: Option<&RunPlan>) {
-    let (complete, unfinished) = parts
-        .iter()
-        .partition::<Vec<&StoredShard>, _>(|part| part.manifest.status == Status::Complete);
-    for part in unfinished
-        .into_iter()
-        .filter(|part| !part.is_covered_by(&complete))
-    {
+    let (complete, unfinished) =
+        parts.iter().partition::<Vec<&StoredShard>, _>(|part| part.manifest.status == Status::Complete);
+    for part in unfinished.into_iter().filter(|part| !part.is_covered_by(&complete)) {
         let counts = part.manifest.counts;
         tracing::warn!(
             "{}: shard {} is {}: {} of {} trials answered; {}",
@@ -110,24 +97,14 @@ fn remedy(parts: &[StoredShard], plan: Option<&RunPlan>, shards: &[Shard]) -> St
         .iter()
         .filter_map(|part| part.manifest.columns.get("model"))
         .flat_map(|models| models.keys().map(String::as_str));
-    let command = plan
-        .and_then(|plan| plan.command(models))
-        .unwrap_or_else(|| "the command of the parts with".to_owned());
+    let command =
+        plan.and_then(|plan| plan.command(models)).unwrap_or_else(|| "the command of the parts with".to_owned());
     match shards {
-        [] => format!(
-            "{command} --shard I/N, for all I of one N, asks only what no other part in the same folder has"
-        ),
+        [] => format!("{command} --shard I/N, for all I of one N, asks only what no other part in the same folder has"),
         [only] => format!("{command} --shard {only} asks what is left"),
         [first, ..] => {
-            let numbers: Vec<String> = shards
-                .iter()
-                .map(|shard| (shard.index() + 1).to_string())
-                .collect();
-            format!(
-                "{command} --shard I/{} asks them, with I = {}",
-                first.count(),
-                numbers.join(", ")
-            )
+            let numbers: Vec<String> = shards.iter().map(|shard| (shard.index() + 1).to_string()).collect();
+            format!("{command} --shard I/{} asks them, with I = {}", first.count(), numbers.join(", "))
         }
     }
 }

@@ -1,4 +1,5 @@
-//! The shards of a run, joined into one run: [`ShardedRun`]. `report merge` writes this run, and `report` reports on it without writing it.
+//! The shards of a run, joined into one run: [`ShardedRun`]. `report merge` writes this run, and `report` reports on it
+//! without writing it.
 
 mod coverage;
 mod joined_manifest;
@@ -28,7 +29,8 @@ pub(crate) use open::{common_kind, open_any_run, open_choice_run, run_folders_in
 pub(crate) struct ShardedRun<D: Detail> {
     shards: Vec<StoredShard>,
     pub(crate) questions: ShardQuestions,
-    /// Distinct trials, in the order of questions, conditions and models. The file number of a text is the index of its shard.
+    /// Distinct trials, in the order of questions, conditions and models. The file number of a text is the index of its
+    /// shard.
     pub(crate) trials: Trials<D>,
     /// The manifest of the whole run.
     pub(crate) manifest: RunManifest,
@@ -38,20 +40,15 @@ impl<D: Detail> ShardedRun<D> {
     /// Reads and joins the shards in these folders.
     ///
     /// # Errors
-    /// If a folder has no shard, the shards belong to different runs, the same trial has different images in two shards, or sources are in
-    /// no shard and `missing` is [`MissingShards::Refuse`].
+    /// If a folder has no shard, the shards belong to different runs, the same trial has different images in two
+    /// shards, or sources are in no shard and `missing` is [`MissingShards::Refuse`].
     pub(crate) fn read(folders: &[PathBuf], missing: MissingShards) -> Result<Self> {
-        let mut shards: Vec<StoredShard> = folders
-            .iter()
-            .map(|folder| StoredShard::open(folder))
-            .collect::<Result<_>>()?;
+        let mut shards: Vec<StoredShard> =
+            folders.iter().map(|folder| StoredShard::open(folder)).collect::<Result<_>>()?;
         shards.sort_by_key(|shard| (shard.shard.count(), shard.shard));
         joined_manifest::check_same_run(&shards)?;
-        let coverage = Coverage::from_shards(
-            shards
-                .iter()
-                .map(|shard| (shard.shard, &*shard.folder, &shard.manifest)),
-        )?;
+        let coverage =
+            Coverage::from_shards(shards.iter().map(|shard| (shard.shard, &*shard.folder, &shard.manifest)))?;
         let plan = missing::plan(&shards, &coverage)?;
         let is_missing = missing::check(&shards, &coverage, plan.as_ref(), missing)?;
         missing::warn_unfinished(&shards, plan.as_ref());
@@ -78,12 +75,7 @@ impl<D: Detail> ShardedRun<D> {
         if is_missing {
             manifest.status = Status::Incomplete;
         }
-        Ok(Self {
-            shards,
-            questions,
-            trials,
-            manifest,
-        })
+        Ok(Self { shards, questions, trials, manifest })
     }
 
     /// The folder of each shard.
@@ -98,9 +90,6 @@ impl<D: Detail> ShardedRun<D> {
 
     /// The folder and the manifest of each shard.
     pub(crate) fn manifests(&self) -> Vec<(&Path, &RunManifest)> {
-        self.shards
-            .iter()
-            .map(|shard| (&*shard.folder, &shard.manifest))
-            .collect()
+        self.shards.iter().map(|shard| (&*shard.folder, &shard.manifest)).collect()
     }
 }

@@ -9,14 +9,13 @@ use super::stored_shard::no_shard_error;
 use crate::error::{Error, Result};
 use crate::runs::missing_thumbnails::MissingThumbnails;
 use crate::runs::run_texts::RunTexts;
-use crate::runs::stored::{
-    AnyRun, ExperimentKind, RunLayout, StoredRun, open_questions_error, read_run_manifest,
-};
+use crate::runs::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, open_questions_error, read_run_manifest};
 use crate::store;
 use crate::types::{ChoiceDetail, Trials};
 use darkqa_score::answers::record::Detail;
 
-/// Opens the run in a folder. If the folder itself has no run, joins all shards in it, with a warning about missing ones.
+/// Opens the run in a folder. If the folder itself has no run, joins all shards in it, with a warning about missing
+/// ones.
 ///
 /// # Errors
 /// If the folder has neither, or the shards belong to different runs.
@@ -103,10 +102,8 @@ pub(crate) fn run_folders_in(folder: &Path) -> Result<Vec<PathBuf>> {
 /// # Errors
 /// If there is no run, or the runs are of different kinds.
 pub(crate) fn common_kind(folders: &[PathBuf]) -> Result<ExperimentKind> {
-    let kinds: Vec<ExperimentKind> = folders
-        .iter()
-        .map(|folder| ExperimentKind::read(folder))
-        .collect::<Result<_>>()?;
+    let kinds: Vec<ExperimentKind> =
+        folders.iter().map(|folder| ExperimentKind::read(folder)).collect::<Result<_>>()?;
     let first = *kinds.first().ok_or_else(no_shard_error)?;
     if let Some(other) = kinds.iter().position(|kind| *kind != first) {
         let problem = format!(

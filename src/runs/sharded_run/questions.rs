@@ -28,11 +28,7 @@ impl ShardQuestions {
         let mut questions = Vec::new();
         for (index, folder) in folders.iter().enumerate() {
             each_placed_question(folder, |question, line| {
-                questions.push(ShardQuestion {
-                    question: question.without_evidence(),
-                    folder: index,
-                    line,
-                });
+                questions.push(ShardQuestion { question: question.without_evidence(), folder: index, line });
             })?;
         }
         questions.sort_by_key(|question| question.question.place);
@@ -53,10 +49,7 @@ impl ShardQuestions {
 
     /// The questions without their evidence, in order.
     pub(crate) fn into_questions(self) -> Vec<RunQuestion> {
-        self.0
-            .into_iter()
-            .map(|question| question.question)
-            .collect()
+        self.0.into_iter().map(|question| question.question).collect()
     }
 
     /// Copies the lines of the questions into a run.
@@ -64,10 +57,8 @@ impl ShardQuestions {
     /// # Errors
     /// If a line cannot be read or written.
     pub(crate) fn write<D: Detail>(&self, store: &Store<D>, folders: &[&Path]) -> Result<()> {
-        let files: Vec<Option<QuestionFile>> = folders
-            .iter()
-            .map(|folder| QuestionFile::open(folder))
-            .collect::<Result<_>>()?;
+        let files: Vec<Option<QuestionFile>> =
+            folders.iter().map(|folder| QuestionFile::open(folder)).collect::<Result<_>>()?;
         store.write_question_lines(|out| {
             for question in &self.0 {
                 if let Some(file) = &files[question.folder] {

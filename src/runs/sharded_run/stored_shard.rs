@@ -27,15 +27,11 @@ impl StoredShard {
                 problem: "the run is not a shard: it was made without --shard".to_owned(),
             });
         };
-        Ok(Self {
-            shard: shard.parse()?,
-            folder: folder.to_owned(),
-            manifest,
-        })
+        Ok(Self { shard: shard.parse()?, folder: folder.to_owned(), manifest })
     }
 
-    /// True if every source of this shard is in another one with at least as many trials, and the other has all models, enhancers and other
-    /// column values of this one.
+    /// True if every source of this shard is in another one with at least as many trials, and the other has all models,
+    /// enhancers and other column values of this one.
     pub(super) fn is_covered_by(&self, others: &[&Self]) -> bool {
         let Some(own) = &self.manifest.part else {
             return false;
@@ -45,26 +41,21 @@ impl StoredShard {
             .filter(|other| self.has_columns_in(other))
             .filter_map(|other| other.manifest.part.as_ref())
             .collect();
-        own.trials
-            .iter()
-            .zip(own.place.first..)
-            .all(|(trials, source)| {
-                candidates.iter().any(|part| {
-                    source
-                        .checked_sub(part.place.first)
-                        .and_then(|place| part.trials.get(place))
-                        .is_some_and(|other| other >= trials)
-                })
+        own.trials.iter().zip(own.place.first..).all(|(trials, source)| {
+            candidates.iter().any(|part| {
+                source
+                    .checked_sub(part.place.first)
+                    .and_then(|place| part.trials.get(place))
+                    .is_some_and(|other| other >= trials)
             })
+        })
     }
 
     /// True if another shard has every column value of this one.
     fn has_columns_in(&self, other: &Self) -> bool {
         self.manifest.columns.iter().all(|(column, values)| {
             let known = other.manifest.columns.get(column);
-            values
-                .keys()
-                .all(|value| known.is_some_and(|known| known.contains_key(value)))
+            values.keys().all(|value| known.is_some_and(|known| known.contains_key(value)))
         })
     }
 }

@@ -7,16 +7,13 @@ use crate::runs::shard_records::ShardLogs;
 use crate::types::{KeptTrial, Record, TrialRef, Trials};
 use darkqa_score::answers::record::Detail;
 
-/// Keeps each trial once: the one with a reply, or the one from the first shard if both have a reply. `folders` are the folders of the
-/// shards, by the file numbers in the places of the trials. Returns the number of trials with different replies in two shards, which were
-/// paid for twice.
+/// Keeps each trial once: the one with a reply, or the one from the first shard if both have a reply. `folders` are the
+/// folders of the shards, by the file numbers in the places of the trials. Returns the number of trials with different
+/// replies in two shards, which were paid for twice.
 ///
 /// # Errors
 /// If the same trial has different images in two shards, or a record cannot be read.
-pub(super) fn remove_duplicates<D: Detail>(
-    trials: &mut Trials<D>,
-    folders: &[&Path],
-) -> Result<usize> {
+pub(super) fn remove_duplicates<D: Detail>(trials: &mut Trials<D>, folders: &[&Path]) -> Result<usize> {
     let mut logs = ShardLogs::new(folders);
     let mut paid_twice = 0;
     trials.keep_one_per_key(|first, later| {
@@ -46,10 +43,7 @@ fn check_images<D: Detail>(
     lines: &[Vec<u8>; 2],
 ) -> Result<()> {
     let places = trials.map(TrialRef::text);
-    let records: [Record<D>; 2] = [
-        logs.record(places[0], &lines[0])?,
-        logs.record(places[1], &lines[1])?,
-    ];
+    let records: [Record<D>; 2] = [logs.record(places[0], &lines[0])?, logs.record(places[1], &lines[1])?];
     let images = records.each_ref().map(|record| record.detail.sent_digest());
     if images[0] == images[1] || images.iter().any(Option::is_none) {
         return Ok(());

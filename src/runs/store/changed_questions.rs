@@ -17,13 +17,12 @@ pub(super) struct ChangedQuestions {
 impl ChangedQuestions {
     /// Adds a question that differs from the stored one in a part.
     pub(super) fn add(&mut self, part: QuestionPart, stored: &RunQuestion, now: &RunQuestion) {
-        let first = self
-            .first
-            .get_or_insert_with(|| (part, describe_change(part, stored, now)));
+        let first = self.first.get_or_insert_with(|| (part, describe_change(part, stored, now)));
         self.same_part += usize::from(first.0 == part);
     }
 
-    /// The error text; `None` if no question differs. `is_decoded_alike` returns true if image files are decoded as in the stored run.
+    /// The error text; `None` if no question differs. `is_decoded_alike` returns true if image files are decoded as in
+    /// the stored run.
     pub(super) fn problem(&self, is_decoded_alike: impl FnOnce() -> bool) -> Option<String> {
         let (part, first) = self.first.as_ref()?;
         let more = match self.same_part {
@@ -33,9 +32,7 @@ impl ChangedQuestions {
         };
         let remedy = match part {
             QuestionPart::Image if is_decoded_alike() => "restore the file or its --data",
-            QuestionPart::Image => {
-                "restore the file, and flags that decide how it is read (--decode)"
-            }
+            QuestionPart::Image => "restore the file, and flags that decide how it is read (--decode)",
             _ => "restore --data and --questions",
         };
         Some(format!("{first}{more}; {remedy}, or use another --out"))
@@ -56,10 +53,7 @@ fn describe_change(part: QuestionPart, stored: &RunQuestion, now: &RunQuestion) 
             excerpt(&now, MAX_CHARS),
             excerpt(&before, MAX_CHARS)
         ),
-        (part, None) => format!(
-            "question {id:?} has another {} than in this run",
-            part.words()
-        ),
+        (part, None) => format!("question {id:?} has another {} than in this run", part.words()),
     }
 }
 

@@ -12,12 +12,9 @@ use super::pieces::Pieces;
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files::{reading, write_synced};
 
-/// Calls `take` with each readable line of a file in order; with none if the file does not exist. Returns a description of the damage, or
-/// `None` if every line is readable. A last line without a line end counts as damage.
-pub(super) fn each_readable_line<T: StoredLine>(
-    path: &Path,
-    mut take: impl FnMut(T),
-) -> Option<String> {
+/// Calls `take` with each readable line of a file in order; with none if the file does not exist. Returns a description
+/// of the damage, or `None` if every line is readable. A last line without a line end counts as damage.
+pub(super) fn each_readable_line<T: StoredLine>(path: &Path, mut take: impl FnMut(T)) -> Option<String> {
     let mut broken = Vec::new();
     let read = each_parsed_line(path, |number, line| match line {
         Some(line) => take(line),
@@ -27,11 +24,7 @@ pub(super) fn each_readable_line<T: StoredLine>(
         (Err(e), _) => Some(e.to_string()),
         (Ok(LastLine::Whole), []) => None,
         (Ok(LastLine::Cut), []) => Some(format!("{}: the last line is cut", path.display())),
-        (Ok(_), [number]) => Some(format!(
-            "{}, line {number}: not {}",
-            path.display(),
-            T::WHAT
-        )),
+        (Ok(_), [number]) => Some(format!("{}, line {number}: not {}", path.display(), T::WHAT)),
         (Ok(_), [first, ..]) => Some(format!(
             "{}: {} lines are not {}, the first of them line {first}",
             path.display(),
@@ -50,10 +43,7 @@ enum LastLine {
 }
 
 /// Calls `take` with the number and the content of each line of a file; the content is `None` if it cannot be parsed.
-fn each_parsed_line<T: StoredLine>(
-    path: &Path,
-    mut take: impl FnMut(usize, Option<T>),
-) -> Result<LastLine> {
+fn each_parsed_line<T: StoredLine>(path: &Path, mut take: impl FnMut(usize, Option<T>)) -> Result<LastLine> {
     let Some(mut pieces) = Pieces::open(path)? else {
         return Ok(LastLine::Whole);
     };
@@ -114,8 +104,8 @@ fn path_aside(path: &Path, number: usize) -> PathBuf {
     PathBuf::from(name)
 }
 
-/// Replaces a damaged file of notes about images by its readable lines, with a warning. Returns true if the file is damaged, missing or
-/// empty.
+/// Replaces a damaged file of notes about images by its readable lines, with a warning. Returns true if the file is
+/// damaged, missing or empty.
 pub(super) fn repair_notes<T: Serialize + StoredLine>(path: &Path) -> bool {
     let mut count = 0_usize;
     let Some(damage) = each_readable_line(path, |_: T| count += 1) else {
@@ -147,30 +137,16 @@ mod tests {
     fn readable_lines_are_kept() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("fidelity.jsonl");
-        assert_eq!(
-            count_readable(&path),
-            (0, None),
-            "a missing file is not damaged"
-        );
+        assert_eq!(count_readable(&path), (0, None), "a missing file is not damaged");
         let image = "0".repeat(64);
-        let good = format!(
-            r#"{{"frame":"f","condition":"L3-ev","image":"{image}","psnr":20.0,"ssim":0.5}}"#
-        );
+        let good = format!(r#"{{"frame":"f","condition":"L3-ev","image":"{image}","psnr":20.0,"ssim":0.5}}"#);
         for (text, lines, damage) in [
             (String::new(), 0, None),
             (format!("{good}\n"), 1, None),
             (format!("{good}\n{good}"), 1, Some("the last line is cut")),
             ("\u{0}#".to_owned(), 0, Some("the last line is cut")),
-            (
-                format!("{good}\n\u{0}\u{1}\n{good}\n"),
-                2,
-                Some("line 2: not the fidelity"),
-            ),
-            (
-                format!("{{}}\n[]\n{good}\n"),
-                1,
-                Some("2 lines are not the fidelity"),
-            ),
+            (format!("{good}\n\u{0}\u{1}\n{good}\n"), 2, Some("line 2: not the fidelity")),
+            (format!("{{}}\n[]\n{good}\n"), 1, Some("2 lines are not the fidelity")),
         ] {
             fs::write(&path, &text).unwrap();
             let (readable, found) = count_readable(&path);

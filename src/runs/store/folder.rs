@@ -73,8 +73,8 @@ pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
 }
 
 pub(super) fn write_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
-    let mut text = serde_json::to_vec_pretty(manifest)
-        .map_err(|e| Error::file(folder.join(MANIFEST), "write", e.into()))?;
+    let mut text =
+        serde_json::to_vec_pretty(manifest).map_err(|e| Error::file(folder.join(MANIFEST), "write", e.into()))?;
     text.push(b'\n');
     write(folder, MANIFEST, &text)
 }
@@ -105,28 +105,17 @@ pub fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
         models.share(&mut trial.model);
         trials.push(trial);
     })?;
-    Ok(merge_by_key(
-        trials,
-        |trial| trial.key,
-        StoredTrial::add_earlier,
-    ))
+    Ok(merge_by_key(trials, |trial| trial.key, StoredTrial::add_earlier))
 }
 
-/// Keeps the last line of each key, at the place of the first line of that key. `add_earlier` merges each earlier line of the key into it,
-/// the latest first.
-fn merge_by_key<T>(
-    mut all: Vec<T>,
-    key: impl Fn(&T) -> TrialKey,
-    add_earlier: impl Fn(&mut T, &T),
-) -> Vec<T> {
+/// Keeps the last line of each key, at the place of the first line of that key. `add_earlier` merges each earlier line
+/// of the key into it, the latest first.
+fn merge_by_key<T>(mut all: Vec<T>, key: impl Fn(&T) -> TrialKey, add_earlier: impl Fn(&mut T, &T)) -> Vec<T> {
     // Sorted keys take a fifth of the memory of a map.
     let mut keys: Vec<(TrialKey, u32)> = all.iter().map(key).zip(0..).collect();
     keys.par_sort_unstable();
     let mut is_repeated = vec![false; all.len()];
-    for places in keys
-        .chunk_by(|one, next| one.0 == next.0)
-        .filter(|places| places.len() > 1)
-    {
+    for places in keys.chunk_by(|one, next| one.0 == next.0).filter(|places| places.len() > 1) {
         let (first, last) = (places[0].1 as usize, places[places.len() - 1].1 as usize);
         for (_, place) in places[..places.len() - 1].iter().rev() {
             let (earlier, later) = all.split_at_mut(last);
@@ -165,8 +154,8 @@ pub fn read_thumbnails(folder: &Path) -> Vec<Thumbnail> {
     all
 }
 
-/// The similarities of the images of a run to their clean frames; empty without such a file. Equal frames and conditions share memory.
-/// Damaged lines are skipped with a warning.
+/// The similarities of the images of a run to their clean frames; empty without such a file. Equal frames and
+/// conditions share memory. Damaged lines are skipped with a warning.
 #[must_use]
 pub fn read_fidelity(folder: &Path) -> Vec<ImageFidelity> {
     let (mut frames, mut conditions) = (Distinct::default(), Distinct::default());
@@ -194,11 +183,7 @@ pub fn find(base: &Path, hash: &str) -> Option<PathBuf> {
         .ok()?
         .flatten()
         .map(|entry| entry.path())
-        .filter(|path| {
-            path.file_name()
-                .and_then(OsStr::to_str)
-                .is_some_and(|name| name.ends_with(&ending))
-        })
+        .filter(|path| path.file_name().and_then(OsStr::to_str).is_some_and(|name| name.ends_with(&ending)))
         .filter(|path| is_run(path) || path.join(RECORDS).is_file())
         .max()
 }
@@ -266,9 +251,9 @@ fn schema_problem(found: &str, expected: &str, version: &str) -> String {
         Some((name, number)) if KINDS.contains(&name) && number < newest => format!(
             "this run was made by an earlier version of darkqa-eval ({version}, schema {found:?}); run it again with this one"
         ),
-        Some((name, number)) if KINDS.contains(&name) && number == newest => format!(
-            "the run has the schema {found:?}, {expected:?} is expected here; use another folder"
-        ),
+        Some((name, number)) if KINDS.contains(&name) && number == newest => {
+            format!("the run has the schema {found:?}, {expected:?} is expected here; use another folder")
+        }
         _ => format!(
             "the schema {found:?} is not known to this version of darkqa-eval; the run was made by version {version}: read it with that"
         ),
@@ -296,14 +281,10 @@ fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
         return Ok(None);
     }
     let text = reading::at_most(&path, MAX_MANIFEST_BYTES)?;
-    serde_json::from_slice(&text)
-        .map(Some)
-        .map_err(|e| Error::Run {
-            path: path.clone(),
-            problem: format!(
-                "not the manifest of a run: {e}; the command that made the run, called again, makes it again"
-            ),
-        })
+    serde_json::from_slice(&text).map(Some).map_err(|e| Error::Run {
+        path: path.clone(),
+        problem: format!("not the manifest of a run: {e}; the command that made the run, called again, makes it again"),
+    })
 }
 
 /// Description of the damage if a run has records, but its manifest is missing or cannot be read.
@@ -332,8 +313,8 @@ pub fn restore_manifest(folder: &Path, manifest: &RunManifest) -> Result<()> {
     write_manifest(folder, manifest)
 }
 
-/// Checks that a stored run is the requested one: equal identity, equal shard, and the same meaning of every column value that both
-/// contain.
+/// Checks that a stored run is the requested one: equal identity, equal shard, and the same meaning of every column
+/// value that both contain.
 ///
 /// # Errors
 /// [`Error::Run`], which names the setting that differs.
@@ -343,8 +324,7 @@ pub fn check_same_run(
     requested: &RunManifest,
     address_change: AddressChange,
 ) -> Result<()> {
-    if let Some((field, before, after)) = differences(&stored.identity, &requested.identity).next()
-    {
+    if let Some((field, before, after)) = differences(&stored.identity, &requested.identity).next() {
         let field = setting_spelling(field);
         return run_error(
             folder,
@@ -363,24 +343,10 @@ pub fn check_same_run(
         );
     }
     for difference in stored.column_differences(requested) {
-        let ColumnDifference {
-            column,
-            value,
-            field,
-            first: before,
-            second: after,
-        } = difference;
+        let ColumnDifference { column, value, field, first: before, second: after } = difference;
         // If the requested run contains the stored model under another name, the model was renamed.
-        let mut renamed = requested
-            .columns
-            .get(column)
-            .into_iter()
-            .flatten()
-            .filter(|(name, _)| *name != value);
-        let content = stored
-            .columns
-            .get(column)
-            .and_then(|values| values.get(value));
+        let mut renamed = requested.columns.get(column).into_iter().flatten().filter(|(name, _)| *name != value);
+        let content = stored.columns.get(column).and_then(|values| values.get(value));
         if column == MODEL && renamed.any(|(_, other)| Some(other) == content) {
             continue;
         }
@@ -392,9 +358,7 @@ pub fn check_same_run(
         // An address without a reply, such as a mistyped one, may always change.
         let is_allowed = address_change == AddressChange::Allowed;
         if is_address && (is_allowed || !has_reply(folder, stored, value)?) {
-            tracing::warn!(
-                "{value} was asked at {before} in this run; from now on it is asked at {after}"
-            );
+            tracing::warn!("{value} was asked at {before} in this run; from now on it is asked at {after}");
             continue;
         }
         if field == ENHANCER_FILE {
@@ -406,11 +370,7 @@ pub fn check_same_run(
                 ),
             );
         }
-        let hint = if is_address {
-            " (the same model at another address: --resume)"
-        } else {
-            ""
-        };
+        let hint = if is_address { " (the same model at another address: --resume)" } else { "" };
         return run_error(
             folder,
             format!(
@@ -458,21 +418,16 @@ fn count_replies(folder: &Path, stored: &RunManifest, model: &str) -> Result<usi
     Ok(answered.len())
 }
 
-/// Creates a run in a new or empty folder: writes the manifest before any other file. A new folder is private to this user.
+/// Creates a run in a new or empty folder: writes the manifest before any other file. A new folder is private to this
+/// user.
 pub(super) fn create_run(folder: &Path, manifest: &RunManifest) -> Result<()> {
     FolderAccess::Private.create(folder)?;
     let inside = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
     // Unfinished files of a killed process and the plan of the run do not count.
-    let has_files = inside
-        .flatten()
-        .map(|entry| entry.file_name())
-        .any(|name| !is_unfinished(&name) && name != PLAN);
+    let has_files = inside.flatten().map(|entry| entry.file_name()).any(|name| !is_unfinished(&name) && name != PLAN);
     if has_files {
         let problem = "the folder is not empty and holds no run; use another --out".to_owned();
-        return Err(Error::Run {
-            path: folder.to_owned(),
-            problem,
-        });
+        return Err(Error::Run { path: folder.to_owned(), problem });
     }
     write_manifest(folder, manifest)
 }

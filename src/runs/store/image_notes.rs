@@ -46,9 +46,5 @@ fn missing_notes<T, K: Eq + Hash>(
     is_wanted: impl Fn(&T) -> bool,
 ) -> Vec<T> {
     let mut known: HashSet<_> = present.iter().map(&key).collect();
-    folders
-        .iter()
-        .flat_map(|folder| read(folder))
-        .filter(|note| is_wanted(note) && known.insert(key(note)))
-        .collect()
+    folders.iter().flat_map(|folder| read(folder)).filter(|note| is_wanted(note) && known.insert(key(note))).collect()
 }

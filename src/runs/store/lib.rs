@@ -1,9 +1,10 @@
 //! The folder of a run, `results/<run>/`.
 //!
-//! `records.jsonl` is the source of truth: one line for each trial, written to the operating system as soon as the reply arrives, so that a
-//! killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` contains its questions, `thumbnails.jsonl` small copies
-//! of its images, and `fidelity.jsonl` their similarity to the clean frames. All other files are derived from these, such as
-//! `records.parquet` with the records as a table for other programs ([`ColumnFile`]).
+//! `records.jsonl` is the source of truth: one line for each trial, written to the operating system as soon as the
+//! reply arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` contains its
+//! questions, `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames.
+//! All other files are derived from these, such as `records.parquet` with the records as a table for other programs
+//! ([`ColumnFile`]).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -35,8 +36,8 @@ use darkqa_base::error::{Error, Result};
 use darkqa_base::files::write_with;
 use darkqa_base::types::manifests::{RecordedNames, RunManifest};
 use darkqa_base::types::{
-    ChoiceDetail, Distinct, FrameId, ImageFidelity, InputSummary, QuestionId, Record, RunQuestion,
-    Thumbnail, TrialKey, Via,
+    ChoiceDetail, Distinct, FrameId, ImageFidelity, InputSummary, QuestionId, Record, RunQuestion, Thumbnail, TrialKey,
+    Via,
 };
 use darkqa_score::answers::record::Detail;
 
@@ -58,10 +59,9 @@ pub use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, e
 pub use stored_trial::StoredTrial;
 
 pub use folder::{
-    AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question,
-    find, has_batches, is_locked, is_run, manifest_damage, now, read_columns, read_fidelity,
-    read_manifest, read_questions, read_records, read_settings, read_thumbnails, read_trials,
-    reply_count, restore_manifest, schema,
+    AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question, find, has_batches,
+    is_locked, is_run, manifest_damage, now, read_columns, read_fidelity, read_manifest, read_questions, read_records,
+    read_settings, read_thumbnails, read_trials, reply_count, restore_manifest, schema,
 };
 
 /// The trials that were sent in batches.
@@ -70,7 +70,8 @@ const TRIALS: &str = "trials.jsonl";
 /// Lines of the records that could not be read.
 const SET_ASIDE: &str = "set-aside.jsonl";
 
-/// Interval at which records are forced to the disk. A power cut loses at most the records of this time, a killed process none. Chosen.
+/// Interval at which records are forced to the disk. A power cut loses at most the records of this time, a killed
+/// process none. Chosen.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
 
 /// An open run folder, locked by this process if its file system has locks.
@@ -89,27 +90,21 @@ pub struct Store<D = ChoiceDetail> {
 impl<D: Detail> Store<D> {
     /// Opens a run folder, which is created if it does not exist.
     ///
-    /// An incomplete last line is removed, so that the next record begins on a new line. Other lines that are not records are moved to
-    /// [`SET_ASIDE`], and their trials are asked again.
+    /// An incomplete last line is removed, so that the next record begins on a new line. Other lines that are not
+    /// records are moved to [`SET_ASIDE`], and their trials are asked again.
     ///
     /// # Errors
-    /// If the folder contains other files or another run (the message names the flag that differs), or if another process has locked it.
-    pub fn open(
-        folder: &Path,
-        manifest: &RunManifest,
-        address_change: AddressChange,
-    ) -> Result<Self> {
+    /// If the folder contains other files or another run (the message names the flag that differs), or if another
+    /// process has locked it.
+    pub fn open(folder: &Path, manifest: &RunManifest, address_change: AddressChange) -> Result<Self> {
         let store = Self::open_checked(folder, manifest, address_change)?;
         set_aside::<Record<D>>(&folder.join(RECORDS), &folder.join(SET_ASIDE))?;
         Ok(store)
     }
 
-    /// Opens a run folder as [`open`](Self::open) does, without checking its records, which the caller has read without an error.
-    pub fn open_checked(
-        folder: &Path,
-        manifest: &RunManifest,
-        address_change: AddressChange,
-    ) -> Result<Self> {
+    /// Opens a run folder as [`open`](Self::open) does, without checking its records, which the caller has read without
+    /// an error.
+    pub fn open_checked(folder: &Path, manifest: &RunManifest, address_change: AddressChange) -> Result<Self> {
         match read_manifest(folder, D::SCHEMA)? {
             Some(stored) => check_same_run(folder, &stored, manifest, address_change)?,
             None => create_run(folder, manifest)?,
@@ -194,42 +189,26 @@ impl<D: Detail> Store<D> {
             return Cow::Borrowed(record);
         }
         let model = name.to_owned();
-        Cow::Owned(Record {
-            model,
-            ..record.clone()
-        })
+        Cow::Owned(Record { model, ..record.clone() })
     }
 
     /// Appends trials to the list of trials that were sent in batches.
     pub fn append_to_batch(&mut self, records: &[Record<D>]) -> Result<()> {
         let path = self.batch_trials_file();
-        let records: Vec<Record<D>> = records
-            .iter()
-            .map(|record| self.with_record_name(record).into_owned())
-            .collect();
-        append(&path, &records)?
-            .sync_all()
-            .map_err(|e| Error::file(&path, "write", e))
+        let records: Vec<Record<D>> = records.iter().map(|record| self.with_record_name(record).into_owned()).collect();
+        append(&path, &records)?.sync_all().map_err(|e| Error::file(&path, "write", e))
     }
 
     /// Appends a small copy of an image.
     pub fn append_thumbnail(&mut self, thumbnail: &Thumbnail) -> Result<()> {
-        append(
-            &self.folder.join(THUMBNAILS),
-            std::slice::from_ref(thumbnail),
-        )
-        .map(drop)
+        append(&self.folder.join(THUMBNAILS), std::slice::from_ref(thumbnail)).map(drop)
     }
 
     /// Adds small copies of images from other run folders, for wanted frames, if this run lacks them.
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub fn add_thumbnails_from(
-        &mut self,
-        folders: &[&Path],
-        is_wanted: impl Fn(&FrameId) -> bool,
-    ) -> Result<()> {
+    pub fn add_thumbnails_from(&mut self, folders: &[&Path], is_wanted: impl Fn(&FrameId) -> bool) -> Result<()> {
         let present = read_thumbnails(&self.folder);
         for thumbnail in missing_thumbnails(&present, folders, is_wanted) {
             self.append_thumbnail(&thumbnail)?;
@@ -241,11 +220,7 @@ impl<D: Detail> Store<D> {
     ///
     /// # Errors
     /// If a file cannot be read or written.
-    pub fn add_fidelity_from(
-        &mut self,
-        folders: &[&Path],
-        is_wanted: impl Fn(&FrameId) -> bool,
-    ) -> Result<()> {
+    pub fn add_fidelity_from(&mut self, folders: &[&Path], is_wanted: impl Fn(&FrameId) -> bool) -> Result<()> {
         let present = read_fidelity(&self.folder);
         for image in missing_fidelity(&present, folders, is_wanted) {
             self.append_fidelity(&image)?;
@@ -258,13 +233,13 @@ impl<D: Detail> Store<D> {
         append(&self.folder.join(FIDELITY), std::slice::from_ref(fidelity)).map(drop)
     }
 
-    /// Writes the questions of the run, new and stored ones, in the order of the data. `inputs` summarizes how their image files were
-    /// decoded. A question that is missing although the run has records about it is restored from the data, if one of these records is
-    /// among the `planned` trials of this command.
+    /// Writes the questions of the run, new and stored ones, in the order of the data. `inputs` summarizes how their
+    /// image files were decoded. A question that is missing although the run has records about it is restored from the
+    /// data, if one of these records is among the `planned` trials of this command.
     ///
     /// # Errors
-    /// If a stored question differs in a part that decides its replies or its score (the error names the part), or if a missing question
-    /// cannot be restored.
+    /// If a stored question differs in a part that decides its replies or its score (the error names the part), or if a
+    /// missing question cannot be restored.
     pub fn add_questions(
         &self,
         mut questions: Vec<RunQuestion>,
@@ -274,18 +249,12 @@ impl<D: Detail> Store<D> {
         let path = self.folder.join(QUESTIONS);
         let mut stored_questions: Vec<RunQuestion> = Vec::new();
         let damage = each_readable_line(&path, |question| stored_questions.push(question));
-        let stored_ids = stored_questions
-            .iter()
-            .map(|question| question.id.clone())
-            .collect();
+        let stored_ids = stored_questions.iter().map(|question| question.id.clone()).collect();
         let lost = LostQuestions::find(&self.folder, &questions, &stored_ids, damage.as_deref())?;
         lost.check(&path, planned)?;
         let mut changed = ChangedQuestions::default();
-        let places: HashMap<QuestionId, usize> = questions
-            .iter()
-            .map(|question| question.id.clone())
-            .zip(0..)
-            .collect();
+        let places: HashMap<QuestionId, usize> =
+            questions.iter().map(|question| question.id.clone()).zip(0..).collect();
         for mut stored in stored_questions {
             let Some(&place) = places.get(&stored.id) else {
                 questions.push(stored);
@@ -313,10 +282,7 @@ impl<D: Detail> Store<D> {
         questions.sort_by_key(|question| question.place);
         if let Some(damage) = damage {
             let aside = set_file_aside(&path)?;
-            tracing::warn!(
-                "{damage}; made again from the data; the damaged file is {}",
-                aside.display()
-            );
+            tracing::warn!("{damage}; made again from the data; the damaged file is {}", aside.display());
         } else if !lost.is_empty() {
             tracing::warn!(
                 "{}: questions of records were missing ({}); made again from the data",
@@ -329,32 +295,22 @@ impl<D: Detail> Store<D> {
 
     /// True if the image files of the stored run were decoded in the same way.
     fn is_decoded_alike(&self, inputs: Option<&InputSummary>) -> bool {
-        read_manifest(&self.folder, D::SCHEMA)
-            .ok()
-            .flatten()
-            .is_some_and(|stored| stored.inputs.as_ref() == inputs)
+        read_manifest(&self.folder, D::SCHEMA).ok().flatten().is_some_and(|stored| stored.inputs.as_ref() == inputs)
     }
 
     /// Replaces the stored questions of the run.
     pub fn write_questions(&self, questions: &[RunQuestion]) -> Result<()> {
-        self.write(
-            QUESTIONS,
-            &json_lines(&self.folder.join(QUESTIONS), questions)?,
-        )
+        self.write(QUESTIONS, &json_lines(&self.folder.join(QUESTIONS), questions)?)
     }
 
-    /// Replaces the stored questions of the run by lines from the file of another run; `write` passes each line to its argument.
+    /// Replaces the stored questions of the run by lines from the file of another run; `write` passes each line to its
+    /// argument.
     pub fn write_question_lines(
         &self,
         write: impl FnOnce(&mut dyn FnMut(&[u8]) -> Result<()>) -> Result<()>,
     ) -> Result<()> {
         let path = self.folder.join(QUESTIONS);
-        write_with(&path, |out| {
-            write(&mut |line| {
-                out.write_all(line)
-                    .map_err(|e| Error::file(&path, "write", e))
-            })
-        })
+        write_with(&path, |out| write(&mut |line| out.write_all(line).map_err(|e| Error::file(&path, "write", e))))
     }
 
     /// The trials that were sent in batches, without replies. A trial that was sent again occurs several times.
@@ -399,11 +355,7 @@ impl<D: Detail> Store<D> {
                 *times = times.saturating_sub(1);
             }
         })?;
-        Ok(pending
-            .into_iter()
-            .filter(|(_, times)| *times > 0)
-            .map(|(key, _)| key)
-            .collect())
+        Ok(pending.into_iter().filter(|(_, times)| *times > 0).map(|(key, _)| key).collect())
     }
 
     /// The run folder.
@@ -430,22 +382,14 @@ impl<D: Detail> Store<D> {
         if let Some(unlocked) = &mut self.unlocked {
             unlocked.before_append(&self.records, lines.len());
         }
-        self.records
-            .write_all(lines)
-            .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))?;
-        if self.synced.elapsed() >= SYNC_EVERY {
-            self.sync()
-        } else {
-            Ok(())
-        }
+        self.records.write_all(lines).map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))?;
+        if self.synced.elapsed() >= SYNC_EVERY { self.sync() } else { Ok(()) }
     }
 
     /// Forces all records to the disk.
     pub fn sync(&mut self) -> Result<()> {
         self.synced = Instant::now();
-        self.records
-            .sync_data()
-            .map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))
+        self.records.sync_data().map_err(|e| Error::file(self.folder.join(RECORDS), "write", e))
     }
 
     /// Replaces the manifest.

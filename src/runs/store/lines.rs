@@ -28,16 +28,14 @@ pub(super) fn append<T: Serialize + StoredLine>(path: &Path, values: &[T]) -> Re
         .open(path)
         .map_err(|e| Error::file(path, "write", e))?;
     repair::<T>(path, &file)?;
-    file.write_all(&lines)
-        .map_err(|e| Error::file(path, "write", e))?;
+    file.write_all(&lines).map_err(|e| Error::file(path, "write", e))?;
     Ok(file)
 }
 
 pub(super) fn json_lines<T: Serialize>(path: &Path, values: &[T]) -> Result<Vec<u8>> {
     let mut lines = Vec::new();
     for value in values {
-        serde_json::to_writer(&mut lines, value)
-            .map_err(|e| Error::file(path, "write", e.into()))?;
+        serde_json::to_writer(&mut lines, value).map_err(|e| Error::file(path, "write", e.into()))?;
         lines.push(b'\n');
     }
     Ok(lines)
@@ -50,17 +48,14 @@ pub(super) fn lines<T: StoredLine>(path: &Path) -> Result<Vec<T>> {
     Ok(values)
 }
 
-/// Calls `take` with each complete line of a file in order; with none if the file does not exist. Lines are parsed on all cores, and the
-/// whole file is never in memory.
+/// Calls `take` with each complete line of a file in order; with none if the file does not exist. Lines are parsed on
+/// all cores, and the whole file is never in memory.
 pub(super) fn each_line<T: StoredLine>(path: &Path, mut take: impl FnMut(T)) -> Result<()> {
     each_placed_line(path, |value, _| take(value))
 }
 
 /// Calls `take` with each complete line as [`each_line`] does, and with its place.
-pub(super) fn each_placed_line<T: StoredLine>(
-    path: &Path,
-    mut take: impl FnMut(T, LinePlace),
-) -> Result<()> {
+pub(super) fn each_placed_line<T: StoredLine>(path: &Path, mut take: impl FnMut(T, LinePlace)) -> Result<()> {
     let Some(mut pieces) = Pieces::open(path)? else {
         return Ok(());
     };
@@ -85,8 +80,8 @@ pub(super) fn each_placed_line<T: StoredLine>(
     Ok(())
 }
 
-/// Moves the lines that are not a `T` to the file `aside`, and replaces them by spaces. A damaged line thus affects only its own trial, and
-/// its content is kept.
+/// Moves the lines that are not a `T` to the file `aside`, and replaces them by spaces. A damaged line thus affects
+/// only its own trial, and its content is kept.
 ///
 /// # Errors
 /// If no line is a `T`, so that this is probably another file.
@@ -98,10 +93,8 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
     let mut bad: Vec<BadLine> = Vec::new();
     while let Some(piece) = pieces.next()? {
         let lines = piece.lines();
-        let problems: Vec<Option<serde_json::Error>> = lines
-            .par_iter()
-            .map(|line| T::parse(line.bytes).err())
-            .collect();
+        let problems: Vec<Option<serde_json::Error>> =
+            lines.par_iter().map(|line| T::parse(line.bytes).err()).collect();
         for (line, problem) in lines.iter().zip(problems) {
             match problem {
                 None => good += 1,
@@ -127,10 +120,7 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
     };
     lines.extend(bad.iter().flat_map(|bad| &bad.line));
     write_synced(aside, &lines)?;
-    let mut file = OpenOptions::new()
-        .write(true)
-        .open(path)
-        .map_err(|e| Error::file(path, "open", e))?;
+    let mut file = OpenOptions::new().write(true).open(path).map_err(|e| Error::file(path, "open", e))?;
     for bad in &bad {
         let blanks = vec![b' '; bad.line.len() - 1];
         file.seek(SeekFrom::Start(bad.start))
@@ -140,10 +130,7 @@ pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> 
     file.sync_all().map_err(|e| Error::file(path, "write", e))?;
     let (what, whose) = match bad.len() {
         1 => (format!("line {} is", first.number), "its trial is"),
-        n => (
-            format!("{n} lines are, the first of them line {},", first.number),
-            "their trials are",
-        ),
+        n => (format!("{n} lines are, the first of them line {},", first.number), "their trials are"),
     };
     tracing::warn!(
         "{}: {what} not {} ({}); moved to {}, and {whose} asked again; {}",
@@ -180,10 +167,7 @@ fn cost_in_words(bad: &[BadLine]) -> String {
     match known.len() {
         0 => "its cost cannot be read".to_owned(),
         n if n == bad.len() => format!("{} tokens were paid for it", known.iter().sum::<u64>()),
-        n => format!(
-            "{} tokens were paid for {n} of them",
-            known.iter().sum::<u64>()
-        ),
+        n => format!("{} tokens were paid for {n} of them", known.iter().sum::<u64>()),
     }
 }
 
@@ -196,8 +180,7 @@ pub(super) trait StoredLine: Sized + Send {
     /// The name in error messages, with an article.
     const WHAT: &str;
     /// Remedy for a damaged line.
-    const REMEDY: &str =
-        "the command that made the run, called again, makes the file again from its data";
+    const REMEDY: &str = "the command that made the run, called again, makes the file again from its data";
 
     /// Parses a line, with or without its end.
     fn parse(line: &[u8]) -> serde_json::Result<Self>;
@@ -217,9 +200,7 @@ impl<D: Detail> StoredLine for RereadRecord<D> {
     const REMEDY: &str = RECORD_REMEDY;
 
     fn parse(line: &[u8]) -> serde_json::Result<Self> {
-        reread(D::parse_record(line)?)
-            .map(Self)
-            .map_err(serde_json::Error::custom)
+        reread(D::parse_record(line)?).map(Self).map_err(serde_json::Error::custom)
     }
 }
 
@@ -265,14 +246,13 @@ impl StoredLine for ImageFidelity {
     }
 }
 
-/// True if a file seems to contain lines of a type: one of the complete lines in its first `complete` bytes can be parsed, or without
-/// complete lines the file begins with `{`.
+/// True if a file seems to contain lines of a type: one of the complete lines in its first `complete` bytes can be
+/// parsed, or without complete lines the file begins with `{`.
 fn has_lines_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
     if complete == 0 {
         let mut first = [0];
-        let read = reading::open(path)
-            .and_then(|mut file| file.read(&mut first))
-            .map_err(|e| Error::file(path, "read", e))?;
+        let read =
+            reading::open(path).and_then(|mut file| file.read(&mut first)).map_err(|e| Error::file(path, "read", e))?;
         return Ok(read == 1 && first == *b"{");
     }
     let Some(mut pieces) = Pieces::open(path)? else {
@@ -293,13 +273,10 @@ fn has_lines_of<T: StoredLine>(path: &Path, complete: u64) -> Result<bool> {
 /// Cuts off an incomplete last line: everything after the last line end.
 ///
 /// # Errors
-/// If the file seems to be of another kind: no complete line can be parsed, or without complete lines it does not begin with `{`. Such a
-/// file is not changed.
+/// If the file seems to be of another kind: no complete line can be parsed, or without complete lines it does not begin
+/// with `{`. Such a file is not changed.
 pub(super) fn repair<T: StoredLine>(path: &Path, file: &File) -> Result<()> {
-    let length = file
-        .metadata()
-        .map_err(|e| Error::file(path, "read", e))?
-        .len();
+    let length = file.metadata().map_err(|e| Error::file(path, "read", e))?.len();
     let complete = complete_length(file, length).map_err(|e| Error::file(path, "read", e))?;
     if complete == length {
         return Ok(());
@@ -309,12 +286,8 @@ pub(super) fn repair<T: StoredLine>(path: &Path, file: &File) -> Result<()> {
         let lines = "its last line, which has no end";
         return Err(Error::data(format!("{}, {lines}", path.display()), problem));
     }
-    tracing::warn!(
-        "{}: the last line was incomplete and has been removed; its trial is asked again",
-        path.display()
-    );
-    file.set_len(complete)
-        .map_err(|e| Error::file(path, "write", e))
+    tracing::warn!("{}: the last line was incomplete and has been removed; its trial is asked again", path.display());
+    file.set_len(complete).map_err(|e| Error::file(path, "write", e))
 }
 
 /// The number of bytes up to and including the last line end; 0 without a line end.

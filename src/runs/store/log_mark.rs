@@ -8,7 +8,8 @@ use darkqa_base::error::{Error, Result};
 use darkqa_base::files::reading;
 use darkqa_base::types::Digest;
 
-/// Number of bytes at the end of the records that are hashed. Records are only appended, so every change changes the end.
+/// Number of bytes at the end of the records that are hashed. Records are only appended, so every change changes the
+/// end.
 const TAIL_BYTES: u64 = 64 << 10;
 
 /// A fingerprint of the files of a run folder. A derived file with the same mark is up to date.
@@ -81,13 +82,9 @@ mod tests {
         let longer = "one line\n".repeat(20_001);
         let other_end = lines.clone() + "one lime\n";
         let mut marks = Vec::new();
-        for (name, text) in [
-            (RECORDS, &*lines),
-            (MANIFEST, "{}"),
-            (QUESTIONS, "{}"),
-            (RECORDS, &*longer),
-            (RECORDS, &*other_end),
-        ] {
+        for (name, text) in
+            [(RECORDS, &*lines), (MANIFEST, "{}"), (QUESTIONS, "{}"), (RECORDS, &*longer), (RECORDS, &*other_end)]
+        {
             std::fs::write(folder.path().join(name), text).unwrap();
             marks.push(LogMark::read(folder.path()).unwrap());
         }

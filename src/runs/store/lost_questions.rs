@@ -16,8 +16,8 @@ const MAX_CHARS: usize = 60;
 pub(super) struct LostQuestions(BTreeMap<QuestionId, Vec<TrialKey>>);
 
 impl LostQuestions {
-    /// Finds the records about questions that are not `stored`. The records are read only if a question of the data is not stored, or if
-    /// the file of questions is damaged.
+    /// Finds the records about questions that are not `stored`. The records are read only if a question of the data is
+    /// not stored, or if the file of questions is damaged.
     ///
     /// # Errors
     /// If the records cannot be read.
@@ -47,24 +47,17 @@ impl LostQuestions {
         self.0.len()
     }
 
-    /// Checks that the data contains each lost question: a key of its records is among those of the `planned` trials. A key contains the
-    /// text and choices of its question.
+    /// Checks that the data contains each lost question: a key of its records is among those of the `planned` trials. A
+    /// key contains the text and choices of its question.
     ///
     /// # Errors
     /// If no record of a question is among the planned trials.
-    pub(super) fn check(
-        &self,
-        path: &Path,
-        planned: impl FnOnce() -> Result<HashSet<TrialKey>>,
-    ) -> Result<()> {
+    pub(super) fn check(&self, path: &Path, planned: impl FnOnce() -> Result<HashSet<TrialKey>>) -> Result<()> {
         if self.is_empty() {
             return Ok(());
         }
         let planned = planned()?;
-        let mut others = self
-            .0
-            .iter()
-            .filter(|(_, keys)| !keys.iter().any(|key| planned.contains(key)));
+        let mut others = self.0.iter().filter(|(_, keys)| !keys.iter().any(|key| planned.contains(key)));
         let Some((first, _)) = others.next() else {
             return Ok(());
         };
@@ -75,9 +68,6 @@ impl LostQuestions {
             self.len(),
             excerpt(&first.0, MAX_CHARS)
         );
-        Err(Error::Run {
-            path: path.to_owned(),
-            problem,
-        })
+        Err(Error::Run { path: path.to_owned(), problem })
     }
 }

@@ -1,6 +1,7 @@
 //! Check that a run folder has no links: [`check_own`].
 //!
-//! A run folder may have been downloaded. Through a link in it, this program would write to a file or folder outside of the run.
+//! A run folder may have been downloaded. Through a link in it, this program would write to a file or folder outside of
+//! the run.
 
 use std::ffi::OsStr;
 use std::fs::{self, DirEntry, Metadata};
@@ -14,8 +15,8 @@ const INNER: [&str; 1] = [BATCH];
 /// The files that are appended to. All others are replaced by new files, so that the target of a link stays unchanged.
 const APPENDED: [&str; 4] = [RECORDS, THUMBNAILS, FIDELITY, BATCH_STATE];
 
-/// Refuses a run folder in which a folder or a file that is appended to is a link, or an entry is a pipe or a device. The folder itself
-/// may be reached by a link.
+/// Refuses a run folder in which a folder or a file that is appended to is a link, or an entry is a pipe or a device.
+/// The folder itself may be reached by a link.
 ///
 /// # Errors
 /// Names the link.
@@ -59,8 +60,7 @@ fn foreign_kind(entry: &DirEntry) -> Option<&'static str> {
         return Some("a pipe or a device");
     }
     let is_appended = APPENDED.iter().any(|appended| name == *appended);
-    (is_appended && own.is_file() && link_count(&own) > 1)
-        .then_some("a file with a second name (a hard link)")
+    (is_appended && own.is_file() && link_count(&own) > 1).then_some("a file with a second name (a hard link)")
 }
 
 /// The number of hard links of a file.

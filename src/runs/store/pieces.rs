@@ -75,13 +75,7 @@ pub(super) fn open_if_exists(path: &Path) -> Result<Option<File>> {
 impl<'p> Pieces<'p> {
     /// Opens a file; `None` if it does not exist.
     pub(super) fn open(path: &'p Path) -> Result<Option<Self>> {
-        Ok(open_if_exists(path)?.map(|file| Self {
-            path,
-            file,
-            rest: Vec::new(),
-            start: 0,
-            lines: 0,
-        }))
+        Ok(open_if_exists(path)?.map(|file| Self { path, file, rest: Vec::new(), start: 0, lines: 0 }))
     }
 
     /// The next complete lines; `None` after the last. An incomplete last line is skipped.
@@ -105,17 +99,12 @@ impl<'p> Pieces<'p> {
                 break;
             }
             if bytes.len() > MAX_LINE_BYTES {
-                let problem = format!(
-                    "longer than {MAX_LINE_BYTES} bytes, which no line of a run is; restore the file"
-                );
+                let problem =
+                    format!("longer than {MAX_LINE_BYTES} bytes, which no line of a run is; restore the file");
                 return Err(Error::line(self.path, self.lines + 1, problem));
             }
         }
-        let piece = Piece {
-            start: self.start,
-            lines: self.lines,
-            bytes,
-        };
+        let piece = Piece { start: self.start, lines: self.lines, bytes };
         self.start += piece.bytes.len() as u64;
         #[expect(clippy::naive_bytecount, reason = "fast enough without a crate")]
         let line_ends = piece.bytes.iter().filter(|byte| **byte == b'\n').count();
@@ -131,11 +120,7 @@ impl Piece {
         let split = self.bytes.split_inclusive(|byte| *byte == b'\n');
         for (number, bytes) in (self.lines + 1..).zip(split) {
             if !bytes.trim_ascii().is_empty() {
-                lines.push(FileLine {
-                    number,
-                    start,
-                    bytes,
-                });
+                lines.push(FileLine { number, start, bytes });
             }
             start += bytes.len() as u64;
         }
@@ -151,18 +136,12 @@ mod tests {
     fn too_long_lines_are_errors() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lines");
-        let text = format!(
-            "one\n{}",
-            "x".repeat(MAX_LINE_BYTES + 1 + PIECE_BYTES as usize)
-        );
+        let text = format!("one\n{}", "x".repeat(MAX_LINE_BYTES + 1 + PIECE_BYTES as usize));
         std::fs::write(&path, text).unwrap();
         let mut pieces = Pieces::open(&path).unwrap().unwrap();
         assert!(pieces.next().unwrap().is_some());
         let error = pieces.next().err().unwrap().to_string();
-        assert!(
-            error.contains("line 2: longer than 67108864 bytes"),
-            "{error}"
-        );
+        assert!(error.contains("line 2: longer than 67108864 bytes"), "{error}");
     }
 
     #[test]
@@ -179,10 +158,7 @@ mod tests {
             parts += 1;
             for line in piece.lines() {
                 let start = line.start as usize;
-                assert_eq!(
-                    &text.as_bytes()[start..start + line.bytes.len()],
-                    line.bytes
-                );
+                assert_eq!(&text.as_bytes()[start..start + line.bytes.len()], line.bytes);
                 seen.push(line.number);
             }
         }

@@ -69,8 +69,8 @@ impl RecordLog {
         for together in in_file.chunk_by(|one, next| places[*one].end() == places[*next].start) {
             let start = places[together[0]].start;
             let length = together.iter().map(|index| places[*index].length).sum();
-            let block = bytes_at(&self.file, LinePlace { start, length })
-                .map_err(|e| Error::file(&self.path, "read", e))?;
+            let block =
+                bytes_at(&self.file, LinePlace { start, length }).map_err(|e| Error::file(&self.path, "read", e))?;
             for index in together {
                 let place = places[*index];
                 let at = (place.start - start) as usize;
@@ -124,8 +124,8 @@ fn bytes_at(mut file: &File, place: LinePlace) -> std::io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Calls `take` with the identity of the trial of each record, in the order of the file, and with the record's place. A trial that was
-/// asked again occurs several times.
+/// Calls `take` with the identity of the trial of each record, in the order of the file, and with the record's place. A
+/// trial that was asked again occurs several times.
 ///
 /// # Errors
 /// If a line is not a record.
@@ -133,8 +133,8 @@ pub fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) -> Resu
     each_placed_line(&folder.join(RECORDS), take)
 }
 
-/// Calls `take` with each record of a run folder in the order of the file, and with its place. A trial that was asked again occurs several
-/// times.
+/// Calls `take` with each record of a run folder in the order of the file, and with its place. A trial that was asked
+/// again occurs several times.
 ///
 /// # Errors
 /// If a line is not a record.
@@ -142,14 +142,12 @@ pub fn each_record<D: Detail>(folder: &Path, take: impl FnMut(Record<D>, LinePla
     each_placed_line(&folder.join(RECORDS), take)
 }
 
-/// Calls `take` with each record as [`each_record`] does, after its reply was parsed again by the rules of this version.
+/// Calls `take` with each record as [`each_record`] does, after its reply was parsed again by the rules of this
+/// version.
 ///
 /// # Errors
 /// If a line is not a record, or the choices of a record are not valid.
-pub fn each_reread_record<D: Detail>(
-    folder: &Path,
-    mut take: impl FnMut(Record<D>, LinePlace),
-) -> Result<()> {
+pub fn each_reread_record<D: Detail>(folder: &Path, mut take: impl FnMut(Record<D>, LinePlace)) -> Result<()> {
     each_placed_line(&folder.join(RECORDS), |line: RereadRecord<D>, place| {
         take(line.0, place);
     })
@@ -162,9 +160,7 @@ mod tests {
     #[test]
     fn lines_are_read_in_any_order() {
         let folder = tempfile::tempdir().unwrap();
-        let lines: Vec<String> = (0..40)
-            .map(|number| format!("{}\n", "x".repeat(number)))
-            .collect();
+        let lines: Vec<String> = (0..40).map(|number| format!("{}\n", "x".repeat(number))).collect();
         std::fs::write(folder.path().join(RECORDS), lines.concat()).unwrap();
         let log = RecordLog::open(folder.path()).unwrap();
         let all: Vec<LinePlace> = (0..lines.len())
@@ -179,10 +175,7 @@ mod tests {
             let expected = order.iter().map(|index| lines[*index].clone().into_bytes());
             assert!(read.into_iter().eq(expected), "{order:?}");
         }
-        let beyond = LinePlace {
-            start: 1_000,
-            length: 2,
-        };
+        let beyond = LinePlace { start: 1_000, length: 2 };
         assert!(log.lines(&[all[0], beyond]).is_err());
     }
 }

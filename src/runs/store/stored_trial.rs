@@ -90,16 +90,17 @@ impl StoredTrial {
         self.lost.as_ref().map_or(0, |lost| lost.attempts)
     }
 
-    /// The attempts that were charged and gave no reply, and the requests without a token count; `None` without such attempts and requests.
+    /// The attempts that were charged and gave no reply, and the requests without a token count; `None` without such
+    /// attempts and requests.
     pub fn lost(&self) -> Option<&LostAttempts> {
         self.lost.as_deref()
     }
 
-    /// Merges an earlier record of the same trial into this one, and adds its cost. Must be called with the latest of the earlier records
-    /// first.
+    /// Merges an earlier record of the same trial into this one, and adds its cost. Must be called with the latest of
+    /// the earlier records first.
     ///
-    /// The earlier record may be the same reply, parsed by other rules, whose attempts are not counted twice; a reply with another token
-    /// limit; or a reply that this record failed to replace.
+    /// The earlier record may be the same reply, parsed by other rules, whose attempts are not counted twice; a reply
+    /// with another token limit; or a reply that this record failed to replace.
     pub(super) fn add_earlier(&mut self, earlier: &Self) {
         let own = self.lost.as_deref().copied().unwrap_or_default();
         let before = earlier.lost.as_deref().copied().unwrap_or_default();
@@ -149,9 +150,8 @@ mod tests {
     use super::*;
 
     fn trial(failure: &str, attempts: u32) -> StoredTrial {
-        let lost = format!(
-            r#"{{"attempts":{attempts},"usage":{{"prompt_tokens":{attempts}00,"completion_tokens":null}}}}"#
-        );
+        let lost =
+            format!(r#"{{"attempts":{attempts},"usage":{{"prompt_tokens":{attempts}00,"completion_tokens":null}}}}"#);
         let key = "0".repeat(32);
         let line = format!(r#"{{"key":"{key}","model":"m","failure":{failure},"lost":{lost}}}"#);
         serde_json::from_str(&line).unwrap()
@@ -165,11 +165,7 @@ mod tests {
             (r#"{"kind":"server","status":504,"message":"m"}"#, false),
             ("null", false),
         ] {
-            assert_eq!(
-                trial(failure, 1).timed_out_at_gateway(),
-                expected,
-                "{failure}"
-            );
+            assert_eq!(trial(failure, 1).timed_out_at_gateway(), expected, "{failure}");
         }
     }
 
@@ -185,22 +181,13 @@ mod tests {
     #[test]
     fn truncated_replies_are_charged() {
         let first = reply("null", "length");
-        assert!(
-            first.is_truncated_below(2000, 1024)
-                && !reply("2000", "length").is_truncated_below(2000, 1024)
-        );
+        assert!(first.is_truncated_below(2000, 1024) && !reply("2000", "length").is_truncated_below(2000, 1024));
         assert!(!reply("null", "stop").is_truncated_below(2000, 1024));
         assert!(!first.is_truncated_below(400, 1024) && !first.is_truncated_below(1024, 1024));
         assert!(reply("400", "length").is_truncated_below(1024, 1024));
         let mut last = reply("2000", "stop");
         last.add_earlier(&first);
-        assert_eq!(
-            (
-                last.lost_attempts(),
-                last.lost().unwrap().usage.prompt_tokens
-            ),
-            (1, Some(10))
-        );
+        assert_eq!((last.lost_attempts(), last.lost().unwrap().usage.prompt_tokens), (1, Some(10)));
         let mut failed = trial("{}", 2);
         failed.add_earlier(&first);
         assert!(!failed.failed() && failed.is_truncated_below(2000, 1024));

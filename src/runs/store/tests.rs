@@ -57,19 +57,13 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
 fn runs_with_another_schema_are_refused() {
     let base = tempfile::tempdir().unwrap();
     for (schema, expected) in [
-        (
-            "darkqa.run/1",
-            "made by an earlier version of darkqa-eval (0",
-        ),
+        ("darkqa.run/1", "made by an earlier version of darkqa-eval (0"),
         ("darkqa.openeqa/1", "run it again"),
         ("darkqa.openeqa/2", "\"darkqa.run/2\" is expected here"),
         ("darkqa.run/9", "is not known to this version"),
         ("something", "is not known to this version"),
     ] {
-        let manifest = RunManifest {
-            schema: schema.into(),
-            ..manifest(0)
-        };
+        let manifest = RunManifest { schema: schema.into(), ..manifest(0) };
         write_manifest(base.path(), &manifest).unwrap();
         let error = read_manifest(base.path(), ChoiceDetail::SCHEMA).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
@@ -82,25 +76,12 @@ fn only_the_last_record_of_each_trial_is_read() {
     let folder = base.path().join("run");
     let mut store = Store::open(&folder, &manifest(0), AddressChange::Refused).unwrap();
     assert!(store.records().unwrap().is_empty());
-    for (name, outcome) in [
-        ("a", TrialOutcome::Failed),
-        ("b", TrialOutcome::Right),
-        ("a", TrialOutcome::Wrong),
-    ] {
+    for (name, outcome) in [("a", TrialOutcome::Failed), ("b", TrialOutcome::Right), ("a", TrialOutcome::Wrong)] {
         store.append(&record(name, outcome)).unwrap();
     }
     drop(store);
-    let records = Store::open(&folder, &manifest(0), AddressChange::Refused)
-        .unwrap()
-        .records()
-        .unwrap();
-    assert_eq!(
-        records,
-        [
-            record("a", TrialOutcome::Wrong),
-            record("b", TrialOutcome::Right)
-        ]
-    );
+    let records = Store::open(&folder, &manifest(0), AddressChange::Refused).unwrap().records().unwrap();
+    assert_eq!(records, [record("a", TrialOutcome::Wrong), record("b", TrialOutcome::Right)]);
 }
 
 #[test]
@@ -114,44 +95,28 @@ fn damaged_lines_are_removed_or_set_aside() {
     assert_eq!(store.records().unwrap().len(), 1);
     store.append(&record("b", TrialOutcome::Right)).unwrap();
     drop(store);
-    let records = Store::open(base.path(), &manifest(0), AddressChange::Refused)
-        .unwrap()
-        .records();
+    let records = Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap().records();
     assert_eq!(records.unwrap().len(), 2);
     let path = base.path().join(RECORDS);
     let text = fs::read_to_string(&path).unwrap();
     fs::write(&path, text.replacen("{\"key\"", "{\"kex\"", 1)).unwrap();
     // A reader gets an error.
-    let error = read_records::<ChoiceDetail>(base.path())
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("records.jsonl, line 1: not a record"),
-        "{error}"
-    );
+    let error = read_records::<ChoiceDetail>(base.path()).unwrap_err().to_string();
+    assert!(error.contains("records.jsonl, line 1: not a record"), "{error}");
     // The run continues without the line, which is moved to another file and blanked.
     let mut store = reopen(base.path()).unwrap();
     assert_eq!(store.records().unwrap().len(), 1);
     let aside = fs::read_to_string(base.path().join(SET_ASIDE)).unwrap();
-    assert!(
-        aside.starts_with("{\"kex\"") && aside.lines().count() == 1,
-        "{aside}"
-    );
+    assert!(aside.starts_with("{\"kex\"") && aside.lines().count() == 1, "{aside}");
     store.append(&record("a", TrialOutcome::Right)).unwrap();
     drop(store);
     assert_eq!(reopen(base.path()).unwrap().records().unwrap().len(), 2);
-    assert_eq!(
-        fs::read_to_string(base.path().join(SET_ASIDE)).unwrap(),
-        aside
-    );
+    assert_eq!(fs::read_to_string(base.path().join(SET_ASIDE)).unwrap(), aside);
     assert_eq!(read_records::<ChoiceDetail>(base.path()).unwrap().len(), 2);
     // A file without any record is another file, not a damaged run.
     fs::write(&path, "{}\n[]\n").unwrap();
     let error = reopen(base.path()).unwrap_err().to_string();
-    assert!(
-        error.contains("records.jsonl, line 1: not a record"),
-        "{error}"
-    );
+    assert!(error.contains("records.jsonl, line 1: not a record"), "{error}");
 }
 
 fn reopen(folder: &Path) -> Result<Store> {
@@ -162,13 +127,8 @@ fn reopen(folder: &Path) -> Result<Store> {
 fn other_runs_are_refused_by_the_differing_flag() {
     let base = tempfile::tempdir().unwrap();
     drop(Store::open(base.path(), &manifest(0), AddressChange::Refused).unwrap());
-    let error = Store::open(base.path(), &manifest(7), AddressChange::Refused)
-        .unwrap_err()
-        .to_string();
-    assert!(
-        error.contains("another --seed: it was 0, now it is 7"),
-        "{error}"
-    );
+    let error = Store::open(base.path(), &manifest(7), AddressChange::Refused).unwrap_err().to_string();
+    assert!(error.contains("another --seed: it was 0, now it is 7"), "{error}");
 }
 
 #[test]
@@ -184,10 +144,7 @@ fn locked_runs_and_folders_with_files_are_refused() {
     let other = tempfile::tempdir().unwrap();
     fs::write(other.path().join("thesis.tex"), "").unwrap();
     assert!(
-        Store::open(other.path(), &manifest(0), AddressChange::Refused)
-            .unwrap_err()
-            .to_string()
-            .contains("not empty")
+        Store::open(other.path(), &manifest(0), AddressChange::Refused).unwrap_err().to_string().contains("not empty")
     );
 }
 
@@ -222,19 +179,8 @@ fn unfinished_files_are_ignored() {
 #[test]
 fn runs_are_found_by_their_hash() {
     let base = tempfile::tempdir().unwrap();
-    for name in [
-        "20260101-m-d-0123abcd",
-        "20260102-m-d-0123abcd",
-        "20260103-m-d-99999999",
-    ] {
-        drop(
-            Store::open(
-                &base.path().join(name),
-                &manifest(0),
-                AddressChange::Refused,
-            )
-            .unwrap(),
-        );
+    for name in ["20260101-m-d-0123abcd", "20260102-m-d-0123abcd", "20260103-m-d-99999999"] {
+        drop(Store::open(&base.path().join(name), &manifest(0), AddressChange::Refused).unwrap());
     }
     fs::create_dir(base.path().join("20260104-m-d-0123abcd")).unwrap();
     let found = find(base.path(), "0123abcd").unwrap();

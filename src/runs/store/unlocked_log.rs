@@ -39,10 +39,7 @@ impl UnlockedLog {
     /// # Errors
     /// If the marker cannot be written.
     pub(super) fn begin(folder: &Path, log: &File, problem: &io::Error) -> Result<Self> {
-        let now = SystemTime::now()
-            .duration_since(UNIX_EPOCH)
-            .unwrap_or_default()
-            .as_nanos();
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos();
         let begun = Self {
             marker: folder.join(WRITER),
             name: format!("process {}, {now} ns\n", process::id()),
@@ -62,11 +59,7 @@ impl UnlockedLog {
     pub(super) fn before_append(&mut self, log: &File, bytes: usize) {
         let length = log.metadata().map_or(self.end, |log| log.len());
         if length != self.end && self.found == OtherWriter::None {
-            self.found = if self.is_last() {
-                OtherWriter::Earlier
-            } else {
-                OtherWriter::Later
-            };
+            self.found = if self.is_last() { OtherWriter::Earlier } else { OtherWriter::Later };
             if self.found == OtherWriter::Later {
                 tracing::warn!("another process has begun to write to this run; it stops");
             }
@@ -105,11 +98,7 @@ mod tests {
     use super::*;
 
     fn begin(folder: &Path) -> (UnlockedLog, File) {
-        let log = OpenOptions::new()
-            .append(true)
-            .create(true)
-            .open(folder.join("records.jsonl"))
-            .unwrap();
+        let log = OpenOptions::new().append(true).create(true).open(folder.join("records.jsonl")).unwrap();
         let problem = io::Error::from(io::ErrorKind::Unsupported);
         (UnlockedLog::begin(folder, &log, &problem).unwrap(), log)
     }
@@ -145,10 +134,6 @@ mod tests {
                 assert!(alone.0.problem(folder.path()).is_none());
             }
         }
-        assert_eq!(
-            fs::read_dir(folder.path()).unwrap().count(),
-            1,
-            "the note is removed"
-        );
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "the note is removed");
     }
 }

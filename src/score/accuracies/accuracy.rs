@@ -29,7 +29,8 @@ pub struct AccuracyCell {
     pub unparsed: usize,
     /// Number of trials without a reply. They are not scored.
     pub failed: usize,
-    /// Share of right replies among all replies; `None` if there is no reply. Its interval holds for all values of the missing replies.
+    /// Share of right replies among all replies; `None` if there is no reply. Its interval holds for all values of the
+    /// missing replies.
     pub accuracy: Option<Estimate>,
     /// Share of questions answered correctly every time: in every order of the choices (MMBench's circular evaluation,
     /// Liu et al. 2023, arXiv:2307.06281, section 4.2) and in every repeat. `None` if each question was asked once.
@@ -45,8 +46,8 @@ impl AccuracyCell {
         self.accuracy.map_or(0, |accuracy| accuracy.n)
     }
 
-    /// Accuracy if all missing replies were wrong, and if all were right (the bounds of Manski 1990, Am. Econ. Rev. 80:319); `None` if no
-    /// reply is missing, or if there is none.
+    /// Accuracy if all missing replies were wrong, and if all were right (the bounds of Manski 1990, Am. Econ. Rev.
+    /// 80:319); `None` if no reply is missing, or if there is none.
     #[must_use]
     pub fn bounds(&self) -> Option<[f64; 2]> {
         let all = (self.replies() + self.failed) as f64;
@@ -76,9 +77,7 @@ impl AccuracySummary {
         family: Option<&'s Family>,
         mode: ParsingMode,
     ) -> impl Iterator<Item = &'s AccuracyCell> + Clone {
-        self.cells
-            .iter()
-            .filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
+        self.cells.iter().filter(move |cell| cell.mode == mode && cell.family.as_ref() == family)
     }
 
     /// Cell of a subject, family and parsing, if it exists.
@@ -89,14 +88,12 @@ impl AccuracySummary {
         family: Option<&Family>,
         mode: ParsingMode,
     ) -> Option<&AccuracyCell> {
-        self.cells.iter().find(|cell| {
-            cell.mode == mode && cell.family.as_ref() == family && cell.subject == *subject
-        })
+        self.cells.iter().find(|cell| cell.mode == mode && cell.family.as_ref() == family && cell.subject == *subject)
     }
 }
 
-/// Computes the accuracies of a run. `health` has one entry for each subject; `questions` are all questions of the run, for the chance
-/// line.
+/// Computes the accuracies of a run. `health` has one entry for each subject; `questions` are all questions of the run,
+/// for the chance line.
 #[must_use]
 pub(crate) fn summarize(
     grid: &Grid<'_>,
@@ -110,20 +107,15 @@ pub(crate) fn summarize(
     let mut cells: Vec<AccuracyCell> = (0..grid.subjects.len())
         .into_par_iter()
         .flat_map_iter(|subject| {
-            families.iter().flat_map(move |family| {
-                ParsingMode::ALL.map(|mode| cell(grid, subject, *family, mode, imbalance))
-            })
+            families
+                .iter()
+                .flat_map(move |family| ParsingMode::ALL.map(|mode| cell(grid, subject, *family, mode, imbalance)))
         })
         .collect();
     // A family that a subject was not asked about gets no cell.
     cells.retain(|cell| cell.accuracy.is_some() || cell.failed > 0);
     cells.extend(chance_cells(&questions));
-    AccuracySummary {
-        cells,
-        unread: unread(health),
-        chance_of_questions: chance_of_questions(&questions),
-        unbalanced,
-    }
+    AccuracySummary { cells, unread: unread(health), chance_of_questions: chance_of_questions(&questions), unbalanced }
 }
 
 /// Counts of unreadable replies by reason, in the strict parsing.
@@ -143,21 +135,13 @@ fn cell(
     unbalanced: &[UnbalancedFamily],
 ) -> AccuracyCell {
     let mut unparsed = 0;
-    for (index, _) in grid
-        .items
-        .iter()
-        .enumerate()
-        .filter(|(_, item)| item.is_in_family(family))
-    {
+    for (index, _) in grid.items.iter().enumerate().filter(|(_, item)| item.is_in_family(family)) {
         let result = grid.result(subject, index);
-        unparsed +=
-            usize::from(result.reading(mode) == Some(None) && !cannot_tell(grid, subject, index));
+        unparsed += usize::from(result.reading(mode) == Some(None) && !cannot_tell(grid, subject, index));
     }
     let counts = grid.counts(subject, family, mode);
     let failed = grid.failed(subject, family);
-    let is_unbalanced = unbalanced
-        .iter()
-        .any(|one| family.is_none_or(|family| one.family == *family));
+    let is_unbalanced = unbalanced.iter().any(|one| family.is_none_or(|family| one.family == *family));
     AccuracyCell {
         subject: grid.subjects[subject].clone(),
         family: family.cloned(),
@@ -167,28 +151,19 @@ fn cell(
         failed: failed.iter().map(|count| *count as usize).sum(),
         accuracy: Estimate::with_missing(&counts, &failed),
         always: always(grid, subject, family, mode),
-        balanced: is_unbalanced
-            .then(|| balanced_accuracy(grid, subject, family, mode))
-            .flatten(),
+        balanced: is_unbalanced.then(|| balanced_accuracy(grid, subject, family, mode)).flatten(),
     }
 }
 
 /// True if a person answered that they cannot tell, which is readable but not a choice.
 fn cannot_tell(grid: &Grid<'_>, subject: usize, item: usize) -> bool {
     let trial = grid.trial(subject, item);
-    trial
-        .and_then(darkqa_base::types::TrialRef::strict)
-        .and_then(|reading| reading.why)
+    trial.and_then(darkqa_base::types::TrialRef::strict).and_then(|reading| reading.why)
         == Some(UnreadReason::CannotTell)
 }
 
 /// Share of questions answered correctly every time; `None` if each question was asked once.
-fn always(
-    grid: &Grid<'_>,
-    subject: usize,
-    family: Option<&Family>,
-    mode: ParsingMode,
-) -> Option<Estimate> {
+fn always(grid: &Grid<'_>, subject: usize, family: Option<&Family>, mode: ParsingMode) -> Option<Estimate> {
     let mut clusters = vec![ClusterCount::default(); grid.clusters];
     let mut is_once = true;
     let mut add = |cluster: u32, question: ClusterCount| {
@@ -226,11 +201,8 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
     std::iter::once(None)
         .chain(families.into_iter().map(Some))
         .flat_map(|family| {
-            let accuracy = chance(
-                questions
-                    .iter()
-                    .filter(|question| family.is_none_or(|family| question.family == *family)),
-            );
+            let accuracy =
+                chance(questions.iter().filter(|question| family.is_none_or(|family| question.family == *family)));
             ParsingMode::ALL.map(|mode| AccuracyCell {
                 subject: ModelInCondition {
                     model: CHANCE.to_owned(),

@@ -1,5 +1,5 @@
-//! Families whose true answers are unbalanced ([`UnbalancedFamily`]), and the accuracy with all true answers weighted alike
-//! ([`balanced_accuracy`]).
+//! Families whose true answers are unbalanced ([`UnbalancedFamily`]), and the accuracy with all true answers weighted
+//! alike ([`balanced_accuracy`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,7 +16,8 @@ const MIN_EXCESS: f64 = 0.2;
 /// Minimum number of questions of a family (chosen): among fewer, one answer is common by chance.
 const MIN_QUESTIONS: usize = 10;
 
-/// A family with one true answer to [`MAX_ANSWER_SHARE`] of its questions or more, and to 20 points more than guessing would hit.
+/// A family with one true answer to [`MAX_ANSWER_SHARE`] of its questions or more, and to 20 points more than guessing
+/// would hit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct UnbalancedFamily {
     pub family: Family,
@@ -49,8 +50,7 @@ impl UnbalancedFamily {
                 // Of equally common answers, the first.
                 let (answer, count) = answers.into_iter().rev().max_by_key(|(_, count)| *count)?;
                 let all = questions as f64;
-                let is_common = count as f64 >= MAX_ANSWER_SHARE * all
-                    && count as f64 >= guesses + MIN_EXCESS * all;
+                let is_common = count as f64 >= MAX_ANSWER_SHARE * all && count as f64 >= guesses + MIN_EXCESS * all;
                 (questions >= MIN_QUESTIONS && is_common).then(|| Self {
                     family: family.clone(),
                     answer,
@@ -72,9 +72,9 @@ fn true_answer(item: &GridItem<'_>) -> Option<String> {
     Some(item.asked.choices.get(item.asked.truth?)?.to_lowercase())
 }
 
-/// Accuracy of a subject with all true answers of a family weighted alike: the mean over the true answers of the share of right replies
-/// (Brodersen et al. 2010, ICPR, p. 3121). Over several families it is their mean, weighted by their replies. It equals the accuracy if
-/// every answer of a family is true equally often. `None` without a reply.
+/// Accuracy of a subject with all true answers of a family weighted alike: the mean over the true answers of the share
+/// of right replies (Brodersen et al. 2010, ICPR, p. 3121). Over several families it is their mean, weighted by their
+/// replies. It equals the accuracy if every answer of a family is true equally often. `None` without a reply.
 #[must_use]
 pub(super) fn balanced_accuracy(
     grid: &Grid<'_>,
@@ -94,10 +94,7 @@ pub(super) fn balanced_accuracy(
     let (mut sum, mut all) = (0.0, 0);
     for answers in families.values() {
         let replies: usize = answers.values().map(|[_, replies]| replies).sum();
-        let shares: f64 = answers
-            .values()
-            .map(|[right, replies]| *right as f64 / *replies as f64)
-            .sum();
+        let shares: f64 = answers.values().map(|[right, replies]| *right as f64 / *replies as f64).sum();
         sum += shares / answers.len() as f64 * replies as f64;
         all += replies;
     }

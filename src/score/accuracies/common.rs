@@ -36,11 +36,7 @@ impl CommonItems {
     /// Finds the common items of a grid; `None` if all models were asked the same questions.
     #[must_use]
     pub fn new(grid: &Grid<'_>) -> Option<Self> {
-        let all: BTreeSet<&QuestionId> = grid
-            .items
-            .iter()
-            .map(|item| &*item.asked.question)
-            .collect();
+        let all: BTreeSet<&QuestionId> = grid.items.iter().map(|item| &*item.asked.question).collect();
         let mut asked = BTreeMap::<(bool, &str), BTreeSet<&QuestionId>>::new();
         for (index, subject) in model_subjects(grid) {
             let model = (subject.view == Some(View::Blind), &*subject.model);
@@ -48,11 +44,7 @@ impl CommonItems {
             if questions.len() == all.len() {
                 continue;
             }
-            let items = grid
-                .items
-                .iter()
-                .enumerate()
-                .filter(|(item, _)| grid.trial(index, *item).is_some());
+            let items = grid.items.iter().enumerate().filter(|(item, _)| grid.trial(index, *item).is_some());
             questions.extend(items.map(|(_, item)| &*item.asked.question));
         }
         if asked.values().all(|questions| questions.len() == all.len()) {
@@ -60,16 +52,10 @@ impl CommonItems {
         }
         let shared = shared_items(grid);
         let restricted = grid.select_items(&shared);
-        let offers: Vec<OfferedChoices> = restricted
-            .items
-            .iter()
-            .map(|item| OfferedChoices::from_item(item.asked))
-            .collect();
-        let shared_questions: BTreeSet<&QuestionId> = restricted
-            .items
-            .iter()
-            .map(|item| &*item.asked.question)
-            .collect();
+        let offers: Vec<OfferedChoices> =
+            restricted.items.iter().map(|item| OfferedChoices::from_item(item.asked)).collect();
+        let shared_questions: BTreeSet<&QuestionId> =
+            restricted.items.iter().map(|item| &*item.asked.question).collect();
         Some(Self {
             asked: asked
                 .into_iter()
@@ -90,14 +76,11 @@ impl CommonItems {
 fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g ModelInCondition)> {
     let models = grid.subjects.iter().map(|subject| &*subject.model);
     let models: BTreeSet<&str> = grid.listing.without_people(models).into_iter().collect();
-    grid.subjects
-        .iter()
-        .enumerate()
-        .filter(move |(_, subject)| models.contains(&*subject.model))
+    grid.subjects.iter().enumerate().filter(move |(_, subject)| models.contains(&*subject.model))
 }
 
-/// For each item, returns whether every model with images replied to it, in any condition. Models without any reply do not count, and
-/// people count only if there are no models.
+/// For each item, returns whether every model with images replied to it, in any condition. Models without any reply do
+/// not count, and people count only if there are no models.
 #[must_use]
 pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
     let mut models = BTreeMap::<&str, Vec<bool>>::new();
@@ -105,15 +88,11 @@ pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
         if subject.view != Some(View::Image) {
             continue;
         }
-        let replied = models
-            .entry(&subject.model)
-            .or_insert_with(|| vec![false; grid.items.len()]);
+        let replied = models.entry(&subject.model).or_insert_with(|| vec![false; grid.items.len()]);
         for (item, replied) in replied.iter_mut().enumerate() {
             *replied |= grid.result(index, item).is_reply();
         }
     }
     models.retain(|_, replied| replied.contains(&true));
-    (0..grid.items.len())
-        .map(|item| models.values().all(|replied| replied[item]))
-        .collect()
+    (0..grid.items.len()).map(|item| models.values().all(|replied| replied[item])).collect()
 }

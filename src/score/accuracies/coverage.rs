@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::grid::Grid;
 use darkqa_base::types::AxisLevel;
 
-/// Minimum share of the items of a level that a model must have answered to be averaged or ranked with others (chosen). A few failed trials
-/// do not exclude a model; a missing level or a missing part of the questions does.
+/// Minimum share of the items of a level that a model must have answered to be averaged or ranked with others (chosen).
+/// A few failed trials do not exclude a model; a missing level or a missing part of the questions does.
 pub(super) const MIN_SHARE: f64 = 0.9;
 
 /// Items that a model answered at each level, on all sides of a comparison.
@@ -25,12 +25,7 @@ impl Coverage {
                 .into_iter()
                 .map(|(level, subjects)| {
                     let items = (0..grid.items.len())
-                        .map(|item| {
-                            is_about(item)
-                                && subjects
-                                    .iter()
-                                    .all(|side| grid.result(*side, item).is_reply())
-                        })
+                        .map(|item| is_about(item) && subjects.iter().all(|side| grid.result(*side, item).is_reply()))
                         .collect();
                     (level, items)
                 })
@@ -40,27 +35,17 @@ impl Coverage {
 
     /// Number of answered items over all levels.
     pub(super) fn total(&self) -> usize {
-        self.0
-            .values()
-            .flatten()
-            .filter(|answered| **answered)
-            .count()
+        self.0.values().flatten().filter(|answered| **answered).count()
     }
 
     /// Number of answered items at each level.
     fn counts(&self) -> Vec<(AxisLevel, usize)> {
-        self.0
-            .iter()
-            .map(|(level, items)| (*level, items.iter().filter(|answered| **answered).count()))
-            .collect()
+        self.0.iter().map(|(level, items)| (*level, items.iter().filter(|answered| **answered).count())).collect()
     }
 
     /// Levels with at least one answered item.
     pub(crate) fn levels(&self) -> impl Iterator<Item = AxisLevel> {
-        self.counts()
-            .into_iter()
-            .filter(|(_, count)| *count > 0)
-            .map(|(level, _)| level)
+        self.counts().into_iter().filter(|(_, count)| *count > 0).map(|(level, _)| level)
     }
 
     /// Number of items of `most` at a level, and number of these items that are answered here.
@@ -68,14 +53,8 @@ impl Coverage {
         let Some(all) = most.0.get(&level) else {
             return [0, 0];
         };
-        [Some(all), self.0.get(&level)].map(|answered| {
-            answered
-                .into_iter()
-                .flatten()
-                .zip(all)
-                .filter(|(here, there)| **here && **there)
-                .count()
-        })
+        [Some(all), self.0.get(&level)]
+            .map(|answered| answered.into_iter().flatten().zip(all).filter(|(here, there)| **here && **there).count())
     }
 
     /// Levels at which less than [`MIN_SHARE`] of the items of `most` are answered, with both numbers of items.
@@ -91,9 +70,9 @@ impl Coverage {
 /// Levels with the numbers of items answered by the others and by the model.
 pub(crate) type Lacking = Vec<(AxisLevel, [usize; 2])>;
 
-/// Selects the coverage to average over: the one that retains the most answers if models that lack some of it are reported separately. Ties
-/// go to the larger one, then to the first. A model that was asked fewer or more items than the others therefore does not change their
-/// results. `None` without models.
+/// Selects the coverage to average over: the one that retains the most answers if models that lack some of it are
+/// reported separately. Ties go to the larger one, then to the first. A model that was asked fewer or more items than
+/// the others therefore does not change their results. `None` without models.
 pub(crate) fn shared(coverages: &[Coverage]) -> Option<&Coverage> {
     let mut seen = BTreeSet::new();
     let mut best: Option<((usize, usize), &Coverage)> = None;
@@ -102,10 +81,7 @@ pub(crate) fn shared(coverages: &[Coverage]) -> Option<&Coverage> {
         if !seen.insert(coverage.counts()) {
             continue;
         }
-        let models = coverages
-            .iter()
-            .filter(|other| other.lacking(coverage).is_empty())
-            .count();
+        let models = coverages.iter().filter(|other| other.lacking(coverage).is_empty()).count();
         let total = coverage.total();
         let score = (models * total, total);
         if best.is_none_or(|(highest, _)| score > highest) {

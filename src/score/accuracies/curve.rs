@@ -105,25 +105,20 @@ impl CurvePoints {
                             && (subject.level == Some(AxisLevel::L0)
                                 && subject.enhancer.is_none()
                                 && RunGroup::overlap(subject.variant.group.as_ref(), group)
-                                || subject.variant == *variant
-                                    && subject.enhancer.as_ref() == enhancer)
+                                || subject.variant == *variant && subject.enhancer.as_ref() == enhancer)
                     })
                     .filter_map(|(index, subject)| Some((subject.level?, index)))
                     .collect();
                 subjects.sort_unstable();
-                Self {
-                    model: model.to_owned(),
-                    variant: variant.clone(),
-                    enhancer: enhancer.cloned(),
-                    subjects,
-                }
+                Self { model: model.to_owned(), variant: variant.clone(), enhancer: enhancer.cloned(), subjects }
             })
             .filter(|points| points.subjects.len() > 1 && points.subjects[0].0 == AxisLevel::L0)
             .collect()
     }
 }
 
-/// Computes all curves of a grid: each model in each variant, raw and with each enhancer. A curve needs L0 and at least one degraded level.
+/// Computes all curves of a grid: each model in each variant, raw and with each enhancer. A curve needs L0 and at least
+/// one degraded level.
 #[must_use]
 pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
     let mut unbalanced = UnbalancedFamily::all(grid);
@@ -143,26 +138,21 @@ fn curve(
     points: CurvePoints,
 ) -> Option<Curve> {
     let subjects = &points.subjects;
-    let missing: Vec<Vec<u32>> = subjects
-        .iter()
-        .map(|(_, subject)| grid.failed(*subject, family))
-        .collect();
+    let missing: Vec<Vec<u32>> = subjects.iter().map(|(_, subject)| grid.failed(*subject, family)).collect();
     let blind = grid.find_up_to_group(&ModelInCondition::new(&points.model, None));
     let [(strict, floor), (lenient, _)] = ParsingMode::ALL.map(|mode| {
-        let counts: Vec<Vec<ClusterCount>> = subjects
-            .iter()
-            .map(|(_, subject)| grid.counts(*subject, family, mode))
-            .collect();
+        let counts: Vec<Vec<ClusterCount>> =
+            subjects.iter().map(|(_, subject)| grid.counts(*subject, family, mode)).collect();
         let of_choices = |unbalanced| Floor::of_choices(grid, subjects[0].1, family, unbalanced);
         let guessing = of_choices(&[]);
-        let seeing_nothing = blind.and_then(|blind| {
-            Floor::of_blind(&grid.counts(blind, family, mode), &counts[0], &missing[0])
-        });
+        let seeing_nothing =
+            blind.and_then(|blind| Floor::of_blind(&grid.counts(blind, family, mode), &counts[0], &missing[0]));
         // Only what images add can be lost in the dark; without an image the model may still be worse than a guess.
         let (floor, kind) = match seeing_nothing {
             Some(blind) if blind.total() > guessing.total() => (blind, FloorKind::Blind),
             Some(_) => (guessing, FloorKind::Guessing),
-            // What the model knows of the answers without an image is not known, so it is assumed to know which is common.
+            // What the model knows of the answers without an image is not known, so it is assumed to know which is
+            // common.
             None => match of_choices(unbalanced) {
                 common if common == guessing => (guessing, FloorKind::Guessing),
                 common => (common, FloorKind::CommonAnswer),
@@ -179,11 +169,7 @@ fn curve(
     });
     let summary = strict.summary(draws)?;
     Some(Curve {
-        lenient: if lenient.counts == strict.counts {
-            summary.clone()
-        } else {
-            lenient.summary(draws)?
-        },
+        lenient: if lenient.counts == strict.counts { summary.clone() } else { lenient.summary(draws)? },
         floor,
         summary,
         model: points.model,
@@ -204,12 +190,7 @@ pub(crate) struct Floor {
 
 impl Floor {
     /// The floor of an answer without the image: the common one in these unbalanced families, a guess in others.
-    fn of_choices(
-        grid: &Grid<'_>,
-        clean: usize,
-        family: Option<&Family>,
-        unbalanced: &[UnbalancedFamily],
-    ) -> Self {
+    fn of_choices(grid: &Grid<'_>, clean: usize, family: Option<&Family>, unbalanced: &[UnbalancedFamily]) -> Self {
         let (mut replies, mut missing) = (vec![0.0; grid.clusters], vec![0.0; grid.clusters]);
         for (item, result) in grid.family_items(clean, family) {
             let of_result = match result {
@@ -217,9 +198,7 @@ impl Floor {
                 TrialResult::Failed => &mut missing,
                 TrialResult::Read { .. } => &mut replies,
             };
-            let common = unbalanced
-                .iter()
-                .find(|one| one.family == *item.asked.family);
+            let common = unbalanced.iter().find(|one| one.family == *item.asked.family);
             of_result[item.cluster as usize] += match common {
                 Some(common) => f32::from(u8::from(common.is_true_of(item))),
                 None => 1.0 / item.asked.choices.len() as f32,
@@ -228,30 +207,17 @@ impl Floor {
         Self { replies, missing }
     }
 
-    /// The floor of a model that was asked without images, scaled to its number of replies at L0 (`clean`). `missing` is the number of
-    /// missing replies at L0. `None` without a reply.
-    pub(crate) fn of_blind(
-        blind: &[ClusterCount],
-        clean: &[ClusterCount],
-        missing: &[u32],
-    ) -> Option<Self> {
+    /// The floor of a model that was asked without images, scaled to its number of replies at L0 (`clean`). `missing`
+    /// is the number of missing replies at L0. `None` without a reply.
+    pub(crate) fn of_blind(blind: &[ClusterCount], clean: &[ClusterCount], missing: &[u32]) -> Option<Self> {
         let sum = |counts: &[ClusterCount], count: fn(&ClusterCount) -> u32| -> f64 {
             counts.iter().map(|one| f64::from(count(one))).sum()
         };
         let replies = sum(blind, |count| count.replies);
-        let (scale, share) = (
-            sum(clean, |count| count.replies) / replies,
-            sum(blind, |count| count.right) / replies,
-        );
+        let (scale, share) = (sum(clean, |count| count.replies) / replies, sum(blind, |count| count.right) / replies);
         (replies > 0.0).then(|| Self {
-            replies: blind
-                .iter()
-                .map(|count| (f64::from(count.right) * scale) as f32)
-                .collect(),
-            missing: missing
-                .iter()
-                .map(|missing| (f64::from(*missing) * share) as f32)
-                .collect(),
+            replies: blind.iter().map(|count| (f64::from(count.right) * scale) as f32).collect(),
+            missing: missing.iter().map(|missing| (f64::from(*missing) * share) as f32).collect(),
         })
     }
 

@@ -15,14 +15,12 @@ pub struct FirstFailure {
 /// First failing levels for every curve of a grid.
 #[must_use]
 pub(crate) fn first_failures(grid: &Grid<'_>) -> Vec<FirstFailure> {
-    CurvePoints::all(grid)
-        .into_iter()
-        .map(|curve| FirstFailure { curve })
-        .collect()
+    CurvePoints::all(grid).into_iter().map(|curve| FirstFailure { curve }).collect()
 }
 
 impl FirstFailure {
-    /// First level at which an item of the grid is not answered correctly. `None` if no level fails, or if an earlier level has no reply.
+    /// First level at which an item of the grid is not answered correctly. `None` if no level fails, or if an earlier
+    /// level has no reply.
     #[must_use]
     pub fn first(&self, grid: &Grid<'_>, item: usize) -> Option<AxisLevel> {
         for &(level, subject) in &self.curve.subjects {

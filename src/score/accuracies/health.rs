@@ -56,10 +56,7 @@ impl Health {
     /// Number of replies without a choice for one of these reasons.
     #[must_use]
     pub fn unread_for(&self, reasons: &[UnreadReason]) -> usize {
-        reasons
-            .iter()
-            .map(|reason| self.unread.get(reason).copied().unwrap_or(0))
-            .sum()
+        reasons.iter().map(|reason| self.unread.get(reason).copied().unwrap_or(0)).sum()
     }
 }
 

@@ -35,11 +35,12 @@ pub struct GroupChance {
     pub share: Option<Estimate>,
 }
 
-/// Strict score: the share of groups of related questions in which every answer is right. Some benchmarks report it in addition to
-/// accuracy.
+/// Strict score: the share of groups of related questions in which every answer is right. Some benchmarks report it in
+/// addition to accuracy.
 ///
-/// A group is right if all its questions are right, in every order of choices and every repeat in which they were asked. It is scored if
-/// every question of the group in the data set has a reply. Groups that share a cluster belong to one cluster.
+/// A group is right if all its questions are right, in every order of choices and every repeat in which they were
+/// asked. It is scored if every question of the group in the data set has a reply. Groups that share a cluster belong
+/// to one cluster.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StrictScore {
     /// Cells, ordered by subject, family and parsing.
@@ -80,7 +81,8 @@ enum GroupResult {
 }
 
 impl StrictScore {
-    /// Computes the strict score of a grid from the groups that its questions name; `None` if no question names a group.
+    /// Computes the strict score of a grid from the groups that its questions name; `None` if no question names a
+    /// group.
     #[must_use]
     pub fn new(grid: &Grid<'_>, questions: &[RunQuestion]) -> Option<Self> {
         let groups = groups(grid, questions);
@@ -88,9 +90,7 @@ impl StrictScore {
             return None;
         }
         let families: BTreeSet<&Family> = groups.iter().filter_map(|group| group.family).collect();
-        let families: Vec<Option<&Family>> = std::iter::once(None)
-            .chain(families.into_iter().map(Some))
-            .collect();
+        let families: Vec<Option<&Family>> = std::iter::once(None).chain(families.into_iter().map(Some)).collect();
         let mut cells = Vec::new();
         for subject in 0..grid.subjects.len() {
             for family in &families {
@@ -123,9 +123,7 @@ impl StrictScore {
     /// Cell of the same subject and family in the lenient parsing.
     pub fn lenient(&self, strict: &GroupCell) -> Option<&GroupCell> {
         self.cells.iter().find(|cell| {
-            cell.mode == ParsingMode::Lenient
-                && cell.family == strict.family
-                && cell.subject == strict.subject
+            cell.mode == ParsingMode::Lenient && cell.family == strict.family && cell.subject == strict.subject
         })
     }
 }
@@ -135,10 +133,7 @@ fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
     let mut by_name = BTreeMap::<&str, Vec<(&StrictGroup, &RunQuestion)>>::new();
     for question in questions {
         if let Some(group) = &question.group {
-            by_name
-                .entry(&group.name)
-                .or_default()
-                .push((group, question));
+            by_name.entry(&group.name).or_default().push((group, question));
         }
     }
     let mut items = HashMap::<&QuestionId, Vec<usize>>::new();
@@ -148,24 +143,13 @@ fn groups<'a>(grid: &Grid<'_>, questions: &'a [RunQuestion]) -> Vec<Group<'a>> {
     let mut groups: Vec<Group<'a>> = by_name
         .into_values()
         .map(|members| {
-            let questions: Vec<&RunQuestion> =
-                members.iter().map(|(_, question)| *question).collect();
+            let questions: Vec<&RunQuestion> = members.iter().map(|(_, question)| *question).collect();
             let family = questions.first().map(|question| &question.family);
-            let of_group = questions
-                .iter()
-                .filter_map(|question| items.get(&question.id));
+            let of_group = questions.iter().filter_map(|question| items.get(&question.id));
             Group {
-                size: members
-                    .iter()
-                    .map(|(group, _)| group.size)
-                    .max()
-                    .unwrap_or(0),
-                family: family.filter(|family| {
-                    questions
-                        .iter()
-                        .map(|question| &question.family)
-                        .all(|other| other == *family)
-                }),
+                size: members.iter().map(|(group, _)| group.size).max().unwrap_or(0),
+                family: family
+                    .filter(|family| questions.iter().map(|question| &question.family).all(|other| other == *family)),
                 items: of_group.flatten().copied().collect(),
                 questions,
                 cluster: 0,
@@ -195,10 +179,7 @@ fn join_clusters(grid: &Grid<'_>, groups: &mut [Group<'_>]) {
 
 /// Groups of a family; all groups without one.
 fn family_groups<'g, 'a>(groups: &'g [Group<'a>], family: Option<&Family>) -> Vec<&'g Group<'a>> {
-    groups
-        .iter()
-        .filter(|group| family.is_none() || group.family == family)
-        .collect()
+    groups.iter().filter(|group| family.is_none() || group.family == family).collect()
 }
 
 /// Follows parents up to the root of a group.
@@ -215,8 +196,8 @@ impl Group<'_> {
         self.questions.len() == self.size
     }
 
-    /// Result of the group for a subject. Orders and repeats that the subject was not asked are ignored, if every question has a reply and
-    /// no trial failed.
+    /// Result of the group for a subject. Orders and repeats that the subject was not asked are ignored, if every
+    /// question has a reply and no trial failed.
     fn result(&self, grid: &Grid<'_>, subject: usize, mode: ParsingMode) -> GroupResult {
         let mut replied = BTreeSet::<&QuestionId>::new();
         let (mut is_asked, mut has_failed, mut is_right) = (false, false, true);
@@ -277,8 +258,9 @@ fn cell(
     })
 }
 
-/// Mean over the groups of the product of 1 / number of choices, with one factor for each time that a question of the group was asked.
-/// `None` if the run asks no group completely. Groups are sorted by name, so that the order of questions cannot change the rounding.
+/// Mean over the groups of the product of 1 / number of choices, with one factor for each time that a question of the
+/// group was asked. `None` if the run asks no group completely. Groups are sorted by name, so that the order of
+/// questions cannot change the rounding.
 fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
     let groups: Vec<&&Group<'_>> = groups.iter().filter(|group| group.is_complete()).collect();
     let sum: f64 = groups
@@ -289,11 +271,8 @@ fn chance(grid: &Grid<'_>, groups: &[&Group<'_>]) -> Option<Estimate> {
             questions
                 .iter()
                 .map(|question| {
-                    let times = group
-                        .items
-                        .iter()
-                        .filter(|item| *grid.items[**item].asked.question == question.id)
-                        .count();
+                    let times =
+                        group.items.iter().filter(|item| *grid.items[**item].asked.question == question.id).count();
                     let times = i32::try_from(times.max(1)).unwrap_or(i32::MAX);
                     (question.choices.len() as f64).recip().powi(times)
                 })

@@ -47,8 +47,8 @@ pub struct CheckAgreement {
     pub people: [String; 2],
     /// Share of questions with the same result of both people.
     pub same: Estimate,
-    /// Cohen's κ of finding a question right (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` if one person found all questions right, or
-    /// none.
+    /// Cohen's κ of finding a question right (Cohen 1960, Educ. Psychol. Meas. 20:37); `None` if one person found all
+    /// questions right, or none.
     pub kappa: Option<f64>,
     /// Lower and upper bound of the 95 % interval of κ; `None` if the results vary in too few scenes.
     pub interval: Option<[f64; 2]>,
@@ -69,12 +69,7 @@ pub fn shares(checks: &Checks) -> Vec<CheckedShare> {
             let [wrong, ambiguous] = [CheckFinding::Wrong, CheckFinding::Ambiguous]
                 .map(|finding| share(&own, |check| check.finding == finding));
             if let (Some(wrong), Some(ambiguous)) = (wrong, ambiguous) {
-                shares.push(CheckedShare {
-                    person: person.clone(),
-                    family: family.cloned(),
-                    wrong,
-                    ambiguous,
-                });
+                shares.push(CheckedShare { person: person.clone(), family: family.cloned(), wrong, ambiguous });
             }
         }
     }
@@ -122,11 +117,7 @@ fn agreement(checks: &Checks, [first, second]: [&String; 2]) -> Option<CheckAgre
     Some(CheckAgreement {
         people: [first.clone(), second.clone()],
         same: Estimate::clustered(&same)?,
-        kappa: kappa(
-            total.both / total.all,
-            total.first / total.all,
-            total.second / total.all,
-        ),
+        kappa: kappa(total.both / total.all, total.first / total.all, total.second / total.all),
         interval: clustered_kappa(&counts).map(|kappa| [kappa.low, kappa.high]),
     })
 }
@@ -146,22 +137,15 @@ mod tests {
                     35..45 => [Ambiguous, Right],
                     _ => [Right, Wrong],
                 };
-                people
-                    .into_iter()
-                    .zip(findings)
-                    .map(move |(person, finding)| {
-                        let check = Check {
-                            person: person.to_owned(),
-                            family: if i % 2 == 0 {
-                                Family::Color
-                            } else {
-                                Family::Presence
-                            },
-                            scene: format!("{i}"),
-                            finding,
-                        };
-                        ((person.to_owned(), QuestionId(format!("{i}"))), check)
-                    })
+                people.into_iter().zip(findings).map(move |(person, finding)| {
+                    let check = Check {
+                        person: person.to_owned(),
+                        family: if i % 2 == 0 { Family::Color } else { Family::Presence },
+                        scene: format!("{i}"),
+                        finding,
+                    };
+                    ((person.to_owned(), QuestionId(format!("{i}"))), check)
+                })
             })
             .collect()
     }
@@ -174,10 +158,7 @@ mod tests {
         assert!((found[0].kappa.unwrap() - 0.4).abs() < 1e-12, "{found:?}");
         assert!((found[0].same.value - 0.7).abs() < 1e-12);
         let [low, high] = found[0].interval.unwrap();
-        assert!(
-            0.0 < low && low < 0.4 && 0.4 < high && high < 1.0,
-            "{low} {high}"
-        );
+        assert!(0.0 < low && low < 0.4 && 0.4 < high && high < 1.0, "{low} {high}");
         // One person alone has nobody to agree with.
         let mut alone = checks(["anna", "ben"]);
         alone.retain(|(person, _), _| person == "anna");
@@ -190,9 +171,7 @@ mod tests {
         assert_eq!(found.len(), 6);
         let anna = found.iter().find(|share| share.family.is_none()).unwrap();
         assert_eq!((&*anna.person, anna.wrong.n), ("anna", 50));
-        assert!(
-            (anna.wrong.value - 0.3).abs() < 1e-12 && (anna.ambiguous.value - 0.2).abs() < 1e-12
-        );
+        assert!((anna.wrong.value - 0.3).abs() < 1e-12 && (anna.ambiguous.value - 0.2).abs() < 1e-12);
         assert!(anna.wrong.low < 0.3 && 0.3 < anna.wrong.high);
     }
 

@@ -90,8 +90,8 @@ impl Confusion {
     }
 }
 
-/// Distribution of the given answers, compared with the true answers. A model that cannot see anything gives the same answer to every
-/// question.
+/// Distribution of the given answers, compared with the true answers. A model that cannot see anything gives the same
+/// answer to every question.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Collapse {
     /// Most common answer.
@@ -108,14 +108,15 @@ pub struct Collapse {
     pub true_entropy: f64,
     /// Number of clusters of the replies.
     pub clusters: usize,
-    /// Comparison of the share with that of the same model at L0; `None` for L0 itself, enhanced images and models without L0.
+    /// Comparison of the share with that of the same model at L0; `None` for L0 itself, enhanced images and models
+    /// without L0.
     pub clean: Option<AgainstClean>,
 }
 
 /// Comparison of the share of an answer with its share at L0, on the same items.
 ///
-/// The tested answer is the most common one of both sides together. Swapping the sides does not change this choice, so the test keeps its
-/// size although the data select the answer.
+/// The tested answer is the most common one of both sides together. Swapping the sides does not change this choice, so
+/// the test keeps its size although the data select the answer.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgainstClean {
     /// Shares of the answer in the strict parsing, with their difference.
@@ -124,7 +125,8 @@ pub struct AgainstClean {
     pub lenient: PairedComparison,
     /// True if the answer is the most common one of both sides together.
     pub is_commonest: bool,
-    /// p-values after the correction over all tests behind sentences, by parsing; `None` if no sentence is about the answer.
+    /// p-values after the correction over all tests behind sentences, by parsing; `None` if no sentence is about the
+    /// answer.
     pub p_report: [Option<f64>; 2],
 }
 
@@ -141,8 +143,7 @@ impl AgainstClean {
             if !item.is_in_family(Some(family)) {
                 continue;
             }
-            let [a, b] =
-                [subject, clean].map(|side| grid.result(side, index).reading(ParsingMode::Strict));
+            let [a, b] = [subject, clean].map(|side| grid.result(side, index).reading(ParsingMode::Strict));
             let (Some(a), Some(b)) = (a, b) else { continue };
             for given in [a, b].into_iter().flatten() {
                 if let Some(text) = item.asked.choices.get(usize::from(given)) {
@@ -180,11 +181,10 @@ impl AgainstClean {
         }
     }
 
-    /// True if the answer is shown to be more common than at L0, in both parsings and after the correction over all sentences.
+    /// True if the answer is shown to be more common than at L0, in both parsings and after the correction over all
+    /// sentences.
     fn is_detected(&self) -> bool {
-        let is_more_frequent = [&self.strict, &self.lenient]
-            .iter()
-            .all(|paired| paired.difference.value > 0.0);
+        let is_more_frequent = [&self.strict, &self.lenient].iter().all(|paired| paired.difference.value > 0.0);
         is_more_frequent && self.p_report.iter().all(|p| p.is_some_and(|p| p < ALPHA))
     }
 }
@@ -199,11 +199,7 @@ impl Collapse {
     /// Describes the most common answer of a subject, the first by name of several.
     fn from_confusion(grid: &Grid<'_>, subject: usize, confusion: &Confusion) -> Option<Self> {
         let shares = confusion.shares();
-        let (top, (predicted, truth)) = shares
-            .iter()
-            .enumerate()
-            .rev()
-            .max_by_key(|(_, (predicted, _))| *predicted)?;
+        let (top, (predicted, truth)) = shares.iter().enumerate().rev().max_by_key(|(_, (predicted, _))| *predicted)?;
         if *predicted == 0 {
             return None;
         }
@@ -243,8 +239,9 @@ impl Collapse {
         self.is_far_too_frequent() && self.clean.as_ref().is_some_and(AgainstClean::is_detected)
     }
 
-    /// True if one answer is far too frequent: its share is [`MIN_EXCESS`] above its true share, and its interval is above both its true
-    /// share and the share expected by guessing. A model that guesses yes or no, when few answers are “yes”, does not collapse.
+    /// True if one answer is far too frequent: its share is [`MIN_EXCESS`] above its true share, and its interval is
+    /// above both its true share and the share expected by guessing. A model that guesses yes or no, when few answers
+    /// are “yes”, does not collapse.
     #[must_use]
     pub fn is_far_too_frequent(&self) -> bool {
         let rounding = 1e-9;
@@ -292,8 +289,7 @@ impl FalseAnswer {
             Self::Yes => Self::No,
         };
         let known = item.asked.truth;
-        item.is_in_family(Some(&Family::Presence))
-            && known.is_some_and(|known| truth.is_choice(item, known))
+        item.is_in_family(Some(&Family::Presence)) && known.is_some_and(|known| truth.is_choice(item, known))
     }
 
     /// True if a parsed reply is this answer. An unreadable reply is neither word.
@@ -317,8 +313,8 @@ pub struct Hallucination {
     pub false_negative: Option<Estimate>,
 }
 
-/// Computes the hallucination of every subject on presence questions (DarkQA, section IV). Unreadable replies count as replies, but as
-/// neither "yes" nor "no".
+/// Computes the hallucination of every subject on presence questions (DarkQA, section IV). Unreadable replies count as
+/// replies, but as neither "yes" nor "no".
 #[must_use]
 pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
     grid.subjects

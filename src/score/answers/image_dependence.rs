@@ -1,14 +1,17 @@
 //! Detection of replies that follow the text of a question and ignore its image: [`ImageDependence`], [`Independence`].
 //!
-//! A server that drops images, or that caches replies by the text, gives the same answer to a wording (a question with its choices in one
-//! order) for all images. Two tests use the replies to images whose true answer is not the usual reply to the wording:
+//! A server that drops images, or that caches replies by the text, gives the same answer to a wording (a question with
+//! its choices in one order) for all images. Two tests use the replies to images whose true answer is not the usual
+//! reply to the wording:
 //!
-//! - If nearly all of these replies are the usual reply, the replies do not depend on the image. A model that sees or guesses gives the
-//!   usual reply at most every second time, or as often as the letter that it prefers (exact binomial test).
-//! - If at least a third of these replies are the usual reply, some images may be lost. Then replies to images with the same true answer
-//!   depend on the wording. They do not if a model answers by the image, even if it confuses answers, or if it guesses, even if it prefers
-//!   letters. Replies to images with the same true answer and the same number of choices are therefore permuted, and the pairs of equal
-//!   replies to one wording are counted (stratified permutation test; p by Phipson and Smyth 2010, doi:10.2202/1544-6115.1585).
+//! - If nearly all of these replies are the usual reply, the replies do not depend on the image. A model that sees or
+//!   guesses gives the usual reply at most every second time, or as often as the letter that it prefers (exact binomial
+//!   test).
+//! - If at least a third of these replies are the usual reply, some images may be lost. Then replies to images with the
+//!   same true answer depend on the wording. They do not if a model answers by the image, even if it confuses answers,
+//!   or if it guesses, even if it prefers letters. Replies to images with the same true answer and the same number of
+//!   choices are therefore permuted, and the pairs of equal replies to one wording are counted (stratified permutation
+//!   test; p by Phipson and Smyth 2010, doi:10.2202/1544-6115.1585).
 //!
 //! Only untouched images are used, because a model may fall back on the text in the dark.
 
@@ -34,41 +37,22 @@ pub struct LitReply {
 }
 
 impl LitReply {
-    /// Extracts the reply of a record, with the digest of its wording. `None` unless it is the first reply of a model to a question about
-    /// an untouched image with a known true choice.
-    pub fn from_record<D: Detail>(
-        record: &Record<D>,
-        wording: impl FnOnce() -> Digest,
-    ) -> Option<Self> {
+    /// Extracts the reply of a record, with the digest of its wording. `None` unless it is the first reply of a model
+    /// to a question about an untouched image with a known true choice.
+    pub fn from_record<D: Detail>(record: &Record<D>, wording: impl FnOnce() -> Digest) -> Option<Self> {
         let asked = record.detail.asked();
-        let is_counted = record.condition.as_ref().is_some_and(is_untouched)
-            && asked.repeat == 0
-            && record.via != Via::File;
-        let (truth, chosen) = asked
-            .truth
-            .zip(record.detail.chosen())
-            .filter(|_| is_counted)?;
-        Some(Self {
-            wording: wording(),
-            choices: asked.choices.len(),
-            truth,
-            chosen,
-        })
+        let is_counted =
+            record.condition.as_ref().is_some_and(is_untouched) && asked.repeat == 0 && record.via != Via::File;
+        let (truth, chosen) = asked.truth.zip(record.detail.chosen()).filter(|_| is_counted)?;
+        Some(Self { wording: wording(), choices: asked.choices.len(), truth, chosen })
     }
 
     /// Extracts the reply of a trial, under the same conditions as [`Self::from_record`].
     pub fn from_trial(trial: TrialRef<'_>, wording: impl FnOnce() -> Digest) -> Option<Self> {
-        let is_counted = trial.condition().is_some_and(is_untouched)
-            && trial.repeat() == 0
-            && trial.via() != Via::File;
+        let is_counted = trial.condition().is_some_and(is_untouched) && trial.repeat() == 0 && trial.via() != Via::File;
         let chosen = trial.lenient().and_then(|reading| reading.chosen);
         let (truth, chosen) = trial.truth().zip(chosen).filter(|_| is_counted)?;
-        Some(Self {
-            wording: wording(),
-            choices: trial.choices().len(),
-            truth,
-            chosen,
-        })
+        Some(Self { wording: wording(), choices: trial.choices().len(), truth, chosen })
     }
 }
 
@@ -99,13 +83,13 @@ pub struct Independence {
     pub other_truth: usize,
     /// Number of these replies that are the usual reply.
     pub usual: usize,
-    /// p-value of the binomial test for all replies, or of the permutation test for a part; `None` for one letter, which may be a
-    /// preference.
+    /// p-value of the binomial test for all replies, or of the permutation test for a part; `None` for one letter,
+    /// which may be a preference.
     pub p: Option<f64>,
 }
 
-/// Significance level of a test. It is repeated whenever the number of replies has grown by half, from 24 to 100,000: at most 20 times, so
-/// that at most 1 % of the models that answer by the image or guess are reported in a run.
+/// Significance level of a test. It is repeated whenever the number of replies has grown by half, from 24 to 100,000:
+/// at most 20 times, so that at most 1 % of the models that answer by the image or guess are reported in a run.
 const LEVEL: f64 = 0.0005;
 
 /// Number of permutations (chosen, so that the smallest p-value is 0.0001).
@@ -159,13 +143,7 @@ impl Independence {
     /// Describes the finding about a model, in two sentences.
     #[must_use]
     pub fn words(&self, model: &str) -> String {
-        let Self {
-            replies,
-            wordings,
-            other_truth,
-            usual,
-            ..
-        } = self;
+        let Self { replies, wordings, other_truth, usual, .. } = self;
         let (finding, test, cause) = match self.extent {
             Extent::OneLetter(choice) => {
                 let letter = char::from(b'A'.saturating_add(choice.min(25) as u8));
@@ -246,14 +224,10 @@ struct Counts {
 }
 
 impl Counts {
-    /// Counts over wordings with several replies. The replies must be sorted by wording. `letter` is the usual reply to all wordings, if
-    /// given.
+    /// Counts over wordings with several replies. The replies must be sorted by wording. `letter` is the usual reply to
+    /// all wordings, if given.
     fn new(sorted: &[LitReply], letter: Option<usize>) -> Self {
-        let mut counts = Self {
-            wordings: 0,
-            other_truth: 0,
-            usual: 0,
-        };
+        let mut counts = Self { wordings: 0, other_truth: 0, usual: 0 };
         for replies in sorted
             .chunk_by(|one, other| one.wording == other.wording)
             .filter(|replies| replies.len() > 1 || letter.is_some())
@@ -270,8 +244,8 @@ impl Counts {
         counts
     }
 
-    /// p-value of this number of usual replies if each is given at most every second time, or as often as the most frequent letter of all
-    /// replies; `None` if it is above the level.
+    /// p-value of this number of usual replies if each is given at most every second time, or as often as the most
+    /// frequent letter of all replies; `None` if it is above the level.
     fn binomial_test(&self, replies: &[LitReply]) -> Option<f64> {
         let (_, preferred) = most_frequent(replies)?;
         let chance = (preferred as f64 / replies.len() as f64).max(0.5);
@@ -282,8 +256,8 @@ impl Counts {
     }
 }
 
-/// p-value of the number of pairs of equal replies to one wording, under permutation of the replies to images with the same true answer;
-/// `None` if it is above the level, which ends the test early.
+/// p-value of the number of pairs of equal replies to one wording, under permutation of the replies to images with the
+/// same true answer; `None` if it is above the level, which ends the test early.
 fn permutation_test(sorted: &[LitReply]) -> Option<f64> {
     // Every n-th of the sorted replies has nearly the same composition as all replies.
     let step = sorted.len().div_ceil(MAX_PERMUTED);
@@ -294,19 +268,12 @@ fn permutation_test(sorted: &[LitReply]) -> Option<f64> {
         let next = numbers.len();
         numbers.entry(reply.wording).or_insert(next);
     }
-    let wordings: Vec<usize> = replies
-        .iter()
-        .map(|reply| numbers[&reply.wording])
-        .collect();
+    let wordings: Vec<usize> = replies.iter().map(|reply| numbers[&reply.wording]).collect();
     let mut chosen: Vec<usize> = replies.iter().map(|reply| reply.chosen).collect();
-    let same_truth =
-        |one: &LitReply, other: &LitReply| (one.choices, one.truth) == (other.choices, other.truth);
+    let same_truth = |one: &LitReply, other: &LitReply| (one.choices, one.truth) == (other.choices, other.truth);
     let strata: Vec<usize> = replies.chunk_by(same_truth).map(<[_]>::len).collect();
     let answers = chosen.iter().max().map_or(1, |most| most + 1);
-    let mut pairs = EqualPairs {
-        counts: vec![0; numbers.len() * answers],
-        answers,
-    };
+    let mut pairs = EqualPairs { counts: vec![0; numbers.len() * answers], answers };
     let observed = pairs.count(&wordings, &chosen);
     let mut random = SplitMix(0);
     let most_exceeding = (LEVEL * (PERMUTATIONS + 1) as f64) as usize - 1;

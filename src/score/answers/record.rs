@@ -6,8 +6,8 @@ use crate::choice::{LENIENT_VERSION, has_thoughts, readings};
 use darkqa_base::error::Result;
 use darkqa_base::types::records::Record;
 use darkqa_base::types::{
-    Answer, ChoiceDetail, Choices, Finish, OpenDetail, OptionProbabilities, Reply, Step,
-    StoredDetail, TrialOutcome, UnreadReason,
+    Answer, ChoiceDetail, Choices, Finish, OpenDetail, OptionProbabilities, Reply, Step, StoredDetail, TrialOutcome,
+    UnreadReason,
 };
 
 /// Part of a record that stores the answer parsed from a reply.
@@ -24,7 +24,8 @@ pub trait Detail: StoredDetail {
     /// Index of the choice in the lenient parsing; `None` if no choice was found.
     fn chosen(&self) -> Option<usize>;
 
-    /// Parses the line of a record. Each kind has its own function, so that this crate compiles it, for speed, and not the caller.
+    /// Parses the line of a record. Each kind has its own function, so that this crate compiles it, for speed, and not
+    /// the caller.
     ///
     /// # Errors
     /// If the line is not a record of this kind.
@@ -53,7 +54,8 @@ impl Detail for ChoiceDetail {
         };
         self.strict = Some(strict.into());
         self.lenient = Some(lenient.into());
-        // A stored reply lacks the observer's findings and the probabilities of the choices, so the stored ones are kept.
+        // A stored reply lacks the observer's findings and the probabilities of the choices, so the stored ones are
+        // kept.
         if let Some(chances) = &reply.chances {
             let options = option_probabilities(chances, &self.choices);
             self.options = options.map(|options| OptionProbabilities {
@@ -134,8 +136,5 @@ pub fn reread<D: Detail>(mut record: Record<D>) -> Result<Record<D>> {
 
 fn read<D: Detail>(record: &mut Record<D>, reply: &Reply) -> Result<()> {
     let question = &record.question.0;
-    record
-        .detail
-        .read(reply)
-        .map_err(|e| e.at(format!("the record of question {question:?}")))
+    record.detail.read(reply).map_err(|e| e.at(format!("the record of question {question:?}")))
 }

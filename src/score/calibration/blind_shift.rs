@@ -1,13 +1,14 @@
-//! Effect of the image on the probabilities of a model: [`distances`] between the probabilities with and without the image.
+//! Effect of the image on the probabilities of a model: [`distances`] between the probabilities with and without the
+//! image.
 
 use super::confident_reply::usable_probabilities;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
 use darkqa_base::types::View;
 
-/// Returns, for each item, its cluster and the Jensen–Shannon distance, from 0 to 1, between the probabilities of a subject and those of
-/// the same model without an image (the root of the divergence in bits: Endres and Schindelin 2003, IEEE Trans. Inf. Theory 49:1858). Empty
-/// if the model was not asked without images.
+/// Returns, for each item, its cluster and the Jensen–Shannon distance, from 0 to 1, between the probabilities of a
+/// subject and those of the same model without an image (the root of the divergence in bits: Endres and Schindelin
+/// 2003, IEEE Trans. Inf. Theory 49:1858). Empty if the model was not asked without images.
 pub(super) fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
     let with_image = &grid.subjects[subject];
     let blind = grid.find(&ModelInCondition::new(&with_image.model, None));
@@ -32,13 +33,7 @@ fn distance(one: &[f64], other: &[f64]) -> f64 {
         .zip(other)
         .map(|(&p, &q)| {
             let middle = f64::midpoint(p, q);
-            let [a, b] = [p, q].map(|p| {
-                if p > 0.0 {
-                    p * libm::log2(p / middle)
-                } else {
-                    0.0
-                }
-            });
+            let [a, b] = [p, q].map(|p| if p > 0.0 { p * libm::log2(p / middle) } else { 0.0 });
             f64::midpoint(a, b)
         })
         .sum();

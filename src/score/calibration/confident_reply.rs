@@ -5,7 +5,8 @@ use crate::estimate::Estimate;
 use crate::grid::Grid;
 use darkqa_base::types::{OptionProbabilities, TrialOutcome, TrialRef};
 
-/// Probability assumed for a true choice that is neither listed nor bounded. Probabilities are stored with six decimals.
+/// Probability assumed for a true choice that is neither listed nor bounded. Probabilities are stored with six
+/// decimals.
 const MIN_PROBABILITY: f64 = 1e-6;
 
 /// A reply with probabilities, and without reasoning before the answer.
@@ -46,11 +47,7 @@ pub(super) struct SortedReplies {
 
 /// Collects the replies of a subject.
 pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplies {
-    let mut sorted = SortedReplies {
-        replies: Vec::new(),
-        reasoned: 0,
-        unstated: 0,
-    };
+    let mut sorted = SortedReplies { replies: Vec::new(), reasoned: 0, unstated: 0 };
     for (index, item) in grid.items.iter().enumerate() {
         let trial = grid.trial(subject, index);
         let Some(trial) = trial.filter(|trial| !trial.failed()) else {
@@ -59,9 +56,7 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
         match trial.options() {
             None => sorted.unstated += 1,
             Some(options) if options.reasoned => sorted.reasoned += 1,
-            Some(options) => sorted
-                .replies
-                .extend(reply(trial, options, index, item.cluster)),
+            Some(options) => sorted.replies.extend(reply(trial, options, index, item.cluster)),
         }
     }
     let replies = &mut sorted.replies;
@@ -70,12 +65,7 @@ pub(super) fn confident_replies(grid: &Grid<'_>, subject: usize) -> SortedReplie
 }
 
 /// Returns the reply of a trial; `None` if the probabilities do not match its choices, as in an edited file.
-fn reply(
-    trial: TrialRef<'_>,
-    options: &OptionProbabilities,
-    item: usize,
-    cluster: u32,
-) -> Option<ConfidentReply> {
+fn reply(trial: TrialRef<'_>, options: &OptionProbabilities, item: usize, cluster: u32) -> Option<ConfidentReply> {
     let p = &options.p;
     let truth = *p.get(trial.truth()?)?;
     if p.len() != trial.choices().len() || options.mass <= 0.0 {
@@ -105,7 +95,8 @@ pub(super) fn accuracy(clusters: usize, replies: &[ConfidentReply]) -> Option<Es
     Estimate::clustered(&counts)
 }
 
-/// Probabilities of a trial, if they may be evaluated; `None` without probabilities, or with reasoning before the answer.
+/// Probabilities of a trial, if they may be evaluated; `None` without probabilities, or with reasoning before the
+/// answer.
 pub(super) fn usable_probabilities(trial: Option<TrialRef<'_>>) -> Option<&OptionProbabilities> {
     let trial = trial.filter(|trial| !trial.failed())?;
     let options = trial.options()?;

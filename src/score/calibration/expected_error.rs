@@ -1,9 +1,10 @@
 //! Expected calibration error: [`estimate`].
 //!
-//! The L2 form is the root mean square difference between accuracy and confidence over bins (Guo et al. 2017, ICML; bins of equal count:
-//! Nixon et al. 2019, CVPR workshops). The plain estimate is above 0 even for a perfectly calibrated model, more so with fewer replies:
-//! 0.10 with 100 replies, 0.027 with 4000. To make levels with different numbers of replies comparable, the binomial variance of each
-//! bin's accuracy is subtracted (Kumar, Liang and Ma 2019, NeurIPS, arXiv:1909.10155).
+//! The L2 form is the root mean square difference between accuracy and confidence over bins (Guo et al. 2017, ICML;
+//! bins of equal count: Nixon et al. 2019, CVPR workshops). The plain estimate is above 0 even for a perfectly
+//! calibrated model, more so with fewer replies: 0.10 with 100 replies, 0.027 with 4000. To make levels with different
+//! numbers of replies comparable, the binomial variance of each bin's accuracy is subtracted (Kumar, Liang and Ma 2019,
+//! NeurIPS, arXiv:1909.10155).
 
 use super::confident_reply::ConfidentReply;
 use crate::bootstrap::Resamples;
@@ -17,14 +18,11 @@ const MIN_REPLIES_PER_BIN: usize = 20;
 
 /// Estimates the error of replies sorted by confidence, with its interval by the cluster bootstrap.
 ///
-/// Each draw is binned on its own. A draw contains the noise of the replies twice, which biases its squared error upwards. The bias is
-/// the mean of the draws less the squared error of the replies; it is subtracted from each draw.
+/// Each draw is binned on its own. A draw contains the noise of the replies twice, which biases its squared error
+/// upwards. The bias is the mean of the draws less the squared error of the replies; it is subtracted from each draw.
 pub(super) fn estimate(draws: &Resamples, replies: &[ConfidentReply]) -> Estimate {
     let value = squared_error(replies, |_| 1);
-    let drawn: Vec<f64> = draws
-        .all()
-        .map(|draw| squared_error(replies, |cluster| draw.times(cluster)))
-        .collect();
+    let drawn: Vec<f64> = draws.all().map(|draw| squared_error(replies, |cluster| draw.times(cluster))).collect();
     let bias = drawn.iter().sum::<f64>() / drawn.len().max(1) as f64 - value;
     let unbiased = drawn.into_iter().map(|error| error - bias).collect();
     let interval = draws.interval(unbiased).map(root);
@@ -48,8 +46,8 @@ struct Bin {
 }
 
 impl Bin {
-    /// Corrected squared error, weighted by the number of replies: `replies · ((accuracy − confidence)² − variance of the accuracy)`.
-    /// 0 for fewer than two replies.
+    /// Corrected squared error, weighted by the number of replies: `replies · ((accuracy − confidence)² − variance of
+    /// the accuracy)`. 0 for fewer than two replies.
     fn weighted_error(self) -> f64 {
         if self.replies < 2.0 {
             return 0.0;
@@ -61,8 +59,8 @@ impl Bin {
     }
 }
 
-/// Corrected squared error of replies sorted by confidence. Each cluster counts `times(cluster)` times. Replies of equal confidence share
-/// a bin.
+/// Corrected squared error of replies sorted by confidence. Each cluster counts `times(cluster)` times. Replies of
+/// equal confidence share a bin.
 fn squared_error(replies: &[ConfidentReply], times: impl Fn(u32) -> usize) -> f64 {
     let n: usize = replies.iter().map(|reply| times(reply.cluster)).sum();
     let bins = (n / MIN_REPLIES_PER_BIN).clamp(1, MAX_BINS);

@@ -1,7 +1,8 @@
 //! Calibration of models, that is, the relation between their confidence and their accuracy: [`calibrations`].
 //!
-//! The confidence of a reply is the highest probability of a choice. Only replies with probabilities and without reasoning before the
-//! answer are evaluated; the others are only counted. Whether a reply is right follows from the strict parsing.
+//! The confidence of a reply is the highest probability of a choice. Only replies with probabilities and without
+//! reasoning before the answer are evaluated; the others are only counted. Whether a reply is right follows from the
+//! strict parsing.
 
 mod blind_shift;
 mod confident_reply;
@@ -50,7 +51,8 @@ pub struct Calibration {
     pub accuracy: Estimate,
     /// Confidence minus accuracy, with its test; above 0 the model is overconfident.
     pub overconfidence: TestedConfidence,
-    /// Overconfidence minus overconfidence at L0, on the items of both; for raw degraded images of a model that was asked at L0.
+    /// Overconfidence minus overconfidence at L0, on the items of both; for raw degraded images of a model that was
+    /// asked at L0.
     pub growth: Option<TestedConfidence>,
     /// Expected calibration error (`expected_error`); `None` below 100 replies.
     pub error: Option<Estimate>,
@@ -66,7 +68,8 @@ pub struct Calibration {
     pub auroc: Option<Auc>,
     /// Mean distance between the probabilities with the image and those of the same model without an image.
     pub blind_shift: Option<Estimate>,
-    /// Accuracy of the choice with the highest probability averaged over the orders of choices, if several orders were asked.
+    /// Accuracy of the choice with the highest probability averaged over the orders of choices, if several orders were
+    /// asked.
     pub over_orders: Option<Estimate>,
     /// Accuracy over confidence, in bins.
     pub bins: Vec<ReliabilityBin>,
@@ -78,9 +81,7 @@ pub struct Calibration {
 #[must_use]
 pub fn calibrations(grid: &Grid<'_>, draws: &Resamples) -> Vec<Calibration> {
     let subjects = 0..grid.subjects.len();
-    subjects
-        .filter_map(|subject| calibration(grid, draws, subject))
-        .collect()
+    subjects.filter_map(|subject| calibration(grid, draws, subject)).collect()
 }
 
 fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Calibration> {
@@ -106,12 +107,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         growth: growth(grid, subject, replies),
         error,
         brier: mean(draws, replies, |reply| reply.brier),
-        skill: Estimate {
-            value: 1.0 - skill.value,
-            low: 1.0 - skill.high,
-            high: 1.0 - skill.low,
-            n,
-        },
+        skill: Estimate { value: 1.0 - skill.value, low: 1.0 - skill.high, high: 1.0 - skill.low, n },
         nll: mean(draws, replies, |reply| reply.nll),
         risk: RiskCoverage::new(replies),
         auroc: auroc(grid.clusters, replies),
@@ -130,10 +126,7 @@ fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option
     }
     let clean = ModelInCondition::with_images(&dark.model, AxisLevel::L0, &dark.variant, None);
     let clean = confident_replies(grid, grid.find_up_to_group(&clean)?).replies;
-    let clean: BTreeMap<usize, f64> = clean
-        .iter()
-        .map(|reply| (reply.item, reply.excess()))
-        .collect();
+    let clean: BTreeMap<usize, f64> = clean.iter().map(|reply| (reply.item, reply.excess())).collect();
     let changes = replies.iter().filter_map(|reply| {
         let change = reply.excess() - clean.get(&reply.item)?;
         Some((reply.cluster, change))
@@ -144,19 +137,13 @@ fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option
 /// Mean distance to the probabilities without an image; `None` if the model was not asked without images.
 fn blind_shift(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Estimate> {
     let distances = blind_shift::distances(grid, subject);
-    let terms: Vec<(u32, f64, f64)> = distances
-        .into_iter()
-        .map(|(cluster, distance)| (cluster, distance, 1.0))
-        .collect();
+    let terms: Vec<(u32, f64, f64)> =
+        distances.into_iter().map(|(cluster, distance)| (cluster, distance, 1.0)).collect();
     (!terms.is_empty()).then(|| ratio_of_sums(draws, &terms))
 }
 
 /// Mean of a quantity over the replies.
-fn mean(
-    draws: &Resamples,
-    replies: &[ConfidentReply],
-    quantity: fn(&ConfidentReply) -> f64,
-) -> Estimate {
+fn mean(draws: &Resamples, replies: &[ConfidentReply], quantity: fn(&ConfidentReply) -> f64) -> Estimate {
     ratio(draws, replies, quantity, |_| 1.0)
 }
 
@@ -167,10 +154,8 @@ fn ratio(
     numerator: impl Fn(&ConfidentReply) -> f64,
     denominator: impl Fn(&ConfidentReply) -> f64,
 ) -> Estimate {
-    let terms: Vec<(u32, f64, f64)> = replies
-        .iter()
-        .map(|reply| (reply.cluster, numerator(reply), denominator(reply)))
-        .collect();
+    let terms: Vec<(u32, f64, f64)> =
+        replies.iter().map(|reply| (reply.cluster, numerator(reply), denominator(reply))).collect();
     ratio_of_sums(draws, &terms)
 }
 
@@ -193,11 +178,8 @@ fn ratio_of_sums(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
         .filter(|(_, denominator)| *denominator > 0.0)
         .map(|(numerator, denominator)| numerator / denominator)
         .collect();
-    let (numerator, denominator) = terms
-        .iter()
-        .fold((0.0, 0.0), |(numerator, denominator), term| {
-            (numerator + term.1, denominator + term.2)
-        });
+    let (numerator, denominator) =
+        terms.iter().fold((0.0, 0.0), |(numerator, denominator), term| (numerator + term.1, denominator + term.2));
     Estimate::around(numerator / denominator, draws.interval(ratios), terms.len())
 }
 
@@ -205,11 +187,7 @@ fn ratio_of_sums(draws: &Resamples, terms: &[(u32, f64, f64)]) -> Estimate {
 fn auroc(clusters: usize, replies: &[ConfidentReply]) -> Option<Auc> {
     let mut ranked: Vec<RankedReply> = replies
         .iter()
-        .map(|reply| RankedReply {
-            cluster: reply.cluster,
-            number: reply.confidence,
-            right: reply.right,
-        })
+        .map(|reply| RankedReply { cluster: reply.cluster, number: reply.confidence, right: reply.right })
         .collect();
     let mut pairs = PairCounts::new(clusters);
     pairs.add(&mut ranked);

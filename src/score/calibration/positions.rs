@@ -3,8 +3,8 @@
 use super::confident_reply::usable_probabilities;
 use crate::grid::Grid;
 
-/// Mean probability of the choices at one position, and share of true choices at this position. The difference of both is a preference for
-/// a letter.
+/// Mean probability of the choices at one position, and share of true choices at this position. The difference of both
+/// is a preference for a letter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PositionShare {
     /// Index of the position; 0 is A.
@@ -26,12 +26,7 @@ pub(super) fn shares(grid: &Grid<'_>, subject: usize) -> Vec<PositionShare> {
         };
         for (position, p) in options.p.iter().enumerate() {
             if shares.len() == position {
-                shares.push(PositionShare {
-                    position,
-                    p: 0.0,
-                    truth: 0.0,
-                    n: 0,
-                });
+                shares.push(PositionShare { position, p: 0.0, truth: 0.0, n: 0 });
             }
             let share = &mut shares[position];
             share.p += p;

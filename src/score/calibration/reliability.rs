@@ -1,7 +1,7 @@
 //! Accuracy by confidence, in bins: [`bins`].
 //!
-//! A reliability diagram (Murphy and Winkler 1977, Appl. Stat. 26:41; DeGroot and Fienberg 1983, The Statistician 32:12) with bins of
-//! equal count: a model is calibrated if the accuracy of each bin equals its mean confidence.
+//! A reliability diagram (Murphy and Winkler 1977, Appl. Stat. 26:41; DeGroot and Fienberg 1983, The Statistician
+//! 32:12) with bins of equal count: a model is calibrated if the accuracy of each bin equals its mean confidence.
 
 use super::confident_reply::{ConfidentReply, accuracy};
 use crate::estimate::Estimate;
@@ -21,8 +21,8 @@ pub struct ReliabilityBin {
     pub accuracy: Estimate,
 }
 
-/// Divides replies into bins of about equal size, in order of confidence; replies of equal confidence share a bin. Empty with fewer than
-/// twenty replies.
+/// Divides replies into bins of about equal size, in order of confidence; replies of equal confidence share a bin.
+/// Empty with fewer than twenty replies.
 ///
 /// `replies` must be sorted by confidence.
 pub(super) fn bins(clusters: usize, replies: &[ConfidentReply]) -> Vec<ReliabilityBin> {
@@ -40,10 +40,7 @@ pub(super) fn bins(clusters: usize, replies: &[ConfidentReply]) -> Vec<Reliabili
         let own = &replies[start..end];
         let sum: f64 = own.iter().map(|reply| reply.confidence).sum();
         if let Some(accuracy) = accuracy(clusters, own) {
-            bins.push(ReliabilityBin {
-                confidence: sum / own.len() as f64,
-                accuracy,
-            });
+            bins.push(ReliabilityBin { confidence: sum / own.len() as f64, accuracy });
         }
         start = end;
     }
@@ -87,9 +84,7 @@ mod tests {
             let own = &made[40 * index..40 * (index + 1)];
             let right = own.iter().filter(|reply| reply.right).count();
             assert!((bin.accuracy.value - right as f64 / 40.0).abs() < 1e-12);
-            assert!(
-                bin.accuracy.low <= bin.accuracy.value && bin.accuracy.value <= bin.accuracy.high
-            );
+            assert!(bin.accuracy.low <= bin.accuracy.value && bin.accuracy.value <= bin.accuracy.high);
         }
         // All of one confidence are one bin, however many they are; few are none.
         let one = super::bins(10, &replies((0..400).map(|i| (0.5, i % 2 == 0))));
@@ -97,20 +92,8 @@ mod tests {
         assert_eq!(one[0].accuracy.n, 400);
         assert!(super::bins(10, &made[..19]).is_empty());
         // 60 replies are three bins; a long tie at the start makes the first one larger.
-        let tied = replies((0..60).map(|i| {
-            (
-                if i < 30 {
-                    0.2
-                } else {
-                    0.2 + f64::from(i) / 100.0
-                },
-                true,
-            )
-        }));
-        let sizes: Vec<usize> = super::bins(10, &tied)
-            .iter()
-            .map(|bin| bin.accuracy.n)
-            .collect();
+        let tied = replies((0..60).map(|i| (if i < 30 { 0.2 } else { 0.2 + f64::from(i) / 100.0 }, true)));
+        let sizes: Vec<usize> = super::bins(10, &tied).iter().map(|bin| bin.accuracy.n).collect();
         assert_eq!(sizes, [30, 10, 20]);
     }
 }

@@ -4,8 +4,8 @@ use super::confident_reply::ConfidentReply;
 
 /// Risk at some coverages, and area under the risk–coverage curve (Geifman and El-Yaniv 2017, NeurIPS).
 ///
-/// Replies are included in order of decreasing confidence. Each of several replies of equal confidence counts as their mean, so that their
-/// order does not matter.
+/// Replies are included in order of decreasing confidence. Each of several replies of equal confidence counts as their
+/// mean, so that their order does not matter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RiskCoverage {
     /// Share of wrong replies among all replies.
@@ -24,10 +24,7 @@ impl RiskCoverage {
         let n = replies.len();
         let mut risks = Vec::with_capacity(n);
         let mut wrong = 0.0;
-        for tied in replies
-            .chunk_by(|a, b| a.confidence.total_cmp(&b.confidence).is_eq())
-            .rev()
-        {
+        for tied in replies.chunk_by(|a, b| a.confidence.total_cmp(&b.confidence).is_eq()).rev() {
             let share = tied.iter().filter(|reply| !reply.right).count() as f64 / tied.len() as f64;
             for _ in tied {
                 wrong += share;
@@ -38,12 +35,7 @@ impl RiskCoverage {
             let taken = ((coverage * n as f64).ceil() as usize).clamp(1, n);
             risks[taken - 1]
         });
-        Self {
-            at_100,
-            at_80,
-            at_50,
-            area: risks.iter().sum::<f64>() / n as f64,
-        }
+        Self { at_100, at_80, at_50, area: risks.iter().sum::<f64>() / n as f64 }
     }
 }
 

@@ -19,8 +19,8 @@ struct AskedInOrders<'a> {
     by_text: BTreeMap<&'a str, f64>,
 }
 
-/// Share of questions whose true choice has the highest probability on average over the orders; `None` if no question was asked in several
-/// orders. A preference for letters averages out.
+/// Share of questions whose true choice has the highest probability on average over the orders; `None` if no question
+/// was asked in several orders. A preference for letters averages out.
 pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
     let mut questions = BTreeMap::<(&QuestionId, u32), AskedInOrders<'_>>::new();
     for (index, item) in grid.items.iter().enumerate() {
@@ -30,9 +30,7 @@ pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
         let Some(options) = usable_probabilities(Some(trial)) else {
             continue;
         };
-        let asked = questions
-            .entry((trial.question(), trial.repeat()))
-            .or_default();
+        let asked = questions.entry((trial.question(), trial.repeat())).or_default();
         asked.cluster = item.cluster;
         asked.truth = trial.choices().get(trial.truth()?)?;
         asked.shown.insert(trial.choices());
@@ -43,10 +41,7 @@ pub(super) fn accuracy(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
     let mut counts = vec![ClusterCount::default(); grid.clusters];
     for asked in questions.values().filter(|asked| asked.shown.len() > 1) {
         let truth = asked.by_text.get(asked.truth).copied().unwrap_or(0.0);
-        let is_right = asked
-            .by_text
-            .iter()
-            .all(|(text, p)| *text == asked.truth || *p < truth);
+        let is_right = asked.by_text.iter().all(|(text, p)| *text == asked.truth || *p < truth);
         let count = &mut counts[asked.cluster as usize];
         count.replies += 1;
         count.right += u32::from(is_right);

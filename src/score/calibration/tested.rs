@@ -4,7 +4,8 @@ use crate::comparisons::paired::tested_difference;
 use crate::estimate::Estimate;
 use crate::significance::ALPHA;
 
-/// Mean of confidence minus accuracy, or of its change, with the test against 0 by Student's t that matches its interval.
+/// Mean of confidence minus accuracy, or of its change, with the test against 0 by Student's t that matches its
+/// interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TestedConfidence {
     pub estimate: Estimate,
@@ -29,11 +30,7 @@ impl TestedConfidence {
         sums.retain(|(_, count)| *count > 0.0);
         (n > 0).then(|| {
             let (estimate, p) = tested_difference(&sums, squares, n);
-            Self {
-                estimate,
-                p,
-                p_report: None,
-            }
+            Self { estimate, p, p_report: None }
         })
     }
 

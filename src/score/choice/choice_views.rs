@@ -36,11 +36,7 @@ const MIN_JOINED: usize = 6;
 
 impl ChoiceViews {
     pub(super) fn new(choices: &Choices) -> Self {
-        let texts: Vec<String> = choices
-            .texts()
-            .iter()
-            .map(|text| plain(&clean::tidy(text)))
-            .collect();
+        let texts: Vec<String> = choices.texts().iter().map(|text| plain(&clean::tidy(text))).collect();
         let mut folded: Vec<(String, usize)> = texts
             .iter()
             .map(|text| fold(text.strip_suffix('.').unwrap_or(text)))
@@ -49,12 +45,7 @@ impl ChoiceViews {
             .collect();
         let naming = folded.iter().map(|(text, _)| classify(text)).collect();
         folded.retain(|(text, _)| !text.is_empty());
-        let [yes, no] = ["yes", "no"].map(|word| {
-            folded
-                .iter()
-                .find(|(text, _)| text == word)
-                .map(|(_, index)| *index)
-        });
+        let [yes, no] = ["yes", "no"].map(|word| folded.iter().find(|(text, _)| text == word).map(|(_, index)| *index));
         let yes_no = yes.zip(no);
         let mut joined = HashMap::<String, Vec<usize>>::new();
         for (text, index) in &folded {
@@ -64,28 +55,16 @@ impl ChoiceViews {
             }
         }
         folded.sort_by_key(|(text, index)| (std::cmp::Reverse(text.len()), *index));
-        Self {
-            texts,
-            folded,
-            joined,
-            naming,
-            yes_no,
-        }
+        Self { texts, folded, joined, naming, yes_no }
     }
 }
 
 /// Classifies a choice by its words: a color or an attribute if it has only words of that class, otherwise a thing.
 fn classify(folded: &str) -> Naming {
     let words = Clauses::new(folded, &tokens(folded)).elements;
-    let is_color = words
-        .iter()
-        .all(|word| word.roles.has_any(&[Role::Color, Role::Shade]));
-    let is_place = words
-        .iter()
-        .all(|word| word.roles.has_any(&[Role::Place, Role::Number]));
-    let is_number = words
-        .iter()
-        .all(|word| word.slice(folded).chars().all(char::is_numeric));
+    let is_color = words.iter().all(|word| word.roles.has_any(&[Role::Color, Role::Shade]));
+    let is_place = words.iter().all(|word| word.roles.has_any(&[Role::Place, Role::Number]));
+    let is_number = words.iter().all(|word| word.slice(folded).chars().all(char::is_numeric));
     if !words.is_empty() && is_color {
         Naming::Color
     } else if is_number || is_place || matches!(folded, "yes" | "no") {

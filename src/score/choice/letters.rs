@@ -54,11 +54,7 @@ fn has_neighbour(text: &[u8], at: usize) -> bool {
 fn delimiting(text: &str, start: usize, letter: char, clauses: &Clauses<'_>) -> Option<Delimiting> {
     let (left, right) = (&text[..start], &text[start + 1..]);
     let (before, after) = (left.chars().next_back(), right.chars().next());
-    if continues_word(before)
-        || continues_word(after)
-        || before == Some('\'')
-        || after == Some('\'')
-    {
+    if continues_word(before) || continues_word(after) || before == Some('\'') || after == Some('\'') {
         return None;
     }
     if is_hyphenated(left, right) || is_abbreviated(left, right) {
@@ -74,8 +70,8 @@ fn delimiting(text: &str, start: usize, letter: char, clauses: &Clauses<'_>) -> 
     }
     let words = right.trim_start_matches(' ');
     let ends = words.is_empty() || words.starts_with(['\n', '-', '–', '—']);
-    let is_marked = after.is_some_and(|c| ".):,;!?]}、。，：；/&=".contains(c))
-        && !(letter == 'I' && after == Some(','));
+    let is_marked =
+        after.is_some_and(|c| ".):,;!?]}、。，：；/&=".contains(c)) && !(letter == 'I' && after == Some(','));
     let is_bracketed = matches!(before, Some('(' | '['));
     let is_name = match letter {
         _ if is_called_letter(left) || after.is_some_and(is_unspaced) => true,
@@ -98,10 +94,7 @@ fn delimiting(text: &str, start: usize, letter: char, clauses: &Clauses<'_>) -> 
 fn joined_to_letter(clauses: &Clauses<'_>, end: usize) -> bool {
     let or = clauses.index(end);
     let other = clauses.elements.get(or + 1);
-    clauses
-        .elements
-        .get(or)
-        .is_some_and(|element| element.has(Role::Or))
+    clauses.elements.get(or).is_some_and(|element| element.has(Role::Or))
         && other.is_some_and(|other| other.slice(clauses.folded).len() == 1)
 }
 
@@ -110,28 +103,14 @@ pub(super) fn is_hyphenated(left: &str, right: &str) -> bool {
     let (mut before, mut after) = (left.chars().rev(), right.chars());
     [(before.next(), before.next()), (after.next(), after.next())]
         .into_iter()
-        .any(|(dash, letter)| {
-            matches!(dash, Some('-' | '‐' | '‑' | RANGE)) && continues_word(letter)
-        })
+        .any(|(dash, letter)| matches!(dash, Some('-' | '‐' | '‑' | RANGE)) && continues_word(letter))
 }
 
 /// True if the words before a letter mark it as a choice: "option A".
 pub(super) fn is_called_letter(left: &str) -> bool {
-    const WORDS: [&str; 8] = [
-        "option",
-        "choice",
-        "letter",
-        "opción",
-        "opção",
-        "opzione",
-        "optie",
-        "вариант",
-    ];
+    const WORDS: [&str; 8] = ["option", "choice", "letter", "opción", "opção", "opzione", "optie", "вариант"];
     let words = left.trim_end();
-    let word = words
-        .rsplit(|c: char| !c.is_alphabetic())
-        .next()
-        .unwrap_or_default();
+    let word = words.rsplit(|c: char| !c.is_alphabetic()).next().unwrap_or_default();
     word.len() <= WORDS[7].len() && WORDS.contains(&word.to_lowercase().as_str())
 }
 
@@ -139,10 +118,7 @@ pub(super) fn is_called_letter(left: &str) -> bool {
 pub(super) fn is_abbreviated(left: &str, right: &str) -> bool {
     let mut before = left.chars().rev();
     let mut after = right.chars();
-    let preceded = before.next() == Some('.')
-        && continues_word(before.next())
-        && !continues_word(before.next());
-    let followed =
-        after.next() == Some('.') && continues_word(after.next()) && after.next() == Some('.');
+    let preceded = before.next() == Some('.') && continues_word(before.next()) && !continues_word(before.next());
+    let followed = after.next() == Some('.') && continues_word(after.next()) && after.next() == Some('.');
     preceded || followed || left.ends_with("N/") || right.starts_with("/A")
 }

@@ -1,5 +1,5 @@
-//! LLM-Match, OpenEQA's score of open answers by a judge model (Majumdar et al. 2024, CVPR, section 4): truncation of an answer,
-//! parsing of a mark, and points of a mark. It follows `facebookresearch/open-eqa` at cfa3fce.
+//! LLM-Match, OpenEQA's score of open answers by a judge model (Majumdar et al. 2024, CVPR, section 4): truncation of
+//! an answer, parsing of a mark, and points of a mark. It follows `facebookresearch/open-eqa` at cfa3fce.
 
 mod tolerant;
 
@@ -22,8 +22,8 @@ flag_words!(Protocol);
 
 /// Cuts off the text after the last full stop of an answer, as upstream does (`evaluate-predictions.py`).
 ///
-/// The rule is meant for sentences that were truncated at the token limit; it also turns "about 1.5 meters" into "about 1.".
-/// An answer without a full stop, or with nothing after it, stays whole.
+/// The rule is meant for sentences that were truncated at the token limit; it also turns "about 1.5 meters" into "about
+/// 1.". An answer without a full stop, or with nothing after it, stays whole.
 #[must_use]
 pub fn truncate_answer(answer: &str) -> &str {
     match answer.rfind('.') {
@@ -32,18 +32,15 @@ pub fn truncate_answer(answer: &str) -> &str {
     }
 }
 
-/// Parses the mark in a judge's reply, without its thoughts; `None` without a mark. The upstream rules accept any integer, which
-/// [`points`] clips to 1 to 5. The tolerant protocol parses other replies as well, and there accepts only 1 to 5.
+/// Parses the mark in a judge's reply, without its thoughts; `None` without a mark. The upstream rules accept any
+/// integer, which [`points`] clips to 1 to 5. The tolerant protocol parses other replies as well, and there accepts
+/// only 1 to 5.
 #[must_use]
 pub fn mark(reply: &str, protocol: Protocol) -> Option<i64> {
     let has_mark = |text: &str| upstream(text).is_some();
     let separated = separate(reply, Asked::Mark(&has_mark)).ok()?;
     // Without thoughts, upstream sees the reply as it is.
-    let text = if separated.has_thoughts {
-        separated.text
-    } else {
-        reply
-    };
+    let text = if separated.has_thoughts { separated.text } else { reply };
     upstream(text).or_else(|| match protocol {
         Protocol::Upstream => None,
         Protocol::Tolerant => tolerant::mark(text),
@@ -61,7 +58,8 @@ fn upstream(reply: &str) -> Option<i64> {
     line.trim().parse().ok()
 }
 
-/// Points of one item, between 0 and 1: (clip(mark, 1, 5) − 1) / 4. A null answer (`None`) has 0 points without a judge.
+/// Points of one item, between 0 and 1: (clip(mark, 1, 5) − 1) / 4. A null answer (`None`) has 0 points without a
+/// judge.
 #[must_use]
 pub fn points(mark: Option<i64>) -> f64 {
     mark.map_or(0.0, |mark| (mark.clamp(1, 5) - 1) as f64 / 4.0)
@@ -106,11 +104,7 @@ mod tests {
             ("", none, none),
             ("0 or 6", none, none),
             ("{\"mark\": 5}", none, five),
-            (
-                "```json\n{\"score\": \"5\", \"reason\": \"2 of 2 chairs\"}\n```",
-                none,
-                five,
-            ),
+            ("```json\n{\"score\": \"5\", \"reason\": \"2 of 2 chairs\"}\n```", none, five),
             ("{\"reason\": \"it fits\", \"rating\": 5.0}", none, five),
             ("{\"mark\": 7}", none, none),
             ("{\"mark\": 4, \"score\": 5}", none, none),
@@ -138,11 +132,7 @@ mod tests {
             assert_eq!(mark(reply, Protocol::Tolerant), tolerant, "{reply:?}");
         }
         for (reply, upstream, tolerant) in [
-            (
-                "<think>\nYour mark: 1\nNo.</think>\nYour mark: 5",
-                five,
-                five,
-            ),
+            ("<think>\nYour mark: 1\nNo.</think>\nYour mark: 5", five, five),
             ("<think>Maybe 1.</think>\n\n5", five, five),
             ("</think>5", five, five),
             ("<ponder>Your mark: 1</ponder>Your mark: 5", five, five),

@@ -53,19 +53,10 @@ static MARKER: LazyLock<Regex> = LazyLock::new(|| {
 /// Every marker of a text in lower case, from left to right.
 pub(super) fn markers(folded: &str) -> impl Iterator<Item = Marker> {
     MARKER.captures_iter(folded).filter_map(|found| {
-        let groups = [
-            ("answer", MarkerKind::Answer),
-            ("decision", MarkerKind::Decision),
-            ("mention", MarkerKind::Mention),
-        ];
-        let (mark, kind) = groups
-            .into_iter()
-            .find_map(|(name, kind)| Some((found.name(name)?, kind)))?;
-        Some(Marker {
-            start: mark.start(),
-            end: mark.end(),
-            kind,
-        })
+        let groups =
+            [("answer", MarkerKind::Answer), ("decision", MarkerKind::Decision), ("mention", MarkerKind::Mention)];
+        let (mark, kind) = groups.into_iter().find_map(|(name, kind)| Some((found.name(name)?, kind)))?;
+        Some(Marker { start: mark.start(), end: mark.end(), kind })
     })
 }
 
@@ -110,19 +101,14 @@ pub(super) struct Lead {
 /// Maximum number of words between a marker and a name.
 const MAX_LEAD_WORDS: usize = 12;
 
-/// The lead after a marker that ends at byte `end`. Denials in it are skipped, because the state of the name contains them.
+/// The lead after a marker that ends at byte `end`. Denials in it are skipped, because the state of the name contains
+/// them.
 pub(super) fn lead(clauses: &Clauses<'_>, end: usize) -> Lead {
     let folded = clauses.folded;
-    let mut lead = Lead {
-        steps: vec![past_space(folded, end)],
-        is_linked: false,
-        has_colon: false,
-    };
+    let mut lead = Lead { steps: vec![past_space(folded, end)], is_linked: false, has_colon: false };
     let mut at = end;
     for _ in 0..MAX_LEAD_WORDS {
-        let denial = clauses
-            .element_at(at)
-            .filter(|word| word.roles.has_any(&[Role::Not, Role::Exclude]));
+        let denial = clauses.element_at(at).filter(|word| word.roles.has_any(&[Role::Not, Role::Exclude]));
         if let Some(denial) = denial {
             at = denial.end;
             lead.is_linked = true;

@@ -1,11 +1,12 @@
 //! Parsing of the choice in a model's reply: [`read`] and [`readings`].
 //!
-//! Two parsings are always reported together. [`ParsingMode::Strict`] accepts a reply that is an answer and nothing else.
-//! [`ParsingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither. No choice
-//! is ever guessed. If the strict parsing finds a choice, the lenient parsing finds the same.
+//! Two parsings are always reported together. [`ParsingMode::Strict`] accepts a reply that is an answer and nothing
+//! else. [`ParsingMode::Lenient`] also finds an answer inside a reply; if two choices are possible, it accepts neither.
+//! No choice is ever guessed. If the strict parsing finds a choice, the lenient parsing finds the same.
 //!
-//! A reply passes through `reasoning` (which removes thoughts and leaked tokens of templates), then `strict`, then the levels of
-//! `lenient`. Answers to open questions ([`open_answer`]) and marks of judges ([`llm_match`]) pass through `reasoning`, too.
+//! A reply passes through `reasoning` (which removes thoughts and leaked tokens of templates), then `strict`, then the
+//! levels of `lenient`. Answers to open questions ([`open_answer`]) and marks of judges ([`llm_match`]) pass through
+//! `reasoning`, too.
 
 mod choice_views;
 mod letters;
@@ -32,16 +33,18 @@ use text::reasoning::{Asked, separate_sections};
 
 pub use text::reasoning::{has_thoughts, open_answer};
 
-/// The version of the lenient parsing, raised whenever the result of any reply may change. `report --rescore` parses the replies of
-/// records of another version again. The strict parsing changed only with `lenient/4` (marks of reasoning, and full-width signs around
-/// letters) and `lenient/5` (marks of reasoning and tokens of templates by their form).
+/// The version of the lenient parsing, raised whenever the result of any reply may change. `report --rescore` parses
+/// the replies of records of another version again. The strict parsing changed only with `lenient/4` (marks of
+/// reasoning, and full-width signs around letters) and `lenient/5` (marks of reasoning and tokens of templates by their
+/// form).
 pub const LENIENT_VERSION: &str = "lenient/5";
 
 /// The parsing of a reply: how much text may surround the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ParsingMode {
-    /// No other text: the reply is a choice's text, its letter, or its letter with its text. Headline numbers use this parsing.
+    /// No other text: the reply is a choice's text, its letter, or its letter with its text. Headline numbers use this
+    /// parsing.
     Strict,
     /// Sentences, markup, JSON or LaTeX around exactly one choice.
     Lenient,
@@ -63,8 +66,8 @@ impl ParsingMode {
 
 /// The choice in a reply, as an index in the order shown, or the reason why none could be read.
 ///
-/// Text in a closed reasoning block is ignored, whatever the names of its marks. If a block is not closed, the result is
-/// [`UnreadReason::Truncated`].
+/// Text in a closed reasoning block is ignored, whatever the names of its marks. If a block is not closed, the result
+/// is [`UnreadReason::Truncated`].
 ///
 /// ```
 /// use darkqa_score::choice::{ParsingMode, read};
@@ -98,9 +101,9 @@ pub fn read(reply: &str, choices: &Choices, mode: ParsingMode) -> Answer {
 
 /// The strict and the lenient parsing of a reply, in this order. Unlike [`read`], it considers how the reply ended.
 ///
-/// A choice that the strict parsing finds always counts. Otherwise a content filter, a separate refusal and the token limit decide, in
-/// this order. A truncated explanation is not parsed leniently, because it could still have ended in another choice; nor is a text that
-/// the server ended early for another reason.
+/// A choice that the strict parsing finds always counts. Otherwise a content filter, a separate refusal and the token
+/// limit decide, in this order. A truncated explanation is not parsed leniently, because it could still have ended in
+/// another choice; nor is a text that the server ended early for another reason.
 #[must_use]
 pub fn readings(reply: &Reply, choices: &Choices) -> (Answer, Answer) {
     let strict = read(&reply.text, choices, ParsingMode::Strict);

@@ -17,25 +17,19 @@ pub(super) struct Names<'a> {
 impl Names<'_> {
     /// The choice's text that begins at a byte, after optional articles and words such as "it is".
     pub(super) fn text_at(&self, at: usize) -> Option<Name> {
-        self.text_from(at)
-            .or_else(|| self.text_from(at + markers::article_length(&self.folded[at..])))
+        self.text_from(at).or_else(|| self.text_from(at + markers::article_length(&self.folded[at..])))
     }
 
     /// The choice's text that begins exactly at a byte.
     pub(super) fn text_from(&self, at: usize) -> Option<Name> {
         let first = self.texts.partition_point(|name| name.start < at);
-        self.texts
-            .get(first)
-            .copied()
-            .filter(|name| name.start == at)
+        self.texts.get(first).copied().filter(|name| name.start == at)
     }
 
     /// The choice's text after a letter that labels it: "B. kitchen", "(B) a kitchen", "B: kitchen", "B-kitchen".
     pub(super) fn labelled_text(&self, letter: &Name) -> Option<Name> {
         let rest = &self.text[letter.end..];
-        let after = rest.trim_start_matches([
-            ')', ']', '.', ':', ',', '、', ' ', '\n', '-', '–', '—', '=', '>', '→',
-        ]);
+        let after = rest.trim_start_matches([')', ']', '.', ':', ',', '、', ' ', '\n', '-', '–', '—', '=', '>', '→']);
         let gap = &rest[..rest.len() - after.len()];
         if gap.is_empty() {
             return None;

@@ -60,26 +60,22 @@ impl Name {
 
 /// Index of the choice with a Latin letter: 0 for A.
 pub(super) fn index_of_letter(letter: char) -> Option<usize> {
-    letter
-        .is_ascii_alphabetic()
-        .then(|| usize::from(letter.to_ascii_uppercase() as u8 - b'A'))
+    letter.is_ascii_alphabetic().then(|| usize::from(letter.to_ascii_uppercase() as u8 - b'A'))
 }
 
-/// True if a character next to a letter makes it part of a longer word. Characters of scripts without letter case do not, because these
-/// scripts have no space next to a Latin letter.
+/// True if a character next to a letter makes it part of a longer word. Characters of scripts without letter case do
+/// not, because these scripts have no space next to a Latin letter.
 pub(super) fn continues_word(c: Option<char>) -> bool {
     c.is_some_and(|c| c.is_numeric() || c == '_' || c.is_lowercase() || c.is_uppercase())
 }
 
 /// True if two neighbouring characters belong to the same word; false for scripts without spaces between words.
 pub(super) fn is_same_word(left: Option<char>, right: Option<char>) -> bool {
-    [left, right]
-        .iter()
-        .all(|c| c.is_some_and(|c| (c.is_alphanumeric() || c == '_') && !is_unspaced(c)))
+    [left, right].iter().all(|c| c.is_some_and(|c| (c.is_alphanumeric() || c == '_') && !is_unspaced(c)))
 }
 
-/// True if a character belongs to a script without spaces between words: Thai to Khmer, kana, Han, and Hangul, whose particles are joined
-/// to the word.
+/// True if a character belongs to a script without spaces between words: Thai to Khmer, kana, Han, and Hangul, whose
+/// particles are joined to the word.
 pub(super) fn is_unspaced(c: char) -> bool {
     matches!(c, '\u{e00}'..='\u{eff}' | '\u{1000}'..='\u{109f}' | '\u{1100}'..='\u{11ff}' | '\u{1780}'..='\u{17ff}'
         | '\u{2e80}'..='\u{9fff}' | '\u{ac00}'..='\u{d7ff}' | '\u{f900}'..='\u{faff}' | '\u{20000}'..='\u{3ffff}')

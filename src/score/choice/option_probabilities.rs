@@ -19,24 +19,17 @@ const MAX_TOKEN_CHARS: usize = 40;
 
 /// The probabilities of these choices in the order shown; `None` if the reply does not begin with one.
 ///
-/// The tokens are taken from the first position that is more than white space, brackets, punctuation or the word “Answer”; in a JSON
-/// object, from the start of its value. A token counts for the choice of its letter, ignoring case, spaces and brackets (“ B”, “(b”). If
-/// tokens of letters have too little probability, a token counts for the only choice whose text begins with it. The probabilities are
-/// scaled to a sum of 1.
-pub fn option_probabilities(
-    chances: &TokenChances,
-    choices: &[String],
-) -> Option<OptionProbabilities> {
+/// The tokens are taken from the first position that is more than white space, brackets, punctuation or the word
+/// “Answer”; in a JSON object, from the start of its value. A token counts for the choice of its letter, ignoring case,
+/// spaces and brackets (“ B”, “(b”). If tokens of letters have too little probability, a token counts for the only
+/// choice whose text begins with it. The probabilities are scaled to a sum of 1.
+pub fn option_probabilities(chances: &TokenChances, choices: &[String]) -> Option<OptionProbabilities> {
     let position = &chances.positions[answer_position(&chances.positions)?];
-    let letters = masses(position, choices.len(), |token| {
-        choice_by_letter(token, choices.len())
-    });
+    let letters = masses(position, choices.len(), |token| choice_by_letter(token, choices.len()));
     let masses = if letters.iter().sum::<f64>() >= MIN_MASS {
         letters
     } else {
-        masses(position, choices.len(), |token| {
-            choice_by_text(token, choices)
-        })
+        masses(position, choices.len(), |token| choice_by_text(token, choices))
     };
     let mass: f64 = masses.iter().sum();
     if mass < MIN_MASS {
@@ -57,10 +50,7 @@ fn round(value: f64) -> f64 {
 
 /// The index of the position at which the answer begins; `None` if the reply does not begin with an answer.
 fn answer_position(positions: &[TokenPosition]) -> Option<usize> {
-    let first = positions
-        .iter()
-        .position(|at| !is_before_answer(&at.token))
-        .filter(|index| *index < FIRST_TOKENS);
+    let first = positions.iter().position(|at| !is_before_answer(&at.token)).filter(|index| *index < FIRST_TOKENS);
     let whole: String = positions.iter().map(|at| at.token.as_str()).collect();
     if !whole.trim_start().starts_with('{') {
         return first;
@@ -92,13 +82,11 @@ fn is_before_answer(token: &str) -> bool {
     bare.is_empty() || bare == "answer" || bare == "answer:"
 }
 
-/// A token in lower case, without surrounding white space, brackets, quotation marks, punctuation and tokenizer marks for a space (`Ġ`
-/// of byte-level BPE, `▁` of SentencePiece).
+/// A token in lower case, without surrounding white space, brackets, quotation marks, punctuation and tokenizer marks
+/// for a space (`Ġ` of byte-level BPE, `▁` of SentencePiece).
 fn bare(token: &str) -> String {
     const AROUND: &str = "\"'`“”‘’*#([{<.:,)]}>\u{120}\u{2581}\u{10a}";
-    token
-        .trim_matches(|c: char| c.is_whitespace() || AROUND.contains(c))
-        .to_lowercase()
+    token.trim_matches(|c: char| c.is_whitespace() || AROUND.contains(c)).to_lowercase()
 }
 
 /// The choice whose letter is the token.
@@ -117,11 +105,7 @@ fn choice_by_text(token: &str, choices: &[String]) -> Option<usize> {
 }
 
 /// The sum of the token probabilities for each choice; `option` returns the choice of a token.
-fn masses(
-    position: &TokenPosition,
-    choices: usize,
-    option: impl Fn(&str) -> Option<usize>,
-) -> Vec<f64> {
+fn masses(position: &TokenPosition, choices: usize, option: impl Fn(&str) -> Option<usize>) -> Vec<f64> {
     let mut masses = vec![0.0; choices];
     for (token, logprob) in &position.likeliest {
         if let Some(index) = option(&bare(token)) {
@@ -131,13 +115,10 @@ fn masses(
     masses
 }
 
-/// Upper bound for the probability of an unlisted token: the probability of the least likely listed token, and at most 1 minus the sum of
-/// the listed ones.
+/// Upper bound for the probability of an unlisted token: the probability of the least likely listed token, and at most
+/// 1 minus the sum of the listed ones.
 fn bound(position: &TokenPosition) -> f64 {
-    let listed = position
-        .likeliest
-        .iter()
-        .map(|(_, logprob)| libm::exp(*logprob));
+    let listed = position.likeliest.iter().map(|(_, logprob)| libm::exp(*logprob));
     let least = listed.clone().fold(f64::INFINITY, f64::min);
     let rest = (1.0 - listed.sum::<f64>()).max(0.0);
     least.min(rest)
@@ -150,19 +131,13 @@ mod tests {
     fn at(token: &str, likeliest: &[(&str, f64)]) -> TokenPosition {
         TokenPosition {
             token: token.to_owned(),
-            likeliest: likeliest
-                .iter()
-                .map(|(token, logprob)| ((*token).to_owned(), *logprob))
-                .collect(),
+            likeliest: likeliest.iter().map(|(token, logprob)| ((*token).to_owned(), *logprob)).collect(),
         }
     }
 
     fn read(positions: &[TokenPosition], choices: &[&str]) -> Option<OptionProbabilities> {
         let choices: Vec<String> = choices.iter().map(|&text| text.to_owned()).collect();
-        let chances = TokenChances {
-            positions: positions.to_vec(),
-            thought: Thought::None,
-        };
+        let chances = TokenChances { positions: positions.to_vec(), thought: Thought::None };
         option_probabilities(&chances, &choices)
     }
 
@@ -171,22 +146,9 @@ mod tests {
     #[test]
     fn tokens_of_a_letter_are_added_up_and_scaled() {
         // e^-0.1 + e^-3.0 of B, e^-3.2 of A, e^-5.0 of C; e^-6.0 names no choice.
-        let position = at(
-            "B",
-            &[
-                ("B", -0.1),
-                (" B", -3.0),
-                ("A", -3.2),
-                ("C", -5.0),
-                ("The", -6.0),
-            ],
-        );
+        let position = at("B", &[("B", -0.1), (" B", -3.0), ("A", -3.2), ("C", -5.0), ("The", -6.0)]);
         let options = read(&[position], &FOUR).unwrap();
-        let masses = [
-            (-3.2_f64).exp(),
-            (-0.1_f64).exp() + (-3.0_f64).exp(),
-            (-5.0_f64).exp(),
-        ];
+        let masses = [(-3.2_f64).exp(), (-0.1_f64).exp() + (-3.0_f64).exp(), (-5.0_f64).exp()];
         let mass: f64 = masses.iter().sum();
         for (p, own) in options.p.iter().zip(masses) {
             assert!((p - own / mass).abs() < 1e-6, "{options:?}");
@@ -225,28 +187,12 @@ mod tests {
 
     /// Positions with these tokens, then one with the answer B.
     fn with_answer(tokens: &[&str]) -> Vec<TokenPosition> {
-        tokens
-            .iter()
-            .map(|token| at(token, &[(*token, 0.0)]))
-            .chain([at("B", &[("B", -0.01), ("A", -5.0)])])
-            .collect()
+        tokens.iter().map(|token| at(token, &[(*token, 0.0)])).chain([at("B", &[("B", -0.01), ("A", -5.0)])]).collect()
     }
 
     #[test]
     fn every_spelling_of_a_letter_counts() {
-        for token in [
-            "B",
-            " B",
-            "b",
-            "B.",
-            "(B",
-            "(B)",
-            "\u{120}B",
-            "\u{2581}b",
-            "**B",
-            "\"B\"",
-            "B:",
-        ] {
+        for token in ["B", " B", "b", "B.", "(B", "(B)", "\u{120}B", "\u{2581}b", "**B", "\"B\"", "B:"] {
             let options = read(&[at(token, &[(token, -0.2)])], &FOUR).unwrap();
             assert_eq!(options.p, [0.0, 1.0, 0.0, 0.0], "{token}");
         }
@@ -268,8 +214,7 @@ mod tests {
 
     #[test]
     fn half_of_the_probability_must_name_a_choice() {
-        let [enough, too_little] =
-            [-0.69, -0.70].map(|logprob| at("A", &[("A", logprob), ("I", -0.7)]));
+        let [enough, too_little] = [-0.69, -0.70].map(|logprob| at("A", &[("A", logprob), ("I", -0.7)]));
         assert!(read(&[enough], &FOUR).is_some());
         assert_eq!(read(&[too_little], &FOUR), None);
     }

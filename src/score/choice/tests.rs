@@ -43,14 +43,8 @@ const SETS: [(&str, &[&str]); 9] = [
     ("rooms", &["bedroom", "kitchen", "bathroom", "garage"]),
     ("yes_no", &["yes", "no"]),
     ("numbers", &["1", "2", "3", "4"]),
-    (
-        "tables",
-        &["table", "dining table", "coffee table", "chair"],
-    ),
-    (
-        "six",
-        &["bed", "sofa", "lamp", "desk", "rug", "none of the above"],
-    ),
+    ("tables", &["table", "dining table", "coffee table", "chair"]),
+    ("six", &["bed", "sofa", "lamp", "desk", "rug", "none of the above"]),
     ("chinese", &["卧室", "厨房", "浴室", "车库"]),
     ("letters", &["D", "C", "B", "A"]),
     ("signs", &["C++", "C#", ".*", "[a-z]+", "(x)"]),
@@ -86,33 +80,21 @@ fn replies_of_the_table_are_parsed() {
     let mut wrong = Vec::new();
     for line in include_str!("../../../tests/data/replies.jsonl").lines() {
         let case: Case = serde_json::from_str(line).unwrap();
-        for (mode, want) in [
-            (ParsingMode::Strict, case.strict),
-            (ParsingMode::Lenient, case.lenient),
-        ] {
+        for (mode, want) in [(ParsingMode::Strict, case.strict), (ParsingMode::Lenient, case.lenient)] {
             let found = read(&case.reply, &choices(&case.of), mode);
             if found != want.into() {
                 wrong.push(format!("{mode:?} {line}: {found:?}"));
             }
         }
     }
-    assert!(
-        wrong.is_empty(),
-        "{} wrong:\n{}",
-        wrong.len(),
-        wrong.join("\n")
-    );
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
 }
 
 #[test]
 fn full_width_letters_are_read_strictly() {
     let rooms = choices_of(&["厨房", "卧室"]);
     for reply in ["（B）", "B、", "B．", "B：", "（B） 卧室", "B、卧室"] {
-        assert_eq!(
-            read(reply, &rooms, ParsingMode::Strict),
-            Answer::Chosen(1),
-            "{reply}"
-        );
+        assert_eq!(read(reply, &rooms, ParsingMode::Strict), Answer::Chosen(1), "{reply}");
     }
     let wrong = Answer::Unparsed(UnreadReason::Contradiction);
     assert_eq!(read("（B）厨房", &rooms, ParsingMode::Strict), wrong);
@@ -123,89 +105,31 @@ fn finish_and_refusal_are_considered() {
     let rooms = choices("rooms");
     for (text, finish, refusal, want) in [
         ("B", Finish::Stop, None, Answer::Chosen(1)),
-        (
-            "",
-            Finish::Stop,
-            None,
-            Answer::Unparsed(UnreadReason::Empty),
-        ),
-        (
-            "",
-            Finish::Stop,
-            Some("I cannot."),
-            Answer::Unparsed(UnreadReason::Refused),
-        ),
-        (
-            "Option B",
-            Finish::Stop,
-            Some("I cannot."),
-            Answer::Unparsed(UnreadReason::Refused),
-        ),
-        (
-            "",
-            Finish::Filter,
-            None,
-            Answer::Unparsed(UnreadReason::Filtered),
-        ),
-        (
-            "",
-            Finish::Length,
-            None,
-            Answer::Unparsed(UnreadReason::Truncated),
-        ),
+        ("", Finish::Stop, None, Answer::Unparsed(UnreadReason::Empty)),
+        ("", Finish::Stop, Some("I cannot."), Answer::Unparsed(UnreadReason::Refused)),
+        ("Option B", Finish::Stop, Some("I cannot."), Answer::Unparsed(UnreadReason::Refused)),
+        ("", Finish::Filter, None, Answer::Unparsed(UnreadReason::Filtered)),
+        ("", Finish::Length, None, Answer::Unparsed(UnreadReason::Truncated)),
         ("B", Finish::Length, None, Answer::Chosen(1)),
-        (
-            "The answer is B",
-            Finish::Length,
-            None,
-            Answer::Unparsed(UnreadReason::Truncated),
-        ),
-        (
-            "",
-            Finish::Filter,
-            Some("400: it violates our policy"),
-            Answer::Unparsed(UnreadReason::Filtered),
-        ),
-        (
-            "",
-            Finish::Other("x".into()),
-            None,
-            Answer::Unparsed(UnreadReason::Empty),
-        ),
+        ("The answer is B", Finish::Length, None, Answer::Unparsed(UnreadReason::Truncated)),
+        ("", Finish::Filter, Some("400: it violates our policy"), Answer::Unparsed(UnreadReason::Filtered)),
+        ("", Finish::Other("x".into()), None, Answer::Unparsed(UnreadReason::Empty)),
         ("B", Finish::Other("x".into()), None, Answer::Chosen(1)),
-        (
-            "The answer is B",
-            Finish::Other("x".into()),
-            None,
-            Answer::Unparsed(UnreadReason::NoChoice),
-        ),
+        ("The answer is B", Finish::Other("x".into()), None, Answer::Unparsed(UnreadReason::NoChoice)),
     ] {
-        let reply = Reply {
-            finish,
-            refusal: refusal.map(str::to_owned),
-            ..Reply::local(text.to_owned())
-        };
+        let reply = Reply { finish, refusal: refusal.map(str::to_owned), ..Reply::local(text.to_owned()) };
         assert_eq!(readings(&reply, &rooms), (want, want), "{reply:?}");
     }
     for finish in [Finish::Stop, Finish::Other("TOOL_CALLS".into())] {
-        let sentence = Reply {
-            finish,
-            ..Reply::local("It is B.".to_owned())
-        };
-        assert_eq!(
-            readings(&sentence, &rooms),
-            (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1))
-        );
+        let sentence = Reply { finish, ..Reply::local("It is B.".to_owned()) };
+        assert_eq!(readings(&sentence, &rooms), (Answer::Unparsed(UnreadReason::NoChoice), Answer::Chosen(1)));
     }
 }
 
 #[test]
 fn long_replies_are_read() {
     let rooms = choices("rooms");
-    let answered = format!(
-        "There is a stove. {}\nAnswer: B",
-        "It is dim here. ".repeat(10_000)
-    );
+    let answered = format!("There is a stove. {}\nAnswer: B", "It is dim here. ".repeat(10_000));
     let found = read(&answered, &rooms, ParsingMode::Lenient);
     assert_eq!(found, Answer::Chosen(1));
     // Repetitions of the strings that the parser searches for. A quadratic step would make this test very slow.
@@ -309,12 +233,7 @@ const FRAGMENTS: [&str; 64] = [
 fn reply() -> impl Strategy<Value = String> {
     let fragments = prop::collection::vec(prop::sample::select(&FRAGMENTS[..]), 0..14);
     let spaced = (fragments.clone(), Just(" ")).prop_map(|(parts, gap)| parts.join(gap));
-    prop_oneof![
-        fragments.prop_map(|parts| parts.concat()),
-        spaced,
-        any::<String>(),
-        "\\PC{0,40}"
-    ]
+    prop_oneof![fragments.prop_map(|parts| parts.concat()), spaced, any::<String>(), "\\PC{0,40}"]
 }
 
 proptest! {

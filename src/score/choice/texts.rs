@@ -15,25 +15,13 @@ struct Candidate {
     is_respaced: bool,
 }
 
-/// Every choice's text that occurs as whole words, from left to right. Longer texts take precedence. A hyphen counts as a space, and
-/// spaces may be removed or inserted between two words: "living-room", "livingroom", "arm chair". A thing's name that only modifies
-/// another noun is ignored: "table-lamp", "TV stand".
-pub(super) fn texts(
-    text: &str,
-    folded: &str,
-    tokens: &[Token],
-    offered: &ChoiceViews,
-) -> Vec<Name> {
+/// Every choice's text that occurs as whole words, from left to right. Longer texts take precedence. A hyphen counts as
+/// a space, and spaces may be removed or inserted between two words: "living-room", "livingroom", "arm chair". A
+/// thing's name that only modifies another noun is ignored: "table-lamp", "TV stand".
+pub(super) fn texts(text: &str, folded: &str, tokens: &[Token], offered: &ChoiceViews) -> Vec<Name> {
     let mut candidates = exact(folded, offered);
     candidates.extend(respaced(folded, tokens, offered));
-    candidates.sort_by_key(|c| {
-        (
-            std::cmp::Reverse(c.end - c.start),
-            c.start,
-            c.is_respaced,
-            c.choice,
-        )
-    });
+    candidates.sort_by_key(|c| (std::cmp::Reverse(c.end - c.start), c.start, c.is_respaced, c.choice));
     let mut covered = vec![false; folded.len()];
     let mut names: Vec<Name> = Vec::new();
     let mut last = (0, 0, false);
@@ -55,11 +43,7 @@ pub(super) fn texts(
         });
     }
     names.sort_by_key(|name| name.start);
-    names
-        .iter()
-        .filter(|name| !is_modifier(text, folded, tokens, name, &names, offered))
-        .copied()
-        .collect()
+    names.iter().filter(|name| !is_modifier(text, folded, tokens, name, &names, offered)).copied().collect()
 }
 
 /// Occurrences of the texts as they are spelled.
@@ -69,12 +53,7 @@ fn exact(folded: &str, offered: &ChoiceViews) -> Vec<Candidate> {
         for (start, _) in folded.match_indices(text.as_str()) {
             let end = start + text.len();
             if stands_alone(folded, start, end) {
-                candidates.push(Candidate {
-                    start,
-                    end,
-                    choice: *choice,
-                    is_respaced: false,
-                });
+                candidates.push(Candidate { start, end, choice: *choice, is_respaced: false });
             }
         }
     }
@@ -97,13 +76,9 @@ fn respaced<'a>(
             return Vec::new();
         }
         let mut found = joined_choices(offered, word, token.start, token.end);
-        if let Some(next) = tokens
-            .get(at + 1)
-            .filter(|next| next.start == token.end + 1)
-        {
+        if let Some(next) = tokens.get(at + 1).filter(|next| next.start == token.end + 1) {
             let second = next.slice(folded);
-            let fits =
-                word.len().min(second.len()) >= MIN_PART && word.len() + second.len() <= longest;
+            let fits = word.len().min(second.len()) >= MIN_PART && word.len() + second.len() <= longest;
             if fits && folded.as_bytes()[token.end] == b' ' {
                 let letters = format!("{word}{second}");
                 found.extend(joined_choices(offered, &letters, token.start, next.end));
@@ -114,58 +89,34 @@ fn respaced<'a>(
 }
 
 /// A candidate at `start..end` for each choice that consists of these letters, ignoring spaces.
-fn joined_choices(
-    offered: &ChoiceViews,
-    letters: &str,
-    start: usize,
-    end: usize,
-) -> Vec<Candidate> {
+fn joined_choices(offered: &ChoiceViews, letters: &str, start: usize, end: usize) -> Vec<Candidate> {
     offered
         .joined
         .get(letters)
         .into_iter()
         .flatten()
-        .map(|&choice| Candidate {
-            start,
-            end,
-            choice,
-            is_respaced: true,
-        })
+        .map(|&choice| Candidate { start, end, choice, is_respaced: true })
         .collect()
 }
 
 /// True if a span is not part of a word or a number, not an article, and not a "no" before a noun.
 fn stands_alone(folded: &str, start: usize, end: usize) -> bool {
     let span = &folded[start..end];
-    let (before, after) = (
-        folded[..start].chars().next_back(),
-        folded[end..].chars().next(),
-    );
-    let inside =
-        is_same_word(before, span.chars().next()) || is_same_word(span.chars().next_back(), after);
+    let (before, after) = (folded[..start].chars().next_back(), folded[end..].chars().next());
+    let inside = is_same_word(before, span.chars().next()) || is_same_word(span.chars().next_back(), after);
     let article = span.len() == 1 && matches!(span, "a" | "i") && after == Some(' ');
     let determiner = span == "no" && !determiner::is_answer(folded, start, end);
     !inside && !article && !determiner && !is_part_of_number(folded, start, end)
 }
 
-/// True if a thing's name only modifies the noun after it: always before a hyphen, and after a space only before a listed noun. A
-/// hyphen or dash between two choices joins two names instead.
-fn is_modifier(
-    text: &str,
-    folded: &str,
-    tokens: &[Token],
-    name: &Name,
-    names: &[Name],
-    offered: &ChoiceViews,
-) -> bool {
-    let is_thing = name
-        .choice
-        .is_some_and(|choice| offered.naming[choice] == Naming::Thing);
+/// True if a thing's name only modifies the noun after it: always before a hyphen, and after a space only before a
+/// listed noun. A hyphen or dash between two choices joins two names instead.
+fn is_modifier(text: &str, folded: &str, tokens: &[Token], name: &Name, names: &[Name], offered: &ChoiceViews) -> bool {
+    let is_thing = name.choice.is_some_and(|choice| offered.naming[choice] == Naming::Thing);
     if !is_thing {
         // "Brown-ish" is not brown, but "white-framed" is white.
         let suffix = folded[name.end..].strip_prefix(' ').unwrap_or_default();
-        return text[name.end..].starts_with(['-', RANGE])
-            && (suffix.starts_with("ish") || suffix.starts_with("like"));
+        return text[name.end..].starts_with(['-', RANGE]) && (suffix.starts_with("ish") || suffix.starts_with("like"));
     }
     let mut after = text[name.end..].chars();
     let (joint, next) = (after.next(), after.next());
@@ -180,10 +131,7 @@ fn is_modifier(
         .is_some_and(|(_, roles)| roles.has(Role::Head));
     // "Kitchen-cum-bathroom" is both.
     let joins = next.is_some_and(|next| matches!(next.slice(folded), "cum" | "and" | "or"));
-    let named = joins
-        || names
-            .binary_search_by_key(&(name.end + 1), |name| name.start)
-            .is_ok();
+    let named = joins || names.binary_search_by_key(&(name.end + 1), |name| name.start).is_ok();
     match joint {
         Some(' ') => is_head,
         Some(RANGE) => !named,

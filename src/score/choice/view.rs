@@ -45,10 +45,7 @@ impl Scopes {
             (&self.excluded, NameState::Excluded),
             (&self.denied, NameState::Denied),
         ];
-        states
-            .iter()
-            .find(|(ranges, _)| ranges.contain(byte))
-            .map_or(NameState::Affirmed, |(_, state)| *state)
+        states.iter().find(|(ranges, _)| ranges.contain(byte)).map_or(NameState::Affirmed, |(_, state)| *state)
     }
 }
 
@@ -60,12 +57,7 @@ impl<'a> ReplyView<'a> {
         let texts = texts(text, folded, &tokens, offered);
         let mut letters = letters(text, offered.texts.len(), &clauses);
         letters.retain(|letter| !is_within(letter, &texts));
-        let mut names = Names {
-            text,
-            folded,
-            letters,
-            texts,
-        };
+        let mut names = Names { text, folded, letters, texts };
         for letter in &names.letters {
             let has_sign = text[letter.end..].starts_with(['.', ':']);
             if has_sign && names.labelled_text(letter).is_some() {
@@ -81,14 +73,7 @@ impl<'a> ReplyView<'a> {
             denied: denied(&clauses, &names),
         };
         names.set_states(|name| scopes.state(name.start));
-        Self {
-            text,
-            folded,
-            offered,
-            clauses,
-            names,
-            scopes,
-        }
+        Self { text, folded, offered, clauses, names, scopes }
     }
 
     /// State of a name that begins at a byte.
@@ -98,10 +83,7 @@ impl<'a> ReplyView<'a> {
 
     /// The affirmed letters that are delimited from the words around them.
     pub(super) fn affirmed_letters(&self) -> impl Iterator<Item = &Name> + Clone {
-        self.names
-            .letters
-            .iter()
-            .filter(|name| name.is_affirmed() && name.delimiting > Delimiting::Loose)
+        self.names.letters.iter().filter(|name| name.is_affirmed() && name.delimiting > Delimiting::Loose)
     }
 
     /// The affirmed texts.
@@ -113,7 +95,5 @@ impl<'a> ReplyView<'a> {
 /// True if a letter is inside the text of a choice.
 fn is_within(letter: &Name, texts: &[Name]) -> bool {
     let after = texts.partition_point(|name| name.start <= letter.start);
-    texts[..after]
-        .last()
-        .is_some_and(|name| name.end > letter.end)
+    texts[..after].last().is_some_and(|name| name.end > letter.end)
 }

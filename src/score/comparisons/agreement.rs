@@ -52,8 +52,8 @@ impl AgreementCounts {
     }
 }
 
-/// Agreement of each model with itself between two kinds of images of the same scenes: dark photographs against synthetic images, and
-/// enhanced against raw images, both for dark photographs and for untouched frames.
+/// Agreement of each model with itself between two kinds of images of the same scenes: dark photographs against
+/// synthetic images, and enhanced against raw images, both for dark photographs and for untouched frames.
 #[must_use]
 pub(crate) fn light_agreements(grid: &Grid<'_>) -> Vec<Agreement> {
     let untouched = pairs(grid, ComparisonKind::Enhancer)
@@ -80,8 +80,7 @@ fn agreement(grid: &Grid<'_>, first: usize, second: usize) -> Option<Agreement> 
     let mut same = vec![ClusterCount::default(); grid.clusters];
     let mut counts = vec![AgreementCounts::default(); grid.clusters];
     for (index, item) in grid.items.iter().enumerate() {
-        let [a, b] =
-            [first, second].map(|subject| grid.result(subject, index).reading(ParsingMode::Strict));
+        let [a, b] = [first, second].map(|subject| grid.result(subject, index).reading(ParsingMode::Strict));
         let (Some(a), Some(b)) = (a, b) else {
             continue;
         };
@@ -98,26 +97,20 @@ fn agreement(grid: &Grid<'_>, first: usize, second: usize) -> Option<Agreement> 
     })
 }
 
-/// Minimum number of clusters in which each model errs, and in which each is right (chosen). With fewer, no interval of κ had its nominal
-/// coverage in simulation.
+/// Minimum number of clusters in which each model errs, and in which each is right (chosen). With fewer, no interval of
+/// κ had its nominal coverage in simulation.
 const MIN_CLUSTERS: usize = 8;
 
-/// Estimates κ of two models from the counts of each cluster; `None` if one of them is right, or wrong, in fewer than [`MIN_CLUSTERS`]
-/// clusters.
+/// Estimates κ of two models from the counts of each cluster; `None` if one of them is right, or wrong, in fewer than
+/// [`MIN_CLUSTERS`] clusters.
 ///
-/// The variance is that of the linearization of κ in the counts of the clusters, with Student's quantile for the degrees of freedom of the
-/// residuals of the clusters.
+/// The variance is that of the linearization of κ in the counts of the clusters, with Student's quantile for the
+/// degrees of freedom of the residuals of the clusters.
 #[must_use]
 pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
-    let conditions: [fn(&AgreementCounts) -> bool; 4] = [
-        |r| r.first > 0.0,
-        |r| r.second > 0.0,
-        |r| r.first < r.all,
-        |r| r.second < r.all,
-    ];
-    let vary = conditions
-        .iter()
-        .all(|holds| counts.iter().filter(|r| holds(r)).count() >= MIN_CLUSTERS);
+    let conditions: [fn(&AgreementCounts) -> bool; 4] =
+        [|r| r.first > 0.0, |r| r.second > 0.0, |r| r.first < r.all, |r| r.second < r.all];
+    let vary = conditions.iter().all(|holds| counts.iter().filter(|r| holds(r)).count() >= MIN_CLUSTERS);
     if !vary {
         return None;
     }
@@ -132,11 +125,7 @@ pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
         .iter()
         .filter(|counts| counts.all > 0.0)
         .map(|r| {
-            let (both, first, second) = (
-                r.both - both * r.all,
-                r.first - a * r.all,
-                r.second - b * r.all,
-            );
+            let (both, first, second) = (r.both - both * r.all, r.first - a * r.all, r.second - b * r.all);
             let crossed = 2.0 * (b * first + a * second);
             (2.0 * both - crossed - value * (first + second - crossed)) / denominator / all
         })
@@ -144,23 +133,15 @@ pub fn clustered_kappa(counts: &[AgreementCounts]) -> Option<Estimate> {
     let c = influences.len() as f64;
     let variance = c / (c - 1.0) * influences.iter().map(|x| x * x).sum::<f64>();
     let half = student(degrees_of_freedom(&influences)) * variance.sqrt();
-    Some(Estimate {
-        value,
-        low: (value - half).max(-1.0),
-        high: (value + half).min(1.0),
-        n: all as usize,
-    })
+    Some(Estimate { value, low: (value - half).max(-1.0), high: (value + half).min(1.0), n: all as usize })
 }
 
-/// Cohen's κ of two binary ratings (Cohen 1960, Educ. Psychol. Meas. 20:37), from the shares that both, the first and the second
-/// got right; `None` if one of them does not vary.
+/// Cohen's κ of two binary ratings (Cohen 1960, Educ. Psychol. Meas. 20:37), from the shares that both, the first and
+/// the second got right; `None` if one of them does not vary.
 pub(crate) fn kappa(both: f64, first: f64, second: f64) -> Option<f64> {
     let observed = 1.0 - first - second + 2.0 * both;
     let expected = first * second + (1.0 - first) * (1.0 - second);
-    [first, second]
-        .iter()
-        .all(|share| *share > 0.0 && *share < 1.0)
-        .then(|| (observed - expected) / (1.0 - expected))
+    [first, second].iter().all(|share| *share > 0.0 && *share < 1.0).then(|| (observed - expected) / (1.0 - expected))
 }
 
 #[cfg(test)]
@@ -169,7 +150,8 @@ mod tests {
 
     #[test]
     fn kappa_is_cohens() {
-        // Both right on 20 of 50, both wrong on 15: κ 0.4 (the example of the English Wikipedia's article on Cohen's κ).
+        // Both right on 20 of 50, both wrong on 15: κ 0.4 (the example of the English Wikipedia's article on Cohen's
+        // κ).
         assert!((kappa(0.4, 0.5, 0.6).unwrap() - 0.4).abs() < 1e-12);
         assert_eq!(kappa(1.0, 1.0, 1.0), None);
         assert!((kappa(0.25, 0.5, 0.5).unwrap()).abs() < 1e-12);
@@ -193,22 +175,15 @@ mod tests {
         ]
         .concat();
         let estimate = clustered_kappa(&counts).unwrap();
-        // The asymptotic standard error of Fleiss, Cohen and Everitt 1969 (Psychol. Bull. 72:323), equation 13, times √(50 / 49).
+        // The asymptotic standard error of Fleiss, Cohen and Everitt 1969 (Psychol. Bull. 72:323), equation 13, times
+        // √(50 / 49).
         let error = 0.126_996_062_931_100_3 * f64::sqrt(50.0 / 49.0);
         let half = estimate.high - estimate.value;
         assert!((estimate.value - 0.4).abs() < 1e-12 && estimate.n == 50);
         let degrees = half / error;
-        assert!(
-            degrees > student(49.0) - 1e-9 && degrees < student(30.0),
-            "{degrees}"
-        );
+        assert!(degrees > student(49.0) - 1e-9 && degrees < student(30.0), "{degrees}");
         // Errors in seven clusters only are too few for an interval of the first model.
-        let few = [
-            vec![item(true, true); 40],
-            vec![item(false, true); 7],
-            vec![item(true, false); 9],
-        ]
-        .concat();
+        let few = [vec![item(true, true); 40], vec![item(false, true); 7], vec![item(true, false); 9]].concat();
         assert_eq!(clustered_kappa(&few), None);
     }
 }

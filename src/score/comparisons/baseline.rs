@@ -15,11 +15,12 @@ pub struct BaselineRow {
     pub subject: ModelInCondition,
     /// New minus old, on the items that both answered about the same image.
     pub paired: PairedComparison,
-    /// p-value after Holm's correction over all conditions of all models under test. Reference models (`random`, the observer) are
-    /// corrected among themselves.
+    /// p-value after Holm's correction over all conditions of all models under test. Reference models (`random`, the
+    /// observer) are corrected among themselves.
     pub holm: f64,
     pub significance: Significance,
-    /// Smallest difference that the test would detect in 80 % of runs like these, at the level after Bonferroni's correction.
+    /// Smallest difference that the test would detect in 80 % of runs like these, at the level after Bonferroni's
+    /// correction.
     pub detectable: f64,
     /// Number of items that were asked about different images; they are not compared.
     pub other_images: usize,
@@ -40,8 +41,8 @@ pub struct BaselineSide {
     pub cost: Option<f64>,
 }
 
-/// Compares the subjects of a grid. `pairs` lists the indices of a new subject and the old one, `health` has one entry for each subject,
-/// and `cost` returns the cost of a subject.
+/// Compares the subjects of a grid. `pairs` lists the indices of a new subject and the old one, `health` has one entry
+/// for each subject, and `cost` returns the cost of a subject.
 #[must_use]
 pub fn baseline_rows(
     grid: &Grid<'_>,
@@ -54,17 +55,14 @@ pub fn baseline_rows(
         .filter_map(|&(new, old)| {
             let has_other_image: Vec<bool> = (0..grid.items.len())
                 .map(|item| {
-                    let [new, old] =
-                        [new, old].map(|subject| grid.trial(subject, item)?.sent_digest());
+                    let [new, old] = [new, old].map(|subject| grid.trial(subject, item)?.sent_digest());
                     new.zip(old).is_some_and(|(new, old)| new != old)
                 })
                 .collect();
             let mode = ParsingMode::Strict;
             Some(BaselineRow {
                 subject: grid.subjects[new].clone(),
-                paired: PairedComparison::on_items(grid, new, old, mode, |item, _| {
-                    !has_other_image[item]
-                })?,
+                paired: PairedComparison::on_items(grid, new, old, mode, |item, _| !has_other_image[item])?,
                 holm: 1.0,
                 significance: Significance::TooFew,
                 detectable: f64::INFINITY,
@@ -79,11 +77,7 @@ pub fn baseline_rows(
         })
         .collect();
     for is_reference in [false, true] {
-        correct(
-            rows.iter_mut()
-                .filter(|row| row.subject.is_reference() == is_reference)
-                .collect(),
-        );
+        correct(rows.iter_mut().filter(|row| row.subject.is_reference() == is_reference).collect());
     }
     rows
 }

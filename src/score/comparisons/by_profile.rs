@@ -1,10 +1,10 @@
 //! Findings about noise, tested under each noise profile: [`FindingByProfile`].
 //!
-//! The paper's noise model can be interpreted in several ways; each interpretation is a noise profile. A conclusion that holds under only
-//! one profile is a conclusion about that profile. Each finding is therefore computed under every profile, on the same items and by the
-//! same formula, and the results are reported side by side. Only the paper's levels, L1–L5, are tested. Holm's correction covers all claims
-//! of all models under all profiles (Holm 1979, Scand. J. Stat. 6:65): without any effect, the report names none with a probability of 95
-//! %.
+//! The paper's noise model can be interpreted in several ways; each interpretation is a noise profile. A conclusion
+//! that holds under only one profile is a conclusion about that profile. Each finding is therefore computed under every
+//! profile, on the same items and by the same formula, and the results are reported side by side. Only the paper's
+//! levels, L1–L5, are tested. Holm's correction covers all claims of all models under all profiles (Holm 1979, Scand.
+//! J. Stat. 6:65): without any effect, the report names none with a probability of 95 %.
 
 use std::collections::BTreeSet;
 
@@ -85,11 +85,7 @@ impl NoiseHypothesis {
 
 /// The paper's levels, L1 to L5.
 fn paper_levels() -> Vec<AxisLevel> {
-    Kind::Sensor
-        .ladder()
-        .iter()
-        .map(|severity| AxisLevel::new(Kind::Sensor, *severity))
-        .collect()
+    Kind::Sensor.ladder().iter().map(|severity| AxisLevel::new(Kind::Sensor, *severity)).collect()
 }
 
 /// Test result of a claim, after Holm's correction over all claims and profiles.
@@ -149,8 +145,8 @@ impl Robustness {
 pub struct EffectInProfile {
     /// Noise profile.
     pub profile: ProfileName,
-    /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items. `None` if a side was
-    /// not asked.
+    /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items.
+    /// `None` if a side was not asked.
     pub effect: Option<TestedEffect>,
 }
 
@@ -184,33 +180,27 @@ pub struct FindingByProfile {
     pub effects: Vec<EffectInProfile>,
     /// Summary over all profiles.
     pub robustness: Robustness,
-    /// Number of items that were asked, but not answered on every side, level and profile. The effects hold for all values of the missing
-    /// replies.
+    /// Number of items that were asked, but not answered on every side, level and profile. The effects hold for all
+    /// values of the missing replies.
     pub dropped: usize,
 }
 
 /// Tests all claims of each model under every noise profile; empty if the grid has fewer than two profiles.
 #[must_use]
 pub(crate) fn by_profile(grid: &Grid<'_>) -> Vec<FindingByProfile> {
-    let profiles: BTreeSet<&ProfileName> = noisy_subjects(grid)
-        .filter_map(|subject| subject.variant.reading.as_ref())
-        .collect();
+    let profiles: BTreeSet<&ProfileName> =
+        noisy_subjects(grid).filter_map(|subject| subject.variant.reading.as_ref()).collect();
     if profiles.len() < 2 {
         return Vec::new();
     }
     let profiles: Vec<&ProfileName> = profiles.into_iter().collect();
-    let models: BTreeSet<(&str, Option<&RunGroup>)> = noisy_subjects(grid)
-        .map(|subject| (&*subject.model, subject.variant.group.as_ref()))
-        .collect();
+    let models: BTreeSet<(&str, Option<&RunGroup>)> =
+        noisy_subjects(grid).map(|subject| (&*subject.model, subject.variant.group.as_ref())).collect();
     let mut models: Vec<(&str, Option<&RunGroup>)> = models.into_iter().collect();
     models.sort_by_cached_key(|(model, _)| grid.listing.place(model));
     let tests: Vec<(&str, Option<&RunGroup>, NoiseHypothesis)> = models
         .into_iter()
-        .flat_map(|(model, group)| {
-            claims(grid, model)
-                .into_iter()
-                .map(move |claim| (model, group, claim))
-        })
+        .flat_map(|(model, group)| claims(grid, model).into_iter().map(move |claim| (model, group, claim)))
         .collect();
     let findings: Vec<FindingByProfile> = tests
         .into_par_iter()
@@ -224,9 +214,9 @@ pub(crate) fn by_profile(grid: &Grid<'_>) -> Vec<FindingByProfile> {
 
 /// Subjects with noisy images.
 fn noisy_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = &'g ModelInCondition> {
-    grid.subjects.iter().filter(|subject| {
-        subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_profiles)
-    })
+    grid.subjects
+        .iter()
+        .filter(|subject| subject.view == Some(View::Image) && subject.variant.kind.is_some_and(Kind::has_profiles))
 }
 
 /// Claims to test for a model, in the order of the table.
@@ -237,23 +227,14 @@ fn claims(grid: &Grid<'_>, model: &str) -> Vec<NoiseHypothesis> {
         .collect();
     let levels = paper_levels();
     let mut claims = vec![NoiseHypothesis::NoiseCompounds(None)];
-    claims.extend(
-        levels
-            .iter()
-            .map(|level| NoiseHypothesis::NoiseCompounds(Some(*level))),
-    );
+    claims.extend(levels.iter().map(|level| NoiseHypothesis::NoiseCompounds(Some(*level))));
     claims.push(NoiseHypothesis::DarknessCosts);
     for name in enhancers {
         claims.push(NoiseHypothesis::EnhancerHarms(name.clone()));
         claims.push(NoiseHypothesis::EnhancerHelps(name.clone()));
     }
     for family in grid.families() {
-        claims.extend(
-            levels[3..]
-                .iter()
-                .rev()
-                .map(|level| NoiseHypothesis::BelowBlind(family.clone(), *level)),
-        );
+        claims.extend(levels[3..].iter().rev().map(|level| NoiseHypothesis::BelowBlind(family.clone(), *level)));
     }
     claims
 }
@@ -266,13 +247,9 @@ struct SideLookup<'g, 'a> {
 }
 
 impl SideLookup<'_, '_> {
-    /// Indices of the first and second subject of a claim at a level under a profile; `None` if the grid lacks one of them.
-    fn find(
-        &self,
-        claim: &NoiseHypothesis,
-        level: AxisLevel,
-        profile: &ProfileName,
-    ) -> Option<(usize, usize)> {
+    /// Indices of the first and second subject of a claim at a level under a profile; `None` if the grid lacks one of
+    /// them.
+    fn find(&self, claim: &NoiseHypothesis, level: AxisLevel, profile: &ProfileName) -> Option<(usize, usize)> {
         let noisy = Variant {
             kind: Some(Kind::Sensor),
             reading: Some(profile.clone()),
@@ -282,11 +259,7 @@ impl SideLookup<'_, '_> {
         let unenhanced = self.subject_index(level, &noisy, None)?;
         Some(match claim {
             NoiseHypothesis::NoiseCompounds(_) => {
-                let base = Variant {
-                    kind: Kind::Sensor.base(),
-                    reading: None,
-                    ..noisy
-                };
+                let base = Variant { kind: Kind::Sensor.base(), reading: None, ..noisy };
                 (self.subject_index(level, &base, None)?, unenhanced)
             }
             NoiseHypothesis::DarknessCosts => {
@@ -300,25 +273,15 @@ impl SideLookup<'_, '_> {
         })
     }
 
-    fn subject_index(
-        &self,
-        level: AxisLevel,
-        variant: &Variant,
-        enhancer: Option<&EnhancerName>,
-    ) -> Option<usize> {
+    fn subject_index(&self, level: AxisLevel, variant: &Variant, enhancer: Option<&EnhancerName>) -> Option<usize> {
         let subject = ModelInCondition::with_images(self.model, level, variant, enhancer);
         self.grid.find_up_to_group(&subject)
     }
 
     /// Index of the same model without images, or else of the only model without images.
     fn blind(&self) -> Option<usize> {
-        let blind: Vec<(usize, &ModelInCondition)> = self
-            .grid
-            .subjects
-            .iter()
-            .enumerate()
-            .filter(|(_, subject)| subject.view == Some(View::Blind))
-            .collect();
+        let blind: Vec<(usize, &ModelInCondition)> =
+            self.grid.subjects.iter().enumerate().filter(|(_, subject)| subject.view == Some(View::Blind)).collect();
         let own = blind.iter().find(|(_, other)| other.model == self.model);
         match (own, &blind[..]) {
             (Some((index, _)), _) | (None, [(index, _)]) => Some(*index),
@@ -328,11 +291,7 @@ impl SideLookup<'_, '_> {
 }
 
 /// Tests a claim under every profile; `None` if no profile has replies to compare.
-fn finding(
-    lookup: &SideLookup<'_, '_>,
-    claim: NoiseHypothesis,
-    profiles: &[&ProfileName],
-) -> Option<FindingByProfile> {
+fn finding(lookup: &SideLookup<'_, '_>, claim: NoiseHypothesis, profiles: &[&ProfileName]) -> Option<FindingByProfile> {
     let levels: Vec<AxisLevel> = profiles
         .iter()
         .map(|profile| asked_levels(lookup, &claim, profile))
@@ -343,18 +302,11 @@ fn finding(
     let pairs: Vec<Vec<(usize, usize)>> = profiles
         .iter()
         .map(|profile| {
-            levels
-                .iter()
-                .map(|level| lookup.find(&claim, *level, profile))
-                .collect::<Option<_>>()
-                .unwrap_or_default()
+            levels.iter().map(|level| lookup.find(&claim, *level, profile)).collect::<Option<_>>().unwrap_or_default()
         })
         .collect();
     let shared = SharedItems::new(lookup.grid, &pairs, claim.family());
-    let effects: Vec<Option<TestedEffect>> = pairs
-        .iter()
-        .map(|pairs| shared.effect(lookup.grid, pairs))
-        .collect();
+    let effects: Vec<Option<TestedEffect>> = pairs.iter().map(|pairs| shared.effect(lookup.grid, pairs)).collect();
     if effects.iter().all(Option::is_none) {
         return None;
     }
@@ -372,26 +324,15 @@ fn finding(
         effects: profiles
             .iter()
             .zip(effects)
-            .map(|(profile, effect)| EffectInProfile {
-                profile: (*profile).clone(),
-                effect,
-            })
+            .map(|(profile, effect)| EffectInProfile { profile: (*profile).clone(), effect })
             .collect(),
         dropped: shared.dropped,
     })
 }
 
 /// Levels of a claim at which both sides were asked under a profile.
-fn asked_levels(
-    lookup: &SideLookup<'_, '_>,
-    claim: &NoiseHypothesis,
-    profile: &ProfileName,
-) -> BTreeSet<AxisLevel> {
-    claim
-        .levels()
-        .into_iter()
-        .filter(|level| lookup.find(claim, *level, profile).is_some())
-        .collect()
+fn asked_levels(lookup: &SideLookup<'_, '_>, claim: &NoiseHypothesis, profile: &ProfileName) -> BTreeSet<AxisLevel> {
+    claim.levels().into_iter().filter(|level| lookup.find(claim, *level, profile).is_some()).collect()
 }
 
 /// Items of a family that are compared under all profiles.
@@ -406,16 +347,8 @@ struct SharedItems {
 
 impl SharedItems {
     fn new(grid: &Grid<'_>, pairs: &[Vec<(usize, usize)>], family: Option<&Family>) -> Self {
-        let subjects: BTreeSet<usize> = pairs
-            .iter()
-            .flatten()
-            .flat_map(|(first, second)| [*first, *second])
-            .collect();
-        let mut shared = Self {
-            answered: Vec::new(),
-            missing: Vec::new(),
-            dropped: 0,
-        };
+        let subjects: BTreeSet<usize> = pairs.iter().flatten().flat_map(|(first, second)| [*first, *second]).collect();
+        let mut shared = Self { answered: Vec::new(), missing: Vec::new(), dropped: 0 };
         for (index, item) in grid.items.iter().enumerate() {
             if !item.is_in_family(family) {
                 continue;
@@ -433,8 +366,8 @@ impl SharedItems {
         shared
     }
 
-    /// Tests the accuracy of the first sides minus that of the second sides, averaged over the pairs. `None` without pairs or answered
-    /// items.
+    /// Tests the accuracy of the first sides minus that of the second sides, averaged over the pairs. `None` without
+    /// pairs or answered items.
     fn effect(&self, grid: &Grid<'_>, pairs: &[(usize, usize)]) -> Option<TestedEffect> {
         if pairs.is_empty() {
             return None;
@@ -457,12 +390,7 @@ impl SharedItems {
             sums.add_missing(grid.items[index].cluster, lowest, highest);
         }
         let tested = sums.test(pairs.len() as f64)?;
-        Some(TestedEffect {
-            support: Support::Open,
-            difference: tested.difference,
-            p: tested.p,
-            holm: tested.p,
-        })
+        Some(TestedEffect { support: Support::Open, difference: tested.difference, p: tested.p, holm: tested.p })
     }
 }
 
@@ -477,11 +405,8 @@ fn with_holm_correction(mut findings: Vec<FindingByProfile>) -> Vec<FindingByPro
     let mut corrected = holm(&p_values).into_iter();
     for finding in &mut findings {
         let expects_gain = finding.claim.expects_gain();
-        for (effect, holm) in finding
-            .effects
-            .iter_mut()
-            .filter_map(|in_profile| in_profile.effect.as_mut())
-            .zip(&mut corrected)
+        for (effect, holm) in
+            finding.effects.iter_mut().filter_map(|in_profile| in_profile.effect.as_mut()).zip(&mut corrected)
         {
             effect.holm = holm;
             effect.support = support(effect, expects_gain);
@@ -502,14 +427,11 @@ fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
     }
 }
 
-/// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold under all.
+/// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold
+/// under all.
 fn robustness(effects: &[EffectInProfile]) -> Robustness {
     let [holding, opposite] = [Support::Holds, Support::Opposite].map(|support| {
-        effects
-            .iter()
-            .filter_map(|effect| effect.effect)
-            .filter(|effect| effect.support == support)
-            .count()
+        effects.iter().filter_map(|effect| effect.effect).filter(|effect| effect.support == support).count()
     });
     match (holding, opposite) {
         (0, 0) => Robustness::Open,

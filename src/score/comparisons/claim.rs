@@ -36,17 +36,14 @@ impl ParsedFinding {
     }
 
     fn direction(&self) -> Significance {
-        if self.gain > 0.0 {
-            Significance::Better
-        } else {
-            Significance::Worse
-        }
+        if self.gain > 0.0 { Significance::Better } else { Significance::Worse }
     }
 }
 
 impl Claim {
-    /// Verdict of a finding in tables, which is that of the sentences. `own` is its verdict within its own set of tests, and `p_report` its
-    /// p-value after the correction over all sentences. `None` if no sentence is about the finding.
+    /// Verdict of a finding in tables, which is that of the sentences. `own` is its verdict within its own set of
+    /// tests, and `p_report` its p-value after the correction over all sentences. `None` if no sentence is about the
+    /// finding.
     pub(super) fn verdict(self, own: Significance, p_report: Option<f64>) -> Option<Significance> {
         match self {
             _ if !own.is_possible() => Some(own),
@@ -81,46 +78,23 @@ mod tests {
     use super::*;
 
     fn finding(gain: f64, p: f64) -> ParsedFinding {
-        ParsedFinding {
-            gain,
-            verdict: Significance::Worse,
-            p_report: Some(p),
-        }
+        ParsedFinding { gain, verdict: Significance::Worse, p_report: Some(p) }
     }
 
     #[test]
     fn detection_needs_both_parsings_in_one_direction() {
         for (strict, lenient, expected) in [
-            (
-                (-0.2, 0.01),
-                (-0.1, 0.01),
-                Claim::Detected(Significance::Worse),
-            ),
-            (
-                (-0.2, 0.01),
-                (-0.1, 0.2),
-                Claim::StrictOnly(Significance::Worse),
-            ),
-            (
-                (0.2, 0.01),
-                (-0.1, 0.01),
-                Claim::StrictOnly(Significance::Better),
-            ),
+            ((-0.2, 0.01), (-0.1, 0.01), Claim::Detected(Significance::Worse)),
+            ((-0.2, 0.01), (-0.1, 0.2), Claim::StrictOnly(Significance::Worse)),
+            ((0.2, 0.01), (-0.1, 0.01), Claim::StrictOnly(Significance::Better)),
             ((-0.2, 0.05), (-0.1, 0.01), Claim::InOwnSet),
         ] {
             let claim = Claim::new(finding(strict.0, strict.1), finding(lenient.0, lenient.1));
             assert_eq!(claim, expected);
         }
-        let unshown = ParsedFinding {
-            verdict: Significance::NotShown,
-            p_report: None,
-            ..finding(-0.2, 0.5)
-        };
+        let unshown = ParsedFinding { verdict: Significance::NotShown, p_report: None, ..finding(-0.2, 0.5) };
         assert_eq!(Claim::new(unshown, unshown), Claim::Open);
-        let few = ParsedFinding {
-            verdict: Significance::TooFewClusters,
-            ..finding(-0.2, 0.001)
-        };
+        let few = ParsedFinding { verdict: Significance::TooFewClusters, ..finding(-0.2, 0.001) };
         assert_eq!(Claim::new(few, few), Claim::Impossible);
     }
 }

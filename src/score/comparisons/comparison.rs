@@ -67,8 +67,8 @@ impl ComparisonKind {
     }
 }
 
-/// Minimum number of shared items for a verdict in comparisons that may be across runs: two models, or two kinds of images (chosen). In all
-/// other kinds, one run asked both sides the same items.
+/// Minimum number of shared items for a verdict in comparisons that may be across runs: two models, or two kinds of
+/// images (chosen). In all other kinds, one run asked both sides the same items.
 pub const MIN_PAIRS: usize = 30;
 
 /// One subject against another on the items to which both replied, in both parsings.
@@ -93,8 +93,8 @@ pub struct Comparison {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TestedComparison {
     pub paired: PairedComparison,
-    /// p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the report changes no
-    /// result. Comparisons by family are corrected separately.
+    /// p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the
+    /// report changes no result. Comparisons by family are corrected separately.
     pub holm: f64,
     pub significance: Significance,
     /// p-value after the correction over all tests behind sentences; `None` if no sentence is about the comparison.
@@ -103,12 +103,7 @@ pub struct TestedComparison {
 
 impl TestedComparison {
     fn new(paired: PairedComparison) -> Self {
-        Self {
-            paired,
-            holm: 1.0,
-            significance: Significance::NotShown,
-            p_report: None,
-        }
+        Self { paired, holm: 1.0, significance: Significance::NotShown, p_report: None }
     }
 }
 
@@ -134,8 +129,7 @@ impl Comparison {
     /// Verdict in tables, the same as in sentences; `None` if no sentence is about the comparison.
     #[must_use]
     pub fn verdict(&self) -> Option<Significance> {
-        self.claim()
-            .verdict(self.strict.significance, self.strict.p_report)
+        self.claim().verdict(self.strict.significance, self.strict.p_report)
     }
 
     /// Comparison in a parsing.
@@ -151,7 +145,8 @@ impl Comparison {
 /// Maximum number of comparisons between models, and between enhancers (chosen); they take at most a gigabyte each.
 const MAX_COMPARISONS: usize = 500_000;
 
-/// True if models are compared with each other. The number of pairs grows with the square of the number of models, so it is limited.
+/// True if models are compared with each other. The number of pairs grows with the square of the number of models, so
+/// it is limited.
 #[must_use]
 pub fn compares_models(grid: &Grid<'_>) -> bool {
     let models: BTreeSet<&str> = grid.subjects.iter().map(|s| &*s.model).collect();
@@ -159,7 +154,8 @@ pub fn compares_models(grid: &Grid<'_>) -> bool {
     pairs.saturating_mul(grid.groups().len()) <= MAX_COMPARISONS
 }
 
-/// True if enhancers are compared with each other. The number of pairs grows with the square of the number of enhancers, so it is limited.
+/// True if enhancers are compared with each other. The number of pairs grows with the square of the number of
+/// enhancers, so it is limited.
 #[must_use]
 pub fn compares_enhancers(grid: &Grid<'_>) -> bool {
     let enhanced = grid.subjects.iter().filter_map(|s| s.enhancer.as_ref());
@@ -209,16 +205,12 @@ fn uncorrected(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
         .collect()
 }
 
-/// Comparisons of the kind [`Light`](ComparisonKind::Light) between different names of one model, which was asked in the same way under
-/// each name.
+/// Comparisons of the kind [`Light`](ComparisonKind::Light) between different names of one model, which was asked in
+/// the same way under each name.
 #[must_use]
 pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Comparison> {
-    let named: Vec<(usize, &ModelInCondition)> = grid
-        .subjects
-        .iter()
-        .enumerate()
-        .filter(|(_, subject)| names.contains(&subject.model))
-        .collect();
+    let named: Vec<(usize, &ModelInCondition)> =
+        grid.subjects.iter().enumerate().filter(|(_, subject)| names.contains(&subject.model)).collect();
     let mut pairs = Vec::new();
     for (position, (index, subject)) in named.iter().enumerate() {
         pairs.extend(
@@ -230,11 +222,7 @@ pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Compariso
     }
     let mut jobs = Vec::new();
     for family in grid.groups() {
-        jobs.extend(
-            pairs
-                .iter()
-                .map(|(first, second)| (ComparisonKind::Light, family, *first, *second)),
-        );
+        jobs.extend(pairs.iter().map(|(first, second)| (ComparisonKind::Light, family, *first, *second)));
     }
     corrected(uncorrected(grid, jobs))
 }
@@ -243,10 +231,7 @@ pub(crate) fn lights_between(grid: &Grid<'_>, names: &[String]) -> Vec<Compariso
 fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     let mut sets = BTreeMap::<_, Vec<usize>>::new();
     for (index, comparison) in all.iter().enumerate() {
-        let models = (
-            comparison.first.model.clone(),
-            comparison.second.model.clone(),
-        );
+        let models = (comparison.first.model.clone(), comparison.second.model.clone());
         let set = (comparison.kind, comparison.family.is_some(), models);
         sets.entry(set).or_default().push(index);
     }
@@ -261,17 +246,13 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
             let comparison = &mut all[index];
             let is_too_small = comparison.is_too_small();
             comparison.least_holm = strict[position].least;
-            for (tested, corrected) in [
-                (&mut comparison.strict, strict[position]),
-                (&mut comparison.lenient, lenient[position]),
-            ] {
+            for (tested, corrected) in
+                [(&mut comparison.strict, strict[position]), (&mut comparison.lenient, lenient[position])]
+            {
                 let difference = tested.paired.difference.value;
                 tested.holm = corrected.p;
-                tested.significance = if is_too_small {
-                    Significance::TooFew
-                } else {
-                    Significance::new(difference, corrected)
-                };
+                tested.significance =
+                    if is_too_small { Significance::TooFew } else { Significance::new(difference, corrected) };
             }
         }
     }
@@ -286,37 +267,23 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
             // Only raw images show the cost of darkness. The curves show how much of it an enhancer recovers.
-            ComparisonKind::Level
-                if subject.variant.is_degraded() && subject.enhancer.is_none() =>
-            {
-                let clean = ModelInCondition::with_images(
-                    &subject.model,
-                    AxisLevel::L0,
-                    &subject.variant,
-                    None,
-                );
+            ComparisonKind::Level if subject.variant.is_degraded() && subject.enhancer.is_none() => {
+                let clean = ModelInCondition::with_images(&subject.model, AxisLevel::L0, &subject.variant, None);
                 grid.find_up_to_group(&clean).into_iter().collect()
             }
-            ComparisonKind::Variant => match subject
-                .variant
-                .kind
-                .and_then(darkqa_base::types::degradations::Kind::base)
-            {
-                None => Vec::new(),
-                // The same level of the base kind, which has no noise profiles.
-                base => find_changed(grid, subject, |other| {
-                    other.variant = Variant {
-                        kind: base,
-                        reading: None,
-                        pair: None,
-                        group: subject.variant.group.clone(),
-                    };
-                }),
-            },
+            ComparisonKind::Variant => {
+                match subject.variant.kind.and_then(darkqa_base::types::degradations::Kind::base) {
+                    None => Vec::new(),
+                    // The same level of the base kind, which has no noise profiles.
+                    base => find_changed(grid, subject, |other| {
+                        other.variant =
+                            Variant { kind: base, reading: None, pair: None, group: subject.variant.group.clone() };
+                    }),
+                }
+            }
             ComparisonKind::Enhancer | ComparisonKind::RealEnhanced
                 if subject.enhancer.is_some()
-                    && subject.variant.photograph().is_some()
-                        == (kind == ComparisonKind::RealEnhanced) =>
+                    && subject.variant.photograph().is_some() == (kind == ComparisonKind::RealEnhanced) =>
             {
                 find_changed(grid, subject, |other| other.enhancer = None)
             }
@@ -337,17 +304,14 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
 }
 
 /// Finds the subject that differs from `subject` only by a change, if the grid contains it.
-fn find_changed(
-    grid: &Grid<'_>,
-    subject: &ModelInCondition,
-    change: impl FnOnce(&mut ModelInCondition),
-) -> Vec<usize> {
+fn find_changed(grid: &Grid<'_>, subject: &ModelInCondition, change: impl FnOnce(&mut ModelInCondition)) -> Vec<usize> {
     let mut other = subject.clone();
     change(&mut other);
     grid.find_up_to_group(&other).into_iter().collect()
 }
 
-/// Other enhancers of the same model at the same level and variant, later in the order of names, so that each pair occurs once.
+/// Other enhancers of the same model at the same level and variant, later in the order of names, so that each pair
+/// occurs once.
 fn later_enhancers(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
     // The subjects of a model are sorted by level, variant and enhancer.
@@ -356,21 +320,20 @@ fn later_enhancers(grid: &Grid<'_>, index: usize) -> Vec<usize> {
         .enumerate()
         .skip(index + 1)
         .take_while(|(_, other)| {
-            (&other.model, other.level, &other.variant)
-                == (&subject.model, subject.level, &subject.variant)
+            (&other.model, other.level, &other.variant) == (&subject.model, subject.level, &subject.variant)
         })
         .map(|(other, _)| other)
         .collect()
 }
 
-/// Later models of the grid in the same condition, so that each pair occurs once. Only models in `under_test` are compared.
+/// Later models of the grid in the same condition, so that each pair occurs once. Only models in `under_test` are
+/// compared.
 fn later_models(grid: &Grid<'_>, index: usize, under_test: &BTreeSet<&str>) -> Vec<usize> {
     let subject = &grid.subjects[index];
     if !under_test.contains(&*subject.model) {
         return Vec::new();
     }
-    let condition =
-        |of: &ModelInCondition| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
+    let condition = |of: &ModelInCondition| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
     grid.subjects
         .iter()
         .enumerate()
@@ -381,8 +344,8 @@ fn later_models(grid: &Grid<'_>, index: usize, under_test: &BTreeSet<&str>) -> V
         .collect()
 }
 
-/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, but in another noise profile or with
-/// images of other runs.
+/// Later subjects of the grid with the same model at the same level, raw or with the same enhancer, but in another
+/// noise profile or with images of other runs.
 fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
     let subject = &grid.subjects[index];
     grid.subjects
@@ -394,7 +357,8 @@ fn later_lights(grid: &Grid<'_>, index: usize) -> Vec<usize> {
         .collect()
 }
 
-/// True if two subjects have the same level, raw or with the same enhancer, but another noise profile or images of other runs.
+/// True if two subjects have the same level, raw or with the same enhancer, but another noise profile or images of
+/// other runs.
 fn is_other_light(one: &ModelInCondition, other: &ModelInCondition) -> bool {
     (one.view, one.level) == (other.view, other.level)
         && (one.variant.kind, &one.enhancer) == (other.variant.kind, &other.enhancer)
@@ -408,9 +372,5 @@ fn blind(grid: &Grid<'_>, subject: &ModelInCondition) -> Vec<usize> {
     let (same_model, others) = (0..grid.subjects.len())
         .filter(|index| grid.subjects[*index].view == Some(View::Blind))
         .partition::<Vec<_>, _>(|index| grid.subjects[*index].model == subject.model);
-    if same_model.is_empty() {
-        others
-    } else {
-        same_model
-    }
+    if same_model.is_empty() { others } else { same_model }
 }

@@ -1,6 +1,7 @@
 //! Differences pooled over models: [`PooledFinding`].
 //!
-//! The models are fixed: a finding is about these models, not about models in general. The sample consists of items, grouped in clusters.
+//! The models are fixed: a finding is about these models, not about models in general. The sample consists of items,
+//! grouped in clusters.
 
 mod contrast;
 mod finding;
@@ -31,8 +32,8 @@ pub use finding::{PooledDifference, PooledFinding};
 pub use left_out::ModelsLeftOut;
 pub(crate) use left_out::models_left_out;
 
-/// Models that findings are about, sorted: models with images, without people and without reference models. If only reference models ran,
-/// one of them.
+/// Models that findings are about, sorted: models with images, without people and without reference models. If only
+/// reference models ran, one of them.
 #[must_use]
 pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
     models(grid, View::Image)
@@ -40,17 +41,12 @@ pub fn pool<'g>(grid: &'g Grid<'_>) -> Vec<&'g str> {
 
 /// [`pooled_models`] with or without images.
 fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
-    let asked = grid
-        .subjects
-        .iter()
-        .filter(|subject| subject.view == Some(view))
-        .map(|subject| &*subject.model);
-    pooled_models(grid.listing.without_people(asked))
-        .into_iter()
-        .collect()
+    let asked = grid.subjects.iter().filter(|subject| subject.view == Some(view)).map(|subject| &*subject.model);
+    pooled_models(grid.listing.without_people(asked)).into_iter().collect()
 }
 
-/// A kind, variant and enhancers; Holm's correction is applied to each family of such a set, and of all pairs of enhancers together.
+/// A kind, variant and enhancers; Holm's correction is applied to each family of such a set, and of all pairs of
+/// enhancers together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 struct PooledSet {
     kind: PooledKind,
@@ -65,11 +61,7 @@ impl PooledSet {
     fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
         let mut sets = Self::of_enhancers_and_raw(grid);
         if compares_enhancers(grid) {
-            let enhanced: Vec<Self> = sets
-                .iter()
-                .filter(|set| set.enhancer.is_some())
-                .cloned()
-                .collect();
+            let enhanced: Vec<Self> = sets.iter().filter(|set| set.enhancer.is_some()).cloned().collect();
             // The sets are sorted by variant and enhancer, so those of a variant are neighbours.
             for of_variant in enhanced.chunk_by(|a, b| a.variant == b.variant) {
                 for (index, first) in of_variant.iter().enumerate() {
@@ -105,16 +97,10 @@ impl PooledSet {
             .collect()
     }
 
-    /// Indices of the two subjects that are compared at a level; `model` is the model of the first side, `other` that of the second.
-    fn sides(
-        &self,
-        grid: &Grid<'_>,
-        model: &str,
-        other: &str,
-        level: AxisLevel,
-    ) -> Option<(usize, usize)> {
-        let first =
-            ModelInCondition::with_images(model, level, &self.variant, self.enhancer.as_ref());
+    /// Indices of the two subjects that are compared at a level; `model` is the model of the first side, `other` that
+    /// of the second.
+    fn sides(&self, grid: &Grid<'_>, model: &str, other: &str, level: AxisLevel) -> Option<(usize, usize)> {
+        let first = ModelInCondition::with_images(model, level, &self.variant, self.enhancer.as_ref());
         let second = match self.kind {
             PooledKind::Darkness | PooledKind::Hallucination(_) => {
                 ModelInCondition::with_images(model, AxisLevel::L0, &self.variant, None)
@@ -128,9 +114,7 @@ impl PooledSet {
                 };
                 ModelInCondition::with_images(model, level, &base, None)
             }
-            PooledKind::Enhancer => {
-                ModelInCondition::with_images(model, level, &self.variant, None)
-            }
+            PooledKind::Enhancer => ModelInCondition::with_images(model, level, &self.variant, None),
             PooledKind::EnhancerPair => {
                 ModelInCondition::with_images(model, level, &self.variant, self.against.as_ref())
             }
@@ -152,7 +136,8 @@ impl PooledSet {
             .collect()
     }
 
-    /// Models of the set, as pairs of first and second side. Models that answered fewer items than others are listed separately.
+    /// Models of the set, as pairs of first and second side. Models that answered fewer items than others are listed
+    /// separately.
     fn models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> SetModels<'g> {
         let all = self.asked_models(grid, levels);
         let coverages: Vec<Coverage> = all
@@ -172,10 +157,8 @@ impl PooledSet {
         for (pair, coverage) in all.into_iter().zip(&coverages) {
             let lacking = coverage.lacking(most);
             if lacking.is_empty() {
-                let more: Vec<AxisLevel> = coverage
-                    .levels()
-                    .filter(|level| !most.levels().any(|known| known == *level))
-                    .collect();
+                let more: Vec<AxisLevel> =
+                    coverage.levels().filter(|level| !most.levels().any(|known| known == *level)).collect();
                 if !more.is_empty() {
                     models.extra_levels.push((pair[0], more));
                 }
@@ -189,32 +172,18 @@ impl PooledSet {
 
     /// Models that were asked on both sides at some level, as pairs of first and second side.
     ///
-    /// A model is compared with its own replies without images. Only if no model was asked without images, each is compared with every
-    /// blind model.
-    fn asked_models<'g>(
-        &self,
-        grid: &'g Grid<'_>,
-        levels: &BTreeSet<AxisLevel>,
-    ) -> Vec<[&'g str; 2]> {
+    /// A model is compared with its own replies without images. Only if no model was asked without images, each is
+    /// compared with every blind model.
+    fn asked_models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> Vec<[&'g str; 2]> {
         let pool = pool(grid);
-        let is_asked = |pair: &[&str; 2]| {
-            levels
-                .iter()
-                .any(|level| self.sides(grid, pair[0], pair[1], *level).is_some())
-        };
-        let own: Vec<[&str; 2]> = pool
-            .iter()
-            .map(|model| [*model, *model])
-            .filter(is_asked)
-            .collect();
+        let is_asked =
+            |pair: &[&str; 2]| levels.iter().any(|level| self.sides(grid, pair[0], pair[1], *level).is_some());
+        let own: Vec<[&str; 2]> = pool.iter().map(|model| [*model, *model]).filter(is_asked).collect();
         if self.kind != PooledKind::Blind || !own.is_empty() {
             return own;
         }
         let blind = models(grid, View::Blind);
-        pool.iter()
-            .flat_map(|model| blind.iter().map(|other| [*model, *other]))
-            .filter(is_asked)
-            .collect()
+        pool.iter().flat_map(|model| blind.iter().map(|other| [*model, *other])).filter(is_asked).collect()
     }
 }
 
@@ -229,17 +198,14 @@ struct SetModels<'g> {
     extra_levels: Vec<(&'g str, Vec<AxisLevel>)>,
 }
 
-/// Returns all pooled findings of single levels, and those averaged over levels, both ordered by kind, variant, enhancer, family and level.
+/// Returns all pooled findings of single levels, and those averaged over levels, both ordered by kind, variant,
+/// enhancer, family and level.
 #[must_use]
 pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
     let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
-    let findings: Vec<PooledFinding> = sets
-        .into_par_iter()
-        .flat_map_iter(|set| set_findings(grid, &set))
-        .collect();
-    let (mut levels, means): (Vec<PooledFinding>, Vec<PooledFinding>) = findings
-        .into_iter()
-        .partition(|finding| finding.mean_over.is_empty());
+    let findings: Vec<PooledFinding> = sets.into_par_iter().flat_map_iter(|set| set_findings(grid, &set)).collect();
+    let (mut levels, means): (Vec<PooledFinding>, Vec<PooledFinding>) =
+        findings.into_iter().partition(|finding| finding.mean_over.is_empty());
     correct_enhancer_pairs(&mut levels);
     (levels, means)
 }
@@ -261,8 +227,8 @@ fn correct_enhancer_pairs(findings: &mut [PooledFinding]) {
     }
 }
 
-/// Computes the findings of a set averaged over its darker levels, and over its lighter levels, if it has several of them. An effect that
-/// grows with the level is not averaged over the lighter levels.
+/// Computes the findings of a set averaged over its darker levels, and over its lighter levels, if it has several of
+/// them. An effect that grows with the level is not averaged over the lighter levels.
 fn averaged(
     grid: &Grid<'_>,
     set: &PooledSet,
@@ -273,10 +239,8 @@ fn averaged(
         return Vec::new();
     }
     let halves = [true, false].map(|severe| {
-        let half: Vec<&(AxisLevel, Vec<PooledItem>)> = levels
-            .iter()
-            .filter(|(level, _)| is_severe(*level, set.variant.kind) == severe)
-            .collect();
+        let half: Vec<&(AxisLevel, Vec<PooledItem>)> =
+            levels.iter().filter(|(level, _)| is_severe(*level, set.variant.kind) == severe).collect();
         let is_tested = severe || !set.kind.grows_with_the_level();
         if half.len() < 2 || !is_tested {
             return None;
@@ -297,27 +261,16 @@ fn averaged(
         let items: Vec<PooledItem> = sums
             .into_values()
             .map(|(item, levels)| PooledItem {
-                state: if levels == half.len() {
-                    item.state
-                } else {
-                    PooledState::Unasked
-                },
+                state: if levels == half.len() { item.state } else { PooledState::Unasked },
                 ..item
             })
             .collect();
         let level = *mean_over.last()?;
-        let pool = PoolOfLevels {
-            models,
-            levels: half.len(),
-        };
+        let pool = PoolOfLevels { models, levels: half.len() };
         let found = finding(grid, set, pool, level, &items, None)?;
         Some(PooledFinding { mean_over, ..found })
     });
-    halves
-        .into_iter()
-        .flatten()
-        .flat_map(|one| corrected(vec![one]))
-        .collect()
+    halves.into_iter().flatten().flat_map(|one| corrected(vec![one])).collect()
 }
 
 /// Models of a finding, and the number of levels that it averages over.
@@ -334,26 +287,18 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
     if models.is_empty() {
         return Vec::new();
     }
-    let levels: Vec<(AxisLevel, Vec<PooledItem>)> = levels
-        .iter()
-        .filter_map(|level| Some((*level, items(grid, set, &models, *level)?)))
-        .collect();
+    let levels: Vec<(AxisLevel, Vec<PooledItem>)> =
+        levels.iter().filter_map(|level| Some((*level, items(grid, set, &models, *level)?))).collect();
     let groups = match set.kind.only_family() {
         None => grid.groups(),
         only => vec![only],
     };
-    let pool = PoolOfLevels {
-        models: &models,
-        levels: 1,
-    };
+    let pool = PoolOfLevels { models: &models, levels: 1 };
     let mut findings: Vec<PooledFinding> = groups
         .into_iter()
         .flat_map(|family| {
             corrected(
-                levels
-                    .iter()
-                    .filter_map(|(level, items)| finding(grid, set, pool, *level, items, family))
-                    .collect(),
+                levels.iter().filter_map(|(level, items)| finding(grid, set, pool, *level, items, family)).collect(),
             )
         })
         .collect();
@@ -362,22 +307,11 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
 }
 
 /// Items that some model was asked on both sides; `None` if a model lacks a side.
-fn items(
-    grid: &Grid<'_>,
-    set: &PooledSet,
-    models: &[[&str; 2]],
-    level: AxisLevel,
-) -> Option<Vec<PooledItem>> {
-    let pairs: Vec<(usize, usize)> = models
-        .iter()
-        .map(|[model, other]| set.sides(grid, model, other, level))
-        .collect::<Option<_>>()?;
-    let items = grid
-        .items
-        .iter()
-        .enumerate()
-        .filter(|(_, item)| set.kind.is_about(item))
-        .filter_map(|(index, item)| {
+fn items(grid: &Grid<'_>, set: &PooledSet, models: &[[&str; 2]], level: AxisLevel) -> Option<Vec<PooledItem>> {
+    let pairs: Vec<(usize, usize)> =
+        models.iter().map(|[model, other]| set.sides(grid, model, other, level)).collect::<Option<_>>()?;
+    let items =
+        grid.items.iter().enumerate().filter(|(_, item)| set.kind.is_about(item)).filter_map(|(index, item)| {
             let mut sides = [SideCounts::default(); 2];
             let mut is_asked = false;
             let mut state = PooledState::Answered;
@@ -389,11 +323,7 @@ fn items(
                 for (side, result) in sides.iter_mut().zip(results) {
                     let TrialResult::Read { strict, lenient } = result else {
                         side.missing += u32::from(has_reply);
-                        state = state.and(if is_asked_on_both {
-                            PooledState::Missing
-                        } else {
-                            PooledState::Unasked
-                        });
+                        state = state.and(if is_asked_on_both { PooledState::Missing } else { PooledState::Unasked });
                         continue;
                     };
                     side.strict += u32::from(set.kind.counts(item, strict));
@@ -402,11 +332,7 @@ fn items(
                     side.replies += 1;
                 }
             }
-            is_asked.then_some(PooledItem {
-                index,
-                sides,
-                state,
-            })
+            is_asked.then_some(PooledItem { index, sides, state })
         });
     Some(items.collect())
 }
@@ -436,15 +362,8 @@ fn finding(
     let dropped = of_family.len() - answered.len();
     let replies = (each * answered.len()) as f64;
     let strict = difference(grid, &of_family, each, |side| side.strict)?;
-    let parsings_differ = of_family
-        .iter()
-        .flat_map(|(_, item)| &item.sides)
-        .any(|side| side.strict != side.lenient);
-    let lenient = if parsings_differ {
-        difference(grid, &of_family, each, |side| side.lenient)?
-    } else {
-        strict
-    };
+    let parsings_differ = of_family.iter().flat_map(|(_, item)| &item.sides).any(|side| side.strict != side.lenient);
+    let lenient = if parsings_differ { difference(grid, &of_family, each, |side| side.lenient)? } else { strict };
     let clusters: BTreeSet<u32> = answered.iter().map(|(cluster, _)| *cluster).collect();
     let [names, blind_names] = [0, 1].map(|side| {
         let names: BTreeSet<&str> = models.iter().map(|pair| pair[side]).collect();
@@ -459,28 +378,16 @@ fn finding(
         level,
         mean_over: Vec::new(),
         models: names,
-        blind_models: if set.kind == PooledKind::Blind {
-            blind_names
-        } else {
-            Vec::new()
-        },
+        blind_models: if set.kind == PooledKind::Blind { blind_names } else { Vec::new() },
         strict,
         lenient,
-        format: [0, 1].map(|side| {
-            answered
-                .iter()
-                .map(|(_, sides)| f64::from(sides[side].read))
-                .sum::<f64>()
-                / replies
-        }),
+        format: [0, 1].map(|side| answered.iter().map(|(_, sides)| f64::from(sides[side].read)).sum::<f64>() / replies),
         levels: 1,
         items: answered.len(),
         dropped,
         missing: of_family
             .iter()
-            .filter(|(_, item)| {
-                item.state == PooledState::Missing && item.net_bounds(|_| 0).is_some()
-            })
+            .filter(|(_, item)| item.state == PooledState::Missing && item.net_bounds(|_| 0).is_some())
             .count(),
         clusters: clusters.len(),
         least_p: least_p(clusters.len()),
@@ -488,8 +395,8 @@ fn finding(
     })
 }
 
-/// Computes the difference of the counted replies, before correction; `counted` gives their number, `each` is the number of replies to an
-/// item on each side. `None` if no item is answered.
+/// Computes the difference of the counted replies, before correction; `counted` gives their number, `each` is the
+/// number of replies to an item on each side. `None` if no item is answered.
 fn difference(
     grid: &Grid<'_>,
     items: &[(u32, PooledItem)],
@@ -542,10 +449,7 @@ fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
         finding.levels = levels;
         finding.least_holm = strict[index].least;
         let kind = finding.kind;
-        for (parsed, corrected) in [
-            (&mut finding.strict, strict[index]),
-            (&mut finding.lenient, lenient[index]),
-        ] {
+        for (parsed, corrected) in [(&mut finding.strict, strict[index]), (&mut finding.lenient, lenient[index])] {
             parsed.holm = corrected.p;
             let gain = kind.gain(parsed.difference.value);
             parsed.verdict = Significance::new(gain, corrected);

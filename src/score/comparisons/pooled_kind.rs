@@ -5,8 +5,8 @@ use crate::grid::GridItem;
 use darkqa_base::types::Family;
 use darkqa_base::types::degradations::Kind;
 
-/// Comparison that a pooled finding reports: its two sides, and the replies that it counts. Correct replies are counted, except in
-/// [`Self::Hallucination`].
+/// Comparison that a pooled finding reports: its two sides, and the replies that it counts. Correct replies are
+/// counted, except in [`Self::Hallucination`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PooledKind {
     /// A degraded level against L0, without an enhancer.
@@ -24,18 +24,15 @@ pub enum PooledKind {
 }
 
 impl PooledKind {
-    /// Comparisons that apply to raw images with this degradation; `None` is L0. [`Self::Noise`] needs a degradation that extends another.
+    /// Comparisons that apply to raw images with this degradation; `None` is L0. [`Self::Noise`] needs a degradation
+    /// that extends another.
     pub(super) fn for_raw(degradation: Option<Kind>) -> Vec<Self> {
         let Some(degradation) = degradation else {
             return vec![Self::Blind];
         };
         let noise = degradation.base().map(|_| Self::Noise);
-        let others = [
-            Self::Darkness,
-            Self::Blind,
-            Self::Hallucination(FalseAnswer::No),
-            Self::Hallucination(FalseAnswer::Yes),
-        ];
+        let others =
+            [Self::Darkness, Self::Blind, Self::Hallucination(FalseAnswer::No), Self::Hallucination(FalseAnswer::Yes)];
         others.into_iter().chain(noise).collect()
     }
 
@@ -53,8 +50,8 @@ impl PooledKind {
         }
     }
 
-    /// Name of the comparison on images with this degradation. [`Self::Darkness`] is named after the cause of the loss, which depends on
-    /// the degradation.
+    /// Name of the comparison on images with this degradation. [`Self::Darkness`] is named after the cause of the loss,
+    /// which depends on the degradation.
     #[must_use]
     pub fn name_on(self, degradation: Option<Kind>) -> &'static str {
         match (self, degradation) {
@@ -63,7 +60,8 @@ impl PooledKind {
         }
     }
 
-    /// Question family to which the comparison is restricted; `None` if it applies to each family and to all of them together.
+    /// Question family to which the comparison is restricted; `None` if it applies to each family and to all of them
+    /// together.
     #[must_use]
     pub fn only_family(self) -> Option<&'static Family> {
         match self {
@@ -74,13 +72,10 @@ impl PooledKind {
 
     /// True if the effect is assumed to grow with the level, so that the darkest level is tested first.
     ///
-    /// Loss in the dark, loss against the blind baseline and missed objects grow with the level. Noise, enhancers and invented objects may
-    /// have their largest effect at any level.
+    /// Loss in the dark, loss against the blind baseline and missed objects grow with the level. Noise, enhancers and
+    /// invented objects may have their largest effect at any level.
     pub(crate) fn grows_with_the_level(self) -> bool {
-        matches!(
-            self,
-            Self::Darkness | Self::Blind | Self::Hallucination(FalseAnswer::No)
-        )
+        matches!(self, Self::Darkness | Self::Blind | Self::Hallucination(FalseAnswer::No))
     }
 
     /// True if the average over the levels is tested, too, in addition to each level.
@@ -104,8 +99,8 @@ impl PooledKind {
         }
     }
 
-    /// Gain of the first side over the second, given the difference of their counted replies. More false answers are a loss: the sign
-    /// is reversed for [`Self::Hallucination`].
+    /// Gain of the first side over the second, given the difference of their counted replies. More false answers are a
+    /// loss: the sign is reversed for [`Self::Hallucination`].
     pub(super) fn gain(self, difference: f64) -> f64 {
         match self {
             Self::Hallucination(_) => -difference,

@@ -28,10 +28,7 @@ pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
                     _ => {}
                 }
             }
-            RankRange {
-                first: better + 1,
-                last: best.models.len() - worse,
-            }
+            RankRange { first: better + 1, last: best.models.len() - worse }
         })
         .collect()
 }
@@ -45,12 +42,7 @@ mod tests {
     use darkqa_base::types::Variant;
 
     fn best(names: &[&str], shown: &[(&str, &str, Significance)]) -> BestInTheDark {
-        let share = Estimate {
-            value: 0.5,
-            low: 0.4,
-            high: 0.6,
-            n: 10,
-        };
+        let share = Estimate { value: 0.5, low: 0.4, high: 0.6, n: 10 };
         let models = names.iter().map(|name| DarkAccuracy {
             model: (*name).to_owned(),
             mean: share,
@@ -73,12 +65,7 @@ mod tests {
             variant: Variant::NONE,
             levels: Vec::new(),
             lighter: Vec::new(),
-            gain: DarkGain {
-                is_against_blind: false,
-                difference: share,
-                p: 1.0,
-                p_report: None,
-            },
+            gain: DarkGain { is_against_blind: false, difference: share, p: 1.0, p_report: None },
             crossing: None,
             p_report: None,
             asked: Vec::new(),
@@ -95,10 +82,7 @@ mod tests {
 
     /// Ranges of ranks of four models.
     fn ranges(shown: &[(&str, &str, Significance)]) -> Vec<(usize, usize)> {
-        rank_ranges(&best(&["a", "b", "c", "d"], shown))
-            .into_iter()
-            .map(|rank| (rank.first, rank.last))
-            .collect()
+        rank_ranges(&best(&["a", "b", "c", "d"], shown)).into_iter().map(|rank| (rank.first, rank.last)).collect()
     }
 
     #[test]
@@ -108,13 +92,8 @@ mod tests {
         let unshown = [("a", "b", NotShown), ("a", "c", TooFewClusters)];
         assert_eq!(ranges(&unshown), [(1, 4); 4]);
         // The first is shown to be better than all others, the last worse than the first alone.
-        let first = [
-            ("a", "b", Better),
-            ("a", "c", Better),
-            ("a", "d", Better),
-            ("b", "c", NotShown),
-            ("b", "d", Better),
-        ];
+        let first =
+            [("a", "b", Better), ("a", "c", Better), ("a", "d", Better), ("b", "c", NotShown), ("b", "d", Better)];
         assert_eq!(ranges(&first), [(1, 1), (2, 3), (2, 4), (3, 4)]);
         // A pair counts the same from its other side.
         assert_eq!(ranges(&[("b", "a", Worse)]), ranges(&[("a", "b", Better)]));

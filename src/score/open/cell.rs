@@ -7,8 +7,8 @@ use super::group::Group;
 use crate::estimate::Estimate;
 use crate::model_in_condition::ModelInCondition;
 
-/// Maximum number of independent binary replies that one mark may count as. A mark on a five-step scale varies less than a binary reply
-/// with the same mean, unless all marks are 1 or 5.
+/// Maximum number of independent binary replies that one mark may count as. A mark on a five-step scale varies less
+/// than a binary reply with the same mean, unless all marks are 1 or 5.
 const MAX_WEIGHT: f64 = 4.0;
 
 /// Score of a subject on a group of questions, with the counts behind it.
@@ -28,8 +28,8 @@ pub struct OpenCell {
     pub null: usize,
     /// Number of answers that the protocol shortened before they were judged.
     pub cut: usize,
-    /// Mean score, between 0 and 1; `None` if no answer is scored. Its `n` is the number of scored answers; its interval holds for all scores
-    /// of the others.
+    /// Mean score, between 0 and 1; `None` if no answer is scored. Its `n` is the number of scored answers; its
+    /// interval holds for all scores of the others.
     pub score: Option<Estimate>,
 }
 
@@ -48,12 +48,7 @@ pub(super) fn cell(
     answers: &[&ScoredAnswer],
     clusters: &[usize],
 ) -> OpenCell {
-    let count = |outcome| {
-        answers
-            .iter()
-            .filter(|answer| answer.outcome == outcome)
-            .count()
-    };
+    let count = |outcome| answers.iter().filter(|answer| answer.outcome == outcome).count();
     // Sums of the scores by cluster, with a value in place of a missing score.
     let sums = |if_missing: Option<f64>| -> Vec<(f64, f64)> {
         let mut sums = BTreeMap::<usize, (f64, f64)>::new();
@@ -65,14 +60,10 @@ pub(super) fn cell(
         }
         sums.into_values().collect()
     };
-    let n = answers
-        .iter()
-        .filter(|answer| answer.outcome.points().is_some())
-        .count();
+    let n = answers.iter().filter(|answer| answer.outcome.points().is_some()).count();
     let score = Estimate::from_scores(&sums(None), MAX_WEIGHT, n);
     let score = if n < answers.len() {
-        let bounds =
-            [0.0, 1.0].map(|points| Estimate::from_scores(&sums(Some(points)), MAX_WEIGHT, n));
+        let bounds = [0.0, 1.0].map(|points| Estimate::from_scores(&sums(Some(points)), MAX_WEIGHT, n));
         score.map(|score| score.covering(bounds.into_iter().flatten()))
     } else {
         score

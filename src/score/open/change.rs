@@ -48,9 +48,9 @@ pub(super) fn baselines(subject: &ModelInCondition) -> Vec<(Baseline, ModelInCon
         .collect()
 }
 
-/// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several answers to one question, by
-/// different people, count as their mean. The interval holds for all scores of answers without one, on the questions with a score on
-/// either side.
+/// Mean of the first answers minus mean of the second, on the questions for which both have a score. Several answers to
+/// one question, by different people, count as their mean. The interval holds for all scores of answers without one, on
+/// the questions with a score on either side.
 pub(super) fn change(
     first: &[&ScoredAnswer],
     second: &[&ScoredAnswer],
@@ -86,10 +86,7 @@ pub(super) fn change(
         (n > 0).then(|| difference(&sums, squares, n))
     };
     let scored = estimate(&|[first, second]| Some(first.mean()? - second.mean()?))?;
-    if changes
-        .iter()
-        .all(|(_, sides)| sides.iter().all(|side| side.missing == 0))
-    {
+    if changes.iter().all(|(_, sides)| sides.iter().all(|side| side.missing == 0)) {
         return Some(scored);
     }
     let bounds = [(0.0, 1.0), (1.0, 0.0)].map(|(first_points, second_points)| {

@@ -57,10 +57,7 @@ impl Group {
 /// Groups to score: all questions, then each split and each category if there are several.
 pub(super) fn groups(questions: &[QuestionGroups]) -> Vec<Group> {
     let splits: BTreeSet<&String> = questions.iter().map(|question| &question.split).collect();
-    let categories: BTreeSet<&String> = questions
-        .iter()
-        .map(|question| &question.category)
-        .collect();
+    let categories: BTreeSet<&String> = questions.iter().map(|question| &question.category).collect();
     let mut groups = vec![Group::All];
     if splits.len() > 1 {
         groups.extend(splits.into_iter().cloned().map(Group::Split));

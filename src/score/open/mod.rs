@@ -1,7 +1,7 @@
 //! Scores of open answers from the marks of a judge: [`OpenSummary`].
 //!
-//! A score is 100 · mean((clip(mark, 1, 5) − 1) / 4) (Majumdar et al. 2024, CVPR, section 4.2). Questions about one walk share
-//! its frames, so the walks are the clusters. With a single walk, the questions are the clusters.
+//! A score is 100 · mean((clip(mark, 1, 5) − 1) / 4) (Majumdar et al. 2024, CVPR, section 4.2). Questions about one
+//! walk share its frames, so the walks are the clusters. With a single walk, the questions are the clusters.
 
 mod answer;
 mod cell;
@@ -43,22 +43,15 @@ impl OpenSummary {
     /// Score of a subject on a group.
     #[must_use]
     pub fn cell(&self, subject: &ModelInCondition, group: &Group) -> Option<&OpenCell> {
-        self.cells
-            .iter()
-            .find(|cell| cell.subject == *subject && cell.group == *group)
+        self.cells.iter().find(|cell| cell.subject == *subject && cell.group == *group)
     }
 
     /// Difference of a subject from a baseline on a group.
     #[must_use]
-    pub fn change(
-        &self,
-        subject: &ModelInCondition,
-        baseline: Baseline,
-        group: &Group,
-    ) -> Option<&ScoreChange> {
-        self.changes.iter().find(|change| {
-            change.subject == *subject && change.baseline == baseline && change.group == *group
-        })
+    pub fn change(&self, subject: &ModelInCondition, baseline: Baseline, group: &Group) -> Option<&ScoreChange> {
+        self.changes
+            .iter()
+            .find(|change| change.subject == *subject && change.baseline == baseline && change.group == *group)
     }
 
     /// All groups that have a score, sorted.
@@ -81,57 +74,37 @@ pub fn open_summary_listed(
     questions: &[QuestionGroups],
     listing: &ModelListing,
 ) -> OpenSummary {
-    let episodes: BTreeMap<&str, usize> = questions
-        .iter()
-        .map(|question| &*question.episode)
-        .collect::<BTreeSet<_>>()
-        .into_iter()
-        .zip(0..)
-        .collect();
+    let episodes: BTreeMap<&str, usize> =
+        questions.iter().map(|question| &*question.episode).collect::<BTreeSet<_>>().into_iter().zip(0..).collect();
     let by_walk = episodes.len() > 1;
     let clusters: Vec<usize> = questions
         .iter()
         .enumerate()
-        .map(|(index, question)| {
-            if by_walk {
-                episodes[&*question.episode]
-            } else {
-                index
-            }
-        })
+        .map(|(index, question)| if by_walk { episodes[&*question.episode] } else { index })
         .collect();
     let mut by_subject = BTreeMap::<&ModelInCondition, Vec<&ScoredAnswer>>::new();
     for answer in answers {
         by_subject.entry(&answer.subject).or_default().push(answer);
     }
     let groups = groups(questions);
-    let mut by_subject: Vec<(&ModelInCondition, Vec<&ScoredAnswer>)> =
-        by_subject.into_iter().collect();
+    let mut by_subject: Vec<(&ModelInCondition, Vec<&ScoredAnswer>)> = by_subject.into_iter().collect();
     by_subject.sort_by_cached_key(|(subject, _)| listing.place(&subject.model));
     let (mut cells, mut changes) = (Vec::new(), Vec::new());
     for (subject, answers) in &by_subject {
         for group in &groups {
-            let in_group: Vec<&ScoredAnswer> = answers
-                .iter()
-                .filter(|answer| group.contains(&questions[answer.question]))
-                .copied()
-                .collect();
+            let in_group: Vec<&ScoredAnswer> =
+                answers.iter().filter(|answer| group.contains(&questions[answer.question])).copied().collect();
             cells.push(cell(subject, group, &in_group, &clusters));
         }
         for (baseline, other) in baselines(subject) {
-            let Some((_, baseline_answers)) = by_subject
-                .iter()
-                .find(|(subject, _)| subject.matches_up_to_group(&other))
+            let Some((_, baseline_answers)) =
+                by_subject.iter().find(|(subject, _)| subject.matches_up_to_group(&other))
             else {
                 continue;
             };
             for group in &groups {
-                let difference = change(
-                    answers,
-                    baseline_answers,
-                    |question| group.contains(&questions[question]),
-                    &clusters,
-                );
+                let difference =
+                    change(answers, baseline_answers, |question| group.contains(&questions[question]), &clusters);
                 changes.extend(difference.map(|difference| ScoreChange {
                     subject: (*subject).clone(),
                     baseline,
@@ -143,11 +116,7 @@ pub fn open_summary_listed(
     }
     OpenSummary {
         unit: if by_walk { "episode" } else { "question" },
-        clusters: if by_walk {
-            episodes.len()
-        } else {
-            questions.len()
-        },
+        clusters: if by_walk { episodes.len() } else { questions.len() },
         cells,
         changes,
         listing: listing.clone(),

@@ -8,14 +8,13 @@ use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, pooled_models};
 use crate::significance::holm;
 use crate::statistics::auc::{Auc, PairCounts, RankedReply};
-use darkqa_base::types::{
-    AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, Variant, View,
-};
+use darkqa_base::types::{AxisLevel, Digest, EnhancerName, Family, FrameId, ImageFidelity, Variant, View};
 
 /// Relation between the similarity of images to their clean frames and the answers.
 ///
-/// Within a condition, only replies of the same model and family are compared: pairs across conditions would only show that darkness costs
-/// accuracy. Models are pooled; built-in reference models are left out if there are others, and never pooled with each other.
+/// Within a condition, only replies of the same model and family are compared: pairs across conditions would only show
+/// that darkness costs accuracy. Models are pooled; built-in reference models are left out if there are others, and
+/// never pooled with each other.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FidelityFindings {
     /// Models whose replies are counted.
@@ -26,8 +25,8 @@ pub struct FidelityFindings {
     pub within: [Option<Auc>; 2],
     /// p-value of the AUC of PSNR after the correction over all tests behind sentences.
     pub p_report: Option<f64>,
-    /// Spearman's rank correlation of mean accuracy with mean PSNR and with mean SSIM, over the conditions; descriptive, without a test.
-    /// `None` with fewer than three conditions.
+    /// Spearman's rank correlation of mean accuracy with mean PSNR and with mean SSIM, over the conditions;
+    /// descriptive, without a test. `None` with fewer than three conditions.
     pub between: [Option<f64>; 2],
 }
 
@@ -61,8 +60,8 @@ pub struct Prediction {
 /// PSNR and SSIM of images.
 type Measured<'a> = HashMap<ImageKey<'a>, [Option<f64>; 2]>;
 
-/// A frame and the digest of an image of it. Both are needed, because two frames may have the same image, for example a black one, but
-/// different clean frames.
+/// A frame and the digest of an image of it. Both are needed, because two frames may have the same image, for example a
+/// black one, but different clean frames.
 type ImageKey<'a> = (&'a FrameId, Digest);
 
 /// A condition of the trials with its subjects, one for each model.
@@ -74,24 +73,14 @@ impl FidelityFindings {
     pub fn new<'a>(grid: &Grid<'a>, measured: &'a [ImageFidelity]) -> Option<Self> {
         let measured: Measured<'_> = measured
             .iter()
-            .map(|image| {
-                (
-                    (&*image.frame, image.image),
-                    [Some(image.psnr.unwrap_or(f64::INFINITY)), image.ssim],
-                )
-            })
+            .map(|image| ((&*image.frame, image.image), [Some(image.psnr.unwrap_or(f64::INFINITY)), image.ssim]))
             .collect();
         if measured.is_empty() {
             return None;
         }
-        let pool = pooled_models(
-            grid.listing.without_people(
-                grid.subjects
-                    .iter()
-                    .filter(|subject| subject.view == Some(View::Image))
-                    .map(|subject| &*subject.model),
-            ),
-        );
+        let pool = pooled_models(grid.listing.without_people(
+            grid.subjects.iter().filter(|subject| subject.view == Some(View::Image)).map(|subject| &*subject.model),
+        ));
         let mut conditions = BTreeMap::<ConditionKey<'_>, Vec<usize>>::new();
         let mut models = BTreeSet::new();
         for (index, subject) in grid.subjects.iter().enumerate() {
@@ -108,9 +97,7 @@ impl FidelityFindings {
             .filter_map(|(key, subjects)| {
                 let sums = ConditionSums::new(grid, &subjects, &measured);
                 let (row, pairs) = (sums.row(key)?, &sums.pairs);
-                all.iter_mut()
-                    .zip(pairs)
-                    .for_each(|(all, pairs)| all.extend(pairs));
+                all.iter_mut().zip(pairs).for_each(|(all, pairs)| all.extend(pairs));
                 Some(row)
             })
             .collect();
@@ -131,9 +118,7 @@ impl FidelityFindings {
     #[must_use]
     pub fn condition(&self, subject: &ModelInCondition) -> Option<&ConditionFidelity> {
         self.conditions.iter().find(|row| {
-            Some(row.level) == subject.level
-                && row.variant == subject.variant
-                && row.enhancer == subject.enhancer
+            Some(row.level) == subject.level && row.variant == subject.variant && row.enhancer == subject.enhancer
         })
     }
 }
@@ -175,11 +160,7 @@ impl<'a> ConditionSums<'a> {
                 sums.replies += 1;
                 let stratum = strata.entry(&*item.asked.family).or_default();
                 for (replies, number) in stratum.iter_mut().zip(numbers) {
-                    replies.extend(number.map(|number| RankedReply {
-                        cluster: item.cluster,
-                        number,
-                        right,
-                    }));
+                    replies.extend(number.map(|number| RankedReply { cluster: item.cluster, number, right }));
                 }
             }
             for stratum in strata.values_mut() {
@@ -201,8 +182,7 @@ impl<'a> ConditionSums<'a> {
             variant: variant.clone(),
             enhancer: enhancer.cloned(),
             images: self.images.len(),
-            means: [0, 1]
-                .map(|index| mean(self.images.values().filter_map(|numbers| numbers[index]))),
+            means: [0, 1].map(|index| mean(self.images.values().filter_map(|numbers| numbers[index]))),
             accuracy: self.right as f64 / self.replies as f64,
             replies: self.replies,
             predicts: [0, 1].map(|index| {
@@ -213,7 +193,8 @@ impl<'a> ConditionSums<'a> {
     }
 }
 
-/// Mean of the finite numbers, summed in increasing order, so that it does not depend on their order; `None` without finite numbers.
+/// Mean of the finite numbers, summed in increasing order, so that it does not depend on their order; `None` without
+/// finite numbers.
 fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
     let mut finite: Vec<f64> = numbers.filter(|number| number.is_finite()).collect();
     finite.sort_by(f64::total_cmp);
@@ -223,27 +204,20 @@ fn mean(numbers: impl Iterator<Item = f64>) -> Option<f64> {
 /// Applies Holm's correction over the conditions, for PSNR and for SSIM.
 fn correct(rows: &mut [ConditionFidelity]) {
     for index in 0..2 {
-        let mut predictions: Vec<&mut Prediction> = rows
-            .iter_mut()
-            .filter_map(|row| row.predicts[index].as_mut())
-            .collect();
-        let values: Vec<f64> = predictions
-            .iter()
-            .map(|prediction| prediction.auc.p)
-            .collect();
+        let mut predictions: Vec<&mut Prediction> =
+            rows.iter_mut().filter_map(|row| row.predicts[index].as_mut()).collect();
+        let values: Vec<f64> = predictions.iter().map(|prediction| prediction.auc.p).collect();
         for (prediction, holm) in predictions.iter_mut().zip(holm(&values)) {
             prediction.holm = holm;
         }
     }
 }
 
-/// Spearman's rank correlation of mean accuracy and mean fidelity over the conditions; `None` with fewer than three conditions, or if one
-/// of the two is constant.
+/// Spearman's rank correlation of mean accuracy and mean fidelity over the conditions; `None` with fewer than three
+/// conditions, or if one of the two is constant.
 fn rank_correlation(rows: &[ConditionFidelity], index: usize) -> Option<f64> {
-    let (fidelity, accuracy): (Vec<f64>, Vec<f64>) = rows
-        .iter()
-        .filter_map(|row| Some((row.means[index]?, row.accuracy)))
-        .unzip();
+    let (fidelity, accuracy): (Vec<f64>, Vec<f64>) =
+        rows.iter().filter_map(|row| Some((row.means[index]?, row.accuracy))).unzip();
     if fidelity.len() < 3 {
         return None;
     }
@@ -265,10 +239,7 @@ fn ranks(numbers: &[f64]) -> Vec<f64> {
         .iter()
         .map(|number: &f64| {
             let below = numbers.iter().filter(|other| *other < number).count();
-            let equal = numbers
-                .iter()
-                .filter(|other| other.total_cmp(number).is_eq())
-                .count();
+            let equal = numbers.iter().filter(|other| other.total_cmp(number).is_eq()).count();
             below as f64 + f64::midpoint(equal as f64, 1.0)
         })
         .collect()

@@ -63,7 +63,8 @@ pub struct PairDarkness {
     pub is_lower_bound: bool,
     /// Number of frames that are not brighter than their photograph.
     pub brighter: usize,
-    /// Medians over the frames of the drop by the mean and of the drop by the median of pixels; `None` if they cannot be measured.
+    /// Medians over the frames of the drop by the mean and of the drop by the median of pixels; `None` if they cannot
+    /// be measured.
     pub mean_and_median: Option<[f64; 2]>,
 }
 
@@ -79,11 +80,7 @@ impl PairDarkness {
     #[must_use]
     pub fn new(name: &PhotoName, facts: &[PairFacts]) -> Option<Self> {
         let all = sorted(facts, PairFacts::ev);
-        let ev = [
-            quantile(&all, 0.25)?,
-            quantile(&all, 0.5)?,
-            quantile(&all, 0.75)?,
-        ];
+        let ev = [quantile(&all, 0.25)?, quantile(&all, 0.5)?, quantile(&all, 0.75)?];
         let mean = quantile(&sorted(facts, |facts| facts.median.and(facts.mean)), 0.5);
         let median = quantile(&sorted(facts, |facts| facts.mean.and(facts.median)), 0.5);
         let matching = quantile(&sorted(facts, PairFacts::matching), 0.5);
@@ -190,10 +187,7 @@ mod tests {
     #[test]
     fn what_the_data_state_goes_first_and_is_no_lower_bound() {
         let pairs = pair(&[(Some(8.0), 6.9, 6.9)]);
-        assert_eq!(
-            pairs.long(),
-            "8.0 EV (quartiles 8.00–8.00), as the data state"
-        );
+        assert_eq!(pairs.long(), "8.0 EV (quartiles 8.00–8.00), as the data state");
         assert!(pairs.warnings().is_empty());
         let measured = pair(&[(None, 6.9, 6.9)]);
         assert_eq!(measured.short(), "≥ 6.9 EV");
@@ -203,11 +197,7 @@ mod tests {
     #[test]
     fn swapped_pairs_and_other_tones_are_told() {
         let swapped = pair(&[(None, -3.0, -3.1)]);
-        assert!(
-            swapped.warnings()[0].contains("swapped"),
-            "{:?}",
-            swapped.warnings()
-        );
+        assert!(swapped.warnings()[0].contains("swapped"), "{:?}", swapped.warnings());
         let some = pair(&[(None, 3.0, 3.0), (None, 3.0, 3.1), (None, 0.0, 0.0)]);
         assert!(some.warnings()[0].starts_with("1 of 3 photographs dark are not darker"));
         let tone = pair(&[(None, 2.17, 3.33)]);
@@ -216,19 +206,10 @@ mod tests {
 
     #[test]
     fn black_images_are_counted() {
-        let facts = [
-            PairFacts::default(),
-            PairFacts {
-                mean: Some(2.0),
-                ..PairFacts::default()
-            },
-        ];
+        let facts = [PairFacts::default(), PairFacts { mean: Some(2.0), ..PairFacts::default() }];
         let pairs = PairDarkness::new(&PhotoName::numbered(0), &facts).unwrap();
         assert_eq!((pairs.frames, pairs.unknown), (1, 1));
         assert!(pairs.warnings()[0].contains("are black"));
-        assert_eq!(
-            PairDarkness::new(&PhotoName::numbered(0), &facts[..1]),
-            None
-        );
+        assert_eq!(PairDarkness::new(&PhotoName::numbered(0), &facts[..1]), None);
     }
 }

@@ -2,8 +2,8 @@
 
 use darkqa_base::types::SetLight;
 
-/// Minimum mean linear brightness of photographs of well-lit scenes (chosen: a well-lit room has about 0.15, and 0.04 when two stops
-/// darker).
+/// Minimum mean linear brightness of photographs of well-lit scenes (chosen: a well-lit room has about 0.15, and 0.04
+/// when two stops darker).
 const BRIGHT: f64 = 0.08;
 
 /// Light in which the photographs of a data set were taken.
@@ -11,7 +11,8 @@ const BRIGHT: f64 = 0.08;
 pub struct PhotographedSet {
     /// Whether the photographs were taken in the dark.
     pub light: SetLight,
-    /// Mean linear luminance of a sample of the photographs, from 0 to 1, and size of the sample; `None` if it was not measured.
+    /// Mean linear luminance of a sample of the photographs, from 0 to 1, and size of the sample; `None` if it was not
+    /// measured.
     pub brightness: Option<(f64, usize)>,
 }
 
@@ -22,7 +23,9 @@ impl PhotographedSet {
             return None;
         }
         let brightness = self.brightness.map(|(mean, frames)| {
-            format!(" Their mean linear brightness is {mean:.4} of 1 (measured on {frames}); a mid-grey, code 128, is 0.22.")
+            format!(
+                " Their mean linear brightness is {mean:.4} of 1 (measured on {frames}); a mid-grey, code 128, is 0.22."
+            )
         });
         let is_bright = self.brightness.is_some_and(|(mean, _)| mean >= BRIGHT);
         let doubt = if is_bright {

@@ -1,5 +1,5 @@
-//! The area under the receiver operating characteristic (AUC) for clustered replies: how well a number predicts right replies
-//! ([`PairCounts`]).
+//! The area under the receiver operating characteristic (AUC) for clustered replies: how well a number predicts right
+//! replies ([`PairCounts`]).
 
 use super::estimate::Estimate;
 use super::quantiles::{degrees_of_freedom, student};
@@ -23,9 +23,9 @@ pub struct RankedReply {
 
 /// Pairs of a right and a wrong reply of one stratum, summed over strata.
 ///
-/// A pair is concordant if the right reply has the higher number; ties count half. The share of concordant pairs is the AUC
-/// (Hanley and McNeil 1982, Radiology 143:29). Because the replies of a cluster are not independent, the variance is computed between
-/// clusters, from the pairs of each cluster with all replies (Obuchowski 1997, Biometrics 53:567).
+/// A pair is concordant if the right reply has the higher number; ties count half. The share of concordant pairs is the
+/// AUC (Hanley and McNeil 1982, Radiology 143:29). Because the replies of a cluster are not independent, the variance
+/// is computed between clusters, from the pairs of each cluster with all replies (Obuchowski 1997, Biometrics 53:567).
 #[derive(Debug, Clone)]
 pub struct PairCounts {
     /// Concordant pairs and all pairs of each cluster. A pair counts in the cluster of each of its two replies.
@@ -47,13 +47,7 @@ pub struct Auc {
 
 impl PairCounts {
     pub fn new(clusters: usize) -> Self {
-        Self {
-            clusters: vec![[0.0; 2]; clusters],
-            concordant: 0.0,
-            pairs: 0.0,
-            right: 0,
-            wrong: 0,
-        }
+        Self { clusters: vec![[0.0; 2]; clusters], concordant: 0.0, pairs: 0.0, right: 0, wrong: 0 }
     }
 
     /// Adds the pairs within one stratum. Sorts `replies` by their numbers.
@@ -100,8 +94,8 @@ impl PairCounts {
         self.wrong += other.wrong;
     }
 
-    /// The AUC with its interval on the logit scale. `None` if there are too few replies or clusters, or if all pairs agree, so that
-    /// no variance can be estimated.
+    /// The AUC with its interval on the logit scale. `None` if there are too few replies or clusters, or if all pairs
+    /// agree, so that no variance can be estimated.
     pub fn auc(&self) -> Option<Auc> {
         let used = self.clusters.iter().filter(|cluster| cluster[1] > 0.0);
         let count = used.clone().count();
@@ -109,13 +103,8 @@ impl PairCounts {
             return None;
         }
         let (c, value) = (count as f64, self.concordant / self.pairs);
-        let influences: Vec<f64> = used
-            .map(|[concordant, pairs]| (concordant - value * pairs) / self.pairs)
-            .collect();
-        let squares: f64 = influences
-            .iter()
-            .map(|influence| influence * influence)
-            .sum();
+        let influences: Vec<f64> = used.map(|[concordant, pairs]| (concordant - value * pairs) / self.pairs).collect();
+        let squares: f64 = influences.iter().map(|influence| influence * influence).sum();
         let error = (c / (c - 1.0) * squares).sqrt();
         let slope = value * (1.0 - value);
         if error <= 0.0 || slope <= 0.0 {
@@ -148,13 +137,7 @@ mod tests {
     use super::*;
 
     fn replies(list: &[(u32, f64, bool)]) -> Vec<RankedReply> {
-        list.iter()
-            .map(|&(cluster, number, right)| RankedReply {
-                cluster,
-                number,
-                right,
-            })
-            .collect()
+        list.iter().map(|&(cluster, number, right)| RankedReply { cluster, number, right }).collect()
     }
 
     /// Eight replies in each of `clusters` clusters. Multiples of the golden ratio spread their numbers evenly.
@@ -184,13 +167,7 @@ mod tests {
     fn pair_counts_match_a_manual_count() {
         let mut counts = PairCounts::new(2);
         // Right: 1, 2, 3; wrong: 0, 2. Pairs: 1>0, 2>0, 3>0, 3>2 are concordant, 2=2 is tied, 1<2 is not.
-        counts.add(&mut replies(&[
-            (0, 1.0, true),
-            (0, 0.0, false),
-            (1, 2.0, true),
-            (1, 2.0, false),
-            (1, 3.0, true),
-        ]));
+        counts.add(&mut replies(&[(0, 1.0, true), (0, 0.0, false), (1, 2.0, true), (1, 2.0, false), (1, 3.0, true)]));
         let sums = [counts.concordant, counts.pairs];
         assert!((sums[0] - 4.5).abs() < 1e-12 && (sums[1] - 6.0).abs() < 1e-12);
         // Each pair is counted for both of its replies.
@@ -205,10 +182,7 @@ mod tests {
     #[test]
     fn predictive_numbers_are_detected() {
         let none = auc(&spread(20, 0.0), 20).unwrap();
-        assert!(
-            (none.estimate.value - 0.5).abs() < 0.05 && none.p > 0.05,
-            "{none:?}"
-        );
+        assert!((none.estimate.value - 0.5).abs() < 0.05 && none.p > 0.05, "{none:?}");
         let some = auc(&spread(20, 0.3), 20).unwrap();
         assert!(some.estimate.low > 0.5 && some.p < 0.001, "{some:?}");
         let reversed = auc(&spread(20, -0.3), 20).unwrap();
@@ -226,10 +200,7 @@ mod tests {
             pooled.extend(&once);
         }
         let (once, pooled) = (once.auc().unwrap(), pooled.auc().unwrap());
-        assert!(
-            (once.p - pooled.p).abs() < 1e-9 && once.p > 1e-6,
-            "{once:?}"
-        );
+        assert!((once.p - pooled.p).abs() < 1e-9 && once.p > 1e-6, "{once:?}");
         let (once, pooled) = (once.estimate, pooled.estimate);
         assert!((once.low - pooled.low).abs() < 1e-9, "{pooled:?}");
         assert!((once.high - pooled.high).abs() < 1e-9, "{pooled:?}");

@@ -9,18 +9,19 @@ use super::split_mix::SplitMix;
 const DRAWS: usize = 2000;
 /// Seed of the draws (chosen). It is fixed, so that the same records give the same intervals.
 const SEED: u64 = 0x6461_726b_7161;
-/// Maximum number of units that are drawn (chosen): the standard error then has a relative error of 1 %. With more clusters, a unit is a
-/// group of clusters, so that time and memory do not grow further.
+/// Maximum number of units that are drawn (chosen): the standard error then has a relative error of 1 %. With more
+/// clusters, a unit is a group of clusters, so that time and memory do not grow further.
 const MAX_UNITS: usize = 8192;
-/// Minimum number of units for an interval of percentiles alone (chosen). With 5 units they held 92.5 % of true thresholds, with the
-/// interval of Student's t 96.6 %.
+/// Minimum number of units for an interval of percentiles alone (chosen). With 5 units they held 92.5 % of true
+/// thresholds, with the interval of Student's t 96.6 %.
 const MIN_PERCENTILE_UNITS: usize = 8;
 
 /// Draws of all clusters with replacement. Every statistic uses the same draws, so that differences are paired.
 ///
-/// With more than [`MAX_UNITS`] clusters, random groups of clusters are drawn instead. All groups except the last have the same number of
-/// clusters. Groups of independent clusters are independent too, and a sum over groups has the variance of the sum over clusters (the
-/// method of random groups: Wolter 2007, Introduction to Variance Estimation, chapter 2).
+/// With more than [`MAX_UNITS`] clusters, random groups of clusters are drawn instead. All groups except the last have
+/// the same number of clusters. Groups of independent clusters are independent too, and a sum over groups has the
+/// variance of the sum over clusters (the method of random groups: Wolter 2007, Introduction to Variance Estimation,
+/// chapter 2).
 #[derive(Debug)]
 pub struct Resamples {
     /// The index of each cluster's unit.
@@ -56,10 +57,7 @@ impl Resamples {
         if together > 1 {
             random.shuffle(&mut order);
         }
-        let units = order
-            .into_iter()
-            .map(|place| (place / together) as u16)
-            .collect();
+        let units = order.into_iter().map(|place| (place / together) as u16).collect();
         let mut times = vec![0_u8; DRAWS * count];
         if let Ok(uniform) = Uniform::new(0, count as u64) {
             for draw in times.chunks_mut(count) {
@@ -69,11 +67,7 @@ impl Resamples {
                 }
             }
         }
-        Self {
-            units,
-            count,
-            times,
-        }
+        Self { units, count, times }
     }
 
     /// The number of clusters.
@@ -84,10 +78,7 @@ impl Resamples {
 
     /// The draws.
     pub fn all(&self) -> impl Iterator<Item = Draw<'_>> {
-        self.times.chunks(self.count.max(1)).map(|times| Draw {
-            units: &self.units,
-            times,
-        })
+        self.times.chunks(self.count.max(1)).map(|times| Draw { units: &self.units, times })
     }
 
     /// The sum over the clusters of each draw; `by_cluster` has one number for each cluster.
@@ -96,11 +87,7 @@ impl Resamples {
     /// If the length of `by_cluster` is not the number of clusters.
     #[must_use]
     pub fn sums(&self, by_cluster: &[f32]) -> Vec<f64> {
-        assert_eq!(
-            by_cluster.len(),
-            self.units.len(),
-            "one number for each cluster"
-        );
+        assert_eq!(by_cluster.len(), self.units.len(), "one number for each cluster");
         let mut by_unit = vec![0.0_f32; self.count];
         for (unit, number) in self.units.iter().zip(by_cluster) {
             by_unit[usize::from(*unit)] += number;
@@ -108,11 +95,7 @@ impl Resamples {
         self.times
             .chunks(self.count.max(1))
             .map(|times: &[u8]| -> f64 {
-                times
-                    .chunks(256)
-                    .zip(by_unit.chunks(256))
-                    .map(|(times, numbers)| sum_of_products(times, numbers))
-                    .sum()
+                times.chunks(256).zip(by_unit.chunks(256)).map(|(times, numbers)| sum_of_products(times, numbers)).sum()
             })
             .collect()
     }
@@ -120,8 +103,9 @@ impl Resamples {
     /// The 95 % interval of a statistic from its values in the draws, which may be infinite.
     ///
     /// The ends are percentiles, widened for few clusters by Student's distribution (Hesterberg 2015, Am. Stat. 69:371,
-    /// section 5.3, "expanded percentile"). The draws of fewer than [`MIN_PERCENTILE_UNITS`] units have no values far enough out, so
-    /// that the interval also covers that of Student's t with the standard deviation of the finite values.
+    /// section 5.3, "expanded percentile"). The draws of fewer than [`MIN_PERCENTILE_UNITS`] units have no values far
+    /// enough out, so that the interval also covers that of Student's t with the standard deviation of the finite
+    /// values.
     #[must_use]
     pub fn interval(&self, mut values: Vec<f64>) -> [f64; 2] {
         if values.is_empty() {
@@ -150,8 +134,8 @@ impl Resamples {
     }
 }
 
-/// The sum of the products of occurrences and numbers. Eight partial sums let the compiler use vector instructions. For integers the order
-/// does not matter, because sums below 2²⁴ are exact in `f32`.
+/// The sum of the products of occurrences and numbers. Eight partial sums let the compiler use vector instructions. For
+/// integers the order does not matter, because sums below 2²⁴ are exact in `f32`.
 fn sum_of_products(times: &[u8], numbers: &[f32]) -> f64 {
     let mut lanes = [0.0_f32; 8];
     let (whole, rest) = times.as_chunks::<8>();
@@ -161,11 +145,7 @@ fn sum_of_products(times: &[u8], numbers: &[f32]) -> f64 {
             lanes[lane] += f32::from(times[lane]) * numbers[lane];
         }
     }
-    let rest: f32 = rest
-        .iter()
-        .zip(rest_numbers)
-        .map(|(times, number)| f32::from(*times) * number)
-        .sum();
+    let rest: f32 = rest.iter().zip(rest_numbers).map(|(times, number)| f32::from(*times) * number).sum();
     f64::from(lanes.iter().sum::<f32>() + rest)
 }
 
@@ -213,11 +193,7 @@ mod tests {
             let draws = Resamples::new(usize::from(clusters));
             assert!(draws.count <= MAX_UNITS && draws.count > MAX_UNITS / 2);
             let ones = draws.sums(&vec![1.0; usize::from(clusters)]);
-            let means = draws
-                .sums(&numbers)
-                .into_iter()
-                .zip(ones)
-                .map(|(sum, n)| sum / n);
+            let means = draws.sums(&numbers).into_iter().zip(ones).map(|(sum, n)| sum / n);
             let [low, high] = draws.interval(means.collect());
             let half = 1.959_964 * (n * n / 12.0 / n).sqrt();
             let ratio = (high - low) / (2.0 * half);
@@ -233,10 +209,6 @@ mod tests {
         numbers[77] = 1.0;
         let sums = draws.sums(&numbers);
         let times = draws.all().map(|draw| draw.times(77));
-        assert!(
-            sums.iter()
-                .zip(times)
-                .all(|(sum, times)| (sum - times as f64).abs() < 0.5)
-        );
+        assert!(sums.iter().zip(times).all(|(sum, times)| (sum - times as f64).abs() < 0.5));
     }
 }

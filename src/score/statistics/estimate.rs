@@ -14,13 +14,10 @@ pub struct ClusterCount {
     pub replies: u32,
 }
 
-/// The counts with the missing replies of each cluster filled in, all of them right or all wrong. `missing` may be empty.
+/// The counts with the missing replies of each cluster filled in, all of them right or all wrong. `missing` may be
+/// empty.
 #[must_use]
-pub fn fill_missing(
-    counts: &[ClusterCount],
-    missing: &[u32],
-    are_right: bool,
-) -> Vec<ClusterCount> {
+pub fn fill_missing(counts: &[ClusterCount], missing: &[u32], are_right: bool) -> Vec<ClusterCount> {
     let missing = missing.iter().copied().chain(std::iter::repeat(0));
     counts
         .iter()
@@ -51,18 +48,15 @@ pub struct Estimate {
 /// The item whose estimate is furthest from 0 in either direction, and the first of equal ones; `None` without items.
 #[must_use]
 pub fn largest<'i, T>(items: &[&'i T], estimate: impl Fn(&T) -> Estimate) -> Option<&'i T> {
-    items.iter().copied().reduce(|largest, next| {
-        if estimate(next).value.abs() > estimate(largest).value.abs() {
-            next
-        } else {
-            largest
-        }
-    })
+    items
+        .iter()
+        .copied()
+        .reduce(|largest, next| if estimate(next).value.abs() > estimate(largest).value.abs() { next } else { largest })
 }
 
 impl Estimate {
-    /// The share of `right` among `n` independent trials, with Wilson's score interval (Wilson 1927, J. Am. Stat. Assoc.
-    /// 22:209). `None` without trials.
+    /// The share of `right` among `n` independent trials, with Wilson's score interval (Wilson 1927, J. Am. Stat.
+    /// Assoc. 22:209). `None` without trials.
     #[must_use]
     pub fn share(right: usize, n: usize) -> Option<Self> {
         if n == 0 || right > n {
@@ -74,13 +68,14 @@ impl Estimate {
 
     /// The share of right replies in clusters; `None` without replies.
     ///
-    /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of the share between
-    /// clusters, which is the sum of their squared [`residuals`] ([`variance_of_few`] for few clusters), over that of independent replies.
-    /// Student's quantile replaces the normal one. Dean and Pagano 2015 (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven
-    /// for clustered shares. With one reply per cluster it is Wilson's own. If all replies are right, or none, d is [`unknown_design_effect`].
+    /// The interval is Wilson's at the effective number of replies n / d. The design effect d ≥ 1 is the variance of
+    /// the share between clusters, which is the sum of their squared [`residuals`] ([`variance_of_few`] for few
+    /// clusters), over that of independent replies. Student's quantile replaces the normal one. Dean and Pagano 2015
+    /// (J. Surv. Stat. Methodol. 3:484) find this interval the best of seven for clustered shares. With one reply per
+    /// cluster it is Wilson's own. If all replies are right, or none, d is [`unknown_design_effect`].
     ///
-    /// The degrees of freedom follow from the clusters' residuals ([`degrees_of_freedom`]). The shares of wholly right and wholly wrong
-    /// clusters bound the interval ([`Self::bounded_by_whole_clusters`]).
+    /// The degrees of freedom follow from the clusters' residuals ([`degrees_of_freedom`]). The shares of wholly right
+    /// and wholly wrong clusters bound the interval ([`Self::bounded_by_whole_clusters`]).
     #[must_use]
     pub fn clustered(counts: &[ClusterCount]) -> Option<Self> {
         let answered = counts.iter().filter(|count| count.replies > 0);
@@ -88,29 +83,27 @@ impl Estimate {
         if answered.clone().all(|count| count.replies == 1) || answered.clone().count() == 1 {
             return Self::share(answered.map(|count| count.right as usize).sum(), n);
         }
-        let sums: Vec<(f64, f64)> = answered
-            .map(|count| (f64::from(count.right), f64::from(count.replies)))
-            .collect();
+        let sums: Vec<(f64, f64)> = answered.map(|count| (f64::from(count.right), f64::from(count.replies))).collect();
         Self::from_scores(&sums, 1.0, n)
     }
 
-    /// The share of right replies, with an interval that holds whatever the missing replies of each cluster would have been: it covers the
-    /// interval of the share with all of them wrong, and the one with all of them right. `None` without replies.
+    /// The share of right replies, with an interval that holds whatever the missing replies of each cluster would have
+    /// been: it covers the interval of the share with all of them wrong, and the one with all of them right. `None`
+    /// without replies.
     #[must_use]
     pub fn with_missing(counts: &[ClusterCount], missing: &[u32]) -> Option<Self> {
         let estimate = Self::clustered(counts)?;
         if missing.iter().all(|missing| *missing == 0) {
             return Some(estimate);
         }
-        let bounds = [false, true]
-            .map(|are_right| Self::clustered(&fill_missing(counts, missing, are_right)));
+        let bounds = [false, true].map(|are_right| Self::clustered(&fill_missing(counts, missing, are_right)));
         Some(estimate.covering(bounds.into_iter().flatten()))
     }
 
     /// The mean of scores between 0 and 1 in clusters, with the interval of [`Self::clustered`].
     ///
-    /// `sums` has, for each cluster, the sum and the number of its scores. A score may count as up to `max_weight` independent replies, if
-    /// it is the mean of several replies. `n` becomes the estimate's number of trials.
+    /// `sums` has, for each cluster, the sum and the number of its scores. A score may count as up to `max_weight`
+    /// independent replies, if it is the mean of several replies. `n` becomes the estimate's number of trials.
     #[must_use]
     pub fn from_scores(sums: &[(f64, f64)], max_weight: f64, n: usize) -> Option<Self> {
         let all: f64 = sums.iter().map(|(_, n)| n).sum();
@@ -131,24 +124,18 @@ impl Estimate {
         let effective = all / design_effect.max(1.0 / max_weight);
         // At the minimum design effect the variance is not an estimate, so the normal quantile is used.
         let min_effect = if has_spread { 1.0 / max_weight } else { 1.0 };
-        let quantile = if residuals.len() > 1 && design_effect > min_effect {
-            student(degrees_of_freedom(&residuals))
-        } else {
-            Z
-        };
+        let quantile =
+            if residuals.len() > 1 && design_effect > min_effect { student(degrees_of_freedom(&residuals)) } else { Z };
         let estimate = Self::wilson(value, effective, quantile, n);
-        Some(if has_spread {
-            estimate.bounded_by_whole_clusters(sums)
-        } else {
-            estimate
-        })
+        Some(if has_spread { estimate.bounded_by_whole_clusters(sums) } else { estimate })
     }
 
-    /// Narrows the interval by two bounds: the share of right replies is at least the share of wholly right clusters, and at most one minus
-    /// the share of wholly wrong clusters. The bounds use the lower ends of the exact intervals of these shares.
+    /// Narrows the interval by two bounds: the share of right replies is at least the share of wholly right clusters,
+    /// and at most one minus the share of wholly wrong clusters. The bounds use the lower ends of the exact intervals
+    /// of these shares.
     ///
-    /// The bounds are invalid if clusters differ much in size, so they are not applied if the largest cluster has three times the mean size
-    /// or more.
+    /// The bounds are invalid if clusters differ much in size, so they are not applied if the largest cluster has three
+    /// times the mean size or more.
     fn bounded_by_whole_clusters(self, sums: &[(f64, f64)]) -> Self {
         const ROUNDING: f64 = 1e-9;
         let all: f64 = sums.iter().map(|(_, n)| n).sum();
@@ -156,17 +143,10 @@ impl Estimate {
         if largest >= 3.0 * all / sums.len() as f64 {
             return self;
         }
-        let right = sums
-            .iter()
-            .filter(|(sum, n)| *sum >= n * (1.0 - ROUNDING))
-            .count();
+        let right = sums.iter().filter(|(sum, n)| *sum >= n * (1.0 - ROUNDING)).count();
         let wrong = sums.iter().filter(|(sum, n)| *sum <= n * ROUNDING).count();
         let [right, wrong] = [right, wrong].map(|whole| least_share(whole, sums.len()));
-        Self {
-            low: self.low.max(right.min(self.value)),
-            high: self.high.min((1.0 - wrong).max(self.value)),
-            ..self
-        }
+        Self { low: self.low.max(right.min(self.value)), high: self.high.min((1.0 - wrong).max(self.value)), ..self }
     }
 
     /// Wilson's score interval about `value` for `count` effective replies.
@@ -176,12 +156,7 @@ impl Estimate {
         let center = (value + square / (2.0 * count)) / scale;
         let spread = value * (1.0 - value) / count + square / (4.0 * count * count);
         let half = quantile / scale * spread.sqrt();
-        Self {
-            value,
-            low: (center - half).clamp(0.0, value),
-            high: (center + half).clamp(value, 1.0),
-            n,
-        }
+        Self { value, low: (center - half).clamp(0.0, value), high: (center + half).clamp(value, 1.0), n }
     }
 
     /// The estimate with its interval widened to cover those of `others`.
@@ -197,23 +172,13 @@ impl Estimate {
     /// A value with this interval, widened to contain the value.
     #[must_use]
     pub fn around(value: f64, [low, high]: [f64; 2], n: usize) -> Self {
-        Self {
-            value,
-            low: low.min(value),
-            high: high.max(value),
-            n,
-        }
+        Self { value, low: low.min(value), high: high.max(value), n }
     }
 
     /// A share that is known exactly: the interval is the value itself.
     #[must_use]
     pub fn exact(value: f64, n: usize) -> Self {
-        Self {
-            value,
-            low: value,
-            high: value,
-            n,
-        }
+        Self { value, low: value, high: value, n }
     }
 }
 
@@ -223,8 +188,8 @@ mod tests {
 
     #[test]
     fn wilson_matches_published_values() {
-        // statsmodels 0.15.0, proportion_confint(method="wilson"); the first four are those of Newcombe 1998 (Stat. Med. 17:857),
-        // table I, method 3.
+        // statsmodels 0.15.0, proportion_confint(method="wilson"); the first four are those of Newcombe 1998 (Stat.
+        // Med. 17:857), table I, method 3.
         for (right, n, low, high) in [
             (81, 263, 0.2552885198782742, 0.36620957698280004),
             (15, 148, 0.06238639953073628, 0.16048724172330803),
@@ -234,10 +199,7 @@ mod tests {
             (3911, 15600, 0.2439657326535477, 0.25756726993901735),
         ] {
             let share = Estimate::share(right, n).unwrap();
-            assert!(
-                (share.low - low).abs() < 1e-9 && (share.high - high).abs() < 1e-9,
-                "{right}/{n}: {share:?}"
-            );
+            assert!((share.low - low).abs() < 1e-9 && (share.high - high).abs() < 1e-9, "{right}/{n}: {share:?}");
         }
         assert_eq!(Estimate::share(0, 0), None);
         let all = Estimate::share(7, 7).unwrap();
@@ -245,10 +207,7 @@ mod tests {
     }
 
     fn counts(pairs: &[(u32, u32)]) -> Vec<ClusterCount> {
-        pairs
-            .iter()
-            .map(|&(right, replies)| ClusterCount { right, replies })
-            .collect()
+        pairs.iter().map(|&(right, replies)| ClusterCount { right, replies }).collect()
     }
 
     #[test]
@@ -256,20 +215,7 @@ mod tests {
         // Independent implementation with numpy 2 and scipy 1.17.1.
         let one_bad = [vec![(180, 180); 51], vec![(20, 180)]].concat();
         let few = [4, 4, 3, 4, 0, 2, 4, 4, 1, 4].map(|right| (right, 4));
-        let unequal = [
-            (9, 10),
-            (3, 4),
-            (0, 6),
-            (7, 7),
-            (8, 9),
-            (8, 9),
-            (1, 3),
-            (0, 2),
-            (2, 4),
-            (5, 6),
-            (5, 9),
-            (6, 8),
-        ];
+        let unequal = [(9, 10), (3, 4), (0, 6), (7, 7), (8, 9), (8, 9), (1, 3), (0, 2), (2, 4), (5, 6), (5, 9), (6, 8)];
         // One cluster has a third of all replies.
         let small = [5, 4, 5, 3, 5, 5, 4, 2, 5, 4, 5, 5, 3, 5, 4, 5].map(|right| (right, 5));
         let third = [&[(14, 40)], &small[..]].concat();
@@ -293,16 +239,7 @@ mod tests {
             assert!((share.high - high).abs() < 1e-9, "{pairs:?}: {share:?}");
         }
         // One cluster has most replies, so whole clusters do not bound the share.
-        let large = [
-            (1, 1),
-            (2, 2),
-            (2, 2),
-            (5, 5),
-            (9, 90),
-            (0, 3),
-            (0, 3),
-            (3, 3),
-        ];
+        let large = [(1, 1), (2, 2), (2, 2), (5, 5), (9, 90), (0, 3), (0, 3), (3, 3)];
         let share = Estimate::clustered(&counts(&large)).unwrap();
         assert!(share.low < least_share(5, 8), "{share:?}");
     }
@@ -310,20 +247,14 @@ mod tests {
     #[test]
     fn correlated_replies_count_for_fewer() {
         // 40 of 80 are right: half of every cluster, or all or none of each cluster.
-        let (spread, clumped) = (
-            clustered(&[(2, 4); 20]),
-            clustered(&[[(4, 4); 10], [(0, 4); 10]].concat()),
-        );
+        let (spread, clumped) = (clustered(&[(2, 4); 20]), clustered(&[[(4, 4); 10], [(0, 4); 10]].concat()));
         assert_eq!((spread.value, spread.n), (0.5, 80));
         let independent = Estimate::share(40, 80).unwrap();
         assert!(width(spread) >= width(independent) && width(spread) < 1.1 * width(independent));
         assert!(width(clumped) > 1.9 * width(independent));
         // One reply per cluster gives Wilson's own interval; empty clusters are ignored.
         let single = [vec![(1, 1); 15], vec![(0, 1); 133], vec![(0, 0); 9]].concat();
-        assert_eq!(
-            Estimate::clustered(&counts(&single)),
-            Estimate::share(15, 148)
-        );
+        assert_eq!(Estimate::clustered(&counts(&single)), Estimate::share(15, 148));
         // All replies are right: the interval is wider than for the same number of independent replies.
         let (all, alone) = (clustered(&[(4, 4); 20]), Estimate::share(80, 80).unwrap());
         assert!(all.low < alone.low && all.low > 0.85, "{all:?}");

@@ -1,8 +1,10 @@
-//! Quantiles and tails of distributions: [`student`] with its [`degrees_of_freedom`], [`two_sided_tail`], and [`least_share`].
+//! Quantiles and tails of distributions: [`student`] with its [`degrees_of_freedom`], [`two_sided_tail`], and
+//! [`least_share`].
 
 use statrs::distribution::{Beta, ContinuousCDF as _, StudentsT};
 
-/// The 97.5 % quantile of Student's t distribution with `degrees` degrees of freedom, not necessarily an integer; infinite for 0.
+/// The 97.5 % quantile of Student's t distribution with `degrees` degrees of freedom, not necessarily an integer;
+/// infinite for 0.
 #[must_use]
 pub(crate) fn student(degrees: f64) -> f64 {
     quantile(0.975, degrees)
@@ -14,18 +16,20 @@ pub(crate) fn quantile(share: f64, degrees: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees).map_or(f64::INFINITY, |student| student.inverse_cdf(share))
 }
 
-/// The two-sided tail probability of Student's t: that it is at least `distance` away from 0. 1 for 0 degrees of freedom.
+/// The two-sided tail probability of Student's t: that it is at least `distance` away from 0. 1 for 0 degrees of
+/// freedom.
 #[must_use]
 pub(crate) fn two_sided_tail(distance: f64, degrees: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees).map_or(1.0, |student| (2.0 * student.sf(distance)).min(1.0))
 }
 
-/// Degrees of freedom of a variance between C clusters, from the clusters' residuals r: C / (κ − 1), limited to 2 to C − 1, with the
-/// kurtosis κ = C Σr⁴ / (Σr²)².
+/// Degrees of freedom of a variance between C clusters, from the clusters' residuals r: C / (κ − 1), limited to 2 to C
+/// − 1, with the kurtosis κ = C Σr⁴ / (Σr²)².
 ///
-/// The variance of a variance grows with the kurtosis (Satterthwaite 1946, Biometrics Bull. 2:110, gives 2C / (κ − 1)). κ is estimated from
-/// the same clusters and is too small if a few clusters dominate the variance. In simulations, intervals with half of Satterthwaite's
-/// number cover the truth even if shares are near 0 or 1 and clusters are strongly correlated (`tests/program/scores/coverage/`).
+/// The variance of a variance grows with the kurtosis (Satterthwaite 1946, Biometrics Bull. 2:110, gives 2C / (κ − 1)).
+/// κ is estimated from the same clusters and is too small if a few clusters dominate the variance. In simulations,
+/// intervals with half of Satterthwaite's number cover the truth even if shares are near 0 or 1 and clusters are
+/// strongly correlated (`tests/program/scores/coverage/`).
 #[must_use]
 pub(crate) fn degrees_of_freedom(residuals: &[f64]) -> f64 {
     let c = residuals.len() as f64;
@@ -33,15 +37,11 @@ pub(crate) fn degrees_of_freedom(residuals: &[f64]) -> f64 {
     let second: f64 = squares.clone().sum();
     let fourth: f64 = squares.map(|square| square * square).sum();
     let kurtosis = c * fourth / (second * second);
-    if kurtosis > 1.0 {
-        (c / (kurtosis - 1.0)).clamp(f64::min(2.0, c - 1.0), c - 1.0)
-    } else {
-        c - 1.0
-    }
+    if kurtosis > 1.0 { (c / (kurtosis - 1.0)).clamp(f64::min(2.0, c - 1.0), c - 1.0) } else { c - 1.0 }
 }
 
-/// The lower end of the exact 95 % interval of a share, from `hits` of `n` independent trials (Clopper and Pearson 1934, Biometrika
-/// 26:404).
+/// The lower end of the exact 95 % interval of a share, from `hits` of `n` independent trials (Clopper and Pearson
+/// 1934, Biometrika 26:404).
 #[must_use]
 pub(crate) fn least_share(hits: usize, n: usize) -> f64 {
     Beta::new(hits as f64, (n - hits) as f64 + 1.0).map_or(0.0, |beta| beta.inverse_cdf(0.025))
@@ -87,10 +87,7 @@ mod tests {
             (120, 1.979_930_405),
             (1000, 1.962_339_081),
         ] {
-            assert!(
-                (student(f64::from(degrees)) - expected).abs() < 1e-9,
-                "{degrees}"
-            );
+            assert!((student(f64::from(degrees)) - expected).abs() < 1e-9, "{degrees}");
         }
         assert!(student(0.0).is_infinite());
     }
@@ -98,10 +95,7 @@ mod tests {
     #[test]
     fn tails_match_the_quantiles() {
         for (degrees, quantile) in STUDENTS {
-            assert!(
-                (two_sided_tail(quantile, degrees) - 0.05).abs() < 1e-9,
-                "{degrees}"
-            );
+            assert!((two_sided_tail(quantile, degrees) - 0.05).abs() < 1e-9, "{degrees}");
         }
         assert!((two_sided_tail(1.0, 0.0) - 1.0).abs() < 1e-15);
     }
@@ -110,11 +104,7 @@ mod tests {
     fn quantiles_match_scipy() {
         // scipy 1.17.1, t.ppf(0.975, df) and beta.ppf(0.025, hits, n - hits + 1).
         for (degrees, expected) in STUDENTS {
-            assert!(
-                (student(degrees) - expected).abs() < 1e-9,
-                "{degrees}: {}",
-                student(degrees)
-            );
+            assert!((student(degrees) - expected).abs() < 1e-9, "{degrees}: {}", student(degrees));
         }
         for (hits, n, expected) in SHARES {
             let least = least_share(hits, n);

@@ -1,5 +1,5 @@
-//! Tests of paired differences ([`mcnemar`], [`sign_flip`] and [`swap_test`]), the correction for several tests ([`holm`]), and the result
-//! ([`Significance`]).
+//! Tests of paired differences ([`mcnemar`], [`sign_flip`] and [`swap_test`]), the correction for several tests
+//! ([`holm`]), and the result ([`Significance`]).
 
 use std::fmt;
 
@@ -17,7 +17,8 @@ pub enum Significance {
     Worse,
     /// No difference is detected. The two sides are not therefore equal.
     NotShown,
-    /// No verdict is possible: with so few clusters and so many tests the corrected p cannot be below 0.05, however large the difference.
+    /// No verdict is possible: with so few clusters and so many tests the corrected p cannot be below 0.05, however
+    /// large the difference.
     TooFewClusters,
     /// Fewer items are shared than a verdict needs (`MIN_PAIRS` of the comparison).
     TooFew,
@@ -40,20 +41,12 @@ impl PValues {
     /// Corrects each of the three p-values over all tests, by Holm's procedure ([`holm`]).
     #[must_use]
     pub fn corrected(tests: &[Self]) -> Vec<Self> {
-        let [p, if_answered, least] = [
-            |test: &Self| test.p,
-            |test: &Self| test.if_answered,
-            |test: &Self| test.least,
-        ]
-        .map(|value| holm(&tests.iter().map(value).collect::<Vec<f64>>()));
+        let [p, if_answered, least] = [|test: &Self| test.p, |test: &Self| test.if_answered, |test: &Self| test.least]
+            .map(|value| holm(&tests.iter().map(value).collect::<Vec<f64>>()));
         p.into_iter()
             .zip(if_answered)
             .zip(least)
-            .map(|((p, if_answered), least)| Self {
-                p,
-                if_answered,
-                least,
-            })
+            .map(|((p, if_answered), least)| Self { p, if_answered, least })
             .collect()
     }
 }
@@ -146,17 +139,14 @@ const MIN_EFFECTIVE_CLUSTERS: f64 = 1000.0;
 /// Seed of the random swaps (chosen). It is fixed, so that the same records give the same p-value.
 const SEED: u64 = 0x7377_6170;
 
-/// The permutation test that swaps the two sides in whole clusters. Uses [`sign_flip`] if its table has at most 2²⁸ cells; otherwise
-/// [`normal_swaps`] if enough clusters contribute for an error of at most 10⁻⁴; otherwise the Monte Carlo estimate
-/// (1 + hits) / (1 + draws) from 100,000 seeded swaps (Phipson and Smyth 2010, Stat. Appl. Genet. Mol. Biol. 9:39), which keeps the size of
-/// the test.
+/// The permutation test that swaps the two sides in whole clusters. Uses [`sign_flip`] if its table has at most 2²⁸
+/// cells; otherwise [`normal_swaps`] if enough clusters contribute for an error of at most 10⁻⁴; otherwise the Monte
+/// Carlo estimate (1 + hits) / (1 + draws) from 100,000 seeded swaps (Phipson and Smyth 2010, Stat. Appl. Genet. Mol.
+/// Biol. 9:39), which keeps the size of the test.
 #[must_use]
 pub fn swap_test(differences: &[i64]) -> SwapTest {
     let reduced = reduce(differences);
-    let sum: u64 = reduced
-        .iter()
-        .map(|difference| difference.unsigned_abs())
-        .sum();
+    let sum: u64 = reduced.iter().map(|difference| difference.unsigned_abs()).sum();
     let cells = (sum + 1).saturating_mul(reduced.len() as u64);
     let (p, by) = if cells <= MAX_CELLS {
         (sign_flip(differences), SwapMethod::Counted)
@@ -169,20 +159,19 @@ pub fn swap_test(differences: &[i64]) -> SwapTest {
     SwapTest { p, by }
 }
 
-/// The effective number of clusters, (Σ d²)² / Σ d⁴: the number of equal differences whose total is equally close to normal. The excess
-/// kurtosis of the total is −2 divided by this number.
+/// The effective number of clusters, (Σ d²)² / Σ d⁴: the number of equal differences whose total is equally close to
+/// normal. The excess kurtosis of the total is −2 divided by this number.
 fn effective_clusters(differences: &[i64]) -> f64 {
-    let [squares, fourths] =
-        [2, 4].map(|n| differences.iter().map(|d| (*d as f64).powi(n)).sum::<f64>());
+    let [squares, fourths] = [2, 4].map(|n| differences.iter().map(|d| (*d as f64).powi(n)).sum::<f64>());
     squares * squares / fourths
 }
 
 /// Normal approximation of [`sign_flip`], for differences without a common divisor.
 ///
-/// The total of the swaps is symmetric about 0, its variance is Σ d², and it changes in steps of 2. The probability of a total is therefore
-/// that of the normal distribution from 1 below it to 1 above it (continuity correction). Because of the symmetry, the first neglected term
-/// of the Edgeworth expansion is that of the kurtosis (Feller 1971, volume II, section XVI.4): 10⁻⁴ at p = 0.05 with
-/// [`MIN_EFFECTIVE_CLUSTERS`] clusters, and a tenth of p at p = 10⁻⁸.
+/// The total of the swaps is symmetric about 0, its variance is Σ d², and it changes in steps of 2. The probability of
+/// a total is therefore that of the normal distribution from 1 below it to 1 above it (continuity correction). Because
+/// of the symmetry, the first neglected term of the Edgeworth expansion is that of the kurtosis (Feller 1971, volume
+/// II, section XVI.4): 10⁻⁴ at p = 0.05 with [`MIN_EFFECTIVE_CLUSTERS`] clusters, and a tenth of p at p = 10⁻⁸.
 fn normal_swaps(differences: &[i64]) -> f64 {
     let total = differences.iter().sum::<i64>().abs() as f64;
     let squares: f64 = differences.iter().map(|d| (*d as f64).powi(2)).sum();
@@ -194,9 +183,7 @@ fn normal_swaps(differences: &[i64]) -> f64 {
 fn drawn_swaps(differences: &[i64], draws: usize) -> f64 {
     let observed = differences.iter().sum::<i64>().abs();
     let mut random = SplitMix(SEED);
-    let hits = (0..draws)
-        .filter(|_| randomly_swapped_sum(differences, &mut random).abs() >= observed)
-        .count();
+    let hits = (0..draws).filter(|_| randomly_swapped_sum(differences, &mut random).abs() >= observed).count();
     (1 + hits) as f64 / (1 + draws) as f64
 }
 
@@ -206,11 +193,7 @@ fn randomly_swapped_sum(differences: &[i64], random: &mut SplitMix) -> i64 {
     for block in differences.chunks(64) {
         let mut bits = random.bits();
         for difference in block {
-            sum += if bits & 1 == 0 {
-                *difference
-            } else {
-                -difference
-            };
+            sum += if bits & 1 == 0 { *difference } else { -difference };
             bits >>= 1;
         }
     }
@@ -226,11 +209,7 @@ pub fn least_p(clusters: usize) -> f64 {
 /// Removes zeros and divides by the greatest common divisor, which changes no p-value.
 fn reduce(differences: &[i64]) -> Vec<i64> {
     let divisor = differences.iter().fold(0, |a, d| gcd(a, d.unsigned_abs()));
-    differences
-        .iter()
-        .filter(|difference| **difference != 0)
-        .map(|difference| difference / divisor as i64)
-        .collect()
+    differences.iter().filter(|difference| **difference != 0).map(|difference| difference / divisor as i64).collect()
 }
 
 /// Greatest common divisor; `gcd(0, n)` is n.
@@ -241,7 +220,8 @@ pub fn gcd(a: u64, b: u64) -> u64 {
 
 /// Exact two-sided p-value of McNemar's test (McNemar 1947, Psychometrika 12:153; exact as the binomial sign test).
 ///
-/// `gained` and `lost` are the numbers of pairs with only one side right. The test treats pairs as independent; [`sign_flip`] does not.
+/// `gained` and `lost` are the numbers of pairs with only one side right. The test treats pairs as independent;
+/// [`sign_flip`] does not.
 #[must_use]
 pub fn mcnemar(gained: usize, lost: usize) -> f64 {
     let smaller = gained.min(lost);
@@ -250,12 +230,12 @@ pub fn mcnemar(gained: usize, lost: usize) -> f64 {
     (2.0 * tail).min(1.0)
 }
 
-/// Exact two-sided p-value of the hypothesis that the two sides can be swapped in every cluster: the share of the 2ᶜ swaps
-/// whose total difference is at least as far from 0 as the observed one.
+/// Exact two-sided p-value of the hypothesis that the two sides can be swapped in every cluster: the share of the 2ᶜ
+/// swaps whose total difference is at least as far from 0 as the observed one.
 ///
-/// `differences` has, for each cluster, the pairs gained minus the pairs lost. With one pair per cluster this is McNemar's exact test.
-/// Unlike McNemar's test, it keeps its size if the pairs of a cluster are correlated (the permutation form of Durkalski et al. 2003, Stat.
-/// Med. 22:2417).
+/// `differences` has, for each cluster, the pairs gained minus the pairs lost. With one pair per cluster this is
+/// McNemar's exact test. Unlike McNemar's test, it keeps its size if the pairs of a cluster are correlated (the
+/// permutation form of Durkalski et al. 2003, Stat. Med. 22:2417).
 #[must_use]
 pub fn sign_flip(differences: &[i64]) -> f64 {
     let reduced = reduce(differences);
@@ -309,18 +289,15 @@ fn binomial(n: usize) -> Vec<f64> {
     }
     (0..=n)
         .map(|k: usize| {
-            let log = log_factorial
-                - libm::lgamma(k as f64 + 1.0)
-                - libm::lgamma((n - k) as f64 + 1.0)
-                - log_outcomes;
+            let log = log_factorial - libm::lgamma(k as f64 + 1.0) - libm::lgamma((n - k) as f64 + 1.0) - log_outcomes;
             let mass = libm::exp(log);
             if mass < MIN_MASS { 0.0 } else { mass }
         })
         .collect()
 }
 
-/// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order of `values`. If values below 0.05 count as detected, the
-/// probability of any false positive is at most 5 %.
+/// Holm's adjusted p-values (Holm 1979, Scand. J. Stat. 6:65), in the order of `values`. If values below 0.05 count as
+/// detected, the probability of any false positive is at most 5 %.
 #[must_use]
 pub fn holm(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
@@ -363,11 +340,7 @@ mod tests {
 
     /// p-values of a test without missing replies.
     fn complete(p: f64, least: f64) -> PValues {
-        PValues {
-            p,
-            if_answered: p,
-            least,
-        }
+        PValues { p, if_answered: p, least }
     }
 
     #[test]
@@ -375,10 +348,7 @@ mod tests {
         // scipy 1.17.1, binomtest(b, b + c).pvalue.
         for (gained, lost, expected) in GOLDEN_MCNEMAR {
             let p = mcnemar(gained, lost);
-            assert!(
-                (p - expected).abs() < 1e-9 && (p / expected - 1.0).abs() < 1e-9,
-                "{gained} {lost}: {p}"
-            );
+            assert!((p - expected).abs() < 1e-9 && (p / expected - 1.0).abs() < 1e-9, "{gained} {lost}: {p}");
             assert!((p - mcnemar(lost, gained)).abs() < 1e-15);
             let single = [vec![1; gained], vec![-1; lost], vec![0; 5]].concat();
             assert!((sign_flip(&single) - p).abs() < 1e-9, "{gained} {lost}");
@@ -387,51 +357,28 @@ mod tests {
 
     #[test]
     fn swaps_are_counted() {
-        for differences in [
-            vec![],
-            vec![0, 0],
-            vec![3],
-            vec![2, -1, 3],
-            vec![1, 1, 1, -4, 2, 2, -1, 5],
-        ] {
+        for differences in [vec![], vec![0, 0], vec![3], vec![2, -1, 3], vec![1, 1, 1, -4, 2, 2, -1, 5]] {
             let total: i64 = differences.iter().sum();
             let n = differences.len();
             let expected = (0..1_u32 << n)
                 .filter(|signs| {
-                    let sum: i64 = (0..n)
-                        .map(|i| {
-                            if signs >> i & 1 == 0 {
-                                differences[i]
-                            } else {
-                                -differences[i]
-                            }
-                        })
-                        .sum();
+                    let sum: i64 =
+                        (0..n).map(|i| if signs >> i & 1 == 0 { differences[i] } else { -differences[i] }).sum();
                     sum.abs() >= total.abs()
                 })
                 .count() as f64
                 / f64::from(1_u32 << n);
-            assert!(
-                (sign_flip(&differences) - expected).abs() < 1e-12,
-                "{differences:?}"
-            );
+            assert!((sign_flip(&differences) - expected).abs() < 1e-12, "{differences:?}");
         }
     }
 
     #[test]
     fn random_swaps_approximate_the_exact_test() {
-        for differences in [
-            vec![3, -1, 2, 4, 1, 1, 5, -2, 3, 2],
-            vec![2; 9],
-            vec![1, -1],
-        ] {
+        for differences in [vec![3, -1, 2, 4, 1, 1, 5, -2, 3, 2], vec![2; 9], vec![1, -1]] {
             let (counted, drawn) = (sign_flip(&differences), drawn_swaps(&differences, SWAPS));
             // Four standard errors.
             let near = 4.0 * (counted * (1.0 - counted) / SWAPS as f64).sqrt() + 2e-5;
-            assert!(
-                (drawn - counted).abs() < near,
-                "{differences:?}: {drawn}, {counted}"
-            );
+            assert!((drawn - counted).abs() < near, "{differences:?}: {drawn}, {counted}");
         }
         // 900 clusters whose differences have no common divisor: 10⁹ cells.
         let large: Vec<i64> = (0..900).map(|i| 1000 + i % 7).collect();
@@ -446,9 +393,8 @@ mod tests {
     fn normal_swaps_approximate_the_exact_test() {
         // Differences of 1 to 5 in as many clusters as the table allows, `few` of them negative.
         for (clusters, few) in [(1800, 860), (1800, 830), (4000, 1900), (4000, 1850)] {
-            let differences: Vec<i64> = (0..clusters)
-                .map(|i| (1 + i % 5) * if i * 7919 % clusters < few { -1 } else { 1 })
-                .collect();
+            let differences: Vec<i64> =
+                (0..clusters).map(|i| (1 + i % 5) * if i * 7919 % clusters < few { -1 } else { 1 }).collect();
             assert!(effective_clusters(&differences) >= MIN_EFFECTIVE_CLUSTERS);
             let (counted, normal) = (sign_flip(&differences), normal_swaps(&differences));
             assert!((counted - normal).abs() < 1e-4, "{counted} {normal}");
@@ -461,9 +407,7 @@ mod tests {
         let many: Vec<i64> = (0..20_000).map(|i| 1 + i % 5).collect();
         assert_eq!(swap_test(&many).by, SwapMethod::Normal);
         // If one cluster dominates, the total is not normal, whatever the number of clusters.
-        let one: Vec<i64> = (0..1500)
-            .map(|i| if i == 0 { 200_001 } else { 1 })
-            .collect();
+        let one: Vec<i64> = (0..1500).map(|i| if i == 0 { 200_001 } else { 1 }).collect();
         assert_eq!(swap_test(&one).by, SwapMethod::Drawn(SWAPS));
     }
 
@@ -475,15 +419,8 @@ mod tests {
             let least = 5.0 * least_p(clusters);
             assert_eq!(Significance::new(-0.3, complete(least, least)), expected);
         }
-        assert_eq!(
-            Significance::new(0.3, complete(0.05, 0.01)),
-            Significance::NotShown
-        );
-        let undecided = PValues {
-            p: 0.2,
-            if_answered: 0.04,
-            least: 0.01,
-        };
+        assert_eq!(Significance::new(0.3, complete(0.05, 0.01)), Significance::NotShown);
+        let undecided = PValues { p: 0.2, if_answered: 0.04, least: 0.01 };
         assert_eq!(Significance::new(0.3, undecided), Significance::Missing);
     }
 

@@ -6,8 +6,8 @@ use rand::TryRng;
 use rand::rand_core::utils::fill_bytes_via_next_word;
 use rand::seq::SliceRandom as _;
 
-/// SplitMix64 random generator (Steele, Lea and Flood 2014, OOPSLA, figure 13). The field is the state, at first the seed. Implements
-/// [`TryRng`] for the distributions of `rand_distr`.
+/// SplitMix64 random generator (Steele, Lea and Flood 2014, OOPSLA, figure 13). The field is the state, at first the
+/// seed. Implements [`TryRng`] for the distributions of `rand_distr`.
 pub(crate) struct SplitMix(pub(crate) u64);
 
 impl SplitMix {
@@ -51,9 +51,6 @@ mod tests {
         // First outputs of the reference implementation (Vigna, splitmix64.c) with seed 1234567.
         let mut random = SplitMix(1_234_567);
         let first = [random.bits(), random.bits()];
-        assert_eq!(
-            first,
-            [6_457_827_717_110_365_317, 3_203_168_211_198_807_973]
-        );
+        assert_eq!(first, [6_457_827_717_110_365_317, 3_203_168_211_198_807_973]);
     }
 }

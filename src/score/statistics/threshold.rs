@@ -7,12 +7,14 @@ use darkqa_base::types::AxisLevel;
 
 /// Minimum number of replies of a level for a threshold (chosen).
 const MIN_REPLIES: usize = 30;
-/// Minimum number of clusters of a level for a threshold (chosen): the intervals of 5 held at least 94 % in each simulated cell.
+/// Minimum number of clusters of a level for a threshold (chosen): the intervals of 5 held at least 94 % in each
+/// simulated cell.
 const MIN_CLUSTERS: usize = 5;
 /// Minimum number of replies of a level as a share of those at L0 (chosen).
 const MIN_SHARE: f64 = 0.1;
 
-/// Exposure drop, in EV, at which a model's accuracy is half-way between that at L0 and the floor, with a 95 % interval.
+/// Exposure drop, in EV, at which a model's accuracy is half-way between that at L0 and the floor, with a 95 %
+/// interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Threshold {
     /// The threshold; infinite if accuracy at the darkest level is still above half-way.
@@ -35,13 +37,7 @@ impl Threshold {
         if self.value.is_infinite() && low.is_finite() {
             return Err(NoThreshold::Missing { low });
         }
-        Ok(Self {
-            low,
-            high: latest
-                .map_or(f64::INFINITY, |bound| bound.high)
-                .max(self.high),
-            ..self
-        })
+        Ok(Self { low, high: latest.map_or(f64::INFINITY, |bound| bound.high).max(self.high), ..self })
     }
 }
 
@@ -103,8 +99,8 @@ pub struct CurveSummary {
     pub darkest: AxisLevel,
     /// Darkness threshold, or the reason why it is not known.
     pub threshold: Result<Threshold, NoThreshold>,
-    /// Mean accuracy from L0 to the darkest level, by the trapezoid rule over EV. Its `n` is the number of replies. `None` if
-    /// no degraded level has enough replies.
+    /// Mean accuracy from L0 to the darkest level, by the trapezoid rule over EV. Its `n` is the number of replies.
+    /// `None` if no degraded level has enough replies.
     pub area: Option<Estimate>,
     /// Accuracy of the floor: half of the distance from L0 to it is lost at the threshold.
     pub floor: f64,
@@ -121,7 +117,8 @@ pub struct LevelCounts {
     pub counts: Vec<Vec<ClusterCount>>,
     /// Number of missing replies of each cluster, by level; a level without any may be empty.
     pub missing: Vec<Vec<u32>>,
-    /// Expected number of right replies at L0 without the image, by guessing or by a model that sees no image, by cluster.
+    /// Expected number of right replies at L0 without the image, by guessing or by a model that sees no image, by
+    /// cluster.
     pub guesses: Vec<f32>,
     /// The same number for the missing replies at L0; empty without any.
     pub missing_guesses: Vec<f32>,
@@ -131,9 +128,7 @@ impl LevelCounts {
     /// Threshold and area; `None` without a reply at L0.
     #[must_use]
     pub fn summary(&self, draws: &Resamples) -> Option<CurveSummary> {
-        let sizes: Vec<SparseLevel> = (0..self.levels.len())
-            .map(|index| self.size(index))
-            .collect();
+        let sizes: Vec<SparseLevel> = (0..self.levels.len()).map(|index| self.size(index)).collect();
         let clean = *sizes.first().filter(|clean| clean.replies > 0)?;
         // If all levels are small, the area is still computed; only fragments are left out.
         let (left_out, kept): (Vec<usize>, Vec<usize>) = (0..sizes.len()).partition(|index| {
@@ -144,7 +139,8 @@ impl LevelCounts {
         let area = (kept.len() > 1).then(|| curve.area()).flatten();
         let (mut threshold, mut covering) = (curve.threshold(draws, &sizes), area);
         if curve.missing.iter().flatten().any(|missing| *missing > 0) {
-            // The earliest crossing has the missing replies right at L0 and wrong elsewhere; the latest one the other way round.
+            // The earliest crossing has the missing replies right at L0 and wrong elsewhere; the latest one the other
+            // way round.
             let bounds = [true, false]
                 .map(|clean_is_right| curve.filled(clean_is_right, !clean_is_right))
                 .map(|curve| curve.threshold(draws, &sizes));
@@ -163,11 +159,7 @@ impl LevelCounts {
 
     /// The numbers of replies and clusters of a level.
     fn size(&self, index: usize) -> SparseLevel {
-        let [clean, own] = [0, index].map(|index| {
-            self.counts[index]
-                .iter()
-                .map(|count| count.replies as usize)
-        });
+        let [clean, own] = [0, index].map(|index| self.counts[index].iter().map(|count| count.replies as usize));
         SparseLevel {
             level: self.levels[index],
             replies: own.clone().sum(),
@@ -180,28 +172,19 @@ impl LevelCounts {
     fn at_levels(&self, kept: &[usize]) -> Self {
         Self {
             levels: kept.iter().map(|index| self.levels[*index]).collect(),
-            counts: kept
-                .iter()
-                .map(|index| self.counts[*index].clone())
-                .collect(),
-            missing: kept
-                .iter()
-                .map(|index| self.missing[*index].clone())
-                .collect(),
+            counts: kept.iter().map(|index| self.counts[*index].clone()).collect(),
+            missing: kept.iter().map(|index| self.missing[*index].clone()).collect(),
             guesses: self.guesses.clone(),
             missing_guesses: self.missing_guesses.clone(),
         }
     }
 
-    /// The counts with all missing replies filled in: as right or wrong at L0, and as right or wrong at the other levels.
+    /// The counts with all missing replies filled in: as right or wrong at L0, and as right or wrong at the other
+    /// levels.
     fn filled(&self, clean_is_right: bool, others_are_right: bool) -> Self {
         let counts = self.counts.iter().zip(&self.missing).enumerate();
         let counts = counts.map(|(level, (counts, missing))| {
-            let are_right = if level == 0 {
-                clean_is_right
-            } else {
-                others_are_right
-            };
+            let are_right = if level == 0 { clean_is_right } else { others_are_right };
             fill_missing(counts, missing, are_right)
         });
         let missing_guesses = self.missing_guesses.iter().copied();
@@ -226,17 +209,12 @@ impl LevelCounts {
 
     /// The sum of a count over the clusters of a level.
     fn total(&self, index: usize, count: fn(&ClusterCount) -> u32) -> f64 {
-        self.counts[index]
-            .iter()
-            .map(|cluster| f64::from(count(cluster)))
-            .sum()
+        self.counts[index].iter().map(|cluster| f64::from(count(cluster))).sum()
     }
 
     /// The number of replies at each level.
     fn replies(&self) -> Vec<f64> {
-        (0..self.levels.len())
-            .map(|index| self.total(index, |count| count.replies))
-            .collect()
+        (0..self.levels.len()).map(|index| self.total(index, |count| count.replies)).collect()
     }
 
     /// Accuracy of the floor: the guesses per reply at L0.
@@ -245,18 +223,12 @@ impl LevelCounts {
         guesses / self.total(0, |count| count.replies)
     }
 
-    /// The threshold of the curve. `sizes` are the numbers of replies of all levels asked, including the levels left out of the curve.
-    fn threshold(
-        &self,
-        draws: &Resamples,
-        sizes: &[SparseLevel],
-    ) -> Result<Threshold, NoThreshold> {
+    /// The threshold of the curve. `sizes` are the numbers of replies of all levels asked, including the levels left
+    /// out of the curve.
+    fn threshold(&self, draws: &Resamples, sizes: &[SparseLevel]) -> Result<Threshold, NoThreshold> {
         let replies = self.replies();
-        let values: Vec<f64> = replies
-            .iter()
-            .enumerate()
-            .map(|(index, n)| self.total(index, |count| count.right) / n)
-            .collect();
+        let values: Vec<f64> =
+            replies.iter().enumerate().map(|(index, n)| self.total(index, |count| count.right) / n).collect();
         let drops = self.drops();
         let chance = self.floor();
         if let Some(clean) = sizes.first().filter(|size| size.is_thin()) {
@@ -268,36 +240,24 @@ impl LevelCounts {
         let (value, after) = crossing(&drops, &values, &replies, chance);
         // Without a crossing, the threshold is beyond the last level of the curve.
         let after = self.levels[after.min(self.levels.len() - 1)];
-        if let Some(thin) = sizes
-            .iter()
-            .find(|size| size.level <= after && size.is_thin())
-        {
+        if let Some(thin) = sizes.iter().find(|size| size.level <= after && size.is_thin()) {
             return Err(NoThreshold::Thin(*thin));
         }
         if self.levels.len() < 2 {
-            return sizes
-                .last()
-                .map_or(Err(NoThreshold::NotAboveChance), |thin| {
-                    Err(NoThreshold::Thin(*thin))
-                });
+            return sizes.last().map_or(Err(NoThreshold::NotAboveChance), |thin| Err(NoThreshold::Thin(*thin)));
         }
         let resampled = DrawnCurves::new(draws, &self.counts, &self.guesses);
-        let drawn = resampled
-            .statistic(|values, weights, chance| crossing(&drops, values, weights, chance).0);
+        let drawn = resampled.statistic(|values, weights, chance| crossing(&drops, values, weights, chance).0);
         let [low, high] = draws.interval(drawn);
         let high = high.max(value);
         let is_beyond = drops.last().is_some_and(|darkest| high > *darkest);
-        Ok(Threshold {
-            value,
-            low: low.min(value).max(0.0),
-            high: if is_beyond { f64::INFINITY } else { high },
-        })
+        Ok(Threshold { value, low: low.min(value).max(0.0), high: if is_beyond { f64::INFINITY } else { high } })
     }
 
     /// Mean height of the curve by the trapezoid rule, computed as a mean of scores.
     ///
-    /// Each level is weighted by its share of the width. A cluster's score is its weighted number of right answers divided by
-    /// its weighted number of replies.
+    /// Each level is weighted by its share of the width. A cluster's score is its weighted number of right answers
+    /// divided by its weighted number of replies.
     fn area(&self) -> Option<Estimate> {
         let replies = self.replies();
         let weights = weights(&self.levels);
@@ -344,8 +304,8 @@ impl DrawnCurves {
         }
     }
 
-    /// The value of a statistic in each draw, computed from the accuracies, the numbers of replies, and chance. Draws without a reply at
-    /// some level are skipped.
+    /// The value of a statistic in each draw, computed from the accuracies, the numbers of replies, and chance. Draws
+    /// without a reply at some level are skipped.
     fn statistic(&self, number: impl Fn(&[f64], &[f64], f64) -> f64) -> Vec<f64> {
         let mut numbers = Vec::with_capacity(self.guesses.len());
         let (mut values, mut weights) = (Vec::new(), Vec::new());
@@ -366,9 +326,9 @@ impl DrawnCurves {
 
 /// Exposure drop at which the accuracies cross the middle between the first one and chance.
 ///
-/// The accuracies are first fitted by a non-increasing sequence (pool adjacent violators, Ayer et al. 1955) and interpolated linearly.
-/// Infinite without a crossing; 0 if the first accuracy is not above chance. The second number is the index of the level after the
-/// crossing, or the number of levels without a crossing.
+/// The accuracies are first fitted by a non-increasing sequence (pool adjacent violators, Ayer et al. 1955) and
+/// interpolated linearly. Infinite without a crossing; 0 if the first accuracy is not above chance. The second number
+/// is the index of the level after the crossing, or the number of levels without a crossing.
 fn crossing(drops: &[f64], values: &[f64], weights: &[f64], chance: f64) -> (f64, usize) {
     if values[0] <= chance {
         return (0.0, 0);
@@ -378,11 +338,7 @@ fn crossing(drops: &[f64], values: &[f64], weights: &[f64], chance: f64) -> (f64
     for (after, (pair, drop)) in (1..).zip(fitted.windows(2).zip(drops.windows(2))) {
         let ([above, below], [near, far]) = ([pair[0], pair[1]], [drop[0], drop[1]]);
         if below <= middle {
-            let share = if above > middle {
-                (above - middle) / (above - below)
-            } else {
-                0.0
-            };
+            let share = if above > middle { (above - middle) / (above - below) } else { 0.0 };
             return (near + share * (far - near), after);
         }
     }
@@ -404,10 +360,7 @@ fn non_increasing(values: &[f64], weights: &[f64]) -> Vec<f64> {
         }
         blocks.push(block);
     }
-    blocks
-        .into_iter()
-        .flat_map(|(value, _, length)| std::iter::repeat_n(value, length))
-        .collect()
+    blocks.into_iter().flat_map(|(value, _, length)| std::iter::repeat_n(value, length)).collect()
 }
 
 #[cfg(test)]
@@ -425,10 +378,7 @@ mod tests {
         assert!(threshold_of([0.9, 0.9, 0.9, 0.9, 0.8, 0.7]).is_infinite());
         assert!(threshold_of([0.3, 0.3, 0.3, 0.3, 0.3, 0.3]).abs() < 1e-12);
         // A dip with a recovery does not count: pooled, levels 4 and 5 are at 0.65.
-        assert!(
-            (threshold_of([0.9, 0.9, 0.9, 0.5, 0.8, 0.3]) - (7.5 + 0.05 / 0.35 * 1.5)).abs()
-                < 1e-12
-        );
+        assert!((threshold_of([0.9, 0.9, 0.9, 0.5, 0.8, 0.3]) - (7.5 + 0.05 / 0.35 * 1.5)).abs() < 1e-12);
         // All is lost at the first step.
         assert!((threshold_of([0.9, 0.3, 0.3, 0.3, 0.3, 0.3]) - 1.0).abs() < 1e-12);
     }
@@ -438,7 +388,8 @@ mod tests {
         crossing(&DROPS, &values, &[1.0; 6], 0.3).0
     }
 
-    /// Counts of 12 equal clusters at levels with (exposure drop in hundredths of an EV, right replies, replies) of each cluster.
+    /// Counts of 12 equal clusters at levels with (exposure drop in hundredths of an EV, right replies, replies) of
+    /// each cluster.
     fn counts(levels: &[(u16, u32, u32)]) -> LevelCounts {
         LevelCounts {
             levels: levels
@@ -448,10 +399,7 @@ mod tests {
                     drop => AxisLevel::new(Kind::Sensor, Severity::from_hundredths(*drop)),
                 })
                 .collect(),
-            counts: levels
-                .iter()
-                .map(|&(_, right, replies)| vec![ClusterCount { right, replies }; 12])
-                .collect(),
+            counts: levels.iter().map(|&(_, right, replies)| vec![ClusterCount { right, replies }; 12]).collect(),
             missing: vec![Vec::new(); levels.len()],
             guesses: vec![levels[0].2 as f32 / 4.0; 12],
             missing_guesses: Vec::new(),
@@ -466,10 +414,7 @@ mod tests {
         // Without a wrong reply the interval still has a width.
         let all = counts(&[(0, 4, 4), (200, 4, 4), (900, 4, 4)]).area();
         let all = all.unwrap();
-        assert!(
-            all.value > 0.999 && all.low > 0.8 && all.low < 0.95,
-            "{all:?}"
-        );
+        assert!(all.value > 0.999 && all.low > 0.8 && all.low < 0.95, "{all:?}");
     }
 
     /// Levels beyond L5, at uneven steps.
@@ -499,10 +444,7 @@ mod tests {
         // A single reply beyond the crossing is left out and listed; the threshold does not change.
         let beyond = summary_with_single(&full, Some(3));
         let (left_out, darkest) = (beyond.left_out[0], beyond.darkest.value());
-        assert_eq!(
-            (left_out.replies, left_out.clusters, left_out.clean_replies),
-            (1, 1, 108)
-        );
+        assert_eq!((left_out.replies, left_out.clusters, left_out.clean_replies), (1, 1, 108));
         assert!((beyond.threshold.unwrap().value - threshold.value).abs() < 1e-12);
         assert!((darkest - 6.0).abs() < 1e-12 && beyond.area.unwrap().n == 3 * 108);
         // With a single reply before or at the crossing, the threshold is unknown.

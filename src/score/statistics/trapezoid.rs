@@ -6,14 +6,10 @@ use darkqa_base::types::AxisLevel;
 /// Weights of the levels in the trapezoid rule, as integers without a common divisor, so that sums are exact.
 #[must_use]
 pub(crate) fn weights(levels: &[AxisLevel]) -> Vec<u64> {
-    let drops: Vec<u64> = levels
-        .iter()
-        .map(|level| (100.0 * level.value()).round() as u64)
-        .collect();
+    let drops: Vec<u64> = levels.iter().map(|level| (100.0 * level.value()).round() as u64).collect();
     let last = drops.len().saturating_sub(1);
-    let widths: Vec<u64> = (0..drops.len())
-        .map(|index| drops[(index + 1).min(last)] - drops[index.saturating_sub(1)])
-        .collect();
+    let widths: Vec<u64> =
+        (0..drops.len()).map(|index| drops[(index + 1).min(last)] - drops[index.saturating_sub(1)]).collect();
     let divisor = widths.iter().copied().fold(0, gcd).max(1);
     widths.into_iter().map(|width| width / divisor).collect()
 }

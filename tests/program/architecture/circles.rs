@@ -1,7 +1,7 @@
 //! Circles of files: files that import each other, directly or through others.
 //!
-//! A name is followed through each `use` to the file that defines it. A `pub use` of names from a folder's own files is no
-//! import, unless it ends with `*`: then it counts, because its names are not known. Tests do not count.
+//! A name is followed through each `use` to the file that defines it. A `pub use` of names from a folder's own files is
+//! no import, unless it ends with `*`: then it counts, because its names are not known. Tests do not count.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,19 +12,13 @@ use super::source::Kind;
 type Imports<'a> = BTreeMap<&'a str, BTreeMap<&'a str, BTreeSet<String>>>;
 
 /// The circles that are not listed, and the listed ones that are no circles.
-pub(crate) fn wrong<'a>(
-    crates: impl Iterator<Item = &'a Files>,
-    listed: &[(&[&str], &str)],
-) -> Vec<String> {
+pub(crate) fn wrong<'a>(crates: impl Iterator<Item = &'a Files>, listed: &[(&[&str], &str)]) -> Vec<String> {
     let imports: Imports<'_> = crates.flat_map(imports).collect();
     let found = circles(&imports);
     let is_listed = |circle: &&Vec<&str>| listed.iter().any(|(files, _)| files == circle);
     let is_found = |files: &[&str]| found.iter().any(|circle| circle == files);
-    let mut wrong: Vec<String> = found
-        .iter()
-        .filter(|circle| !is_listed(circle))
-        .map(|circle| message(circle, &imports))
-        .collect();
+    let mut wrong: Vec<String> =
+        found.iter().filter(|circle| !is_listed(circle)).map(|circle| message(circle, &imports)).collect();
     let gone = listed.iter().filter(|(files, _)| !is_found(files));
     wrong.extend(gone.map(|(files, _)| {
         let files = files.join(", ");
@@ -48,13 +42,9 @@ fn message(circle: &[&str], imports: &Imports<'_>) -> String {
 
 /// The circles, each with its files in order.
 fn circles<'a>(imports: &Imports<'a>) -> BTreeSet<Vec<&'a str>> {
-    let reached: BTreeMap<&str, BTreeSet<&str>> = imports
-        .keys()
-        .map(|file| (*file, reachable(file, imports)))
-        .collect();
-    let in_circle = reached
-        .iter()
-        .filter(|(file, others)| others.contains(*file));
+    let reached: BTreeMap<&str, BTreeSet<&str>> =
+        imports.keys().map(|file| (*file, reachable(file, imports))).collect();
+    let in_circle = reached.iter().filter(|(file, others)| others.contains(*file));
     let circle = |(file, others): (&&str, &BTreeSet<&'a str>)| {
         let back = others.iter().filter(|other| reached[*other].contains(file));
         back.copied().collect()
@@ -78,10 +68,7 @@ fn reachable<'a>(file: &str, imports: &Imports<'a>) -> BTreeSet<&'a str> {
 
 /// Imports between files, without tests.
 fn imports(files: &Files) -> Imports<'_> {
-    let mut imports: Imports<'_> = files
-        .iter()
-        .map(|source| (source.path.as_str(), BTreeMap::new()))
-        .collect();
+    let mut imports: Imports<'_> = files.iter().map(|source| (source.path.as_str(), BTreeMap::new())).collect();
     for (source, part) in files.parts_outside_tests() {
         let Some(used) = files.defining(part) else {
             continue;

@@ -4,15 +4,10 @@ use super::files::Files;
 use super::source::{Kind, Part};
 
 /// The functions of `Digest` that compute one.
-const DIGEST_MAKERS: [&str; 5] = [
-    "canonical",
-    "canonical_value",
-    "from_bytes",
-    "from_parts",
-    "from_file_digests",
-];
+const DIGEST_MAKERS: [&str; 5] = ["canonical", "canonical_value", "from_bytes", "from_parts", "from_file_digests"];
 
-/// The functions that make a digest, by file and name, each with whether a text of it has debug output. Tests are left out.
+/// The functions that make a digest, by file and name, each with whether a text of it has debug output. Tests are left
+/// out.
 pub(crate) fn makers(files: &Files) -> Vec<(&str, &str, bool)> {
     let mut makers = Vec::new();
     for source in files.iter().filter(|source| !source.is_test) {

@@ -47,14 +47,8 @@ impl Files {
         for source in &mut sources {
             source.is_test = for_tests.iter().any(|test| source.module.starts_with(test));
         }
-        let places = sources
-            .iter()
-            .enumerate()
-            .map(|(at, source)| (source.module.clone(), at));
-        Self {
-            places: places.collect(),
-            sources,
-        }
+        let places = sources.iter().enumerate().map(|(at, source)| (source.module.clone(), at));
+        Self { places: places.collect(), sources }
     }
 
     /// All files, in the order of their paths.
@@ -64,28 +58,21 @@ impl Files {
 
     /// All parts of all files.
     pub(crate) fn parts(&self) -> impl Iterator<Item = (&Source, &Part)> {
-        self.sources
-            .iter()
-            .flat_map(|source| source.parts.iter().map(move |part| (source, part)))
+        self.sources.iter().flat_map(|source| source.parts.iter().map(move |part| (source, part)))
     }
 
     /// The parts outside of tests.
     pub(crate) fn parts_outside_tests(&self) -> impl Iterator<Item = (&Source, &Part)> {
-        self.parts()
-            .filter(|(source, part)| !source.is_test && !part.in_test)
+        self.parts().filter(|(source, part)| !source.is_test && !part.in_test)
     }
 
     /// The rooms: the folders and files beside `lib.rs`.
     pub(crate) fn rooms(&self) -> BTreeSet<&str> {
-        self.places
-            .keys()
-            .filter_map(|module| Some(module.first()?.as_str()))
-            .collect()
+        self.places.keys().filter_map(|module| Some(module.first()?.as_str())).collect()
     }
 
-    /// The path of a part from the crate's root. It is `None` if the path begins with a library, or with a name that a `use`
-    /// brings in: that `use` is a part of its own.
-    /// A crate of the workspace counts as a room.
+    /// The path of a part from the crate's root. It is `None` if the path begins with a library, or with a name that a
+    /// `use` brings in: that `use` is a part of its own. A crate of the workspace counts as a room.
     pub(crate) fn path_from_root(&self, part: &Part) -> Option<Vec<String>> {
         if !part.is_path() {
             return None;
@@ -98,11 +85,7 @@ impl Files {
 
     /// The file that defines what a part names. Every `use` on the way is followed.
     pub(crate) fn defining(&self, part: &Part) -> Option<&Source> {
-        if part.is_path() {
-            self.follow(&part.scope, &part.names, 0)
-        } else {
-            None
-        }
+        if part.is_path() { self.follow(&part.scope, &part.names, 0) } else { None }
     }
 
     /// The path from the crate's root that a path in a module stands for.
@@ -134,8 +117,7 @@ impl Files {
         let is_module = |length: &usize| self.places.contains_key(&path[..*length]);
         let depth = (1..=path.len()).take_while(is_module).last().unwrap_or(0);
         let (module, rest) = path.split_at(depth);
-        self.imported(module, rest, steps)
-            .or_else(|| self.source(module))
+        self.imported(module, rest, steps).or_else(|| self.source(module))
     }
 
     /// The same, if the first name is one that a `use` of the module brings in.

@@ -32,11 +32,7 @@ impl Map {
             let [rooms, uses] = cells[..] else {
                 return Err(unreadable());
             };
-            let uses = if uses == "nothing" {
-                Vec::new()
-            } else {
-                names(uses).ok_or_else(unreadable)?
-            };
+            let uses = if uses == "nothing" { Vec::new() } else { names(uses).ok_or_else(unreadable)? };
             for room in names(rooms).ok_or_else(unreadable)? {
                 let uses = uses.clone();
                 rows.push(Row { room, uses });
@@ -65,15 +61,11 @@ impl Map {
         let mut above = BTreeSet::<&str>::new();
         for Row { room, uses } in &self.0 {
             if !rooms.contains(room.as_str()) {
-                wrong.push(format!(
-                    "the map has a row for `{room}`, which is not in src/"
-                ));
+                wrong.push(format!("the map has a row for `{room}`, which is not in src/"));
             }
             for used in uses {
                 if !rooms.contains(used.as_str()) {
-                    wrong.push(format!(
-                        "the map lets `{room}` use `{used}`, which is not in src/"
-                    ));
+                    wrong.push(format!("the map lets `{room}` use `{used}`, which is not in src/"));
                 } else if !above.contains(used.as_str()) {
                     wrong.push(format!(
                         "the map lets `{room}` use `{used}`, whose row is not above: a room may use only rooms above it, so that no rooms use each other"
@@ -85,9 +77,7 @@ impl Map {
             }
         }
         let unlisted = rooms.iter().filter(|room| !self.has(room));
-        wrong.extend(
-            unlisted.map(|room| format!("the map has no row for `{room}`, which is in src/")),
-        );
+        wrong.extend(unlisted.map(|room| format!("the map has no row for `{room}`, which is in src/")));
         wrong
     }
 }

@@ -29,19 +29,11 @@ const ALIASES: [(&str, &str); 7] = [
 ];
 
 /// The folders of the other crates of the workspace, in `src/`.
-const MEMBERS: [&str; 9] = [
-    "base/",
-    "data/rooms/",
-    "enhance/",
-    "light/",
-    "light/python/",
-    "pictures/",
-    "questions/",
-    "runs/store/",
-    "score/",
-];
+const MEMBERS: [&str; 9] =
+    ["base/", "data/rooms/", "enhance/", "light/", "light/python/", "pictures/", "questions/", "runs/store/", "score/"];
 
-/// The libraries that the program uses in some places (folders or files in `src/`) alone. Test code may use them anywhere.
+/// The libraries that the program uses in some places (folders or files in `src/`) alone. Test code may use them
+/// anywhere.
 const LIBRARIES: [(&str, &[&str]); 11] = [
     ("anstream", &["commands/cli"]),
     ("hyper", &["ask", "commands/serve"]),
@@ -50,15 +42,7 @@ const LIBRARIES: [(&str, &[&str]); 11] = [
     ("comfy_table", &["report/text"]),
     ("terminal_size", &["report/text"]),
     ("unicode_width", &["report/text"]),
-    (
-        "tokio",
-        &[
-            "ask",
-            "engine",
-            "engine/images/image_pipeline.rs",
-            "commands/serve",
-        ],
-    ),
+    ("tokio", &["ask", "engine", "engine/images/image_pipeline.rs", "commands/serve"]),
     ("reqwest", &["ask"]),
     ("tiff", &["commands/calibrate/mosaic"]),
     ("parquet", &["data/ready_made/container"]),
@@ -73,28 +57,18 @@ const MOST_LINES: usize = 600;
 /// The circles of files that may be, each with its reason, or with how to cut it.
 const CIRCLES: [(&[&str], &str); 4] = [
     (
-        &[
-            "score/choice/rules/lenient.rs",
-            "score/choice/rules/stated.rs",
-            "score/choice/rules/structured.rs",
-        ],
+        &["score/choice/rules/lenient.rs", "score/choice/rules/stated.rs", "score/choice/rules/structured.rs"],
         "it stays: a reply within a reply is read by the reader that found it",
     ),
     (
-        &[
-            "base/types/records/trials/mod.rs",
-            "base/types/records/trials/trial_ref.rs",
-        ],
+        &["base/types/records/trials/mod.rs", "base/types/records/trials/trial_ref.rs"],
         "it stays: a trial is read through the tables of all, which hand it out",
     ),
     (
         &["data/frames.rs", "data/mod.rs"],
         "to cut it, move Dataset and stem out of data/mod.rs; what opens a place stays there",
     ),
-    (
-        &["light/exposures.rs", "light/lib.rs"],
-        "to cut it, move VERSION out of lib.rs into a file of its own",
-    ),
+    (&["light/exposures.rs", "light/lib.rs"], "to cut it, move VERSION out of lib.rs into a file of its own"),
 ];
 
 /// Folders with the code that reads the data sets of strangers, which may hold links to any file.
@@ -103,38 +77,14 @@ const DATA_READERS: [&str; 3] = ["data", "engine/images/frames", "commands/opene
 /// The files among them that list folders or open files without `dataset::Root`, each with its reason.
 const LISTING_FILES: [(&str, &str); 9] = [
     ("data/root.rs", "it checks them"),
-    (
-        "data/frames.rs",
-        "whether a folder is empty, or has an image, of folders that Root let pass",
-    ),
-    (
-        "data/similar_path.rs",
-        "names for messages, which Root checks",
-    ),
-    (
-        "data/ready_made/container/tree.rs",
-        "asks Root about each link",
-    ),
-    (
-        "data/ready_made/container/find.rs",
-        "asks Root about each file",
-    ),
-    (
-        "data/import/files.rs",
-        "folders that passed Root::refuse_links_out",
-    ),
-    (
-        "data/import/folder.rs",
-        "folders that passed Root::refuse_links_out",
-    ),
-    (
-        "data/import/unread_files.rs",
-        "folders that passed Root::refuse_links_out",
-    ),
-    (
-        "data/import/lerobot/set.rs",
-        "names of tables, which Root checks before they are read",
-    ),
+    ("data/frames.rs", "whether a folder is empty, or has an image, of folders that Root let pass"),
+    ("data/similar_path.rs", "names for messages, which Root checks"),
+    ("data/ready_made/container/tree.rs", "asks Root about each link"),
+    ("data/ready_made/container/find.rs", "asks Root about each file"),
+    ("data/import/files.rs", "folders that passed Root::refuse_links_out"),
+    ("data/import/folder.rs", "folders that passed Root::refuse_links_out"),
+    ("data/import/unread_files.rs", "folders that passed Root::refuse_links_out"),
+    ("data/import/lerobot/set.rs", "names of tables, which Root checks before they are read"),
 ];
 
 /// The functions that make a digest, and use debug output in what they tell the user alone.
@@ -148,30 +98,22 @@ const DEBUG_IN_MESSAGES: [(&str, &str); 3] = [
 static FILES: LazyLock<Files> = LazyLock::new(|| Files::read(&src()));
 
 /// The files of the other crates.
-static MEMBER_FILES: LazyLock<Vec<Files>> = LazyLock::new(|| {
-    MEMBERS
-        .iter()
-        .map(|member| Files::read(&src().join(member)).below(member))
-        .collect()
-});
+static MEMBER_FILES: LazyLock<Vec<Files>> =
+    LazyLock::new(|| MEMBERS.iter().map(|member| Files::read(&src().join(member)).below(member)).collect());
 
 /// The files of each crate.
 fn crates() -> impl Iterator<Item = &'static Files> {
     std::iter::once(&*FILES).chain(&*MEMBER_FILES)
 }
 
-/// The texts outside of tests in folders or files of `src/`, given by the start of their paths, each with its file and line.
+/// The texts outside of tests in folders or files of `src/`, given by the start of their paths, each with its file and
+/// line.
 pub(crate) fn texts(places: &[&str]) -> Vec<(String, String)> {
     crates()
         .flat_map(Files::parts_outside_tests)
         .filter(|(_, part)| matches!(part.kind, Kind::Text))
         .filter(|(source, _)| places.iter().any(|place| source.path.starts_with(place)))
-        .map(|(source, part)| {
-            (
-                format!("src/{}:{}", source.path, part.line),
-                part.names.concat(),
-            )
-        })
+        .map(|(source, part)| (format!("src/{}:{}", source.path, part.line), part.names.concat()))
         .collect()
 }
 
@@ -219,9 +161,7 @@ fn files_have_no_import_cycles() {
 
 #[test]
 fn libraries_stand_in_their_places() {
-    let found = LIBRARIES
-        .iter()
-        .flat_map(|(name, places)| rules::library(&FILES, name, places));
+    let found = LIBRARIES.iter().flat_map(|(name, places)| rules::library(&FILES, name, places));
     assert_none(&found.collect::<Vec<_>>());
 }
 
@@ -266,10 +206,7 @@ fn no_code_is_missing() {
 fn no_digest_uses_debug_output() {
     let makers: Vec<_> = crates().flat_map(digests::makers).collect();
     assert!(makers.len() > 20, "{makers:?}");
-    let found: Vec<_> = makers
-        .into_iter()
-        .filter(|(_, _, has_debug)| *has_debug)
-        .map(|(file, name, _)| (file, name))
-        .collect();
+    let found: Vec<_> =
+        makers.into_iter().filter(|(_, _, has_debug)| *has_debug).map(|(file, name, _)| (file, name)).collect();
     assert_eq!(found, DEBUG_IN_MESSAGES);
 }

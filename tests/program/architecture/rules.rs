@@ -16,7 +16,8 @@ pub(crate) fn long_files(files: &Files, most: usize) -> Vec<String> {
         .collect()
 }
 
-/// The imports of rooms that the map does not allow; those of tests count, too. `aliases` has the rooms behind other names.
+/// The imports of rooms that the map does not allow; those of tests count, too. `aliases` has the rooms behind other
+/// names.
 pub(crate) fn imports(files: &Files, map: &Map, aliases: &[(&str, &str)]) -> Vec<String> {
     let mut wrong = Vec::new();
     for (source, part, path) in paths(files) {
@@ -39,25 +40,15 @@ pub(crate) fn imports(files: &Files, map: &Map, aliases: &[(&str, &str)]) -> Vec
 /// The imports by which a crate of the workspace uses another that the map does not allow to its room.
 pub(crate) fn crate_imports(files: &Files, map: &Map, aliases: &[(&str, &str)]) -> Vec<String> {
     let mut wrong = Vec::new();
-    for (source, part) in files
-        .parts_outside_tests()
-        .filter(|(_, part)| part.is_path())
-    {
+    for (source, part) in files.parts_outside_tests().filter(|(_, part)| part.is_path()) {
         let room = source.path.split('/').next().unwrap_or_default();
-        let name = part
-            .names
-            .first()
-            .and_then(|name| name.strip_prefix("darkqa_"));
+        let name = part.names.first().and_then(|name| name.strip_prefix("darkqa_"));
         // The networks are data.
         if let Some(other) = name.map(|name| behind(name, aliases))
             && other != "models"
             && !map.allows(room, other)
         {
-            wrong.push(at(
-                source,
-                part.line,
-                &format!("`{room}` may not use `{other}`"),
-            ));
+            wrong.push(at(source, part.line, &format!("`{room}` may not use `{other}`")));
         }
     }
     wrong
@@ -108,8 +99,8 @@ pub(crate) fn library(files: &Files, name: &str, places: &[&str]) -> Vec<String>
     misplaced(&uses.collect::<Vec<_>>(), &format!("`{name}`"), places)
 }
 
-/// Where folders are listed or files are opened by the standard library in `readers`, outside of some files; and the places that do
-/// neither, or are folders, in which nothing would be checked. Tests are free.
+/// Where folders are listed or files are opened by the standard library in `readers`, outside of some files; and the
+/// places that do neither, or are folders, in which nothing would be checked. Tests are free.
 pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<String> {
     const WAYS: [[&str; 2]; 6] = [
         ["reading", "entries"],
@@ -124,21 +115,10 @@ pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<
             let rest = source.path.strip_prefix(reader);
             rest.is_some_and(|rest| rest.starts_with('/'))
         });
-        let end: Vec<&str> = part
-            .names
-            .iter()
-            .rev()
-            .take(2)
-            .rev()
-            .map(String::as_str)
-            .collect();
+        let end: Vec<&str> = part.names.iter().rev().take(2).rev().map(String::as_str).collect();
         is_reader && part.is_path() && WAYS.iter().any(|way| way[..] == end)
     });
-    let mut wrong = misplaced(
-        &uses.collect::<Vec<_>>(),
-        "a list of a folder or an open file",
-        places,
-    );
+    let mut wrong = misplaced(&uses.collect::<Vec<_>>(), "a list of a folder or an open file", places);
     let folders = places.iter().filter(|place| !place.contains('.'));
     wrong.extend(folders.map(|place| format!("{place} is a folder: name its files")));
     wrong
@@ -166,9 +146,7 @@ fn misplaced(uses: &[(&Source, &Part)], what: &str, places: &[&str]) -> Vec<Stri
     }
     for place in places {
         if !uses.iter().any(|(source, _)| is_in(source, place)) {
-            wrong.push(format!(
-                "{what} may stand in {place}, but does not: delete this place"
-            ));
+            wrong.push(format!("{what} may stand in {place}, but does not: delete this place"));
         }
     }
     wrong
@@ -176,9 +154,7 @@ fn misplaced(uses: &[(&Source, &Part)], what: &str, places: &[&str]) -> Vec<Stri
 
 /// The paths into this crate, from its root.
 fn paths(files: &Files) -> impl Iterator<Item = (&Source, &Part, Vec<String>)> {
-    files
-        .parts()
-        .filter_map(|(source, part)| Some((source, part, files.path_from_root(part)?)))
+    files.parts().filter_map(|(source, part)| Some((source, part, files.path_from_root(part)?)))
 }
 
 fn at(source: &Source, line: usize, rule: &str) -> String {

@@ -35,8 +35,8 @@ pub(crate) struct Part {
 
 /// Kind of a part.
 pub(crate) enum Kind {
-    /// A path in an expression, a type, a pattern, an attribute or the tokens of a macro. A path of one name is here if it
-    /// is the name of a type, of a constant or of a function that is called.
+    /// A path in an expression, a type, a pattern, an attribute or the tokens of a macro. A path of one name is here if
+    /// it is the name of a type, of a constant or of a function that is called.
     Path,
     /// The path of a macro that is called.
     Macro,
@@ -57,25 +57,10 @@ impl Source {
     pub(crate) fn read(path: &str, text: &str) -> syn::Result<Self> {
         let module = path.strip_suffix(".rs").unwrap_or(path);
         let module = module.strip_suffix("/mod").unwrap_or(module);
-        let module: Vec<String> = module
-            .split('/')
-            .filter(|name| *name != "lib")
-            .map(str::to_owned)
-            .collect();
-        let mut reader = Reader {
-            scope: module.clone(),
-            parts: Vec::new(),
-            in_test: false,
-            in_attribute: false,
-        };
+        let module: Vec<String> = module.split('/').filter(|name| *name != "lib").map(str::to_owned).collect();
+        let mut reader = Reader { scope: module.clone(), parts: Vec::new(), in_test: false, in_attribute: false };
         reader.visit_file(&syn::parse_file(text)?);
-        Ok(Self {
-            path: path.to_owned(),
-            module,
-            lines: text.lines().count(),
-            parts: reader.parts,
-            is_test: false,
-        })
+        Ok(Self { path: path.to_owned(), module, lines: text.lines().count(), parts: reader.parts, is_test: false })
     }
 
     /// The path behind a name that a `use` at the top of the file brings in.
@@ -112,16 +97,11 @@ impl Reader {
     }
 
     fn add_at(&mut self, kind: Kind, names: Vec<String>, at: Span) {
-        self.parts.push(Part {
-            kind,
-            names,
-            scope: self.scope.clone(),
-            line: at.start().line,
-            in_test: self.in_test,
-        });
+        self.parts.push(Part { kind, names, scope: self.scope.clone(), line: at.start().line, in_test: self.in_test });
     }
 
-    /// Reads the tokens of a macro, which have no syntax tree. In `a::{b, c}`, each path begins with what stands `before`.
+    /// Reads the tokens of a macro, which have no syntax tree. In `a::{b, c}`, each path begins with what stands
+    /// `before`.
     fn tokens(&mut self, tokens: &TokenStream, before: &[Ident]) {
         let joined = if before.is_empty() { "" } else { "::" };
         // The path that the last tokens make, and the signs after it.
@@ -273,11 +253,7 @@ fn branches(tree: &UseTree, before: &[String]) -> Vec<(Vec<String>, String, Span
     };
     match tree {
         UseTree::Path(path) => branches(&path.tree, &with(&plain(&path.ident))),
-        UseTree::Group(group) => group
-            .items
-            .iter()
-            .flat_map(|tree| branches(tree, before))
-            .collect(),
+        UseTree::Group(group) => group.items.iter().flat_map(|tree| branches(tree, before)).collect(),
         UseTree::Name(name) => {
             let path = whole(&name.ident);
             let brings = path.last().cloned().unwrap_or_default();

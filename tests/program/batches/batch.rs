@@ -32,9 +32,7 @@ fn requests(bench: &Bench) -> Vec<Value> {
         .iter()
         .flat_map(|path| {
             let text = fs::read_to_string(path).unwrap();
-            text.lines()
-                .map(|line| serde_json::from_str(line).unwrap())
-                .collect::<Vec<Value>>()
+            text.lines().map(|line| serde_json::from_str(line).unwrap()).collect::<Vec<Value>>()
         })
         .collect()
 }
@@ -45,14 +43,12 @@ fn answer(request: &Value, reply: &str) -> String {
         "usage": {"prompt_tokens": 90, "completion_tokens": 1},
     });
     let response = json!({"status_code": 200, "request_id": "r", "body": body});
-    json!({"id": "b", "custom_id": request["custom_id"], "response": response, "error": null})
-        .to_string()
+    json!({"id": "b", "custom_id": request["custom_id"], "response": response, "error": null}).to_string()
 }
 
 fn expired(request: &Value) -> String {
     let error = json!({"code": "batch_expired", "message": "too late"});
-    json!({"id": "b", "custom_id": request["custom_id"], "response": null, "error": error})
-        .to_string()
+    json!({"id": "b", "custom_id": request["custom_id"], "response": null, "error": error}).to_string()
 }
 
 #[test]
@@ -62,21 +58,13 @@ fn exported_batches_return_in_any_order() {
     // L0, L3 in both variants, and blind: 4 conditions of 4 questions.
     assert!(message.starts_with("16 requests in 4 files"), "{message}");
     let requests = requests(&bench);
-    let ids: BTreeSet<&str> = requests
-        .iter()
-        .map(|r| r["custom_id"].as_str().unwrap())
-        .collect();
+    let ids: BTreeSet<&str> = requests.iter().map(|r| r["custom_id"].as_str().unwrap()).collect();
     assert_eq!(ids.len(), 16);
     for request in &requests {
-        assert_eq!(
-            (&request["method"], &request["url"]),
-            (&"POST".into(), &"/v1/chat/completions".into())
-        );
+        assert_eq!((&request["method"], &request["url"]), (&"POST".into(), &"/v1/chat/completions".into()));
         assert_eq!(request["body"]["model"], "m");
     }
-    let seeing = requests
-        .iter()
-        .filter(|r| r["body"]["messages"][0]["content"].is_array());
+    let seeing = requests.iter().filter(|r| r["body"]["messages"][0]["content"].is_array());
     assert_eq!(seeing.count(), 12);
 
     // An evaluation leaves alone what is out; so does a second export.
@@ -94,46 +82,23 @@ fn exported_batches_return_in_any_order() {
     output.reverse();
     output.push(answer(&json!({"custom_id": "0".repeat(32)}), "C"));
     bench.file("out.jsonl", output.join("\n") + "\n\n");
-    bench.file(
-        "errors.jsonl",
-        requests[..2]
-            .iter()
-            .map(|r| expired(r) + "\n")
-            .collect::<String>(),
-    );
+    bench.file("errors.jsonl", requests[..2].iter().map(|r| expired(r) + "\n").collect::<String>());
     let back = bench.call(&["batch", "import", "run", "errors.jsonl", "out.jsonl"]);
     assert_eq!(back.code, Some(1), "{back:?}");
-    assert!(
-        back.stdout
-            .starts_with("replies: 14 imported, 2 failed, 1 of another run\n"),
-        "{back:?}"
-    );
+    assert!(back.stdout.starts_with("replies: 14 imported, 2 failed, 1 of another run\n"), "{back:?}");
     insta::assert_snapshot!(back.lines_with("answered"), @"
     exit code: 1
     ! run: incomplete: 14 of 16 trials answered, 2 failed. The same command asks the
     ");
     let again = bench.call(&["batch", "import", "run", "out.jsonl", "errors.jsonl"]);
-    assert!(
-        again
-            .stdout
-            .starts_with("replies: 0 imported, 0 failed, 16 imported before"),
-        "{again:?}"
-    );
-    for record in records(&bench.path("run"))
-        .iter()
-        .filter(|r| r["outcome"] != "failed")
-    {
-        assert_eq!(
-            (&record["outcome"], &record["via"]),
-            (&"right".into(), &"batch".into())
-        );
+    assert!(again.stdout.starts_with("replies: 0 imported, 0 failed, 16 imported before"), "{again:?}");
+    for record in records(&bench.path("run")).iter().filter(|r| r["outcome"] != "failed") {
+        assert_eq!((&record["outcome"], &record["via"]), (&"right".into(), &"batch".into()));
     }
 
     // What expired goes out again, and once more if it fails once more; in the end it is asked directly.
     assert!(export(&bench, "").starts_with("2 requests in 1 file; 14 already answered"));
-    assert!(
-        export(&bench, "").starts_with("0 requests in 0 files; 14 already answered, 2 waiting")
-    );
+    assert!(export(&bench, "").starts_with("0 requests in 0 files; 14 already answered, 2 waiting"));
     bench.call(&["batch", "import", "run", "errors.jsonl"]);
     let mock = MockEndpoint::start([Answer::text("C")]);
     let base = mock.base_url();
@@ -153,11 +118,7 @@ fn broken_files_are_named() {
     exit code: 2
     error: out.jsonl, line 2: not a line of a Batch API's output: {"custom_id", "response", "error"} expected
     "#);
-    assert_eq!(
-        records(&bench.path("run")).len(),
-        1,
-        "what came before it is kept"
-    );
+    assert_eq!(records(&bench.path("run")).len(), 1, "what came before it is kept");
     let rows = [
         ("batch import nowhere out.jsonl", "no run in this folder"),
         ("batch import run none.jsonl", "none.jsonl: cannot read"),
@@ -181,16 +142,14 @@ fn probabilities_and_responses_come_through_batch() {
     let bench = Bench::with_questions(QUESTIONS);
     export(&bench, "--probabilities --wire responses");
     let requests = requests(&bench);
-    let position =
-        json!({"token": "C", "logprob": -0.1, "top_logprobs": [{"token": "A", "logprob": -3.0}]});
+    let position = json!({"token": "C", "logprob": -0.1, "top_logprobs": [{"token": "A", "logprob": -3.0}]});
     let mut lines = String::new();
     for request in &requests {
         assert_eq!(request["url"], "/v1/responses");
         assert_eq!(request["body"]["top_logprobs"], 20);
         assert!(request["body"].get("stream").is_none());
         let part = json!({"type": "output_text", "text": "C", "logprobs": [position]});
-        let body =
-            json!({"status": "completed", "output": [{"type": "message", "content": [part]}]});
+        let body = json!({"status": "completed", "output": [{"type": "message", "content": [part]}]});
         let response = json!({"status_code": 200, "body": body});
         let line = json!({"custom_id": request["custom_id"], "response": response, "error": null});
         lines += &line.to_string();
@@ -201,10 +160,7 @@ fn probabilities_and_responses_come_through_batch() {
     let records = records(&bench.path("run"));
     assert_eq!(records.len(), requests.len());
     for record in &records {
-        assert_eq!(
-            (&record["reply"], &record["finish"]),
-            (&"C".into(), &"stop".into())
-        );
+        assert_eq!((&record["reply"], &record["finish"]), (&"C".into(), &"stop".into()));
         assert_eq!(record["options"]["token"], "C");
     }
     // A stream is no part of a file.
@@ -219,11 +175,7 @@ fn probabilities_and_responses_come_through_batch() {
 /// Azure has its own path for chat completions.
 #[test]
 fn batch_line_uses_vendor_path() {
-    for (more, url) in [
-        ("", "/chat/completions"),
-        ("--wire responses", "/v1/responses"),
-        ("--url /v1/x", "/v1/x"),
-    ] {
+    for (more, url) in [("", "/chat/completions"), ("--wire responses", "/v1/responses"), ("--url /v1/x", "/v1/x")] {
         let bench = Bench::with_questions(QUESTIONS);
         let place = words("--out run --base-url https://r.openai.azure.com/openai/v1");
         let line = [words("batch export"), words(RUN), place, words(more)].concat();

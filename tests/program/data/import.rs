@@ -35,31 +35,23 @@ impl Scene {
     }
 
     fn rgb(&self, name: &str) {
-        RgbImage::from_fn(WIDTH, HEIGHT, |x, y| Rgb([x as u8 * 20, y as u8 * 20, 90]))
-            .save(self.at(name))
-            .unwrap();
+        RgbImage::from_fn(WIDTH, HEIGHT, |x, y| Rgb([x as u8 * 20, y as u8 * 20, 90])).save(self.at(name)).unwrap();
     }
 
     /// A 16-bit map: `left` in the left half, `right` in the right.
     fn deep(&self, name: &str, left: u16, right: u16) {
-        let map = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, _| {
-            Luma([if x < WIDTH / 2 { left } else { right }])
-        });
+        let map = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, _| Luma([if x < WIDTH / 2 { left } else { right }]));
         map.save(self.at(name)).unwrap();
     }
 
     fn shallow(&self, name: &str, left: u8, right: u8) {
-        let map = GrayImage::from_fn(WIDTH, HEIGHT, |x, _| {
-            Luma([if x < WIDTH / 2 { left } else { right }])
-        });
+        let map = GrayImage::from_fn(WIDTH, HEIGHT, |x, _| Luma([if x < WIDTH / 2 { left } else { right }]));
         map.save(self.at(name)).unwrap();
     }
 
     /// An array as NumPy writes it.
     fn npy<T: Copy>(&self, name: &str, descr: &str, left: T, right: T, bytes: fn(T) -> Vec<u8>) {
-        let header = format!(
-            "{{'descr': '{descr}', 'fortran_order': False, 'shape': ({HEIGHT}, {WIDTH}), }}\n"
-        );
+        let header = format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({HEIGHT}, {WIDTH}), }}\n");
         let mut file = b"\x93NUMPY\x01\x00".to_vec();
         file.extend((header.len() as u16).to_le_bytes());
         file.extend(header.bytes());
@@ -70,9 +62,7 @@ impl Scene {
     }
 
     fn metres(&self, name: &str, left: f32, right: f32) {
-        self.npy(name, "<f4", left, right, |value| {
-            value.to_le_bytes().to_vec()
-        });
+        self.npy(name, "<f4", left, right, |value| value.to_le_bytes().to_vec());
     }
 
     fn out(&self) -> PathBuf {
@@ -124,10 +114,7 @@ fn sides<T: Copy>(map: Option<&ndarray::Array2<T>>) -> (T, T) {
 fn classes(set: &Dataset, frame: &Frame) -> (String, String) {
     let (left, right) = sides(frame.semantic.as_ref());
     let labels = &set.labels().unwrap().labels;
-    (
-        labels[&left].canonical.clone(),
-        labels[&right].canonical.clone(),
-    )
+    (labels[&left].canonical.clone(), labels[&right].canonical.clone())
 }
 
 fn pair(left: &str, right: &str) -> (String, String) {
@@ -139,13 +126,9 @@ fn habitat() -> Scene {
     let scene = Scene::new();
     for i in 0..5 {
         let name = |kind: &str, end: &str| format!("00800-x/{kind}/{i:03}.{end}");
-        RgbaImage::from_pixel(WIDTH, HEIGHT, Rgba([9, 9, 9, 255]))
-            .save(scene.at(&name("rgb", "png")))
-            .unwrap();
+        RgbaImage::from_pixel(WIDTH, HEIGHT, Rgba([9, 9, 9, 255])).save(scene.at(&name("rgb", "png"))).unwrap();
         scene.metres(&name("depth", "npy"), 2.0, f32::NAN);
-        scene.npy(&name("semantic", "npy"), "<i4", 3_i32, 70_000, |value| {
-            value.to_le_bytes().to_vec()
-        });
+        scene.npy(&name("semantic", "npy"), "<i4", 3_i32, 70_000, |value| value.to_le_bytes().to_vec());
     }
     scene.text(
         "00800-x/x.semantic.txt",
@@ -177,13 +160,7 @@ fn habitat_renders_of_hm3d() {
     assert_eq!(frame.names[&70_000].name, "Kitchen cabinet");
     assert_eq!(frame.names[&3].region, Some(0));
     assert!((frame.intrinsics.unwrap().fx - 4.0).abs() < 1e-9);
-    assert_eq!(
-        (
-            scene.line(1)["t"].as_f64(),
-            scene.line(1)["depth_scale"].as_f64()
-        ),
-        (Some(2.7), Some(0.001))
-    );
+    assert_eq!((scene.line(1)["t"].as_f64(), scene.line(1)["depth_scale"].as_f64()), (Some(2.7), Some(0.001)));
     assert_eq!(set.title(), "habitat");
 }
 
@@ -191,10 +168,7 @@ fn habitat_renders_of_hm3d() {
 fn habitat_renders_of_matterport_and_replica() {
     let house = "R 0 0 0 0 b 0 0 0\nC 0 1 painting 39 objects 0\nC 1 1 bed 11 bed 0\nO 0 0 0 0 0 0\nO 1 0 1 0 0 0\n";
     let replica = r#"{"objects":[{"id":0,"class_name":"picture"},{"id":1,"class_name":"bed"}]}"#;
-    let rows = [
-        ("m.house", house, Some("bedroom")),
-        ("info_semantic.json", replica, None),
-    ];
+    let rows = [("m.house", house, Some("bedroom")), ("info_semantic.json", replica, None)];
     check_rows(rows, |(name, text, room)| {
         let scene = Scene::new();
         scene.rgb("s/rgb/0.png");
@@ -208,10 +182,7 @@ fn habitat_renders_of_matterport_and_replica() {
         assert_eq!(classes(&set, &frame), pair("picture", "bed"));
         assert_eq!(frame.room.as_deref(), room);
         let camera = frame.intrinsics.unwrap();
-        assert!(
-            (camera.fx - 4.0).abs() < 1e-9 && (camera.cx - 3.5).abs() < 1e-9,
-            "{camera:?}"
-        );
+        assert!((camera.fx - 4.0).abs() < 1e-9 && (camera.cx - 3.5).abs() < 1e-9, "{camera:?}");
     });
 }
 
@@ -238,10 +209,7 @@ fn faulty_render_labels_are_named() {
     error: [TMP]/src/00800-x: none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json
         (Replica) in this folder; one of them must name the instances of the semantic maps
     ");
-    scene.text(
-        "00800-x/x.semantic.txt",
-        "HM3D Semantic Annotations\n9,FF,\"bed\",0\n",
-    );
+    scene.text("00800-x/x.semantic.txt", "HM3D Semantic Annotations\n9,FF,\"bed\",0\n");
     let message = scene.refused("habitat", &[]);
     insta::assert_snapshot!(redacted(&message), @"
     ERROR 00800-x/000: [TMP]/src/00800-x/semantic/000.npy: no pixel has the number of an instance that the scene
@@ -256,10 +224,7 @@ fn faulty_render_labels_are_named() {
         names; habitat-sim writes 0 everywhere if the scene is opened without its *.scene_dataset_config.json
     error: [TMP]/src: no frame of it could be read
     ");
-    scene.text(
-        "00800-x/x.semantic.txt",
-        "HM3D Semantic Annotations\n9,FF,bed,0\n",
-    );
+    scene.text("00800-x/x.semantic.txt", "HM3D Semantic Annotations\n9,FF,bed,0\n");
     insta::assert_snapshot!(
         redacted(&scene.refused("habitat", &[])),
         @r#"error: [TMP]/src/00800-x/x.semantic.txt, line 2: a name between quotes expected in id,colour,"name",region"#
@@ -270,10 +235,7 @@ fn faulty_render_labels_are_named() {
 fn trajectory_must_fit_its_images() {
     let scene = habitat();
     let trajectory = "00800-x/trajectory.jsonl";
-    scene.text(
-        trajectory,
-        "{\"frame\":\"000.png\"}\n{\"frame\":\"001.png\"}\n",
-    );
+    scene.text(trajectory, "{\"frame\":\"000.png\"}\n{\"frame\":\"001.png\"}\n");
     let message = scene.run("habitat", &[]).ended(0).stderr;
     insta::assert_snapshot!(redacted(&message), @r#"
     WARN [TMP]/src/00800-x/trajectory.jsonl: frames without an image in rgb: 2, for example "000.png"; a frame
@@ -297,13 +259,7 @@ fn render_of_eight_bits_is_skipped() {
     ERROR 00800-x/001: [TMP]/src/00800-x/semantic/001.png: a grey PNG of 8 bits; 16-bit grey expected, whose
         samples are the values themselves
     ");
-    assert_eq!(
-        Dataset::from_frames(&scene.out(), &[])
-            .unwrap()
-            .frames()
-            .count(),
-        4
-    );
+    assert_eq!(Dataset::from_frames(&scene.out(), &[]).unwrap().frames().count(), 4);
 }
 
 #[test]
@@ -315,13 +271,7 @@ fn existing_frames_need_force() {
         both
     ");
     scene.run("habitat", &["--force", "--count", "2"]).ended(0);
-    assert_eq!(
-        Dataset::from_frames(&scene.out(), &[])
-            .unwrap()
-            .frames()
-            .count(),
-        2
-    );
+    assert_eq!(Dataset::from_frames(&scene.out(), &[]).unwrap().frames().count(), 2);
 }
 
 #[test]
@@ -335,29 +285,16 @@ fn frames_of_scannet() {
         let name = |kind: &str, end: &str| format!("scene0000_00/{kind}/{i}.{end}");
         scene.rgb(&name("color", "jpg"));
         // Half the size of colour.
-        let deep = ImageBuffer::from_fn(WIDTH / 2, HEIGHT / 2, |x, _| {
-            Luma([if x < WIDTH / 4 { 1500_u16 } else { 2500 }])
-        });
+        let deep =
+            ImageBuffer::from_fn(WIDTH / 2, HEIGHT / 2, |x, _| Luma([if x < WIDTH / 4 { 1500_u16 } else { 2500 }]));
         deep.save(scene.at(&name("depth", "png"))).unwrap();
         scene.deep(&name("label-filt", "png"), 1191, 76);
         scene.shallow(&name("instance-filt", "png"), 4, 0);
-        scene.text(
-            &name("pose", "txt"),
-            if i == 0 {
-                "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1"
-            } else {
-                "-inf -inf -inf -inf"
-            },
-        );
+        scene
+            .text(&name("pose", "txt"), if i == 0 { "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1" } else { "-inf -inf -inf -inf" });
     }
-    scene.text(
-        "scene0000_00/scene0000_00.txt",
-        "axisAlignment = 1\nsceneType = Bedroom / Hotel\n",
-    );
-    scene.text(
-        "scene0000_00/intrinsic/intrinsic_color.txt",
-        "4 0 3.5 0\n0 4 2.5 0\n0 0 1 0\n0 0 0 1\n",
-    );
+    scene.text("scene0000_00/scene0000_00.txt", "axisAlignment = 1\nsceneType = Bedroom / Hotel\n");
+    scene.text("scene0000_00/intrinsic/intrinsic_color.txt", "4 0 3.5 0\n0 4 2.5 0\n0 0 1 0\n0 0 0 1\n");
     let set = scene.import("scannet", &[]);
     let frame = frame(&set, "scene0000_00/0");
     assert_eq!(set.frames().count(), 1);
@@ -371,10 +308,7 @@ fn frames_of_scannet() {
     assert!((frame.intrinsics.unwrap().cy - 2.5).abs() < 1e-9);
 
     let groups = vec!["{}"; 256].join(",");
-    scene.text(
-        "scene0000_00/scene0000_00.aggregation.json",
-        &format!("{{\"segGroups\":[{groups}]}}"),
-    );
+    scene.text("scene0000_00/scene0000_00.aggregation.json", &format!("{{\"segGroups\":[{groups}]}}"));
     let message = scene.refused("scannet", &["--force"]);
     insta::assert_snapshot!(redacted(&message), @"
     error: [TMP]/src/scene0000_00/scene0000_00.aggregation.json: 256 objects, but the 8 bits of instance-filt hold
@@ -393,10 +327,7 @@ fn frames_of_scannet_25k() {
     let frame = frame(&set, "scene0001_00/000100");
     assert_eq!(sides(frame.semantic.as_ref()), (5, 0));
     assert_eq!(set.labels().unwrap().space, "nyu40");
-    assert_eq!(
-        (frame.segments.unwrap()[(0, 0)], scene.line(0)["t"].as_f64()),
-        (1, Some(100.0 / 30.0))
-    );
+    assert_eq!((frame.segments.unwrap()[(0, 0)], scene.line(0)["t"].as_f64()), (1, Some(100.0 / 30.0)));
 }
 
 #[test]
@@ -415,10 +346,7 @@ fn images_and_maps_of_nyu() {
     let frame = frame(&set, "src/00001");
     assert_eq!(sides(frame.depth.as_ref()), (2000, 3000));
     assert_eq!(sides(frame.semantic.as_ref()), (4, 0));
-    assert!(
-        frame.intrinsics.is_none(),
-        "the camera is that of 640 × 480"
-    );
+    assert!(frame.intrinsics.is_none(), "the camera is that of 640 × 480");
     let message = scene.refused("nyu", &["--force", "--depth-scale", "0.00001"]);
     insta::assert_snapshot!(redacted(&message), @"
     error: depth: the typical depth of the frames is 0.1 m, but that of rooms is between 0.3 and 15 m; set
@@ -438,17 +366,9 @@ fn frames_of_sun_rgb_d() {
     let at = |name: &str| format!("kv1/b3dodata/img_0063/{name}");
     scene.rgb(&at("image/img_0063.jpg"));
     // 2000 mm and 9000 mm, rotated left by three bits.
-    scene.deep(
-        &at("depth_bfx/img_0063.png"),
-        2000_u16.rotate_left(3),
-        9000_u16.rotate_left(3),
-    );
+    scene.deep(&at("depth_bfx/img_0063.png"), 2000_u16.rotate_left(3), 9000_u16.rotate_left(3));
     // The depth before holes were filled, under the same name: it is not the one that is read.
-    scene.deep(
-        &at("depth/img_0063.png"),
-        1000_u16.rotate_left(3),
-        1000_u16.rotate_left(3),
-    );
+    scene.deep(&at("depth/img_0063.png"), 1000_u16.rotate_left(3), 1000_u16.rotate_left(3));
     scene.text(&at("intrinsics.txt"), "500 0 3 0 510 2 0 0 1\n");
     scene.text(&at("scene.txt"), "living_room\n");
     scene.text(
@@ -484,29 +404,16 @@ fn dumps_of_ai2_thor() {
     let scene = Scene::new();
     scene.rgb("FloorPlan201/rgb/0.png");
     scene.metres("FloorPlan201/depth/0.npy", 1.25, 3.0);
-    let colors = RgbImage::from_fn(WIDTH, HEIGHT, |x, _| {
-        if x < 4 {
-            Rgb([1, 2, 3])
-        } else {
-            Rgb([4, 5, 6])
-        }
-    });
-    colors
-        .save(scene.at("FloorPlan201/instance/0.png"))
-        .unwrap();
-    scene.text(
-        "FloorPlan201/colors.json",
-        r#"{"(1, 2, 3)": "TVStand|-1.0|0.0|2.0", "(4, 5, 6)": "CoffeeTable|1|2|3"}"#,
-    );
+    let colors = RgbImage::from_fn(WIDTH, HEIGHT, |x, _| if x < 4 { Rgb([1, 2, 3]) } else { Rgb([4, 5, 6]) });
+    colors.save(scene.at("FloorPlan201/instance/0.png")).unwrap();
+    scene
+        .text("FloorPlan201/colors.json", r#"{"(1, 2, 3)": "TVStand|-1.0|0.0|2.0", "(4, 5, 6)": "CoffeeTable|1|2|3"}"#);
     let set = scene.import("thor", &["--hfov", "90"]);
     let frame = frame(&set, "FloorPlan201/0");
     assert_eq!(sides(frame.depth.as_ref()), (1250, 3000));
     assert_eq!(classes(&set, &frame), pair("furniture", "table"));
     let (_, right) = sides(frame.segments.as_ref());
-    assert_eq!(
-        (frame.names[&right].name.as_str(), frame.room.as_deref()),
-        ("coffee table", Some("living room"))
-    );
+    assert_eq!((frame.names[&right].name.as_str(), frame.room.as_deref()), ("coffee table", Some("living room")));
     scene.text("FloorPlan201/colors.json", r#"{"red": "Bed|1"}"#);
     insta::assert_snapshot!(
         redacted(&scene.refused("thor", &["--force"])),
@@ -529,17 +436,7 @@ fn folders_of_images_and_maps() {
     error: --labels: "klingon" is neither a file nor one of the built-in label spaces: ade150, mpcat40, nyu13,
         nyu40
     "#);
-    let set = scene.import(
-        "folder",
-        &[
-            "--labels",
-            "nyu40",
-            "--depth-kind",
-            "euclid",
-            "--name",
-            "mine",
-        ],
-    );
+    let set = scene.import("folder", &["--labels", "nyu40", "--depth-kind", "euclid", "--name", "mine"]);
     let found = frame(&set, "home/a");
     assert_eq!((set.title(), found.depth_kind), ("mine", DepthKind::Euclid));
     assert_eq!(sides(found.segments.as_ref()), (300, 0));
@@ -554,10 +451,7 @@ fn folders_of_images_and_maps() {
     )
     .ended(0);
     let twice = frame(&Dataset::from_frames(&again, &[]).unwrap(), "home/a");
-    assert_eq!(
-        (twice.depth, twice.semantic, twice.segments),
-        (found.depth, found.semantic, found.segments)
-    );
+    assert_eq!((twice.depth, twice.semantic, twice.segments), (found.depth, found.semantic, found.segments));
     assert_eq!(twice.rgb, found.rgb);
 }
 
@@ -611,26 +505,12 @@ fn array_class_maps_are_read() {
     for number in 0..3 {
         scene.rgb(&format!("home/rgb/{number}.png"));
         // Hypersim has −1 for no class.
-        scene.npy(
-            &format!("home/sem/{number}.npy"),
-            "<i2",
-            4_i16,
-            -1,
-            |value| value.to_le_bytes().to_vec(),
-        );
-        scene.npy(
-            &format!("home/depth/{number}.npy"),
-            "<f2",
-            0x4000_u16,
-            0x4400,
-            |value| value.to_le_bytes().to_vec(),
-        );
+        scene.npy(&format!("home/sem/{number}.npy"), "<i2", 4_i16, -1, |value| value.to_le_bytes().to_vec());
+        scene.npy(&format!("home/depth/{number}.npy"), "<f2", 0x4000_u16, 0x4400, |value| value.to_le_bytes().to_vec());
         scene.text(&format!("home/normals/{number}.exr"), "");
     }
     scene.text("home/notes", "");
-    let called = scene
-        .run("folder", &["--labels", "nyu40", "--count", "2"])
-        .ended(0);
+    let called = scene.run("folder", &["--labels", "nyu40", "--count", "2"]).ended(0);
     let said = called.stdout;
     insta::assert_snapshot!(redacted(&said), @"
     [TMP]/out: 2 frames of 1 scene, chosen from 3
@@ -641,9 +521,7 @@ fn array_class_maps_are_read() {
     let found = frame(&set, "home/0");
     assert_eq!(sides(found.semantic.as_ref()), (4, 0));
     assert_eq!(sides(found.depth.as_ref()), (2_000, 4_000));
-    scene.npy("home/sem/0.npy", "<i4", 70_000_i32, 0, |value| {
-        value.to_le_bytes().to_vec()
-    });
+    scene.npy("home/sem/0.npy", "<i4", 70_000_i32, 0, |value| value.to_le_bytes().to_vec());
     let refused = scene.refused("folder", &["--labels", "nyu40", "--force"]);
     insta::assert_snapshot!(redacted(&refused), @"ERROR home/0: [TMP]/src/home/sem/0.npy: 70000 is too large for the number of a class");
 }
@@ -654,36 +532,20 @@ fn hypersim_maps_in_hdf5_are_read() {
     let images = "ai_001_002/images/scene_cam_01";
     scene.rgb("image.png");
     for number in ["0003", "0007"] {
-        let image = scene.at(&format!(
-            "{images}_final_preview/frame.{number}.tonemap.jpg"
-        ));
+        let image = scene.at(&format!("{images}_final_preview/frame.{number}.tonemap.jpg"));
         let picture = image::open(scene.at("image.png")).unwrap().into_rgb8();
         picture.save(image).unwrap();
-        let map = |name: &str| {
-            scene.at(&format!(
-                "{images}_geometry_hdf5/frame.{number}.{name}.hdf5"
-            ))
-        };
+        let map = |name: &str| scene.at(&format!("{images}_geometry_hdf5/frame.{number}.{name}.hdf5"));
         let sides = |left: u16, right: u16| -> Vec<u8> {
-            let row: Vec<u8> = (0..WIDTH)
-                .map(|x| if x < WIDTH / 2 { left } else { right })
-                .flat_map(u16::to_le_bytes)
-                .collect();
+            let row: Vec<u8> =
+                (0..WIDTH).map(|x| if x < WIDTH / 2 { left } else { right }).flat_map(u16::to_le_bytes).collect();
             row.repeat(HEIGHT as usize)
         };
         let size = [u64::from(HEIGHT), u64::from(WIDTH)];
         // 2.0 and 4.0 as 16-bit floats; classes and instances of −1 are none.
-        fs::write(
-            map("depth_meters"),
-            hdf5(1, 0, size, &sides(0x4000, 0x4400)),
-        )
-        .unwrap();
+        fs::write(map("depth_meters"), hdf5(1, 0, size, &sides(0x4000, 0x4400))).unwrap();
         fs::write(map("semantic"), hdf5(0, 8, size, &sides(4, u16::MAX))).unwrap();
-        fs::write(
-            map("semantic_instance"),
-            hdf5(0, 8, size, &sides(7, u16::MAX)),
-        )
-        .unwrap();
+        fs::write(map("semantic_instance"), hdf5(0, 8, size, &sides(7, u16::MAX))).unwrap();
         fs::write(map("world_normal"), "").unwrap();
     }
     let called = scene.run("hypersim", &[]).ended(0);
@@ -701,14 +563,10 @@ fn hypersim_maps_in_hdf5_are_read() {
     assert_eq!(sides(found.segments.as_ref()), (7, 0));
 }
 
-/// An HDF5 file of one array of 16-bit numbers, as h5py writes it without compression: a class of type, its bits, and the numbers.
+/// An HDF5 file of one array of 16-bit numbers, as h5py writes it without compression: a class of type, its bits, and
+/// the numbers.
 fn hdf5(class: u8, bits: u8, size: [u64; 2], data: &[u8]) -> Vec<u8> {
-    let long = |numbers: &[u64]| -> Vec<u8> {
-        numbers
-            .iter()
-            .flat_map(|number| number.to_le_bytes())
-            .collect()
-    };
+    let long = |numbers: &[u64]| -> Vec<u8> { numbers.iter().flat_map(|number| number.to_le_bytes()).collect() };
     let header = |messages: &[(u16, Vec<u8>)]| {
         let mut body = Vec::new();
         for (kind, data) in messages {
@@ -725,18 +583,9 @@ fn hdf5(class: u8, bits: u8, size: [u64; 2], data: &[u8]) -> Vec<u8> {
         header
     };
     let mut file = b"\x89HDF\r\n\x1a\n\0\0\0\0\0\x08\x08\0\x04\0\x10\0\0\0\0\0".to_vec();
-    // The root group is at 96, its tree at 136, its node at 184, its names at 232 and 264, the array at 288, its numbers at 400.
-    file.extend(long(&[
-        0,
-        u64::MAX,
-        400 + data.len() as u64,
-        u64::MAX,
-        0,
-        96,
-        0,
-        0,
-        0,
-    ]));
+    // The root group is at 96, its tree at 136, its node at 184, its names at 232 and 264, the array at 288, its
+    // numbers at 400.
+    file.extend(long(&[0, u64::MAX, 400 + data.len() as u64, u64::MAX, 0, 96, 0, 0, 0]));
     file.extend(header(&[(17, long(&[136, 232]))]));
     file.extend(b"TREE\0\0\x01\0");
     file.extend(long(&[u64::MAX, u64::MAX, 0, 184, 8]));
@@ -780,10 +629,7 @@ fn folders_join_with_distinct_scenes() {
         let mut command = Command::new(PROGRAM);
         command.args(["import", "folder", "--labels", labels, "--src"]);
         command.arg(scene.0.path().join("src/one")).arg("--src");
-        command
-            .arg(scene.0.path().join("src/two"))
-            .arg("--out")
-            .arg(scene.out());
+        command.arg(scene.0.path().join("src/two")).arg("--out").arg(scene.out());
         called(&mut command).ended(0)
     };
     import("nyu40");
@@ -793,9 +639,7 @@ fn folders_join_with_distinct_scenes() {
     assert_eq!(sides(frame(&set, "1-home/0").semantic.as_ref()), (4, 9));
     assert_eq!(sides(frame(&set, "2-home/0").semantic.as_ref()), (5, 9));
     // Questions name the command that joins.
-    let said = called(Command::new(PROGRAM).args(["questions", "one", "two", "--out", "q.jsonl"]))
-        .ended(2)
-        .stderr;
+    let said = called(Command::new(PROGRAM).args(["questions", "one", "two", "--out", "q.jsonl"])).ended(2).stderr;
     insta::assert_snapshot!(redacted(&said), @"
     error: DATA: one folder expected, which a run takes with its questions; darkqa-eval import folder --src one
         --src two --out JOINED makes one of 2

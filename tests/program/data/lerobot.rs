@@ -1,4 +1,5 @@
-//! `import lerobot`: frames of LeRobot data sets that the tests write. Tests of videos need ffmpeg and are skipped without it.
+//! `import lerobot`: frames of LeRobot data sets that the tests write. Tests of videos need ffmpeg and are skipped
+//! without it.
 
 use std::fs;
 
@@ -28,10 +29,7 @@ fn import_front(bench: &Bench, line: &str) -> Called {
 
 /// Episode and frame of each line.
 fn places(bench: &Bench) -> Vec<[u64; 2]> {
-    frames(bench)
-        .iter()
-        .map(|line| ["episode", "frame_index"].map(|key| line[key].as_u64().unwrap()))
-        .collect()
+    frames(bench).iter().map(|line| ["episode", "frame_index"].map(|key| line[key].as_u64().unwrap())).collect()
 }
 
 /// Changes `info.json`.
@@ -84,24 +82,16 @@ fn a_camera_is_chosen() {
 #[test]
 fn images_keep_bytes_episodes_and_tasks() {
     for version in ["v3.0", "v2.1", "v2.0"] {
-        let set = Set {
-            version,
-            ..Set::default()
-        };
+        let set = Set { version, ..Set::default() };
         let bench = with_set(&set);
-        let called = import(&bench, "--camera observation.images.front --camera observation.images.wrist --every 0 --out out")
-            .ended(0);
-        assert!(
-            called
-                .stdout
-                .starts_with("out: 14 frames of 2 scenes (one episode each)\n"),
-            "{called:?}"
-        );
+        let called =
+            import(&bench, "--camera observation.images.front --camera observation.images.wrist --every 0 --out out")
+                .ended(0);
+        assert!(called.stdout.starts_with("out: 14 frames of 2 scenes (one episode each)\n"), "{called:?}");
         let lines = frames(&bench);
         assert_eq!(lines.len(), 14);
         for line in lines {
-            let [episode, frame] =
-                ["episode", "frame_index"].map(|key| line[key].as_u64().unwrap() as u32);
+            let [episode, frame] = ["episode", "frame_index"].map(|key| line[key].as_u64().unwrap() as u32);
             let camera = line["topic"].as_str().unwrap();
             let file = fs::read(bench.path("out").join(line["rgb"].as_str().unwrap())).unwrap();
             assert_eq!(file, png(&picture(camera, episode, frame)), "{line}");
@@ -112,8 +102,7 @@ fn images_keep_bytes_episodes_and_tasks() {
             let time = line["t"].as_f64().unwrap();
             assert!((time - f64::from(frame) / 10.0).abs() < 1e-6, "{line}");
         }
-        let info: Value =
-            serde_json::from_slice(&fs::read(bench.path("out/dataset.json")).unwrap()).unwrap();
+        let info: Value = serde_json::from_slice(&fs::read(bench.path("out/dataset.json")).unwrap()).unwrap();
         assert_eq!(info["topics"], json!([FRONT, WRIST]));
         assert_eq!(info["codebase_version"], version);
     }
@@ -121,10 +110,7 @@ fn images_keep_bytes_episodes_and_tasks() {
 
 #[test]
 fn unnamed_index_of_pandas_has_the_tasks() {
-    let set = Set {
-        task_column: "__index_level_0__",
-        ..Set::default()
-    };
+    let set = Set { task_column: "__index_level_0__", ..Set::default() };
     let bench = with_set(&set);
     import_front(&bench, "").ended(0);
     assert_eq!(frames(&bench)[1]["task"], task(1));
@@ -135,12 +121,7 @@ fn frames_without_tasks_are_taken() {
     let bench = with_set(&Set::default());
     fs::remove_file(bench.path("set/meta/tasks.parquet")).unwrap();
     let called = import_front(&bench, "").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("set/meta/tasks.parquet: no such file; the frames have no task"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("set/meta/tasks.parquet: no such file; the frames have no task"), "{called:?}");
     assert_eq!(frames(&bench)[0].get("task"), None);
 }
 
@@ -169,11 +150,7 @@ fn frames_of_joined_videos_are_those_of_the_rows() {
         return;
     }
     for version in ["v3.0", "v2.1"] {
-        let set = Set {
-            version,
-            videos: true,
-            ..Set::default()
-        };
+        let set = Set { version, videos: true, ..Set::default() };
         let bench = with_set(&set);
         for (line, expected) in [
             ("--every 0", &ALL[..]),
@@ -184,15 +161,11 @@ fn frames_of_joined_videos_are_those_of_the_rows() {
             import_front(&bench, &format!("--force {line}")).ended(0);
             assert_eq!(places(&bench), expected, "{version} {line}");
             for line in frames(&bench) {
-                let [episode, frame] =
-                    ["episode", "frame_index"].map(|key| line[key].as_u64().unwrap() as u32);
+                let [episode, frame] = ["episode", "frame_index"].map(|key| line[key].as_u64().unwrap() as u32);
                 let path = bench.path("out").join(line["rgb"].as_str().unwrap());
                 let found = image::open(path).unwrap().into_rgb8()[(16, 8)].0[1];
                 let expected = grey(FRONT, episode, frame);
-                assert!(
-                    found.abs_diff(expected) <= 3,
-                    "{found}, not {expected}: {line}"
-                );
+                assert!(found.abs_diff(expected) <= 3, "{found}, not {expected}: {line}");
             }
         }
     }
@@ -203,12 +176,7 @@ fn a_slower_camera_gives_its_own_frames() {
     if !has_ffmpeg() {
         return;
     }
-    let set = Set {
-        lengths: vec![4, 4],
-        videos: true,
-        wrist_fps: 5,
-        ..Set::default()
-    };
+    let set = Set { lengths: vec![4, 4], videos: true, wrist_fps: 5, ..Set::default() };
     let bench = with_set(&set);
     import(&bench, &format!("--camera {WRIST} --every 0 --out out")).ended(0);
     assert_eq!(places(&bench), [[0, 0], [0, 2], [1, 0], [1, 2]]);
@@ -223,24 +191,14 @@ fn missing_and_cut_videos_are_named() {
     if !has_ffmpeg() {
         return;
     }
-    let set = Set {
-        version: "v2.1",
-        videos: true,
-        ..Set::default()
-    };
+    let set = Set { version: "v2.1", videos: true, ..Set::default() };
     let bench = with_set(&set);
-    let video = |episode: u32| {
-        bench.path(&format!(
-            "set/videos/chunk-000/{FRONT}/episode_{episode:06}.mp4"
-        ))
-    };
+    let video = |episode: u32| bench.path(&format!("set/videos/chunk-000/{FRONT}/episode_{episode:06}.mp4"));
     // The second episode gets the video of the first, which is one frame shorter.
     fs::copy(video(0), video(1)).unwrap();
     let called = import_front(&bench, "--every 0").ended(1);
     assert!(
-        called.stderr.contains(
-            "no frame at 0.300 s, of episode 1; 1 frame of observation.images.front left out"
-        ),
+        called.stderr.contains("no frame at 0.300 s, of episode 1; 1 frame of observation.images.front left out"),
         "{called:?}"
     );
     assert_eq!(places(&bench), ALL[..6]);
@@ -248,9 +206,7 @@ fn missing_and_cut_videos_are_named() {
     let called = import_front(&bench, "--every 0 --force").ended(1);
     assert!(
         called.stderr.contains("no such file")
-            && called
-                .stderr
-                .contains("3 frames of observation.images.front left out"),
+            && called.stderr.contains("3 frames of observation.images.front left out"),
         "{called:?}"
     );
     assert_eq!(places(&bench), ALL[3..6]);
@@ -284,15 +240,9 @@ fn unknown_versions_are_refused_with_a_remedy() {
         info["codebase_version"] = json!("v3.1");
     });
     import_front(&bench, "").ended(0);
-    bench.file(
-        "old/meta_data/info.json",
-        "{\"codebase_version\": \"v1.6\"}",
-    );
+    bench.file("old/meta_data/info.json", "{\"codebase_version\": \"v1.6\"}");
     let refused = bench.call(&["import", "lerobot", "old"]).ended(2);
-    assert!(
-        refused.stderr.contains("convert_dataset_v1_to_v2"),
-        "{refused:?}"
-    );
+    assert!(refused.stderr.contains("convert_dataset_v1_to_v2"), "{refused:?}");
     insta::assert_snapshot!(bench.call(&["import", "lerobot", "."]), @"
     exit code: 2
     stderr:
@@ -304,18 +254,11 @@ fn unknown_versions_are_refused_with_a_remedy() {
 #[test]
 fn a_set_without_episodes_is_refused() {
     for version in ["v3.0", "v2.1"] {
-        let set = Set {
-            version,
-            lengths: Vec::new(),
-            ..Set::default()
-        };
+        let set = Set { version, lengths: Vec::new(), ..Set::default() };
         let bench = with_set(&set);
         for line in ["", "--camera observation.images.front --out out"] {
             let refused = import(&bench, line).ended(2);
-            assert!(
-                refused.stderr.contains("the set has no episodes"),
-                "{refused:?}"
-            );
+            assert!(refused.stderr.contains("the set has no episodes"), "{refused:?}");
         }
         if version == "v3.0" {
             fs::remove_dir_all(bench.path("set/meta/episodes")).unwrap();
@@ -327,78 +270,45 @@ fn a_set_without_episodes_is_refused() {
 
 #[test]
 fn a_damaged_data_file_leaves_the_others() {
-    let set = Set {
-        version: "v2.1",
-        ..Set::default()
-    };
+    let set = Set { version: "v2.1", ..Set::default() };
     let bench = with_set(&set);
     let path = bench.path("set/data/chunk-000/episode_000000.parquet");
     let whole = fs::read(&path).unwrap();
     fs::write(&path, &whole[..whole.len() - 9]).unwrap();
     let called = import_front(&bench, "--every 0").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("episode_000000.parquet: not a whole Parquet file"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("episode_000000.parquet: not a whole Parquet file"), "{called:?}");
     assert_eq!(places(&bench), ALL[3..]);
-    fs::write(
-        &path,
-        "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n",
-    )
-    .unwrap();
+    fs::write(&path, "version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 9\n").unwrap();
     let called = import_front(&bench, "--every 0 --force").ended(1);
     assert!(called.stderr.contains("git lfs pull"), "{called:?}");
 }
 
 #[test]
 fn rows_that_contradict_meta_are_named() {
-    let set = Set {
-        version: "v2.1",
-        ..Set::default()
-    };
+    let set = Set { version: "v2.1", ..Set::default() };
     let bench = with_set(&set);
     bench.file(
         "set/meta/episodes.jsonl",
         "{\"episode_index\": 0, \"length\": 5}\n{\"episode_index\": 1, \"length\": 4}\n",
     );
     let called = import_front(&bench, "--every 0").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("episode 0: 3 frames, but meta states 5"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("episode 0: 3 frames, but meta states 5"), "{called:?}");
     assert_eq!(places(&bench), ALL);
 }
 
 #[test]
 fn episodes_without_rows_are_named() {
     let bench = with_set(&Set::default());
-    let short = with_set(&Set {
-        lengths: vec![3],
-        ..Set::default()
-    });
+    let short = with_set(&Set { lengths: vec![3], ..Set::default() });
     let data = "set/data/chunk-000/file-000.parquet";
     fs::copy(short.path(data), bench.path(data)).unwrap();
     let called = import_front(&bench, "--every 0").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("episode 1: 0 frames, but meta states 4"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("episode 1: 0 frames, but meta states 4"), "{called:?}");
     assert_eq!(places(&bench), ALL[..3]);
     // The other way round: rows of an episode that meta does not have.
     fs::copy(with_set(&Set::default()).path(data), short.path(data)).unwrap();
     let called = import_front(&short, "--every 0").ended(1);
-    assert!(
-        called
-            .stderr
-            .contains("4 rows of no episode that meta has in this file, left out"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("4 rows of no episode that meta has in this file, left out"), "{called:?}");
     assert_eq!(places(&short), ALL[..3]);
 }
 
@@ -406,12 +316,7 @@ fn episodes_without_rows_are_named() {
 fn times_after_an_episode_are_named() {
     let bench = with_set(&Set::default());
     let called = import_front(&bench, "--at 0.1,0.3").ended(0);
-    assert!(
-        called
-            .stderr
-            .contains("--at: no frame at one of its times in 1 episode"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("--at: no frame at one of its times in 1 episode"), "{called:?}");
     let called = import_front(&bench, "--at 0.2 --force").ended(0);
     assert!(!called.stderr.contains("--at"), "{called:?}");
 }
@@ -420,21 +325,12 @@ fn times_after_an_episode_are_named() {
 fn paths_lead_to_no_file_outside() {
     let set = Set::default();
     let bench = with_set(&set);
-    fs::copy(
-        bench.path("set/data/chunk-000/file-000.parquet"),
-        bench.path("secret.parquet"),
-    )
-    .unwrap();
+    fs::copy(bench.path("set/data/chunk-000/file-000.parquet"), bench.path("secret.parquet")).unwrap();
     let absolute = bench.path("secret.parquet").display().to_string();
     for path in ["../secret.parquet", "data/../../secret.parquet", &absolute] {
         change_info(&bench, &set, |info| info["data_path"] = json!(path));
         let refused = import_front(&bench, "").ended(2);
-        assert!(
-            refused
-                .stderr
-                .contains("lies outside set/, the folder of the data"),
-            "{refused:?}"
-        );
+        assert!(refused.stderr.contains("lies outside set/, the folder of the data"), "{refused:?}");
         assert!(!bench.path("out").exists());
     }
     // The remedy in the message.
@@ -444,19 +340,12 @@ fn paths_lead_to_no_file_outside() {
 
 #[test]
 fn camera_names_lead_to_no_video_outside() {
-    let set = Set {
-        videos: true,
-        ..Set::default()
-    };
+    let set = Set { videos: true, ..Set::default() };
     if !has_ffmpeg() {
         return;
     }
     let bench = with_set(&set);
-    fs::copy(
-        bench.path(&format!("set/videos/{FRONT}/chunk-000/file-000.mp4")),
-        bench.path("secret.mp4"),
-    )
-    .unwrap();
+    fs::copy(bench.path(&format!("set/videos/{FRONT}/chunk-000/file-000.mp4")), bench.path("secret.mp4")).unwrap();
     change_info(&bench, &set, |info| {
         info["video_path"] = json!("videos/{video_key}/../../../secret.mp4");
     });
@@ -499,10 +388,7 @@ fn cached_repository_is_read() {
 
     let bench = with_set(&Set::default());
     let cache = "datasets--user--cups";
-    for (number, path) in crate::support::run::files(&bench.path("set"))
-        .iter()
-        .enumerate()
-    {
+    for (number, path) in crate::support::run::files(&bench.path("set")).iter().enumerate() {
         let name = path.strip_prefix(bench.path("set")).unwrap();
         let blob = bench.file(&format!("{cache}/blobs/{number}"), fs::read(path).unwrap());
         let link = bench.path(&format!("{cache}/snapshots/abc")).join(name);
@@ -511,9 +397,7 @@ fn cached_repository_is_read() {
     }
     bench.file(&format!("{cache}/refs/main"), "abc");
     for folder in [cache.to_owned(), format!("{cache}/snapshots/abc")] {
-        let words = [
-            "import", "lerobot", &folder, "--camera", FRONT, "--out", "out", "--force",
-        ];
+        let words = ["import", "lerobot", &folder, "--camera", FRONT, "--out", "out", "--force"];
         bench.call(&words).ended(0);
         assert_eq!(frames(&bench)[0]["scene"], "cups-0000");
     }
@@ -525,10 +409,7 @@ fn a_playlist_in_place_of_a_video_is_not_followed() {
     if !has_ffmpeg() {
         return;
     }
-    let set = Set {
-        videos: true,
-        ..Set::default()
-    };
+    let set = Set { videos: true, ..Set::default() };
     let bench = with_set(&set);
     let video = bench.path(&format!("set/videos/{FRONT}/chunk-000/file-000.mp4"));
     fs::rename(&video, bench.path("secret.mp4")).unwrap();
@@ -537,14 +418,9 @@ fn a_playlist_in_place_of_a_video_is_not_followed() {
     fs::copy(bench.path("secret.mp4"), video.with_file_name("secret.mp4")).unwrap();
     // The playlist works for a video that the user names.
     let name = format!("set/videos/{FRONT}/chunk-000/file-000.mp4");
-    bench
-        .call(&["import", "video", &name, "--out", "named"])
-        .ended(0);
+    bench.call(&["import", "video", &name, "--out", "named"]).ended(0);
     let refused = import_front(&bench, "").ended(2);
-    assert!(
-        refused.stderr.contains("ffmpeg finds no video in it"),
-        "{refused:?}"
-    );
+    assert!(refused.stderr.contains("ffmpeg finds no video in it"), "{refused:?}");
 }
 
 /// A program `ffmpeg` that cannot decode AV1, with the words of a version.
@@ -553,20 +429,11 @@ fn a_playlist_in_place_of_a_video_is_not_followed() {
 fn a_missing_decoder_is_named_with_its_remedy() {
     let lines = [
         ("Decoder (codec av1) not found for input stream #0:0", 1),
-        (
-            "[dec:av1 @ 0x1] Decoding requested, but no decoder found for: av1",
-            1,
-        ),
-        (
-            "[av1 @ 0x1] Your platform doesn't suppport hardware accelerated AV1 decoding.",
-            0,
-        ),
+        ("[dec:av1 @ 0x1] Decoding requested, but no decoder found for: av1", 1),
+        ("[av1 @ 0x1] Your platform doesn't suppport hardware accelerated AV1 decoding.", 0),
     ];
     for (line, code) in lines {
-        let set = Set {
-            version: "v2.1",
-            ..Set::default()
-        };
+        let set = Set { version: "v2.1", ..Set::default() };
         let bench = with_set(&set);
         change_info(&bench, &set, |info| {
             info["features"][FRONT]["dtype"] = json!("video");
@@ -581,17 +448,13 @@ fn a_missing_decoder_is_named_with_its_remedy() {
         bench.program("ffmpeg", &script);
         let video = format!("set/videos/chunk-000/{FRONT}/episode_000000.mp4");
         let calls: [&[&str]; 2] = [
-            &[
-                "import", "lerobot", "set", "--camera", FRONT, "--out", "out",
-            ],
+            &["import", "lerobot", "set", "--camera", FRONT, "--out", "out"],
             &["import", "video", &video, "--out", "out"],
         ];
         for words in calls {
             let refused = bench.call_with_programs(words).ended(2);
             assert!(
-                refused
-                    .stderr
-                    .starts_with("error: ffmpeg: the installed one has no decoder for av1")
+                refused.stderr.starts_with("error: ffmpeg: the installed one has no decoder for av1")
                     && refused.stderr.contains("apt install ffmpeg"),
                 "{line}: {refused:?}"
             );
@@ -604,21 +467,12 @@ fn data_flag_names_the_import() {
     let set = Set::default();
     let bench = with_set(&set);
     let check = |line: &str| {
-        let called = bench.call(
-            &[
-                &["check", "--model", "random", "--data", "set"],
-                &words(line)[..],
-            ]
-            .concat(),
-        );
+        let called = bench.call(&[&["check", "--model", "random", "--data", "set"], &words(line)[..]].concat());
         format!("{}{}", called.stdout, called.stderr)
     };
     for line in ["--ask home", ""] {
         let text = check(line);
-        assert!(
-            text.contains("darkqa-eval import lerobot set"),
-            "{line}: {text}"
-        );
+        assert!(text.contains("darkqa-eval import lerobot set"), "{line}: {text}");
     }
     change_info(&bench, &set, |info| *info = json!({"fps": 10}));
     for line in ["--ask home", ""] {

@@ -15,7 +15,8 @@ fn jpeg(number: u8) -> Vec<u8> {
 const RAW: &str = "sensor_msgs/msg/Image";
 const COMPRESSED: &str = "sensor_msgs/msg/CompressedImage";
 
-/// A recording with JPEG images on `/front/compressed`, of which the one at `broken` has these bytes, and on `/rear/compressed`.
+/// A recording with JPEG images on `/front/compressed`, of which the one at `broken` has these bytes, and on
+/// `/rear/compressed`.
 fn two_cameras(broken: u8, bytes: &[u8]) -> Bench {
     let mut records = Records::default();
     records.topic(1, "/front/compressed", COMPRESSED, "cdr", "");
@@ -34,11 +35,7 @@ fn two_cameras(broken: u8, bytes: &[u8]) -> Bench {
 fn broken_first_image_hides_no_camera() {
     let cut = &jpeg(0)[..400];
     for (broken, bytes, listed) in [
-        (
-            0,
-            &b""[..],
-            "; the first cannot be read: an empty image (format \"jpeg\")",
-        ),
+        (0, &b""[..], "; the first cannot be read: an empty image (format \"jpeg\")"),
         (0, cut, "; the first cannot be read: not a readable image"),
         // Controls: a later image, and none.
         (1, b"", " 3 messages, 1.0 Hz, 2.0 s\n"),
@@ -47,20 +44,13 @@ fn broken_first_image_hides_no_camera() {
         let bench = two_cameras(broken, bytes);
         let called = import(&bench, "").ended(0);
         let line = called.stdout.split_inclusive('\n').next().unwrap();
-        assert!(
-            line.starts_with("/front/compressed") && line.contains(listed),
-            "{line}"
-        );
+        assert!(line.starts_with("/front/compressed") && line.contains(listed), "{line}");
         assert!(line.contains("96×64 jpeg"), "{line}");
         // No camera is chosen silently.
         let both = import(&bench, "--out out").ended(2);
-        assert!(
-            both.stderr.contains("/front/compressed, /rear/compressed"),
-            "{both:?}"
-        );
+        assert!(both.stderr.contains("/front/compressed, /rear/compressed"), "{both:?}");
         let is_broken = broken < 3;
-        let taken = import(&bench, "--topic /front/compressed --every 0 --out out")
-            .ended(i32::from(is_broken));
+        let taken = import(&bench, "--topic /front/compressed --every 0 --out out").ended(i32::from(is_broken));
         assert_eq!(frames(&bench).len(), 3 - usize::from(is_broken));
         assert_eq!(taken.stdout.contains("1 failed"), is_broken, "{taken:?}");
     }
@@ -113,10 +103,7 @@ fn empty_image_gives_its_place_to_the_next() {
 fn yuv([luma, u, v]: [u8; 3]) -> [(&'static str, Vec<u8>); 2] {
     let pixels = (SIZE[0] * SIZE[1]) as usize;
     let planes = [vec![luma; pixels], [u, v].repeat(pixels / 4)].concat();
-    [
-        ("yuv422_yuy2", [luma, u, luma, v].repeat(pixels / 2)),
-        ("nv12", planes),
-    ]
+    [("yuv422_yuy2", [luma, u, luma, v].repeat(pixels / 2)), ("nv12", planes)]
 }
 
 #[test]
@@ -130,24 +117,14 @@ fn yuv_is_converted_with_a_note() {
         let called = import(&bench, "--out out").ended(0);
         let note = "YUV, converted to RGB by BT.601 in limited range, as cv_bridge does (the messages state no matrix): 1 frame\n";
         assert!(called.stdout.contains(note), "{called:?}");
-        let path = bench
-            .path("out")
-            .join(frames(&bench)[0]["rgb"].as_str().unwrap());
+        let path = bench.path("out").join(frames(&bench)[0]["rgb"].as_str().unwrap());
         let red = image::open(path).unwrap().into_rgb8();
-        assert!(
-            red.pixels()
-                .all(|pixel| pixel.0[0] > 250 && pixel.0[1].max(pixel.0[2]) < 4),
-            "{:?}",
-            red[(0, 0)]
-        );
+        assert!(red.pixels().all(|pixel| pixel.0[0] > 250 && pixel.0[1].max(pixel.0[2]) < 4), "{:?}", red[(0, 0)]);
     }
     // Control: no note without YUV.
     let bench = two_cameras(9, b"");
     let called = import(&bench, "--topic /rear/compressed --out out").ended(0);
-    assert!(
-        !called.stdout.contains("YUV") && called.stderr.is_empty(),
-        "{called:?}"
-    );
+    assert!(!called.stdout.contains("YUV") && called.stderr.is_empty(), "{called:?}");
 }
 
 #[test]
@@ -164,11 +141,7 @@ fn colour_lost_by_compression_is_named() {
         records.message(1, 0.0, &compressed(0.0, format, &jpeg(1)));
         let called = import(&with_recording(records.file()), "--out out").ended(0);
         let expected = " WARN drive: /c/image_raw/compressed: 1 image grey, although the camera has colour: the compression dropped it; record /c/image_raw for questions about colours\n";
-        assert_eq!(
-            called.stderr,
-            if is_lost { expected } else { "" },
-            "{format}"
-        );
+        assert_eq!(called.stderr, if is_lost { expected } else { "" }, "{format}");
     }
 }
 
@@ -209,14 +182,8 @@ fn video_in_messages_names_its_commands() {
     records.message(2, 0.0, &image(0.0, "mono8", [2, 2], &[9; 4], 0));
     let bench = with_recording(records.file());
     let listed = import(&bench, "").ended(0);
-    assert!(
-        listed.stdout.contains("/v: make a video of its messages"),
-        "{listed:?}"
-    );
-    assert!(
-        listed.stdout.contains("pip install mcap-protobuf-support"),
-        "{listed:?}"
-    );
+    assert!(listed.stdout.contains("/v: make a video of its messages"), "{listed:?}");
+    assert!(listed.stdout.contains("pip install mcap-protobuf-support"), "{listed:?}");
     // Control: recordings without video.
     let bench = two_cameras(9, b"");
     assert!(!import(&bench, "").ended(0).stdout.contains("video"));
@@ -225,21 +192,9 @@ fn video_in_messages_names_its_commands() {
 #[test]
 fn files_of_other_kinds_are_named() {
     for (format, bytes, expected) in [
-        (
-            "avif",
-            &b"\0\0\0\x20ftypavif\0\0"[..],
-            "AVIF (format \"avif\"); JPEG, PNG or WebP expected",
-        ),
-        (
-            "YUYV; zstd; 16",
-            &[0x28, 0xb5, 0x2f, 0xfd, 1],
-            "raw samples compressed with zstd",
-        ),
-        (
-            "",
-            b"xyz",
-            "data of an unknown kind (no format stated); JPEG, PNG or WebP expected",
-        ),
+        ("avif", &b"\0\0\0\x20ftypavif\0\0"[..], "AVIF (format \"avif\"); JPEG, PNG or WebP expected"),
+        ("YUYV; zstd; 16", &[0x28, 0xb5, 0x2f, 0xfd, 1], "raw samples compressed with zstd"),
+        ("", b"xyz", "data of an unknown kind (no format stated); JPEG, PNG or WebP expected"),
     ] {
         let mut records = Records::default();
         records.topic(1, "/c", COMPRESSED, "cdr", "");
@@ -264,15 +219,9 @@ fn json_messages_of_ros_are_read() {
         let bench = with_recording(records.file());
         import(&bench, "--out out").ended(0);
         let line = &frames(&bench)[0];
-        assert_eq!(
-            (&line["t"], &line["frame_id"]),
-            (&5.5.into(), &"cam".into())
-        );
+        assert_eq!((&line["t"], &line["frame_id"]), (&5.5.into(), &"cam".into()));
         let path = bench.path("out").join(line["rgb"].as_str().unwrap());
-        assert_eq!(
-            image::open(path).unwrap().into_rgb8().into_raw(),
-            [7, 7, 7, 9, 9, 9]
-        );
+        assert_eq!(image::open(path).unwrap().into_rgb8().into_raw(), [7, 7, 7, 9, 9, 9]);
     }
 }
 
@@ -293,14 +242,7 @@ fn constant_time_stamps_give_way_to_the_recorder() {
     exit code: 0
      WARN /c: all 6 messages with the same time stamp; the times of the recorder are used
     ");
-    assert_eq!(
-        names(&bench),
-        [
-            "drive-0000/000000",
-            "drive-0000/000002",
-            "drive-0000/000004"
-        ]
-    );
+    assert_eq!(names(&bench), ["drive-0000/000000", "drive-0000/000002", "drive-0000/000004"]);
     assert_eq!(frames(&bench)[1]["t"], 1_700_000_002.0);
     // Control: stamps that advance are kept, without a warning.
     let bench = recording(|at| at - 3000.0);
@@ -324,11 +266,7 @@ fn intrinsics_of_realsense_are_found() {
         records.topic(1, topic, COMPRESSED, "cdr", "");
         records.topic(2, info, "sensor_msgs/msg/CameraInfo", "cdr", "");
         records.message(2, 0.0, &camera_info(SIZE, [80.0, 81.0]));
-        records.message(
-            1,
-            0.0,
-            &compressed(0.0, "bgr8; jpeg compressed bgr8", &jpeg(1)),
-        );
+        records.message(1, 0.0, &compressed(0.0, "bgr8; jpeg compressed bgr8", &jpeg(1)));
         let bench = with_recording(records.file());
         let called = import(&bench, "--out out").ended(0);
         let line = format!("intrinsics: {found} of 1 frame;");
@@ -348,10 +286,7 @@ fn bags_in_sqlite_name_their_conversion() {
     // An earlier conversion is not overwritten.
     fs::create_dir(bench.path("x")).unwrap();
     let called = bench.call(&["import", "mcap", "x.db3"]).ended(2);
-    assert!(
-        called.stderr.contains("--dst x-mcap --dst-storage"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("--dst x-mcap --dst-storage"), "{called:?}");
     // Without metadata.yaml, only files can be converted; with it, the folder.
     bench.file("my bag/b.db3", b"SQLite format 3\0");
     bench.file("my bag/a.db3", b"SQLite format 3\0");
@@ -386,11 +321,7 @@ fn commands_of_other_formats_lead_on() {
     let by_mcap = bench.call(&["import", "mcap", "old.bag"]).ended(2);
     let by_rosbag = bench.call(&["import", "rosbag", "old.bag"]).ended(2);
     assert_eq!(by_mcap.stderr, by_rosbag.stderr);
-    assert!(
-        by_mcap
-            .stderr
-            .contains("--src old.bag --dst old --dst-storage mcap")
-    );
+    assert!(by_mcap.stderr.contains("--src old.bag --dst old --dst-storage mcap"));
     bench.file("notes.txt", b"hello");
     let called = bench.call(&["import", "rosbag", "notes.txt"]).ended(2);
     insta::assert_snapshot!(called.messages(), @"

@@ -1,4 +1,5 @@
-//! Photographs in the dark: beside their frames, sets that are dark from the start, pairs in two folders, and classes by folder.
+//! Photographs in the dark: beside their frames, sets that are dark from the start, pairs in two folders, and classes
+//! by folder.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -25,18 +26,10 @@ fn scene(number: u32) -> RgbImage {
 /// The image with `ev` EV less light, in linear sRGB.
 fn darker(image: &RgbImage, ev: f64) -> RgbImage {
     let linear = |code: f64| {
-        if code <= 0.04045 {
-            code / 12.92
-        } else {
-            ((code + 0.055) / 1.055).powf(2.4)
-        }
+        if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
     };
     let code = |light: f64| {
-        if light <= 0.003_130_8 {
-            12.92 * light
-        } else {
-            1.055 * light.powf(1.0 / 2.4) - 0.055
-        }
+        if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
     };
     let mut dark = image.clone();
     for sample in dark.iter_mut() {
@@ -61,23 +54,14 @@ fn questions(name: impl Fn(u32) -> String) -> String {
 /// A folder `set` of frames whose photographs in the dark are these of `dark`, by scene; with extra keys in each line.
 fn with_photographs(dark: impl Fn(u32) -> RgbImage, extra: &str) -> Bench {
     let bench = Bench::new();
-    bench.file(
-        "set/questions.jsonl",
-        questions(|number| format!("room{number}/0")),
-    );
+    bench.file("set/questions.jsonl", questions(|number| format!("room{number}/0")));
     fs::create_dir_all(bench.path("set/low")).unwrap();
     let mut lines = String::new();
     for number in 0..SCENES {
-        scene(number)
-            .save(bench.path(&format!("set/{number}.png")))
-            .unwrap();
-        dark(number)
-            .save(bench.path(&format!("set/low/{number}.png")))
-            .unwrap();
+        scene(number).save(bench.path(&format!("set/{number}.png"))).unwrap();
+        dark(number).save(bench.path(&format!("set/low/{number}.png"))).unwrap();
         let extra = extra.replace("{}", &number.to_string());
-        let line = format!(
-            "{{\"scene\":\"room{number}\",\"frame\":\"0\",\"rgb\":\"{number}.png\"{extra}}}\n"
-        );
+        let line = format!("{{\"scene\":\"room{number}\",\"frame\":\"0\",\"rgb\":\"{number}.png\"{extra}}}\n");
         lines.push_str(&line);
     }
     bench.file("set/frames.jsonl", lines);
@@ -91,8 +75,7 @@ fn script(bench: &Bench, wrong: &[(&str, u32)]) {
     let mut lines = "{\"default\":\"brown\"}\n".to_owned();
     for (condition, count) in wrong {
         for number in 0..*count {
-            let line =
-                json!({"question": format!("q{number}"), "condition": condition, "reply": "red"});
+            let line = json!({"question": format!("q{number}"), "condition": condition, "reply": "red"});
             lines.push_str(&line.to_string());
             lines.push('\n');
         }
@@ -124,10 +107,7 @@ fn number(row: &Value, field: &str) -> f64 {
 #[test]
 fn photographs_are_a_separate_condition() {
     let bench = with_photographs(|number| darker(&scene(number), 3.6), DARK);
-    script(
-        &bench,
-        &[("dark", 6), ("dark+lift", 2), ("L2-ev", 5), ("L2-noise", 7)],
-    );
+    script(&bench, &[("dark", 6), ("dark+lift", 2), ("L2-ev", 5), ("L2-noise", 7)]);
     let table = run(&bench, "--levels L0,L2 --llie lift --llie-on dark,noise");
     insta::assert_snapshot!(lines_with(&table, "(real"), @"
     script:script.jsonl   dark (real, 3.6 EV)                          50.0   12          0        0   −24.6
@@ -137,77 +117,36 @@ fn photographs_are_a_separate_condition() {
     ");
     assert!(table.contains("Photographed in the dark"), "{table}");
     let all = records(&bench.path("run"));
-    let of = |condition: &str| -> Vec<&Value> {
-        all.iter()
-            .filter(|record| record["condition"] == condition)
-            .collect()
-    };
-    for condition in [
-        "L0",
-        "L2-ev",
-        "L2-noise",
-        "L2-noise+lift",
-        "dark",
-        "dark+lift",
-    ] {
+    let of =
+        |condition: &str| -> Vec<&Value> { all.iter().filter(|record| record["condition"] == condition).collect() };
+    for condition in ["L0", "L2-ev", "L2-noise", "L2-noise+lift", "dark", "dark+lift"] {
         assert_eq!(of(condition).len(), SCENES as usize, "{condition}");
     }
     assert!(of("L0+lift").is_empty() && of("L2-ev+lift").is_empty());
     let dark = of("dark")[0];
-    assert_eq!(
-        (&dark["level"], &dark["variant"], &dark["ev"]),
-        (&json!("dark"), &json!("dark"), &Value::Null)
-    );
+    assert_eq!((&dark["level"], &dark["variant"], &dark["ev"]), (&json!("dark"), &json!("dark"), &Value::Null));
     let pair = &dark["image"]["pair"];
-    assert!(
-        (pair["mean"].as_f64().unwrap() - 3.6).abs() < 0.05,
-        "{pair}"
-    );
+    assert!((pair["mean"].as_f64().unwrap() - 3.6).abs() < 0.05, "{pair}");
     let rows = rows(&bench, "run/comparisons.csv");
     let compared = |kind: &str| -> Vec<&Value> {
-        rows.iter()
-            .filter(|row| row["kind"] == kind && row["family"] == "all" && row["mode"] == "strict")
-            .collect()
+        rows.iter().filter(|row| row["kind"] == kind && row["family"] == "all" && row["mode"] == "strict").collect()
     };
     // The nearest level is compared where none is matched.
     let synthetic = compared("real-synthetic");
-    let against: Vec<&str> = synthetic
-        .iter()
-        .map(|row| row["against_condition"].as_str().unwrap())
-        .collect();
-    assert_eq!(
-        against,
-        ["L2-ev", "L2-noise", "L2-noise+lift"],
-        "{synthetic:?}"
-    );
+    let against: Vec<&str> = synthetic.iter().map(|row| row["against_condition"].as_str().unwrap()).collect();
+    assert_eq!(against, ["L2-ev", "L2-noise", "L2-noise+lift"], "{synthetic:?}");
     assert!((number(synthetic[0], "difference") + 1.0 / 12.0).abs() < 1e-9);
     assert!((number(synthetic[1], "difference") - 1.0 / 12.0).abs() < 1e-9);
     let enhanced = compared("real-enhanced");
     assert_eq!(enhanced.len(), 1);
     assert!((number(enhanced[0], "difference") - 4.0 / 12.0).abs() < 1e-9);
-    assert_eq!(
-        (
-            number(enhanced[0], "only_first"),
-            number(enhanced[0], "only_second")
-        ),
-        (4.0, 0.0)
-    );
-    assert!(
-        compared("enhancer")
-            .iter()
-            .all(|row| row["condition"] == "L2-noise+lift")
-    );
+    assert_eq!((number(enhanced[0], "only_first"), number(enhanced[0], "only_second")), (4.0, 0.0));
+    assert!(compared("enhancer").iter().all(|row| row["condition"] == "L2-noise+lift"));
     let dark = compared("level");
-    assert!(
-        dark.iter()
-            .any(|row| row["condition"] == "dark" && is(row, "difference", -0.5))
-    );
+    assert!(dark.iter().any(|row| row["condition"] == "dark" && is(row, "difference", -0.5)));
     let curves = fs::read_to_string(bench.path("run/thresholds.csv")).unwrap();
     let curves: Vec<&str> = curves.lines().skip(1).collect();
-    assert!(
-        !curves.is_empty() && curves.iter().all(|line| !line.contains("dark")),
-        "{curves:?}"
-    );
+    assert!(!curves.is_empty() && curves.iter().all(|line| !line.contains("dark")), "{curves:?}");
     let figure = fs::read_to_string(bench.path("run/figures/accuracy.svg")).unwrap();
     assert!(figure.contains("dark (real)"), "no mark in the legend");
     let pairs = self::rows(&bench, "run/pairs.csv");
@@ -228,10 +167,7 @@ fn photograph_bytes_are_sent_unchanged() {
     let args = model_args(&base, "--data set --levels L0 --out run");
     bench.complete(&args);
     let records = records(&bench.path("run"));
-    for record in records
-        .iter()
-        .filter(|record| record["condition"] == "dark")
-    {
+    for record in records.iter().filter(|record| record["condition"] == "dark") {
         let number: u32 = record["question"].as_str().unwrap()[1..].parse().unwrap();
         let file = fs::read(bench.path(&format!("set/low/{number}.png"))).unwrap();
         let digest = blake3::hash(&file).to_hex().to_string();
@@ -278,10 +214,7 @@ fn shards_merge_into_the_same_products() {
     let flags = "--data set --model script:script.jsonl --levels L0,match";
     bench.complete(&words(&format!("{flags} --out whole")));
     for part in ["1/2", "2/2"] {
-        bench.complete(&words(&format!(
-            "{flags} --out part-{} --shard {part}",
-            &part[..1]
-        )));
+        bench.complete(&words(&format!("{flags} --out part-{} --shard {part}", &part[..1])));
     }
     bench.complete(&words("merge part-1 part-2 --out merged"));
     assert!(assert_same_products(&bench.path("whole"), &bench.path("merged")) > 3);
@@ -296,14 +229,8 @@ fn match_uses_brightness_of_each_photograph() {
     script(&bench, &[("dark", 6), ("match-ev", 6), ("match-noise", 9)]);
     let table = run(&bench, "--levels L0,match");
     let all = records(&bench.path("run"));
-    let of = |condition: &'static str| {
-        all.iter()
-            .filter(move |record| record["condition"] == condition)
-    };
-    assert_eq!(
-        (of("match-ev").count(), of("match-noise").count()),
-        (12, 12)
-    );
+    let of = |condition: &'static str| all.iter().filter(move |record| record["condition"] == condition);
+    assert_eq!((of("match-ev").count(), of("match-noise").count()), (12, 12));
     for record in of("match-ev") {
         let number: u32 = record["question"].as_str().unwrap()[1..].parse().unwrap();
         let measured = record["image"]["pair"]["mean"].as_f64().unwrap();
@@ -312,15 +239,10 @@ fn match_uses_brightness_of_each_photograph() {
     let rows = rows(&bench, "run/comparisons.csv");
     let real: Vec<&Value> = rows
         .iter()
-        .filter(|row| {
-            row["kind"] == "real-synthetic" && row["family"] == "all" && row["mode"] == "strict"
-        })
+        .filter(|row| row["kind"] == "real-synthetic" && row["family"] == "all" && row["mode"] == "strict")
         .collect();
     assert_eq!(real.len(), 2, "{real:?}");
-    assert_eq!(
-        (number(real[0], "difference"), number(real[0], "n")),
-        (0.0, 12.0)
-    );
+    assert_eq!((number(real[0], "difference"), number(real[0], "n")), (0.0, 12.0));
     assert!((number(real[1], "difference") - 0.25).abs() < 1e-9);
     let agreement = self::rows(&bench, "run/light_agreement.csv");
     assert_eq!(agreement[0]["against_condition"], "match-ev");
@@ -344,24 +266,17 @@ fn match_uses_brightness_of_each_photograph() {
 fn same_image_shows_no_difference() {
     let bench = with_photographs(scene, DARK);
     script(&bench, &[]);
-    let called = bench.call(&words(
-        "--data set --model script:script.jsonl --levels L0 --out run --full",
-    ));
+    let called = bench.call(&words("--data set --model script:script.jsonl --levels L0 --out run --full"));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
      WARN 12 of 12 photographs dark are not darker than their frames.
     ");
     let rows = rows(&bench, "run/comparisons.csv");
-    let level = rows
-        .iter()
-        .find(|row| row["kind"] == "level" && row["condition"] == "dark")
-        .unwrap();
+    let level = rows.iter().find(|row| row["kind"] == "level" && row["condition"] == "dark").unwrap();
     assert!(is(level, "difference", 0.0));
     assert!(is(&self::rows(&bench, "run/pairs.csv")[0], "ev", 0.0));
     // There is nothing to match.
-    let matched = bench.call(&words(
-        "--data set --model random --levels L0,match --out other",
-    ));
+    let matched = bench.call(&words("--data set --model random --levels L0,match --out other"));
     insta::assert_snapshot!(matched.messages(), @r#"
     exit code: 2
     error: --levels: match makes each frame as dark as its photograph, and no frame has one that is darker than
@@ -397,10 +312,7 @@ fn odd_pairs_are_told() {
     for word in ["another scene", "swapped", "one exposure"] {
         assert!(!fair.stderr.contains(word), "{word}: {fair:?}");
     }
-    let missing = told(
-        &|number| darker(&scene(number), 3.0),
-        ",\"dark\":\"low/{}.jpg\"",
-    );
+    let missing = told(&|number| darker(&scene(number), 3.0), ",\"dark\":\"low/{}.jpg\"");
     insta::assert_snapshot!(missing.messages(), @"
     exit code: 2
     error: set/frames.jsonl, line 1: no such file: set/low/0.jpg
@@ -422,20 +334,14 @@ fn two_folders_pair_by_file_name() {
         fs::create_dir_all(bench.path(folder)).unwrap();
     }
     for number in 0..SCENES {
-        scene(number)
-            .save(bench.path(&format!("normal/{number}.png")))
-            .unwrap();
-        darker(&scene(number), 3.0)
-            .save(bench.path(&format!("low/{number}.png")))
-            .unwrap();
+        scene(number).save(bench.path(&format!("normal/{number}.png"))).unwrap();
+        darker(&scene(number), 3.0).save(bench.path(&format!("low/{number}.png"))).unwrap();
     }
     scene(3).save(bench.path("low/alone.png")).unwrap();
     bench.file("q.jsonl", questions(|number| format!("{number}.png")));
     script(&bench, &[("dark", 4)]);
     let flags = "--model script:script.jsonl --levels L0 --out run --full";
-    let called = bench.call(&words(&format!(
-        "--pairs normal,low --questions q.jsonl {flags}"
-    )));
+    let called = bench.call(&words(&format!("--pairs normal,low --questions q.jsonl {flags}")));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
      WARN --data: no effect: --pairs names the data
@@ -471,24 +377,14 @@ fn dark_set_is_asked_with_enhancement() {
     let bench = Bench::new();
     fs::create_dir_all(bench.path("set")).unwrap();
     for number in 0..SCENES {
-        darker(&scene(number), 4.0)
-            .save(bench.path(&format!("set/{number}.png")))
-            .unwrap();
+        darker(&scene(number), 4.0).save(bench.path(&format!("set/{number}.png"))).unwrap();
     }
-    bench.file(
-        "set/questions.jsonl",
-        questions(|number| format!("{number}.png")),
-    );
-    bench.file(
-        "set/dataset.json",
-        "{\"schema\":\"darkqa.dataset/1\",\"light\":\"dark\"}",
-    );
+    bench.file("set/questions.jsonl", questions(|number| format!("{number}.png")));
+    bench.file("set/dataset.json", "{\"schema\":\"darkqa.dataset/1\",\"light\":\"dark\"}");
     script(&bench, &[("L0", 6), ("L0+lift", 3)]);
     let table = run(&bench, "--llie lift");
-    let conditions: std::collections::BTreeSet<String> = records(&bench.path("run"))
-        .iter()
-        .map(|record| record["condition"].as_str().unwrap().to_owned())
-        .collect();
+    let conditions: std::collections::BTreeSet<String> =
+        records(&bench.path("run")).iter().map(|record| record["condition"].as_str().unwrap().to_owned()).collect();
     assert_eq!(Vec::from_iter(conditions), ["L0", "L0+lift"]);
     insta::assert_snapshot!(lines_with(&table, "as photographed"), @"
     ! These photographs were taken in the dark (--light dark): L0 is each as photographed, there is no image in
@@ -509,9 +405,7 @@ fn dark_set_is_asked_with_enhancement() {
     let agreement = rows(&bench, "run/light_agreement.csv");
     assert!(is(&agreement[0], "same_answer", 0.75));
     // Levels are darkened where they are named, and that is told.
-    let called = bench.call(&words(
-        "--data set --model random --levels L0,L2 --out dark",
-    ));
+    let called = bench.call(&words("--data set --model random --levels L0,L2 --out dark"));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
      WARN the photographs were taken in the dark, and --levels darkens them further: their own noise is in them
@@ -520,10 +414,7 @@ fn dark_set_is_asked_with_enhancement() {
     // The flag goes before the file.
     let lit = bench.call(&words("--data set --light lit --model random --out lit"));
     assert_eq!(records(&bench.path("lit")).len(), 12 * 11, "{lit:?}");
-    bench.file(
-        "set/dataset.json",
-        "{\"schema\":\"darkqa.dataset/1\",\"light\":\"dim\"}",
-    );
+    bench.file("set/dataset.json", "{\"schema\":\"darkqa.dataset/1\",\"light\":\"dim\"}");
     let wrong = bench.call(&words("--data set --model random --out wrong"));
     insta::assert_snapshot!(wrong.messages(), @"
     exit code: 2
@@ -534,17 +425,12 @@ fn dark_set_is_asked_with_enhancement() {
 #[test]
 fn folders_of_classes_have_one_question() {
     let bench = Bench::new();
-    for (place, class) in ["Bicycle", "Boat", "Cup", "Dog", "empty"]
-        .into_iter()
-        .enumerate()
-    {
+    for (place, class) in ["Bicycle", "Boat", "Cup", "Dog", "empty"].into_iter().enumerate() {
         fs::create_dir_all(bench.path(&format!("set/{class}"))).unwrap();
         for number in 0..3_u32 {
             if class != "empty" {
                 let name = format!("set/{class}/{number}.png");
-                scene(10 * place as u32 + number)
-                    .save(bench.path(&name))
-                    .unwrap();
+                scene(10 * place as u32 + number).save(bench.path(&name)).unwrap();
             }
         }
     }
@@ -601,22 +487,15 @@ fn folders_of_classes_have_one_question() {
 fn light_of_a_zip_file_is_read() {
     let bench = Bench::new();
     let mut image = Cursor::new(Vec::new());
-    darker(&scene(1), 4.0)
-        .write_to(&mut image, image::ImageFormat::Png)
-        .unwrap();
-    let question =
-        json!({"question": "Is it red?", "choices": ["yes", "no"], "answer": 0, "image": "1.png"});
+    darker(&scene(1), 4.0).write_to(&mut image, image::ImageFormat::Png).unwrap();
+    let question = json!({"question": "Is it red?", "choices": ["yes", "no"], "answer": 0, "image": "1.png"});
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, bytes) in [
         ("q.jsonl", question.to_string().as_bytes()),
         ("1.png", image.get_ref()),
-        (
-            "dataset.json",
-            br#"{"schema": "darkqa.dataset/1", "light": "dark"}"#,
-        ),
+        ("dataset.json", br#"{"schema": "darkqa.dataset/1", "light": "dark"}"#),
     ] {
-        zip.start_file(name, zip::write::SimpleFileOptions::default())
-            .unwrap();
+        zip.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
         zip.write_all(bytes).unwrap();
     }
     bench.file("set.zip", zip.finish().unwrap().into_inner());

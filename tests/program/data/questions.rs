@@ -1,5 +1,5 @@
-//! `questions`: from files to questions, the same whatever the threads, the order and the interruptions; and what is wrong
-//! with a data set is said.
+//! `questions`: from files to questions, the same whatever the threads, the order and the interruptions; and what is
+//! wrong with a data set is said.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -37,10 +37,7 @@ struct View {
 }
 
 fn bedroom(scene: &'static str) -> View {
-    View {
-        scene,
-        things: BEDROOM.to_vec(),
-    }
+    View { scene, things: BEDROOM.to_vec() }
 }
 
 /// A data set as `import` leaves it.
@@ -56,10 +53,7 @@ impl Data {
         }
         data.write("frames.jsonl", &lines);
         let classes = space("nyu40").unwrap().labels.into_iter();
-        data.label(
-            "nyu40",
-            classes.map(|(id, label)| (id, label.name, label.canonical)),
-        );
+        data.label("nyu40", classes.map(|(id, label)| (id, label.name, label.canonical)));
         data
     }
 
@@ -67,8 +61,7 @@ impl Data {
     fn label(&self, space: &str, classes: impl Iterator<Item = (u16, String, String)>) {
         let class = |(id, name, canonical)| json!({"id": id, "name": name, "canonical": canonical});
         let classes: Vec<Value> = classes.map(class).collect();
-        let file =
-            json!({"schema": "darkqa.classes/1", "space": space, "void_id": 0, "classes": classes});
+        let file = json!({"schema": "darkqa.classes/1", "space": space, "void_id": 0, "classes": classes});
         self.write("classes.json", &file.to_string());
     }
 
@@ -93,9 +86,7 @@ impl Data {
                 Luma([at(x, y).map_or(0, |(i, thing)| value(i, thing))])
             })
         };
-        let image = RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| {
-            Rgb(at(x, y).map_or([0; 3], |(_, thing)| thing.4))
-        });
+        let image = RgbImage::from_fn(SIZE.0, SIZE.1, |x, y| Rgb(at(x, y).map_or([0; 3], |(_, thing)| thing.4)));
         image.save(self.path(&format!("rgb{frame}.png"))).unwrap();
         let save = |name: &str, map: ImageBuffer<Luma<u16>, Vec<u16>>| {
             map.save(self.path(&format!("{name}{frame}.png"))).unwrap();
@@ -147,10 +138,7 @@ struct Outcome {
 impl Outcome {
     fn lines(&self) -> Vec<Value> {
         assert_eq!(self.code, 0, "{}", self.err);
-        self.questions
-            .lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
+        self.questions.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
     fn of(&self, family: &str) -> Vec<Value> {
@@ -176,18 +164,14 @@ fn folder() -> TempDir {
 fn bedroom_has_every_question_family() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
     let outcome = data.ask(out.path(), &["--balance", "none"]);
-    let answers: Vec<(String, String)> =
-        ["room_type", "affordance", "presence", "color", "closest"]
-            .into_iter()
-            .map(|family| {
-                let asked = outcome.of(family);
-                assert_eq!(asked.len(), 1, "{family}: {}", outcome.questions);
-                (
-                    asked[0]["question"].to_string(),
-                    asked[0]["answer"].to_string(),
-                )
-            })
-            .collect();
+    let answers: Vec<(String, String)> = ["room_type", "affordance", "presence", "color", "closest"]
+        .into_iter()
+        .map(|family| {
+            let asked = outcome.of(family);
+            assert_eq!(asked.len(), 1, "{family}: {}", outcome.questions);
+            (asked[0]["question"].to_string(), asked[0]["answer"].to_string())
+        })
+        .collect();
     assert_eq!(answers[0].1, "\"bedroom\"");
     assert_eq!(answers[4].1, "\"chair\"", "{answers:?}");
     for line in outcome.lines() {
@@ -223,11 +207,7 @@ fn threads_and_interrupts_keep_bytes() {
     // Stopped in the middle of a line.
     let cut = folder();
     let kept = statistics(whole.path());
-    fs::write(
-        cut.path().join("q.statistics.jsonl"),
-        &kept[..kept.len() / 2],
-    )
-    .unwrap();
+    fs::write(cut.path().join("q.statistics.jsonl"), &kept[..kept.len() / 2]).unwrap();
     same(cut.path(), &[]);
 }
 
@@ -260,9 +240,7 @@ fn measurements_are_cached_by_content() {
 fn no_depth_questions_without_depth() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
     data.change(|line| {
-        line.as_object_mut()
-            .unwrap()
-            .retain(|key, _| !key.starts_with("depth"));
+        line.as_object_mut().unwrap().retain(|key, _| !key.starts_with("depth"));
     });
     let outcome = data.ask(out.path(), &["--balance", "none"]);
     assert_eq!(outcome.of("closest").len(), 0);
@@ -280,9 +258,7 @@ fn labels_limit_presence_denials() {
         let text = fs::read_to_string(&candidates).unwrap();
         text.lines()
             .map(|line| serde_json::from_str::<Value>(line).unwrap())
-            .filter(|line| {
-                line["family"] == "presence" && line["answer"] == "no" && line["reason"].is_null()
-            })
+            .filter(|line| line["family"] == "presence" && line["answer"] == "no" && line["reason"].is_null())
             .map(|line| line["about"].as_str().unwrap().to_owned())
             .collect()
     };
@@ -292,19 +268,8 @@ fn labels_limit_presence_denials() {
     check_rows(["plant", "stool"], |hidden| {
         assert!(!of_nyu40.contains(&hidden.to_owned()), "{of_nyu40:?}");
     });
-    let own = [
-        (1, "wall"),
-        (2, "floor"),
-        (4, "bed"),
-        (11, "picture"),
-        (17, "chest_of_drawers"),
-        (18, "cushion"),
-    ];
-    data.label(
-        "own",
-        own.map(|(id, name)| (id, name.to_owned(), name.to_owned()))
-            .into_iter(),
-    );
+    let own = [(1, "wall"), (2, "floor"), (4, "bed"), (11, "picture"), (17, "chest_of_drawers"), (18, "cushion")];
+    data.label("own", own.map(|(id, name)| (id, name.to_owned(), name.to_owned())).into_iter());
     assert_eq!(denied(&[]), Vec::<String>::new());
 }
 
@@ -317,38 +282,23 @@ fn verdicts_leave_out_what_was_rejected() {
     let color = before.of("color")[0]["id"].as_str().unwrap().to_owned();
     let html = fs::read_to_string(page).unwrap();
     assert!(html.contains(&color) && html.contains("rgb0.png"));
-    // The rule's answer stands in no element of the page, but only where its script finds it once the person has answered.
+    // The rule's answer stands in no element of the page, but only where its script finds it once the person has
+    // answered.
     let (head, script) = html.split_once("<script>").unwrap();
     assert!(!head.contains(&color) && script.contains("if (!own) return;"));
     let verdicts = out.path().join("verdicts.jsonl");
-    fs::write(
-        &verdicts,
-        json!({"id": color, "verdict": "reject"}).to_string(),
-    )
-    .unwrap();
-    let flags = [
-        "--balance",
-        "none",
-        "--verdicts",
-        verdicts.to_str().unwrap(),
-    ];
+    fs::write(&verdicts, json!({"id": color, "verdict": "reject"}).to_string()).unwrap();
+    let flags = ["--balance", "none", "--verdicts", verdicts.to_str().unwrap()];
     let after = data.ask(out.path(), &flags);
     let ids = |outcome: &Outcome| -> Vec<String> {
-        let mut ids: Vec<String> = outcome
-            .lines()
-            .iter()
-            .map(|line| line["id"].to_string())
-            .collect();
+        let mut ids: Vec<String> = outcome.lines().iter().map(|line| line["id"].to_string()).collect();
         ids.sort();
         ids
     };
     assert!(!ids(&after).contains(&format!("{color:?}")));
     // The rest stands, and another colour may have come in its place.
     for id in ids(&before) {
-        assert!(
-            ids(&after).contains(&id) || id == format!("{color:?}"),
-            "{id}"
-        );
+        assert!(ids(&after).contains(&id) || id == format!("{color:?}"), "{id}");
     }
 }
 
@@ -375,71 +325,45 @@ fn two_people_check_on_their_own() {
         path.to_str().unwrap().to_owned()
     };
     let (anna, ben) = (checked("anna", 1), checked("ben", 2));
-    let after = data.ask(
-        out.path(),
-        &["--balance", "none", "--verdicts", &anna, "--verdicts", &ben],
-    );
+    let after = data.ask(out.path(), &["--balance", "none", "--verdicts", &anna, "--verdicts", &ben]);
     assert_eq!(after.lines().len(), asked.len() - 3);
     let all = asked.len();
     let same = format!("{:.1}", 100.0 * (all - 2) as f64 / all as f64);
     let said = format!("anna and ben found the same of {same} [");
     assert!(after.out.contains(&said), "{}", after.out);
-    assert!(
-        after
-            .out
-            .contains("Cohen's κ of finding a question right: 0."),
-        "{}",
-        after.out
-    );
+    assert!(after.out.contains("Cohen's κ of finding a question right: 0."), "{}", after.out);
     // A file of one person has shares, but no κ.
     let alone = data.ask(out.path(), &["--balance", "none", "--verdicts", &anna]);
-    assert!(
-        alone.out.contains("anna") && !alone.out.contains("κ"),
-        "{}",
-        alone.out
-    );
-    let json = data.ask(
-        out.path(),
-        &["--json", "--verdicts", &anna, "--verdicts", &ben],
-    );
+    assert!(alone.out.contains("anna") && !alone.out.contains("κ"), "{}", alone.out);
+    let json = data.ask(out.path(), &["--json", "--verdicts", &anna, "--verdicts", &ben]);
     let json: Value = serde_json::from_str(&json.out).unwrap();
-    assert_eq!(
-        json["checks"]["agreements"][0]["people"],
-        json!(["anna", "ben"])
-    );
+    assert_eq!(json["checks"]["agreements"][0]["people"], json!(["anna", "ben"]));
     assert_eq!(json["checks"]["agreements"][0]["questions"], all);
 }
 
-/// The page is written into the folder of the command, into a new folder and beside the data: its links lead to the images.
+/// The page is written into the folder of the command, into a new folder and beside the data: its links lead to the
+/// images.
 #[test]
 fn page_finds_images_from_anywhere() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
     let root = out.path().join("root");
     fs::create_dir_all(&root).unwrap();
     let beside = data.path("review.html");
-    check_rows(
-        [
-            "review.html",
-            "new/deep/review.html",
-            beside.to_str().unwrap(),
-        ],
-        |page| {
-            called(
-                Command::new(PROGRAM)
-                    .current_dir(&root)
-                    .arg("questions")
-                    .arg(data.0.path())
-                    .args(["--out", "elsewhere/q.jsonl", "--review", page]),
-            )
-            .ended(0);
-            let page = root.join(page);
-            let html = fs::read_to_string(&page).unwrap();
-            let (_, link) = html.split_once("\"image\":\"").unwrap();
-            let (link, _) = link.split_once('"').unwrap();
-            let image = page.parent().unwrap().join(link);
-            assert!(image.is_file(), "{link} of {}", page.display());
-        },
-    );
+    check_rows(["review.html", "new/deep/review.html", beside.to_str().unwrap()], |page| {
+        called(Command::new(PROGRAM).current_dir(&root).arg("questions").arg(data.0.path()).args([
+            "--out",
+            "elsewhere/q.jsonl",
+            "--review",
+            page,
+        ]))
+        .ended(0);
+        let page = root.join(page);
+        let html = fs::read_to_string(&page).unwrap();
+        let (_, link) = html.split_once("\"image\":\"").unwrap();
+        let (link, _) = link.split_once('"').unwrap();
+        let image = page.parent().unwrap().join(link);
+        assert!(image.is_file(), "{link} of {}", page.display());
+    });
 }
 
 #[test]
@@ -448,22 +372,16 @@ fn rule_file_is_recorded_per_question() {
     let digest = |outcome: &Outcome, of: &str| outcome.lines()[0]["evidence"]["rules"][of].clone();
     let first = data.ask(out.path(), &[]);
     let rules = out.path().join("rules.toml");
-    let built_in = fs::read_to_string(concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/src/questions/rules.toml"
-    ))
-    .unwrap();
+    let built_in = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/src/questions/rules.toml")).unwrap();
     fs::write(&rules, built_in.replace("crushed = 3 ", "crushed = 4 ")).unwrap();
     let outcome = data.ask(out.path(), &["--rules", rules.to_str().unwrap()]);
     assert_ne!(digest(&outcome, "digest"), digest(&first, "digest"));
     assert_eq!(digest(&outcome, "colors"), digest(&first, "colors"));
     fs::write(&rules, "[measure\n").unwrap();
-    data.ask(out.path(), &["--rules", rules.to_str().unwrap()])
-        .refused(&["rules.toml", "line 1"]);
+    data.ask(out.path(), &["--rules", rules.to_str().unwrap()]).refused(&["rules.toml", "line 1"]);
     let colors = out.path().join("colors.txt");
     fs::write(&colors, "x\n".repeat(1024)).unwrap();
-    data.ask(out.path(), &["--colors", colors.to_str().unwrap()])
-        .refused(&["colors.txt", "row 1"]);
+    data.ask(out.path(), &["--colors", colors.to_str().unwrap()]).refused(&["colors.txt", "row 1"]);
 }
 
 #[test]
@@ -472,10 +390,7 @@ fn statistics_are_written_in_every_form() {
     let stats = out.path().join("stats");
     let outcome = data.ask(out.path(), &["--stats", stats.to_str().unwrap(), "--json"]);
     let json: Value = serde_json::from_str(&outcome.out).unwrap();
-    assert_eq!(
-        json,
-        serde_json::from_slice::<Value>(&fs::read(stats.join("statistics.json")).unwrap()).unwrap()
-    );
+    assert_eq!(json, serde_json::from_slice::<Value>(&fs::read(stats.join("statistics.json")).unwrap()).unwrap());
     let csv = fs::read_to_string(stats.join("statistics.csv")).unwrap();
     assert!(csv.lines().any(|line| line.contains("bed")), "{csv}");
     let figure = fs::read_to_string(stats.join("statistics.svg")).unwrap();
@@ -487,18 +402,14 @@ fn sets_are_compared_by_appearance() {
     let (data, out, other) = (Data::of(&[bedroom("a")]), folder(), folder());
     let to_other = ["--against", other.path().to_str().unwrap()];
     let with_json = [to_other[0], to_other[1], "--json"];
-    data.ask(out.path(), &to_other)
-        .refused(&["neither a frames.jsonl nor any PNG"]);
+    data.ask(out.path(), &to_other).refused(&["neither a frames.jsonl nor any PNG"]);
     // A folder of plain pictures: half of white, without any edge.
     let grey = RgbImage::from_pixel(SIZE.0, SIZE.1, Rgb([188; 3]));
     grey.save(other.path().join("grey.png")).unwrap();
     let json: Value = serde_json::from_str(&data.ask(out.path(), &with_json).out).unwrap();
     let rows = &json["against"]["rows"];
     let [light, edges, segments] = [0, 1, 2].map(|row: usize| rows[row]["quartiles"].clone());
-    assert!(
-        (light[1][1].as_f64().unwrap() + 1.0).abs() < 0.01,
-        "{light}"
-    );
+    assert!((light[1][1].as_f64().unwrap() + 1.0).abs() < 0.01, "{light}");
     assert_eq!(edges[1], json!([0.0, 0.0, 0.0]));
     assert!(edges[0][1].as_f64().unwrap() > 1.0, "{edges}");
     // Seven things with maps, and no maps.
@@ -506,11 +417,7 @@ fn sets_are_compared_by_appearance() {
     // A set is within itself, and what is asked is the same with the comparison as without it.
     let own = ["--against", data.0.path().to_str().unwrap()];
     let (alone, compared) = (data.ask(out.path(), &[]), data.ask(out.path(), &own));
-    assert!(
-        compared.out.contains("within") && !compared.out.contains("above"),
-        "{}",
-        compared.out
-    );
+    assert!(compared.out.contains("within") && !compared.out.contains("above"), "{}", compared.out);
     assert!(!alone.out.contains("within"), "{}", alone.out);
     assert_eq!(alone.questions, compared.questions);
 }
@@ -553,16 +460,12 @@ fn walk(folder: &Path, name: &str) -> String {
 fn unknown_numbers_are_counted_or_refused() {
     let mut things = BEDROOM;
     things[5].0 = 77;
-    let view = View {
-        scene: "s",
-        things: things.to_vec(),
-    };
+    let view = View { scene: "s", things: things.to_vec() };
     let (data, out) = (Data::of(&[view]), folder());
     let outcome = data.ask(out.path(), &["--json"]);
     assert_eq!(outcome.code, 0, "{}", outcome.err);
     assert!(outcome.out.contains("77"), "{}", outcome.out);
-    data.ask(out.path(), &["--strict"])
-        .refused(&["frame \"s/0\"", "77", "classes.json"]);
+    data.ask(out.path(), &["--strict"]).refused(&["frame \"s/0\"", "77", "classes.json"]);
 }
 
 #[test]
@@ -574,27 +477,16 @@ fn classes_can_be_places_in_palette() {
     let file = fs::File::create(data.path("sem0.png")).unwrap();
     let mut encoder = png::Encoder::new(file, SIZE.0, SIZE.1);
     encoder.set_color(png::ColorType::Indexed);
-    encoder.set_palette(
-        (0..=255_u8)
-            .flat_map(|i| [i ^ 0x55, i, 255 - i])
-            .collect::<Vec<_>>(),
-    );
-    encoder
-        .write_header()
-        .unwrap()
-        .write_image_data(&places)
-        .unwrap();
+    encoder.set_palette((0..=255_u8).flat_map(|i| [i ^ 0x55, i, 255 - i]).collect::<Vec<_>>());
+    encoder.write_header().unwrap().write_image_data(&places).unwrap();
     assert_eq!(data.ask(out.path(), &[]).questions, grey.questions);
 }
 
 #[test]
 fn segments_of_8_bits_are_refused() {
     let (data, out) = (Data::of(&[bedroom("s")]), folder());
-    GrayImage::new(SIZE.0, SIZE.1)
-        .save(data.path("over0.png"))
-        .unwrap();
-    data.ask(out.path(), &[])
-        .refused(&["over0.png", "a grey PNG of 8 bits", "16-bit grey"]);
+    GrayImage::new(SIZE.0, SIZE.1).save(data.path("over0.png")).unwrap();
+    data.ask(out.path(), &[]).refused(&["over0.png", "a grey PNG of 8 bits", "16-bit grey"]);
 }
 
 #[test]
@@ -639,26 +531,13 @@ fn thousandfold_depth_scale_is_refused() {
 fn broken_lines_are_named() {
     let (data, out) = (Data::of(&[bedroom("a"), bedroom("b")]), folder());
     let text = fs::read_to_string(data.path("frames.jsonl")).unwrap();
-    data.write(
-        "frames.jsonl",
-        &text.replace("\"rgb\":\"rgb1.png\"", "\"rgb\":"),
-    );
+    data.write("frames.jsonl", &text.replace("\"rgb\":\"rgb1.png\"", "\"rgb\":"));
     data.ask(out.path(), &[]).refused(&["frames.jsonl, line 2"]);
     data.write("frames.jsonl", &text.replace("rgb1.png", "missing.png"));
     let outcome = data.ask(out.path(), &[]);
-    assert!(
-        outcome.code != 0 && outcome.err.contains("missing.png"),
-        "{}",
-        outcome.err
-    );
-    data.write(
-        "frames.jsonl",
-        &text
-            .replace("\"frame\":\"1\"", "\"frame\":\"0\"")
-            .replace("\"b\"", "\"a\""),
-    );
-    data.ask(out.path(), &[])
-        .refused(&["frames.jsonl, line 2", "a/0"]);
+    assert!(outcome.code != 0 && outcome.err.contains("missing.png"), "{}", outcome.err);
+    data.write("frames.jsonl", &text.replace("\"frame\":\"1\"", "\"frame\":\"0\"").replace("\"b\"", "\"a\""));
+    data.ask(out.path(), &[]).refused(&["frames.jsonl, line 2", "a/0"]);
     data.write("frames.jsonl", "");
     assert_eq!(data.ask(out.path(), &[]).code, 2);
 }
@@ -667,12 +546,7 @@ fn broken_lines_are_named() {
 fn a_folder_without_classes_is_refused() {
     let (data, out) = (Data::of(&[bedroom("a")]), folder());
     fs::remove_file(data.path("classes.json")).unwrap();
-    data.ask(out.path(), &[])
-        .refused(&["classes.json", "darkqa-eval import"]);
-    data.write(
-        "classes.json",
-        r#"{"schema":"darkqa.classes/2","space":"nyu40","classes":[]}"#,
-    );
-    data.ask(out.path(), &[])
-        .refused(&["classes.json", "darkqa.classes/1"]);
+    data.ask(out.path(), &[]).refused(&["classes.json", "darkqa-eval import"]);
+    data.write("classes.json", r#"{"schema":"darkqa.classes/2","space":"nyu40","classes":[]}"#);
+    data.ask(out.path(), &[]).refused(&["classes.json", "darkqa.classes/1"]);
 }

@@ -26,11 +26,7 @@ fn bench() -> Bench {
 #[test]
 fn ambiguous_answers_need_a_mapping() {
     let bench = bench();
-    let run = |line: &str| {
-        bench.call(&words(&format!(
-            "--data set.json --model random --levels L0 {line}"
-        )))
-    };
+    let run = |line: &str| bench.call(&words(&format!("--data set.json --model random --levels L0 {line}")));
     let called = run("");
     insta::assert_snapshot!(called.messages(), @r#"
     exit code: 2
@@ -49,19 +45,14 @@ fn ambiguous_answers_need_a_mapping() {
     question = question, image = image (files 2), options = options, answer = answer (index1), id = id
     left out: 1 of 3 rows (no options)
     ");
-    let manifest: Value =
-        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
     let reading = manifest["settings"]["reading of the data"].to_string();
     assert!(
-        reading.contains("set: 2 questions on 2 images")
-            && reading.contains("answer = answer (index1)"),
+        reading.contains("set: 2 questions on 2 images") && reading.contains("answer = answer (index1)"),
         "{reading}"
     );
     let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
-    assert!(
-        records.lines().all(|line| line.contains("\"truth\":0")),
-        "{records}"
-    );
+    assert!(records.lines().all(|line| line.contains("\"truth\":0")), "{records}");
     // The other reading makes other truths of the same questions: nothing is mixed.
     let called = run("--map answer=answer:index0 --open skip --out run");
     assert_eq!(called.code, Some(2), "{called:?}");
@@ -82,13 +73,10 @@ fn outside_paths_need_data_root() {
     error: set/set.jsonl, line 1: "../a.png" lies outside set/, the folder of the data; --data-root [TMP] allows
         the folder that it names; --skip bad leaves such rows out
     "#);
-    bench.complete(&words(
-        "--data set/set.jsonl --model random --levels L0 --data-root .",
-    ));
+    bench.complete(&words("--data set/set.jsonl --model random --levels L0 --data-root ."));
     let frames = json!({"scene": "s", "frame": "0", "rgb": "../a.png"});
     bench.file("frames/frames.jsonl", frames.to_string());
-    let question =
-        json!({"id": 1, "frame": "s/0", "question": "?", "choices": ["x", "y"], "answer": "x"});
+    let question = json!({"id": 1, "frame": "s/0", "question": "?", "choices": ["x", "y"], "answer": "x"});
     bench.file("frames/questions.jsonl", question.to_string());
     let called = bench.call(&words("--data frames --model random --levels L0"));
     insta::assert_snapshot!(called.messages(), @r#"
@@ -96,9 +84,7 @@ fn outside_paths_need_data_root() {
     error: frames/frames.jsonl, line 1: "../a.png" lies outside frames/, the folder of the data; --data-root [TMP]
         allows the folder that it names
     "#);
-    bench.complete(&words(
-        "--data frames --model random --levels L0 --data-root .",
-    ));
+    bench.complete(&words("--data frames --model random --levels L0 --data-root ."));
     let line = "synthesize frames --out dark --levels L5 --variant ev";
     let called = bench.call(&words(line));
     insta::assert_snapshot!(called.messages(), @r#"
@@ -125,11 +111,7 @@ fn outside_links_are_named_and_skipped() {
     ");
     assert!(bench.path("dark/own_L5-ev.png").exists() && !bench.path("dark/b_L5-ev.png").exists());
     let called = bench.call(&words(&format!("{line} --data-root .")));
-    assert_eq!(
-        (called.code, called.stderr.contains("link")),
-        (Some(0), false),
-        "{called:?}"
-    );
+    assert_eq!((called.code, called.stderr.contains("link")), (Some(0), false), "{called:?}");
     assert!(bench.path("dark/b_L5-ev.png").exists());
 }
 
@@ -149,20 +131,14 @@ fn links_out_of_data_are_not_read() {
     let secret = make("private/secret.png");
     image::RgbImage::new(9, 7).save(&secret).unwrap();
     let question = |image: &str, key: &str| {
-        json!({"id": 1, key: image, "question": "?", "choices": ["x", "y"], "answer": "x"})
-            .to_string()
+        json!({"id": 1, key: image, "question": "?", "choices": ["x", "y"], "answer": "x"}).to_string()
     };
     let frame = json!({"scene": "s", "frame": "0", "rgb": "a.png"}).to_string();
     bench.file("private/questions.jsonl", question("a.png", "image"));
     bench.file("private/frames.jsonl", &frame);
     bench.file("private/classes.json", r#"{"space":"mpcat40"}"#);
     let link = |target: &str, path: &str| symlink(bench.path(target), make(path)).unwrap();
-    for class in [
-        "pictures/cat/0.png",
-        "pictures/dog/0.png",
-        "folders/cat/0.png",
-        "folders/dog/0.png",
-    ] {
+    for class in ["pictures/cat/0.png", "pictures/dog/0.png", "folders/cat/0.png", "folders/dog/0.png"] {
         fs::copy(bench.path("a.png"), make(class)).unwrap();
     }
     link("private/secret.png", "pictures/dog/1.png");
@@ -178,10 +154,7 @@ fn links_out_of_data_are_not_read() {
     link("private", "hub/datasets--x--y/blobs");
     let picture = make("hub/datasets--x--y/snapshots/1/a.png");
     symlink("../../blobs/secret.png", picture).unwrap();
-    bench.file(
-        "hub/datasets--x--y/snapshots/1/questions.jsonl",
-        question("a.png", "image"),
-    );
+    bench.file("hub/datasets--x--y/snapshots/1/questions.jsonl", question("a.png", "image"));
     bench.file("hub/datasets--x--y/refs/main", "1");
     link("private/questions.jsonl", "pattern/part-1.jsonl");
     let calls = each(
@@ -239,11 +212,7 @@ fn links_out_of_data_are_not_read() {
       error: --data: pattern/*.jsonl: no file has such a name
     "#);
     // The flag in the messages allows them.
-    for data in [
-        "--data questions",
-        "--data frames",
-        "--data pictures --label-folders ?",
-    ] {
+    for data in ["--data questions", "--data frames", "--data pictures --label-folders ?"] {
         let line = format!("{data} --model random --levels L0 --out run --data-root private");
         bench.complete(&words(&line));
         fs::remove_dir_all(bench.path("run")).unwrap();
@@ -259,9 +228,7 @@ fn check_names_everything_that_is_wrong() {
     exit code: 0
     ok: 2 questions, 3 warnings
     ");
-    let called = bench.call(&words(&format!(
-        "{line} --model gpt-4o --llie none.onnx --prompts nowhere"
-    )));
+    let called = bench.call(&words(&format!("{line} --model gpt-4o --llie none.onnx --prompts nowhere")));
     insta::assert_snapshot!(called.lines_with("problem"), @"
     exit code: 1
     problem  nowhere: cannot read: [OS ERROR]
@@ -272,11 +239,7 @@ fn check_names_everything_that_is_wrong() {
     warning  what a run would take is not estimated, as long as there are problems
     3 problems, 3 warnings
     ");
-    assert!(
-        called.stdout.ends_with(" warnings\n") && called.stdout.contains("3 problems"),
-        "{}",
-        called.stdout
-    );
+    assert!(called.stdout.ends_with(" warnings\n") && called.stdout.contains("3 problems"), "{}", called.stdout);
     let cut = fs::read(bench.path("a.png")).unwrap();
     fs::write(bench.path("a.png"), &cut[..cut.len() - 20]).unwrap();
     let called = bench.call(&words(&format!("{line} --deep")));
@@ -292,21 +255,14 @@ fn check_names_everything_that_is_wrong() {
     fs::remove_file(bench.path("a.png")).unwrap();
     let called = bench.call(&words(&format!("{line} --json")));
     let report: Value = serde_json::from_str(&called.stdout).unwrap();
-    assert_eq!(
-        (called.code, &report["problems"]),
-        (Some(1), &json!(1)),
-        "{report}"
-    );
+    assert_eq!((called.code, &report["problems"]), (Some(1), &json!(1)), "{report}");
 }
 
 #[test]
 fn template_checks_and_runs_unchanged() {
     let bench = Bench::new();
     let made = bench.complete(&words("init my-data"));
-    for line in made
-        .lines()
-        .filter(|line| line.starts_with("  darkqa-eval "))
-    {
+    for line in made.lines().filter(|line| line.starts_with("  darkqa-eval ")) {
         assert!(line.contains("my-data"), "{made}");
     }
     let table = fs::read_to_string(bench.path("my-data/questions.csv")).unwrap();
@@ -345,11 +301,7 @@ fn template_checks_and_runs_unchanged() {
     assert_eq!(lines.filter(|line| line.starts_with("room")).count(), 6);
     // A folder of images gets the questions beside them.
     fs::create_dir(bench.path("mine")).unwrap();
-    fs::copy(
-        bench.path("my-data/room1.png"),
-        bench.path("mine/room1.png"),
-    )
-    .unwrap();
+    fs::copy(bench.path("my-data/room1.png"), bench.path("mine/room1.png")).unwrap();
     let beside = bench.complete(&words("init mine --frames mine"));
     insta::assert_snapshot!(redacted(&beside), @"
     mine: 2 questions
@@ -359,11 +311,7 @@ fn template_checks_and_runs_unchanged() {
       darkqa-eval --data mine --model gpt-4o --dry-run
       darkqa-eval --data mine --model gpt-4o
     ");
-    let check = own
-        .stdout
-        .lines()
-        .find(|line| line.contains(" check "))
-        .unwrap();
+    let check = own.stdout.lines().find(|line| line.contains(" check ")).unwrap();
     let command: Vec<&str> = check.split_whitespace().skip(1).collect();
     let checked = bench.complete(&command);
     insta::assert_snapshot!(redacted(&checked), @"
@@ -397,9 +345,7 @@ fn unread_table_is_named() {
     ");
     let line = json!({"id": "a", "frame": "room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no", "family": "f"});
     bench.file("my-data/questions.jsonl", format!("{line}\n"));
-    let both = bench.call(&words(
-        "--data my-data --model random --levels L0 --out run",
-    ));
+    let both = bench.call(&words("--data my-data --model random --levels L0 --out run"));
     insta::assert_snapshot!(both.messages(), @"
     exit code: 0
      WARN my-data/questions.csv is not read, because questions.jsonl is in the same folder; --data
@@ -412,12 +358,9 @@ fn nested_images_need_question_file() {
     let bench = Bench::new();
     bench.complete(&words("init flat"));
     fs::create_dir_all(bench.path("data/images")).unwrap();
-    fs::copy(
-        bench.path("flat/room1.png"),
-        bench.path("data/images/room1.png"),
-    )
-    .unwrap();
-    let line = json!({"id": "a", "frame": "images/room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no"});
+    fs::copy(bench.path("flat/room1.png"), bench.path("data/images/room1.png")).unwrap();
+    let line =
+        json!({"id": "a", "frame": "images/room1.png", "question": "A?", "choices": ["yes", "no"], "answer": "no"});
     bench.file("data/questions.jsonl", format!("{line}\n"));
     let folder = bench.call(&words("check data"));
     insta::assert_snapshot!(folder, @"
@@ -447,10 +390,7 @@ fn repeated_ids_of_own_format_are_named() {
     bench.complete(&words("init data"));
     fs::remove_file(bench.path("data/questions.csv")).unwrap();
     let line = |question: &str| json!({"id": "a", "frame": "room1.png", "question": question, "choices": ["yes", "no"], "answer": "yes"});
-    bench.file(
-        "data/questions.jsonl",
-        format!("{}\n{}\n", line("A?"), line("B?")),
-    );
+    bench.file("data/questions.jsonl", format!("{}\n{}\n", line("A?"), line("B?")));
     let called = bench.call(&words("--data data --model random"));
     insta::assert_snapshot!(lines_with(&called.stderr, "id"), @"WARN data/questions.jsonl: some questions have no id or the same, so all get an id from their content");
 }
@@ -461,10 +401,7 @@ fn answer_outside_options_is_refused() {
     bench.complete(&words("init data"));
     fs::remove_file(bench.path("data/questions.csv")).unwrap();
     let line = |id: &str, answer: &str| json!({"id": id, "frame": "room1.png", "question": "A?", "choices": ["yes", "no"], "answer": answer});
-    bench.file(
-        "data/questions.jsonl",
-        format!("{}\n{}\n", line("a", "yes"), line("b", "A")),
-    );
+    bench.file("data/questions.jsonl", format!("{}\n{}\n", line("a", "yes"), line("b", "A")));
     let refused = bench.call(&words("--data data --model random"));
     insta::assert_snapshot!(refused.messages(), @r#"
     exit code: 2
@@ -479,14 +416,9 @@ fn pairs() -> Bench {
     let mut rows = Vec::new();
     for number in 0..8 {
         let name = format!("{}.png", number / 2);
-        let picture =
-            image::RgbImage::from_pixel(64, 48, image::Rgb([20 * (number as u8 / 2), 60, 30]));
+        let picture = image::RgbImage::from_pixel(64, 48, image::Rgb([20 * (number as u8 / 2), 60, 30]));
         picture.save(bench.path(&name)).unwrap();
-        let answer = if [5, 7].contains(&number) {
-            "no"
-        } else {
-            "yes"
-        };
+        let answer = if [5, 7].contains(&number) { "no" } else { "yes" };
         rows.push(json!({"id": number, "image": name, "pair": number / 2, "question": format!("Is it {number}?"), "answer": answer}));
     }
     bench.file("set.json", json!(rows).to_string());
@@ -516,35 +448,22 @@ fn grouped_set_has_strict_score() {
         beside it
     ");
     // The same trials, the same replies.
-    assert_eq!(
-        read("plain/records.jsonl").lines().count(),
-        read("run/records.jsonl").lines().count()
-    );
+    assert_eq!(read("plain/records.jsonl").lines().count(), read("run/records.jsonl").lines().count());
     let keys = |name: &str| {
         let records = read(name);
-        let mut keys: Vec<String> = records
-            .lines()
-            .map(|line| serde_json::from_str::<Value>(line).unwrap()["key"].to_string())
-            .collect();
+        let mut keys: Vec<String> =
+            records.lines().map(|line| serde_json::from_str::<Value>(line).unwrap()["key"].to_string()).collect();
         keys.sort();
         keys
     };
     assert_eq!(keys("plain/records.jsonl"), keys("run/records.jsonl"));
-    let question: Value =
-        serde_json::from_str(read("run/questions.jsonl").lines().next().unwrap()).unwrap();
-    assert_eq!(
-        (&question["group"], &question["group_size"]),
-        (&json!("0"), &json!(2))
-    );
+    let question: Value = serde_json::from_str(read("run/questions.jsonl").lines().next().unwrap()).unwrap();
+    assert_eq!((&question["group"], &question["group_size"]), (&json!("0"), &json!(2)));
     // The table is what the records say.
     let table = read("run/groups.csv");
     let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
-    for (condition, starts) in [
-        ("L0", "L0,none,"),
-        ("L3-ev", "L3,ev,"),
-        ("L3-noise", "L3,noise,"),
-    ] {
+    for (condition, starts) in [("L0", "L0,none,"), ("L3-ev", "L3,ev,"), ("L3-noise", "L3,noise,")] {
         let mut right = [true; 4];
         for line in read("run/records.jsonl").lines() {
             let record: Value = serde_json::from_str(line).unwrap();
@@ -562,9 +481,7 @@ fn grouped_set_has_strict_score() {
     assert_eq!(line_of(&table, "random,blind,")[at("n")], "4");
     assert_eq!(line_of(&table, "chance,")[at("value")], "0.25");
     // The summary has the same rows.
-    let summary = |run: &str| -> Value {
-        serde_json::from_str(&read(&format!("{run}/summary.json"))).unwrap()
-    };
+    let summary = |run: &str| -> Value { serde_json::from_str(&read(&format!("{run}/summary.json"))).unwrap() };
     let groups = &summary("run")["groups"];
     assert_eq!(groups.as_array().unwrap().len(), table.lines().count() - 1);
     for (row, line) in groups.as_array().unwrap().iter().zip(table.lines().skip(1)) {
@@ -593,38 +510,19 @@ fn report_counts_incomplete_groups() {
     let head: Vec<&str> = table.lines().next().unwrap().split(',').collect();
     let at = |name: &str| head.iter().position(|head| *head == name).unwrap();
     let row = line_of(&table, "random,image,L0,");
-    assert_eq!(
-        (&*row[at("n")], &*row[at("incomplete")]),
-        ("2", "1"),
-        "{table}"
-    );
+    assert_eq!((&*row[at("n")], &*row[at("incomplete")]), ("2", "1"), "{table}");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-    assert!(
-        page.contains("1 group of which questions of the set are left out or not drawn"),
-        "{page}"
-    );
+    assert!(page.contains("1 group of which questions of the set are left out or not drawn"), "{page}");
     // The run goes on with the rest, without the flag too: stored groups stay.
-    bench.complete(&words(
-        "--data set.json --model random --levels L0 --limit 5 --out run",
-    ));
+    bench.complete(&words("--data set.json --model random --levels L0 --limit 5 --out run"));
     let questions = fs::read_to_string(bench.path("run/questions.jsonl")).unwrap();
-    assert_eq!(
-        questions.matches("\"group_size\":2").count(),
-        5,
-        "{questions}"
-    );
+    assert_eq!(questions.matches("\"group_size\":2").count(), 5, "{questions}");
     bench.complete(&words(&format!("{line} --out run")));
     let table = fs::read_to_string(bench.path("run/groups.csv")).unwrap();
     let row = line_of(&table, "random,image,L0,");
-    assert_eq!(
-        (&*row[at("n")], &*row[at("incomplete")]),
-        ("4", "0"),
-        "{table}"
-    );
+    assert_eq!((&*row[at("n")], &*row[at("incomplete")]), ("4", "0"), "{table}");
     // A question cannot change its group within a run.
-    let called = bench.call(&words(
-        "--data set.json --model random --levels L0 --map group=image --out run",
-    ));
+    let called = bench.call(&words("--data set.json --model random --levels L0 --map group=image --out run"));
     insta::assert_snapshot!(called.messages(), @r#"
     exit code: 2
     set: 8 questions on 4 images in 1 family (no column of families)
@@ -663,9 +561,7 @@ fn with_unusable(unusable: &[(usize, Option<Vec<u8>>)]) -> Bench {
 fn transparent() -> Vec<u8> {
     let mut file = std::io::Cursor::new(Vec::new());
     let picture = image::RgbaImage::from_pixel(32, 24, image::Rgba([1, 2, 3, 90]));
-    picture
-        .write_to(&mut file, image::ImageFormat::Png)
-        .unwrap();
+    picture.write_to(&mut file, image::ImageFormat::Png).unwrap();
     file.into_inner()
 }
 
@@ -679,25 +575,13 @@ fn unusable_image_is_skipped_and_counted() {
         Some(transparent()),
     ] {
         let bench = with_unusable(&[(7, bytes)]);
-        let run = |line: &str| {
-            bench.call(&words(&format!(
-                "--data set.jsonl --model random --levels L0 {line}"
-            )))
-        };
+        let run = |line: &str| bench.call(&words(&format!("--data set.jsonl --model random --levels L0 {line}")));
         let called = run("--out run");
         assert_eq!(called.code, Some(2), "{called:?}");
-        assert!(
-            called.stderr.contains("--skip bad") && called.stderr.contains('7'),
-            "{}",
-            called.stderr
-        );
+        assert!(called.stderr.contains("--skip bad") && called.stderr.contains('7'), "{}", called.stderr);
         let called = run("--out run --bad skip");
         assert_eq!(called.code, Some(0), "{called:?}");
-        assert!(
-            called.stderr.contains("left out: 1 of 24"),
-            "{}",
-            called.stderr
-        );
+        assert!(called.stderr.contains("left out: 1 of 24"), "{}", called.stderr);
         assert!(called.stderr.contains("7.png"), "{}", called.stderr);
         let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
         assert_eq!(records.lines().count(), 23);
@@ -709,11 +593,7 @@ fn unusable_image_is_skipped_and_counted() {
 #[test]
 fn unusable_and_missing_share_limit() {
     let bench = with_unusable(&[(3, None), (7, Some(transparent()))]);
-    let run = |line: &str| {
-        bench.call(&words(&format!(
-            "--data set.jsonl --model random --levels L0 {line}"
-        )))
-    };
+    let run = |line: &str| bench.call(&words(&format!("--data set.jsonl --model random --levels L0 {line}")));
     let called = run("--bad skip --out run");
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
@@ -725,9 +605,7 @@ fn unusable_and_missing_share_limit() {
     assert_eq!(called.code, Some(0), "{called:?}");
     let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
     assert_eq!(records.lines().count(), 22);
-    let checked = bench.call(&words(
-        "check set.jsonl --model random --levels L0 --bad skip:9%",
-    ));
+    let checked = bench.call(&words("check set.jsonl --model random --levels L0 --bad skip:9%"));
     assert_eq!(checked.code, Some(0), "{checked:?}");
 }
 
@@ -736,11 +614,8 @@ fn question_bank_skips_unusable_photographs() {
     let bench = with_unusable(&[(7, Some(b"no image".to_vec()))]);
     let bank = json!({"id": "a", "question": "Which?", "choices": ["x \n", "y"]});
     bench.file("bank.jsonl", bank.to_string());
-    let run = |line: &str| {
-        bench.call(&words(&format!(
-            "--data img --ask bank.jsonl --model random --levels L0,L3 {line}"
-        )))
-    };
+    let run =
+        |line: &str| bench.call(&words(&format!("--data img --ask bank.jsonl --model random --levels L0,L3 {line}")));
     assert_eq!(run("--out run").code, Some(2));
     let called = run("--out run --bad skip");
     insta::assert_snapshot!(called.messages(), @"
@@ -755,18 +630,10 @@ fn question_bank_skips_unusable_photographs() {
 #[test]
 fn changed_image_stops_continued_run() {
     let bench = with_unusable(&[]);
-    let run = || {
-        bench.call(&words(
-            "--data set.jsonl --model random --levels L0 --out run",
-        ))
-    };
+    let run = || bench.call(&words("--data set.jsonl --model random --levels L0 --out run"));
     assert_eq!(run().code, Some(0));
     for number in [4, 5] {
-        fs::copy(
-            bench.path("img/1.png"),
-            bench.path(&format!("img/{number}.png")),
-        )
-        .unwrap();
+        fs::copy(bench.path("img/1.png"), bench.path(&format!("img/{number}.png"))).unwrap();
     }
     let called = run();
     insta::assert_snapshot!(called.messages(), @r#"
@@ -777,16 +644,9 @@ fn changed_image_stops_continued_run() {
     // Another answer has a message of its own.
     let text = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     let bench = with_unusable(&[]);
-    let run = || {
-        bench.call(&words(
-            "--data set.jsonl --model random --levels L0 --out run",
-        ))
-    };
+    let run = || bench.call(&words("--data set.jsonl --model random --levels L0 --out run"));
     assert_eq!(run().code, Some(0));
-    bench.file(
-        "set.jsonl",
-        text.replacen("\"answer\":\"x\"", "\"answer\":\"y\"", 1),
-    );
+    bench.file("set.jsonl", text.replacen("\"answer\":\"x\"", "\"answer\":\"y\"", 1));
     let called = run();
     insta::assert_snapshot!(called.messages(), @r#"
     exit code: 2

@@ -23,19 +23,11 @@ pub(super) fn import(bench: &Bench, line: &str) -> Called {
 /// The lines of `out/frames.jsonl`.
 pub(super) fn frames(bench: &Bench) -> Vec<Value> {
     let text = fs::read_to_string(bench.path("out/frames.jsonl")).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 pub(super) fn names(bench: &Bench) -> Vec<String> {
-    let name = |line: &Value| {
-        format!(
-            "{}/{}",
-            line["scene"].as_str().unwrap(),
-            line["frame"].as_str().unwrap()
-        )
-    };
+    let name = |line: &Value| format!("{}/{}", line["scene"].as_str().unwrap(), line["frame"].as_str().unwrap());
     frames(bench).iter().map(name).collect()
 }
 
@@ -43,15 +35,8 @@ pub(super) fn names(bench: &Bench) -> Vec<String> {
 fn topics_are_listed_without_a_folder() {
     let bench = with_recording(drive(4, Compression::Zstd));
     let listed = import(&bench, "").ended(0);
-    let lines: Vec<Vec<&str>> = listed
-        .stdout
-        .lines()
-        .map(|line| line.split_whitespace().collect())
-        .collect();
-    assert_eq!(
-        lines[0].join(" "),
-        "/front/image_raw sensor_msgs/Image 96×64 bgr8 8 messages, 2.0 Hz, 3.5 s"
-    );
+    let lines: Vec<Vec<&str>> = listed.stdout.lines().map(|line| line.split_whitespace().collect()).collect();
+    assert_eq!(lines[0].join(" "), "/front/image_raw sensor_msgs/Image 96×64 bgr8 8 messages, 2.0 Hz, 3.5 s");
     assert_eq!(
         lines[1].join(" "),
         "/rear/image_raw/compressed sensor_msgs/CompressedImage 96×64 bgr8; jpeg compressed bgr8 4 messages, 1.0 Hz, 3.0 s"
@@ -70,24 +55,15 @@ fn frames_keep_pixels_times_and_cameras() {
     for compression in Compression::ALL {
         let bench = with_recording(drive(4, compression));
         let called = import(&bench, "--topic /front/image_raw --every 0 --out out").ended(0);
-        assert!(
-            called.stdout.contains("8 frames of 1 scene (30 s each)\n"),
-            "{called:?}"
-        );
+        assert!(called.stdout.contains("8 frames of 1 scene (30 s each)\n"), "{called:?}");
         let frames = frames(&bench);
         for (i, line) in frames.iter().enumerate() {
             let found = image::open(bench.path("out").join(line["rgb"].as_str().unwrap())).unwrap();
             assert_eq!(found.into_rgb8(), picture(i as u8, SIZE), "{i}");
             assert_eq!(line["t"], 1_700_000_000.0 + i as f64 * 0.5);
             assert_eq!(line["frame_id"], "cam");
-            assert_eq!(
-                line["intrinsics"],
-                serde_json::json!({"fx": 80.0, "fy": 81.0, "cx": 47.5, "cy": 31.5})
-            );
-            assert_eq!(
-                line["exposure"],
-                serde_json::json!({"exposure_time": 10_000 + i / 2, "gain": 2.5})
-            );
+            assert_eq!(line["intrinsics"], serde_json::json!({"fx": 80.0, "fy": 81.0, "cx": 47.5, "cy": 31.5}));
+            assert_eq!(line["exposure"], serde_json::json!({"exposure_time": 10_000 + i / 2, "gain": 2.5}));
         }
     }
 }
@@ -107,37 +83,13 @@ fn compressed_images_are_copied() {
 #[test]
 fn stretches_are_scenes_whatever_is_taken() {
     let bench = with_recording(drive(6, Compression::None));
-    import(
-        &bench,
-        "--topic /front/image_raw --every 1.5 --stretch 2 --out out",
-    )
-    .ended(0);
-    assert_eq!(
-        names(&bench),
-        [
-            "drive-0000/000000",
-            "drive-0000/000003",
-            "drive-0001/000006",
-            "drive-0002/000009"
-        ]
-    );
-    import(
-        &bench,
-        "--topic /front/image_raw --at 5,2.1 --stretch 2 --out out --force",
-    )
-    .ended(0);
+    import(&bench, "--topic /front/image_raw --every 1.5 --stretch 2 --out out").ended(0);
+    assert_eq!(names(&bench), ["drive-0000/000000", "drive-0000/000003", "drive-0001/000006", "drive-0002/000009"]);
+    import(&bench, "--topic /front/image_raw --at 5,2.1 --stretch 2 --out out --force").ended(0);
     assert_eq!(names(&bench), ["drive-0001/000005", "drive-0002/000010"]);
-    import(
-        &bench,
-        "--topic /front/image_raw --max-frames 3 --stretch 2 --out out --force",
-    )
-    .ended(0);
+    import(&bench, "--topic /front/image_raw --max-frames 3 --stretch 2 --out out --force").ended(0);
     assert_eq!(names(&bench).len(), 3);
-    let missed = import(
-        &bench,
-        "--topic /front/image_raw --at 1,99 --out out --force",
-    )
-    .ended(0);
+    let missed = import(&bench, "--topic /front/image_raw --at 1,99 --out out --force").ended(0);
     insta::assert_snapshot!(missed.messages(), @"
     exit code: 0
      WARN /front/image_raw: no frame at [TIME] or later; 1 time of --at
@@ -154,14 +106,7 @@ fn unchanged_frames_are_skipped() {
     }
     let bench = with_recording(records.file());
     import(&bench, "--changed 5 --out out").ended(0);
-    assert_eq!(
-        names(&bench),
-        [
-            "drive-0000/000000",
-            "drive-0000/000002",
-            "drive-0000/000004"
-        ]
-    );
+    assert_eq!(names(&bench), ["drive-0000/000000", "drive-0000/000002", "drive-0000/000004"]);
 }
 
 #[test]
@@ -223,15 +168,7 @@ fn time_reversal_starts_new_scene() {
     exit code: 0
      WARN drive.mcap: time goes back 1 time, first /c at [TIME], [TIME] before the frame in front of it
     ");
-    assert_eq!(
-        names(&bench),
-        [
-            "drive-0000/000000",
-            "drive-0000/000002",
-            "drive-0001/000003",
-            "drive-0001/000005"
-        ]
-    );
+    assert_eq!(names(&bench), ["drive-0000/000000", "drive-0000/000002", "drive-0001/000003", "drive-0001/000005"]);
 }
 
 #[test]
@@ -281,16 +218,10 @@ fn long_texts_of_recording_are_cut() {
 #[test]
 fn mosaic_and_depth_files_are_refused() {
     let mut png = std::io::Cursor::new(Vec::new());
-    picture(0, SIZE)
-        .write_to(&mut png, image::ImageFormat::Png)
-        .unwrap();
-    for (format, expected) in [
-        (
-            "bayer_rggb8; png compressed ",
-            "is a mosaic in an image file",
-        ),
-        ("16UC1; png compressed ", "is depth"),
-    ] {
+    picture(0, SIZE).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    for (format, expected) in
+        [("bayer_rggb8; png compressed ", "is a mosaic in an image file"), ("16UC1; png compressed ", "is depth")]
+    {
         let mut records = Records::default();
         records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
         records.message(1, 0.0, &compressed(0.0, format, png.get_ref()));
@@ -356,18 +287,10 @@ fn unreadable_images_are_named() {
 fn sixteen_bit_codes_are_scaled() {
     let mut records = Records::default();
     records.topic(1, "/c", "sensor_msgs/msg/Image", "cdr", "");
-    let codes: Vec<u8> = [0_u16, 1000, 4095, 2000]
-        .iter()
-        .flat_map(|code| code.to_le_bytes())
-        .collect();
+    let codes: Vec<u8> = [0_u16, 1000, 4095, 2000].iter().flat_map(|code| code.to_le_bytes()).collect();
     records.message(1, 0.0, &image(0.0, "mono16", [2, 2], &codes, 0));
     let bench = with_recording(records.file());
-    let third = || {
-        image::open(bench.path("out/scenes/drive-0000/rgb/000000.png"))
-            .unwrap()
-            .into_rgb16()[(0, 1)]
-            .0
-    };
+    let third = || image::open(bench.path("out/scenes/drive-0000/rgb/000000.png")).unwrap().into_rgb16()[(0, 1)].0;
     let dark = import(&bench, "--out out").ended(0);
     insta::assert_snapshot!(dark.messages(), @"
     exit code: 0
@@ -385,23 +308,15 @@ where
     [P::Subpixel]: image::EncodableLayout,
 {
     let mut file = std::io::Cursor::new(Vec::new());
-    image::ImageBuffer::from_pixel(2, 2, pixel)
-        .write_to(&mut file, image::ImageFormat::Png)
-        .unwrap();
+    image::ImageBuffer::from_pixel(2, 2, pixel).write_to(&mut file, image::ImageFormat::Png).unwrap();
     file.into_inner()
 }
 
 #[test]
 fn white_applies_to_compressed_images_of_16_bits() {
     for (format, file) in [
-        (
-            "mono16; png compressed mono16",
-            png_of(image::Luma([2048_u16])),
-        ),
-        (
-            "rgb16; png compressed rgb16",
-            png_of(image::Rgb([2048_u16; 3])),
-        ),
+        ("mono16; png compressed mono16", png_of(image::Luma([2048_u16]))),
+        ("rgb16; png compressed rgb16", png_of(image::Rgb([2048_u16; 3]))),
     ] {
         let mut records = Records::default();
         records.topic(1, "/c", "sensor_msgs/msg/CompressedImage", "cdr", "");
@@ -460,10 +375,7 @@ fn unrelated_files_are_identified() {
         (b"SQLite format 3\0", "rosbags-convert"),
         (&[0x28, 0xb5, 0x2f, 0xfd, 1, 2, 3, 4], "zstd -d"),
         (b"x", "not an MCAP file"),
-        (
-            b"\x89MCAP0\r\n",
-            "no topic with images: drive.mcap: the recording is cut off",
-        ),
+        (b"\x89MCAP0\r\n", "no topic with images: drive.mcap: the recording is cut off"),
     ] {
         let called = import(&with_recording(bytes), "").ended(2);
         assert!(called.stderr.contains(expected), "{called:?}");
@@ -487,13 +399,8 @@ fn bag_folder_keeps_file_order() {
         records.message(1, at, &image(at, "mono8", [2, 2], &[number; 4], 0));
         bench.file(&format!("bag/bag_{number}.mcap"), records.file());
     }
-    let called = bench
-        .call(&["import", "mcap", "bag", "--out", "out"])
-        .ended(0);
-    assert_eq!(
-        names(&bench),
-        ["bag-0000/000000", "bag-0002/000001", "bag-0003/000002"]
-    );
+    let called = bench.call(&["import", "mcap", "bag", "--out", "out"]).ended(0);
+    assert_eq!(names(&bench), ["bag-0000/000000", "bag-0002/000001", "bag-0003/000002"]);
     assert_eq!(called.stderr, "");
 }
 
@@ -505,9 +412,7 @@ fn broken_file_of_bag_keeps_others() {
     records.message(1, 0.0, &image(0.0, "mono8", [2, 2], &[9; 4], 0));
     bench.file("bag/bag_0.mcap", records.file());
     bench.file("bag/bag_1.mcap", b"");
-    let called = bench
-        .call(&["import", "mcap", "bag", "--out", "out"])
-        .ended(1);
+    let called = bench.call(&["import", "mcap", "bag", "--out", "out"]).ended(1);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 1
      WARN bag/bag_1.mcap: the file is empty, as a recorder leaves it that is killed

@@ -35,10 +35,7 @@ impl Seen {
         for number in frame.segments.as_ref().unwrap() {
             *pixels.entry(*number).or_insert(0) += 1;
         }
-        Self {
-            truth: room.truth(),
-            pixels,
-        }
+        Self { truth: room.truth(), pixels }
     }
 
     /// The things of a class that are in view.
@@ -54,14 +51,10 @@ impl Seen {
     }
 }
 
-/// Questions about the rooms of a seed, by Algorithm 1, with what the generator knows of their frames; and what is wrong with every
-/// colour that could be asked, with the number of these.
+/// Questions about the rooms of a seed, by Algorithm 1, with what the generator knows of their frames; and what is
+/// wrong with every colour that could be asked, with the number of these.
 fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>, (usize, Vec<String>)) {
-    let (rules, palette, labels) = (
-        Rules::built_in().unwrap(),
-        Palette::built_in().unwrap(),
-        labels(),
-    );
+    let (rules, palette, labels) = (Rules::built_in().unwrap(), Palette::built_in().unwrap(), labels());
     let rooms: Vec<(FrameId, Room)> = rooms.all().collect();
     let measured = rooms.par_iter().map(|(id, room)| {
         let frame = room.frame().unwrap();
@@ -130,23 +123,17 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
             if suits { "yes" } else { "no" }.to_owned()
         }
         Family::Presence => {
-            let is_visible = seen.of_class(about).into_iter().any(|thing| {
-                asked
-                    .question
-                    .text
-                    .contains(&format!(" {} in", called(thing)))
-            });
+            let is_visible = seen
+                .of_class(about)
+                .into_iter()
+                .any(|thing| asked.question.text.contains(&format!(" {} in", called(thing))));
             if is_visible { "yes" } else { "no" }.to_owned()
         }
         Family::Color => {
             // One of them is asked about; the others are slivers.
             let things = seen.of_class(about);
             let largest = things.iter().max_by_key(|thing| {
-                let place = seen
-                    .truth
-                    .things
-                    .iter()
-                    .position(|other| std::ptr::eq(other, **thing));
+                let place = seen.truth.things.iter().position(|other| std::ptr::eq(other, **thing));
                 seen.pixels.get(&(place.unwrap() as u32 + 1))
             });
             largest.map_or("", |thing| thing.color).to_owned()
@@ -176,12 +163,7 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
 
 /// Frames enough for five hundred questions, as many of each kind of room as of any other.
 fn many(seed: u64) -> Rooms {
-    Rooms {
-        frames: 168,
-        seed,
-        size: [240, 180],
-        ..Rooms::default()
-    }
+    Rooms { frames: 168, seed, size: [240, 180], ..Rooms::default() }
 }
 
 #[test]
@@ -189,15 +171,9 @@ fn the_questions_are_right_and_even() {
     let (made, mut seen, (colors, lit_wrong)) = asked(many(7));
     assert!(made.asked.len() >= 500, "{}", made.asked.len());
     // Every colour that passes the rules is that of the paint, in light and in shade.
-    assert!(
-        lit_wrong.is_empty() && colors >= 70,
-        "{colors}: {lit_wrong:?}"
-    );
-    let faults: Vec<String> = made
-        .asked
-        .iter()
-        .filter_map(|asked| wrong(asked, &seen[&asked.question.frame]))
-        .collect();
+    assert!(lit_wrong.is_empty() && colors >= 70, "{colors}: {lit_wrong:?}");
+    let faults: Vec<String> =
+        made.asked.iter().filter_map(|asked| wrong(asked, &seen[&asked.question.frame])).collect();
     let counts = format!("{} of {}", faults.len(), made.asked.len());
     assert!(faults.is_empty(), "{counts}:\n{}", faults.join("\n"));
 
@@ -214,26 +190,17 @@ fn the_questions_are_right_and_even() {
         let binary = counts.len() == 2;
         assert!(total >= 15, "{family}: {total}");
         let share = 100 * most / total;
-        assert!(
-            share <= if binary { 55 } else { 45 },
-            "{family}: {counts:?}"
-        );
+        assert!(share <= if binary { 55 } else { 45 }, "{family}: {counts:?}");
     }
-    let chance = made
-        .asked
-        .iter()
-        .map(|asked| 1.0 / asked.question.choices.len() as f64)
-        .sum::<f64>()
-        / made.asked.len() as f64;
+    let chance =
+        made.asked.iter().map(|asked| 1.0 / asked.question.choices.len() as f64).sum::<f64>() / made.asked.len() as f64;
     assert!((0.30..0.37).contains(&chance), "{chance}");
 
     // Every class that is asked about is there in at least five frames.
     let rules = Rules::built_in().unwrap();
     let classes = rules.book().class.iter();
     for (class, _) in classes.filter(|(_, class)| class.flags.contains(&ClassFlag::Asked)) {
-        let frames = seen
-            .values()
-            .filter(|seen| !seen.of_class(class).is_empty());
+        let frames = seen.values().filter(|seen| !seen.of_class(class).is_empty());
         let count = frames.count();
         assert!(count >= 5, "{class}: in {count} frames");
     }
@@ -241,23 +208,16 @@ fn the_questions_are_right_and_even() {
     // No colour is the answer so often that naming it always would pay.
     let colors = &answers[&Family::Color];
     let most = colors.values().max().unwrap();
-    assert!(
-        100 * most <= 20 * colors.values().sum::<usize>(),
-        "{colors:?}"
-    );
+    assert!(100 * most <= 20 * colors.values().sum::<usize>(), "{colors:?}");
 
-    // A generator that is wrong about everything is found out by every family; a wrong class is often another that is there.
+    // A generator that is wrong about everything is found out by every family; a wrong class is often another that is
+    // there.
     for seen in seen.values_mut() {
         spoil(&mut seen.truth);
     }
     for family in Family::PAPER {
-        let of_family = made
-            .asked
-            .iter()
-            .filter(|asked| asked.question.family == family);
-        let found = of_family
-            .clone()
-            .filter(|asked| wrong(asked, &seen[&asked.question.frame]).is_some());
+        let of_family = made.asked.iter().filter(|asked| asked.question.family == family);
+        let found = of_family.clone().filter(|asked| wrong(asked, &seen[&asked.question.frame]).is_some());
         let (found, all) = (found.count(), of_family.count());
         assert!(4 * found >= all, "{family}: {found} of {all}");
     }
@@ -277,41 +237,18 @@ fn spoil(truth: &mut RoomTruth) {
 fn pixels(rooms: Rooms, place: usize) -> Digest {
     let (_, room) = rooms.all().nth(place).unwrap();
     let frame = room.frame().unwrap();
-    let depth = frame
-        .depth
-        .as_ref()
-        .unwrap()
-        .iter()
-        .flat_map(|depth| depth.to_le_bytes());
-    let segments = frame
-        .segments
-        .as_ref()
-        .unwrap()
-        .iter()
-        .flat_map(|id| id.to_le_bytes());
+    let depth = frame.depth.as_ref().unwrap().iter().flat_map(|depth| depth.to_le_bytes());
+    let segments = frame.segments.as_ref().unwrap().iter().flat_map(|id| id.to_le_bytes());
     let maps: Vec<u8> = depth.chain(segments).collect();
     Digest::from_parts([frame.rgb.samples(), &maps])
 }
 
 #[test]
 fn seed_gives_same_bytes_everywhere() {
-    let rooms = Rooms {
-        frames: 12,
-        seed: 7,
-        size: [160, 120],
-        ..Rooms::default()
-    };
+    let rooms = Rooms { frames: 12, seed: 7, size: [160, 120], ..Rooms::default() };
     let all = |threads: usize| -> Vec<Digest> {
-        let cores = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
-        cores.install(|| {
-            (0..12)
-                .into_par_iter()
-                .map(|place| pixels(rooms, place))
-                .collect()
-        })
+        let cores = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        cores.install(|| (0..12).into_par_iter().map(|place| pixels(rooms, place)).collect())
     };
     let made = all(1);
     assert_eq!(made, all(3));
@@ -333,11 +270,7 @@ fn stored_rooms_match_built_in() {
     let size = ["--frames", "4", "--size", "160x120"];
     bench.complete(&[&["rooms", "--out", "frames"][..], &size].concat());
     let folder = Dataset::from_frames(&bench.path("frames"), &[]).unwrap();
-    let rooms = Rooms {
-        frames: 4,
-        size: [160, 120],
-        ..Rooms::default()
-    };
+    let rooms = Rooms { frames: 4, size: [160, 120], ..Rooms::default() };
     let built_in = Dataset::open_without_questions(&DataPlace::Rooms(rooms), &[]).unwrap();
     assert_eq!(folder.labels(), built_in.labels());
     assert_eq!(folder.title(), built_in.title());
@@ -345,18 +278,9 @@ fn stored_rooms_match_built_in() {
     for name in built_in.frames() {
         let [kept, drawn] = [&folder, &built_in].map(|set| set.frame(name).unwrap());
         assert!(kept.rgb == drawn.rgb, "{name}");
-        assert_eq!(
-            (&kept.depth, &kept.semantic),
-            (&drawn.depth, &drawn.semantic)
-        );
-        assert_eq!(
-            (&kept.segments, &kept.names),
-            (&drawn.segments, &drawn.names)
-        );
-        assert_eq!(
-            (&kept.room, kept.intrinsics),
-            (&drawn.room, drawn.intrinsics)
-        );
+        assert_eq!((&kept.depth, &kept.semantic), (&drawn.depth, &drawn.semantic));
+        assert_eq!((&kept.segments, &kept.names), (&drawn.segments, &drawn.names));
+        assert_eq!((&kept.room, kept.intrinsics), (&drawn.room, drawn.intrinsics));
         count += 1;
     }
     assert_eq!(count, 4);
@@ -367,17 +291,11 @@ fn stored_rooms_match_built_in() {
     ");
     // The frames on disk and those in the program are asked the same, and answered alike.
     let run = |data: &str, out: &str| {
-        bench.complete(&words(&format!(
-            "--model observer --data {data} --levels L0,L4 --out {out}"
-        )));
+        bench.complete(&words(&format!("--model observer --data {data} --levels L0,L4 --out {out}")));
         records(&bench.path(out))
             .into_iter()
             .map(|record| {
-                (
-                    record["question"].to_string(),
-                    record["condition"].to_string(),
-                    record["reply"].to_string(),
-                )
+                (record["question"].to_string(), record["condition"].to_string(), record["reply"].to_string())
             })
             .collect::<BTreeSet<_>>()
     };
@@ -390,9 +308,7 @@ fn senseless_settings_are_named() {
     let data = ["frames=0", "size=640", "size=9x9", "seed=x", "doors=4"];
     let errors = each(data, |setting| {
         let data = format!("rooms:{setting}");
-        bench
-            .call(&["--model", "random", "--data", &data])
-            .messages()
+        bench.call(&["--model", "random", "--data", &data]).messages()
     });
     insta::assert_snapshot!(errors, @"
     frames=0
@@ -417,9 +333,7 @@ fn senseless_settings_are_named() {
     ");
     // A file without questions is no wish for those of the rules.
     bench.file("empty.jsonl", "\n");
-    let refused = bench.call(&words(
-        "--model random --data rooms:frames=1 --questions empty.jsonl",
-    ));
+    let refused = bench.call(&words("--model random --data rooms:frames=1 --questions empty.jsonl"));
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 2
     error: empty.jsonl: no questions in it

@@ -48,11 +48,7 @@ fn scenes_cluster_and_are_named_later() {
         as independent; a "scene" in each question (or --map scene=COLUMN) names them
     "#);
     let joined = |text: &str| text.replace("\n  ", " ");
-    assert!(
-        joined(&called.stdout).contains(suggested),
-        "{}",
-        called.stdout
-    );
+    assert!(joined(&called.stdout).contains(suggested), "{}", called.stdout);
     insta::assert_snapshot!(called.lines_with("the intervals"), @"
     exit code: 0
     Sample         ·  With 24 frames the intervals of the findings reach about 16
@@ -111,10 +107,7 @@ fn scenes_cluster_and_are_named_later() {
 fn cluster_alerts(summary: &str) -> Vec<String> {
     let summary: Value = serde_json::from_str(summary).unwrap();
     let alerts = summary["alerts"].as_array().unwrap().iter();
-    alerts
-        .filter(|alert| alert["kind"] == "clusters")
-        .map(|alert| alert["text"].as_str().unwrap().to_owned())
-        .collect()
+    alerts.filter(|alert| alert["kind"] == "clusters").map(|alert| alert["text"].as_str().unwrap().to_owned()).collect()
 }
 
 /// A set of frames with one question each, from the number of its picture and its scene.
@@ -123,9 +116,7 @@ fn frames(bench: &Bench, frames: impl IntoIterator<Item = (u8, &'static str)>) {
     let mut lines = String::new();
     for (number, (picture, scene)) in frames.into_iter().enumerate() {
         let image = image::RgbImage::from_pixel(32, 24, image::Rgb([90, 60, picture]));
-        image
-            .save(bench.path(&format!("set/{number}.png")))
-            .unwrap();
+        image.save(bench.path(&format!("set/{number}.png"))).unwrap();
         let question = json!({
             "id": format!("q{number}"), "frame": format!("{number}.png"), "scene": scene, "family": "color",
             "question": format!("What color is it, {number}?"), "choices": ["red", "blue", "brown"], "answer": "brown",
@@ -149,9 +140,7 @@ fn equal_files_count_as_one_frame() {
     assert_eq!(cluster_alerts(&stored), expected);
     assert!(stored.contains("\"clusters\": 10.0"), "{stored}");
     // A stored run, and two runs together.
-    bench.complete(&words(
-        &RUN.replace("L3", "L4").replace("--out run", "--out other"),
-    ));
+    bench.complete(&words(&RUN.replace("L3", "L4").replace("--out run", "--out other")));
     for runs in ["run", "run other"] {
         let report = bench.call(&words(&format!("report {runs} --json")));
         assert_eq!(cluster_alerts(&report.stdout), expected);
@@ -165,16 +154,10 @@ fn equal_files_count_as_one_frame() {
 fn few_scenes_are_clusters_with_an_alert() {
     let bench = Bench::new();
     let names = ["a", "b", "c", "d", "e"];
-    frames(
-        &bench,
-        (0..40).map(|number| (number, names[usize::from(number) % 5])),
-    );
+    frames(&bench, (0..40).map(|number| (number, names[usize::from(number) % 5])));
     bench.complete(&words(RUN));
     let stored = summary(&bench, "run");
-    assert_eq!(
-        cluster_alerts(&stored),
-        ["Only 5 scenes (8 are needed): wide intervals, few possible verdicts."]
-    );
+    assert_eq!(cluster_alerts(&stored), ["Only 5 scenes (8 are needed): wide intervals, few possible verdicts."]);
     let report = bench.call(&words("report run"));
     let text = report.stdout.replace("\n  ", " ");
     assert!(text.contains("With 5 scenes no verdict"), "{text}");
@@ -189,9 +172,7 @@ fn a_scene_with_most_questions_has_an_alert() {
     bench.complete(&words(RUN));
     assert_eq!(
         cluster_alerts(&summary(&bench, "run")),
-        [
-            "Scene hall has 50 % of the questions: the results are mostly about it, and intervals may be too narrow."
-        ]
+        ["Scene hall has 50 % of the questions: the results are mostly about it, and intervals may be too narrow."]
     );
     // Without one of them, no scene is large.
     let bench = Bench::new();

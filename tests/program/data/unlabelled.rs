@@ -1,4 +1,5 @@
-//! Photographs without labels: questions that are asked about every image, and agreement with a model's own answers in the light.
+//! Photographs without labels: questions that are asked about every image, and agreement with a model's own answers in
+//! the light.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,7 +12,8 @@ use crate::support::snapshot::{on_one_line, redacted};
 /// Number of photographs.
 const PHOTOGRAPHS: usize = 12;
 
-/// Twelve photographs in two folders, a bank of three questions, and a script that answers as it sees: it forgets in the dark.
+/// Twelve photographs in two folders, a bank of three questions, and a script that answers as it sees: it forgets in
+/// the dark.
 fn photographs() -> Bench {
     let bench = Bench::new();
     let mut replies = Vec::new();
@@ -21,11 +23,7 @@ fn photographs() -> Bench {
         let picture = image::RgbImage::from_pixel(24, 16, image::Rgb([grey, 90, 200 - grey]));
         fs::create_dir_all(bench.path("photos").join(&name).parent().unwrap()).unwrap();
         picture.save(bench.path("photos").join(&name)).unwrap();
-        for (id, light) in [
-            ("lamp", index % 3 == 0),
-            ("window", index % 2 == 0),
-            ("cat", false),
-        ] {
+        for (id, light) in [("lamp", index % 3 == 0), ("window", index % 2 == 0), ("cat", false)] {
             let letter = if light { "A" } else { "B" };
             let id = format!("{id}@{name}");
             // Without an image, and in the dark, it says no to everything; the enhancer of a name is not used here.
@@ -52,7 +50,8 @@ fn photographs() -> Bench {
     bench
 }
 
-const ASKED: &str = "--data photos --ask bank.jsonl --model script:eyes.jsonl --levels L0,L1,L5 --variant noise --out run";
+const ASKED: &str =
+    "--data photos --ask bank.jsonl --model script:eyes.jsonl --levels L0,L1,L5 --variant noise --out run";
 
 fn text(bench: &Bench, name: &str) -> String {
     fs::read_to_string(bench.path(name)).unwrap()
@@ -81,15 +80,9 @@ fn pairs_need_true_answers() {
     let bench = photographs();
     for (folder, name) in [("light", "a.png"), ("dark", "a.png")] {
         fs::create_dir_all(bench.path(folder)).unwrap();
-        fs::copy(
-            bench.path("photos/hall/00.png"),
-            bench.path(folder).join(name),
-        )
-        .unwrap();
+        fs::copy(bench.path("photos/hall/00.png"), bench.path(folder).join(name)).unwrap();
     }
-    let called = bench.call(&words(
-        "--pairs light,dark --ask home --model random --levels L0 --out run",
-    ));
+    let called = bench.call(&words("--pairs light,dark --ask home --model random --levels L0 --out run"));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
      WARN --data: no effect: --pairs names the data
@@ -115,10 +108,7 @@ fn photographs_have_no_true_answers() {
     let records = records(&bench.path("run"));
     // Twice at L0, once at L1, at L5 and without an image.
     assert_eq!(records.len(), 36 * 5);
-    let outcomes: BTreeSet<&str> = records
-        .iter()
-        .filter_map(|record| record["outcome"].as_str())
-        .collect();
+    let outcomes: BTreeSet<&str> = records.iter().filter_map(|record| record["outcome"].as_str()).collect();
     assert_eq!(outcomes, BTreeSet::from(["answered"]));
     assert!(records.iter().all(|record| record["truth"].is_null()));
     let again: BTreeSet<&str> = records
@@ -129,10 +119,7 @@ fn photographs_have_no_true_answers() {
     assert_eq!(again, BTreeSet::from(["L0"]));
     let question = text(&bench, "run/questions.jsonl");
     let question: Value = serde_json::from_str(question.lines().next().unwrap()).unwrap();
-    assert_eq!(
-        (&question["answer"], &question["evidence"]),
-        (&Value::Null, &json!({"bank_id": "lamp"}))
-    );
+    assert_eq!((&question["answer"], &question["evidence"]), (&Value::Null, &json!({"bank_id": "lamp"})));
 }
 
 #[test]
@@ -140,17 +127,7 @@ fn report_measures_agreement_with_l0() {
     let bench = photographs();
     let shown = bench.complete(&words(ASKED));
     let own = rows(&bench, "run/own_answers.csv");
-    let of = |level: &str| {
-        row(
-            &own,
-            &[
-                ("level", level),
-                ("family", "all"),
-                ("mode", "strict"),
-                ("view", "image"),
-            ],
-        )
-    };
+    let of = |level: &str| row(&own, &[("level", level), ("family", "all"), ("mode", "strict"), ("view", "image")]);
     // In the light 4 lamps, 6 windows and no cat: 10 of 36 are yes. At L5 all is no.
     assert!((number(of("L5"), "agreement") - 26.0 / 36.0).abs() < 1e-12);
     assert!((number(of("L0"), "agreement") - 1.0).abs() < 1e-12);
@@ -167,40 +144,18 @@ fn report_measures_agreement_with_l0() {
     assert!((number(of("L1"), "agreement") - 35.0 / 36.0).abs() < 1e-12);
     assert!((number(of("L1"), "evidence") - 0.9).abs() < 1e-12);
     let questions = rows(&bench, "run/own_questions.csv");
-    let informative = questions.iter().map(|row| {
-        (
-            row["question"].as_str().unwrap(),
-            row["informative"].as_str().unwrap(),
-        )
-    });
-    assert_eq!(
-        informative.collect::<Vec<_>>(),
-        [("lamp", "true"), ("window", "true"), ("cat", "false")]
-    );
-    for said in [
-        "evidence kept",
-        "entropy",
-        "κ",
-        "without images, the floor",
-        "2 of 3 questions of the bank are informative",
-    ] {
+    let informative =
+        questions.iter().map(|row| (row["question"].as_str().unwrap(), row["informative"].as_str().unwrap()));
+    assert_eq!(informative.collect::<Vec<_>>(), [("lamp", "true"), ("window", "true"), ("cat", "false")]);
+    for said in
+        ["evidence kept", "entropy", "κ", "without images, the floor", "2 of 3 questions of the bank are informative"]
+    {
         assert!(on_one_line(&shown).contains(said), "{said}: {shown}");
     }
     let comparisons = rows(&bench, "run/comparisons.csv");
-    let dark = row(
-        &comparisons,
-        &[
-            ("kind", "level"),
-            ("condition", "L5-noise"),
-            ("family", "all"),
-        ],
-    );
+    let dark = row(&comparisons, &[("kind", "level"), ("condition", "L5-noise"), ("family", "all")]);
     assert_eq!(
-        (
-            &dark["against_condition"],
-            &dark["only_second"],
-            &dark["measure"]
-        ),
+        (&dark["against_condition"], &dark["only_second"], &dark["measure"]),
         (&json!("L0"), &json!("10"), &json!("agreement"))
     );
 }
@@ -211,24 +166,19 @@ fn word_accuracy_stands_over_no_agreement() {
     let shown = bench.complete(&words(ASKED)) + &bench.complete(&["report", "run", "--full"]);
     assert!(!shown.contains("ccuracy"), "{shown}");
     let summary = rows(&bench, "run/summary.csv");
-    assert!(
-        summary
-            .iter()
-            .all(|row| row["measure"] == "agreement" && row["right"] == "")
-    );
+    assert!(summary.iter().all(|row| row["measure"] == "agreement" && row["right"] == ""));
     let head = text(&bench, "run/summary.csv");
-    assert!(head.starts_with("model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high,reading,measure\n"), "{head}");
+    assert!(
+        head.starts_with(
+            "model,view,level,variant,enhancer,family,mode,n,right,unparsed,failed,value,low,high,reading,measure\n"
+        ),
+        "{head}"
+    );
     let json: Value = serde_json::from_str(&text(&bench, "run/summary.json")).unwrap();
     assert_eq!(json["measure"], "agreement");
-    assert_eq!(
-        json["own_answers"].as_array().unwrap().len(),
-        json["rows"].as_array().unwrap().len()
-    );
+    assert_eq!(json["own_answers"].as_array().unwrap().len(), json["rows"].as_array().unwrap().len());
     for name in ["figures/agreement.svg", "figures/evidence.svg"] {
-        assert!(
-            !text(&bench, &format!("run/{name}")).contains("ccuracy"),
-            "{name}"
-        );
+        assert!(!text(&bench, &format!("run/{name}")).contains("ccuracy"), "{name}");
     }
     let figure = text(&bench, "run/figures/agreement.svg");
     assert!(figure.contains("agreement in %"), "{figure}");
@@ -236,10 +186,7 @@ fn word_accuracy_stands_over_no_agreement() {
     // The style and the script are those of every page.
     let page = page.split("<script id=\"data\"").next().unwrap();
     assert!(!page.contains("ccuracy") && page.contains("Agreement with its own answer at L0"));
-    assert!(
-        !bench.path("run/thresholds.csv").exists()
-            && bench.path("run/evidence_thresholds.csv").exists()
-    );
+    assert!(!bench.path("run/thresholds.csv").exists() && bench.path("run/evidence_thresholds.csv").exists());
 }
 
 #[test]
@@ -247,16 +194,9 @@ fn constant_no_gives_no_verdict() {
     let bench = photographs();
     bench.file("no.jsonl", json!({"default": "B"}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "no.jsonl")));
-    assert!(
-        on_one_line(&shown).contains("The questions do not show what script:no.jsonl sees"),
-        "{shown}"
-    );
+    assert!(on_one_line(&shown).contains("The questions do not show what script:no.jsonl sees"), "{shown}");
     assert!(!shown.contains("gives its answer at L0 to"), "{shown}");
-    assert!(
-        on_one_line(&shown)
-            .contains("the ceiling is 0.0 points above the floor, and 10.0 are needed"),
-        "{shown}"
-    );
+    assert!(on_one_line(&shown).contains("the ceiling is 0.0 points above the floor, and 10.0 are needed"), "{shown}");
 }
 
 #[test]
@@ -265,14 +205,9 @@ fn unreadable_model_is_not_compared() {
     bench.file("mute.jsonl", json!({"default": "Well."}).to_string());
     let shown = bench.complete(&words(&ASKED.replace("eyes.jsonl", "mute.jsonl")));
     let shown = on_one_line(&shown);
+    assert!(shown.contains("Nothing is known about script:mute.jsonl"), "{shown}");
     assert!(
-        shown.contains("Nothing is known about script:mute.jsonl"),
-        "{shown}"
-    );
-    assert!(
-        shown.contains(
-            "180 of 180 replies of script:mute.jsonl (100.0 %) could not be read, and do not agree."
-        ),
+        shown.contains("180 of 180 replies of script:mute.jsonl (100.0 %) could not be read, and do not agree."),
         "{shown}"
     );
     assert!(!shown.contains("The questions do not show"), "{shown}");
@@ -297,12 +232,12 @@ fn cannot_tell_has_its_own_measure() {
     bench.file("eyes.jsonl", replies);
     let shown = bench.complete(&words(ASKED));
     let shown = on_one_line(&shown);
-    assert!(shown.contains("script:eyes.jsonl says “cannot tell” to 0.0 % of the questions at L0, and to 100.0 % at L5"),"{shown}");
-    let own = rows(&bench, "run/own_answers.csv");
-    let dark = row(
-        &own,
-        &[("level", "L5"), ("family", "all"), ("mode", "strict")],
+    assert!(
+        shown.contains("script:eyes.jsonl says “cannot tell” to 0.0 % of the questions at L0, and to 100.0 % at L5"),
+        "{shown}"
     );
+    let own = rows(&bench, "run/own_answers.csv");
+    let dark = row(&own, &[("level", "L5"), ("family", "all"), ("mode", "strict")]);
     assert!((number(dark, "cannot_tell") - 1.0).abs() < 1e-12);
 }
 
@@ -319,24 +254,15 @@ fn runs_continue_grow_and_merge() {
     assert!(after.starts_with(&before));
     assert_eq!(after.lines().count() - before.lines().count(), 36);
     let rescored = bench.complete(&["report", "run", "--rescore"]);
-    assert!(
-        rescored.starts_with("0 of 180 records now read differently\n"),
-        "{rescored}"
-    );
+    assert!(rescored.starts_with("0 of 180 records now read differently\n"), "{rescored}");
     for shard in ["1/2", "2/2"] {
         let call = ASKED.replace("--out run", "--out parts");
         bench.complete(&[words(&call), vec!["--shard", shard]].concat());
     }
     bench.complete(&words("merge parts --out whole"));
-    assert_eq!(
-        text(&bench, "whole/own_answers.csv"),
-        text(&bench, "run/own_answers.csv")
-    );
+    assert_eq!(text(&bench, "whole/own_answers.csv"), text(&bench, "run/own_answers.csv"));
     let item = bench.complete(&words("show run lamp@hall/00.png --data photos"));
-    assert!(
-        item.contains("answered") && !item.contains("(true)"),
-        "{item}"
-    );
+    assert!(item.contains("answered") && !item.contains("(true)"), "{item}");
 }
 
 #[test]
@@ -359,9 +285,7 @@ fn two_models_are_compared_by_agreement() {
     let shown = bench.complete(&words(&format!("{ASKED} --model script:other.jsonl")));
     let shown = on_one_line(&shown);
     assert!(
-        shown.contains(
-            "At L0 script:eyes.jsonl and script:other.jsonl give the same answer to 100.0 %"
-        ),
+        shown.contains("At L0 script:eyes.jsonl and script:other.jsonl give the same answer to 100.0 %"),
         "{shown}"
     );
     assert_eq!(rows(&bench, "run/models_in_light.csv").len(), 3);
@@ -371,12 +295,15 @@ fn two_models_are_compared_by_agreement() {
 fn what_needs_a_truth_is_refused() {
     let bench = photographs();
     bench.complete(&words(ASKED));
-    bench.file("photos/questions.jsonl", json!({"id": "a", "frame": "hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"}).to_string());
-    let set = json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
+    bench.file(
+        "photos/questions.jsonl",
+        json!({"id": "a", "frame": "hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"})
+            .to_string(),
+    );
+    let set =
+        json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
     bench.file("set.jsonl", set.to_string());
-    bench.complete(&words(
-        "--data set.jsonl --model random --levels L0 --out known",
-    ));
+    bench.complete(&words("--data set.jsonl --model random --levels L0 --out known"));
     let open = json!({"id": "a", "frame": "hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": null});
     bench.file("open.jsonl", open.to_string());
     let asked = "--data photos --ask bank.jsonl --levels L0,L5 --out other";
@@ -386,8 +313,14 @@ fn what_needs_a_truth_is_refused() {
         (format!("{asked} --blind-model random"), "random is shown no image"),
         (format!("{asked} --model random --questions set.jsonl"), "cannot be used with"),
         ("--data photos --ask bank.jsonl --model random --levels L5 --out other".to_owned(), "add L0 to --levels"),
-        ("--data photos --ask nothing --model random --out other".to_owned(), "no such file; home and home:uncertain are built in"),
-        ("--data photos --ask home --model script:eyes.jsonl --levels L0,L1,L5 --variant noise --out run".to_owned(), "--ask"),
+        (
+            "--data photos --ask nothing --model random --out other".to_owned(),
+            "no such file; home and home:uncertain are built in",
+        ),
+        (
+            "--data photos --ask home --model script:eyes.jsonl --levels L0,L1,L5 --variant noise --out run".to_owned(),
+            "--ask",
+        ),
         ("--data set.jsonl --model random --levels L0 --out run".to_owned(), "--ask"),
         ("report run known".to_owned(), "accuracy and agreement are different measures"),
         ("report known --baseline run".to_owned(), "accuracy and agreement are different measures"),
@@ -395,7 +328,10 @@ fn what_needs_a_truth_is_refused() {
         ("report run --common".to_owned(), "--common: each model is compared with its own answers"),
         ("study pack run --out page".to_owned(), "nobody knows the true answers"),
         ("show run lamp@hall/00.png --data photos --sheet story.png".to_owned(), "nobody knows the true answers"),
-        ("--data photos --questions open.jsonl --model random --out other".to_owned(), "--ask FILE asks questions without answers"),
+        (
+            "--data photos --questions open.jsonl --model random --out other".to_owned(),
+            "--ask FILE asks questions without answers",
+        ),
     ] {
         let called = bench.call(&words(&call));
         assert_eq!(called.code, Some(2), "{call}: {called:?}");
@@ -406,7 +342,8 @@ fn what_needs_a_truth_is_refused() {
 #[test]
 fn rooms_and_sets_work_without_labels() {
     let bench = photographs();
-    let set = json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
+    let set =
+        json!({"id": "a", "image": "photos/hall/00.png", "question": "?", "choices": ["yes", "no"], "answer": "no"});
     bench.file("set.jsonl", set.to_string());
     let call = |data: &str, out: &str| {
         let call = format!(
@@ -456,10 +393,7 @@ fn dark_photographs_are_asked_unchanged() {
     // Twice at L0, and once without an image.
     assert_eq!(all.len(), 36 * 3);
     let levels: BTreeSet<String> = all.iter().map(|r| r["level"].to_string()).collect();
-    assert_eq!(
-        levels,
-        BTreeSet::from(["null".to_owned(), "\"L0\"".to_owned()])
-    );
+    assert_eq!(levels, BTreeSet::from(["null".to_owned(), "\"L0\"".to_owned()]));
     // The ceiling is what the records say.
     let chosen = |question: &Value, repeat: u64| {
         all.iter()
@@ -481,18 +415,12 @@ fn dark_photographs_are_asked_unchanged() {
         .count() as f64
         / 36.0;
     let own = rows(&bench, "run/own_answers.csv");
-    let ceiling = row(
-        &own,
-        &[("level", "L0"), ("family", "all"), ("mode", "strict")],
-    );
+    let ceiling = row(&own, &[("level", "L0"), ("family", "all"), ("mode", "strict")]);
     assert_eq!(ceiling["role"], "ceiling");
     assert!((number(ceiling, "agreement") - same).abs() < 1e-12 && same > 0.0 && same < 1.0);
     // No word of an answer in the light, which nobody gave.
     let shown = on_one_line(&called.stdout);
-    assert!(
-        shown.contains(NOTICE) && shown.contains("random, as photographed"),
-        "{shown}"
-    );
+    assert!(shown.contains(NOTICE) && shown.contains("random, as photographed"), "{shown}");
     let page = text(&bench, "run/report.html");
     let summary = text(&bench, "run/summary.json");
     let tex = text(&bench, "run/tables.tex");
@@ -500,12 +428,7 @@ fn dark_photographs_are_asked_unchanged() {
         assert!(of.contains(NOTICE), "{name}");
     }
     let page = page.split("<script id=\"data\"").next().unwrap();
-    for (name, of) in [
-        ("text", &*shown),
-        ("page", page),
-        ("summary", &summary),
-        ("tex", &tex),
-    ] {
+    for (name, of) in [("text", &*shown), ("page", page), ("summary", &summary), ("tex", &tex)] {
         let of = of.replace(NOTICE, "");
         assert!(!of.contains("in the light"), "{name}: {of}");
         // The pictures at the end of the page are named by their files.
@@ -524,10 +447,7 @@ fn dark_photographs_are_asked_unchanged() {
         they are and enhanced, and --light dark does so by default
     "#);
     let shown = on_one_line(&called.stdout);
-    assert!(
-        !shown.contains("taken in the dark") && shown.contains("random, untouched"),
-        "{shown}"
-    );
+    assert!(!shown.contains("taken in the dark") && shown.contains("random, untouched"), "{shown}");
 }
 
 #[test]

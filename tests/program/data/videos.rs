@@ -1,7 +1,7 @@
 //! `import video`: frames that ffmpeg decodes, with the colours that the video states.
 //!
-//! Most tests use a program `ffmpeg` of their own, so that each combination of colours is tested everywhere. Tests of ffmpeg itself are
-//! skipped where it is not installed.
+//! Most tests use a program `ffmpeg` of their own, so that each combination of colours is tested everywhere. Tests of
+//! ffmpeg itself are skipped where it is not installed.
 #![cfg(unix)]
 
 use std::fs;
@@ -53,13 +53,8 @@ fn frames_of_video_come_from_ffmpeg() {
     video: h264 (High), yuv420p, 4x2, 2 fps; one every [TIME]
     ");
     assert_eq!(frames(&bench)[3]["t"], 3.5);
-    let image = image::open(bench.path("out/scenes/drive-0001/rgb/000003.png"))
-        .unwrap()
-        .into_rgb8();
-    assert_eq!(
-        (image.dimensions(), image[(0, 0)].0, image[(3, 1)].0),
-        ((4, 2), *b"abc", *b"vw3")
-    );
+    let image = image::open(bench.path("out/scenes/drive-0001/rgb/000003.png")).unwrap().into_rgb8();
+    assert_eq!((image.dimensions(), image[(0, 0)].0, image[(3, 1)].0), ((4, 2), *b"abc", *b"vw3"));
     let calls = fs::read_to_string(bench.path("calls")).unwrap();
     insta::assert_snapshot!(redacted(&calls), @"
     -nostdin -nostats -protocol_whitelist file,pipe -i file:drive.mp4
@@ -113,14 +108,11 @@ fn without_ffmpeg_the_remedy_is_named() {
 /// The pixels of each frame of [`with_colours`]: three colours, and white.
 const PIXELS: [[u8; 3]; 4] = [[128; 3], [200, 100, 50], [60; 3], [255; 3]];
 
-/// A program `ffmpeg` that writes one frame of [`PIXELS`] for each of these colours (`matrix primaries transfer`), in 8 or 16 bits as asked
-/// for. It states the colours as ffmpeg does, unless the text is empty.
+/// A program `ffmpeg` that writes one frame of [`PIXELS`] for each of these colours (`matrix primaries transfer`), in 8
+/// or 16 bits as asked for. It states the colours as ffmpeg does, unless the text is empty.
 fn with_colours(bench: &Bench, colours: &[&str]) {
     let bytes = |samples: &[u8], times: usize| -> String {
-        samples
-            .iter()
-            .map(|sample| format!("\\{sample:03o}").repeat(times))
-            .collect()
+        samples.iter().map(|sample| format!("\\{sample:03o}").repeat(times)).collect()
     };
     let samples = PIXELS.as_flattened();
     let lines: String = colours
@@ -159,17 +151,14 @@ echo '[Parsed_showinfo_1 @ 0x1] config in time_base: 1/1, frame_rate: 1/1' >&2
 
 /// The pixels of the first imported frame.
 fn first_frame(bench: &Bench) -> Vec<[u8; 3]> {
-    let path = bench
-        .path("out")
-        .join(frames(bench)[0]["rgb"].as_str().unwrap());
+    let path = bench.path("out").join(frames(bench)[0]["rgb"].as_str().unwrap());
     let image = image::open(path).unwrap().into_rgb8();
     image.pixels().map(|pixel| pixel.0).collect()
 }
 
 fn assert_near(found: &[[u8; 3]], expected: &[[u8; 3]]) {
     let pairs = found.as_flattened().iter().zip(expected.as_flattened());
-    let is_near =
-        found.len() == expected.len() && pairs.map(|(a, b)| a.abs_diff(*b)).max() <= Some(1);
+    let is_near = found.len() == expected.len() && pairs.map(|(a, b)| a.abs_diff(*b)).max() <= Some(1);
     assert!(is_near, "{found:?}, not {expected:?}");
 }
 
@@ -193,11 +182,7 @@ fn codes_of_sdr_video_are_kept() {
         let bench = Bench::new();
         with_colours(&bench, &[colours, colours]);
         let called = import_video(&bench, "--every 0 --out out").ended(0);
-        assert_eq!(
-            (frames(&bench).len(), &*called.stderr),
-            (2, ""),
-            "{colours}"
-        );
+        assert_eq!((frames(&bench).len(), &*called.stderr), (2, ""), "{colours}");
         assert!(!called.stdout.contains("colours"), "{called:?}");
         assert_eq!(first_frame(&bench), PIXELS, "{colours}");
         let info = fs::read_to_string(bench.path("out/dataset.json")).unwrap();
@@ -209,41 +194,13 @@ fn codes_of_sdr_video_are_kept() {
 #[test]
 fn other_colours_of_video_are_converted() {
     for (colours, expected, name) in [
-        (
-            "bt2020nc bt2020 arib-std-b67",
-            [[137; 3], [255, 69, 27], [57; 3], [255; 3]],
-            "HLG (HDR), BT.2020",
-        ),
-        (
-            "bt2020nc bt2020 smpte2084",
-            [[181; 3], [255, 0, 0], [39; 3], [255; 3]],
-            "PQ (HDR), BT.2020",
-        ),
-        (
-            "unknown unknown smpte2084",
-            [[181; 3], [255, 0, 0], [39; 3], [255; 3]],
-            "PQ (HDR), BT.2020",
-        ),
-        (
-            "bt2020nc bt2020 bt2020-10",
-            [[128; 3], [241, 76, 29], [60; 3], [255; 3]],
-            "BT.2020",
-        ),
-        (
-            "bt2020nc bt2020 bt709",
-            [[128; 3], [241, 76, 29], [60; 3], [255; 3]],
-            "BT.2020",
-        ),
-        (
-            "bt709 smpte432 bt709",
-            [[128; 3], [215, 93, 31], [60; 3], [255; 3]],
-            "Display P3",
-        ),
-        (
-            "bt470bg bt470bg gamma28",
-            [[106; 3], [189, 76, 26], [36; 3], [255; 3]],
-            "gamma 2.8",
-        ),
+        ("bt2020nc bt2020 arib-std-b67", [[137; 3], [255, 69, 27], [57; 3], [255; 3]], "HLG (HDR), BT.2020"),
+        ("bt2020nc bt2020 smpte2084", [[181; 3], [255, 0, 0], [39; 3], [255; 3]], "PQ (HDR), BT.2020"),
+        ("unknown unknown smpte2084", [[181; 3], [255, 0, 0], [39; 3], [255; 3]], "PQ (HDR), BT.2020"),
+        ("bt2020nc bt2020 bt2020-10", [[128; 3], [241, 76, 29], [60; 3], [255; 3]], "BT.2020"),
+        ("bt2020nc bt2020 bt709", [[128; 3], [241, 76, 29], [60; 3], [255; 3]], "BT.2020"),
+        ("bt709 smpte432 bt709", [[128; 3], [215, 93, 31], [60; 3], [255; 3]], "Display P3"),
+        ("bt470bg bt470bg gamma28", [[106; 3], [189, 76, 26], [36; 3], [255; 3]], "gamma 2.8"),
     ] {
         let bench = Bench::new();
         with_colours(&bench, &[colours, colours]);
@@ -253,16 +210,9 @@ fn other_colours_of_video_are_converted() {
         let said = format!("colours: {name}, converted to sRGB\n");
         assert!(called.stdout.ends_with(&said), "{called:?}");
         let is_hdr = name.contains("HDR");
-        assert_eq!(
-            called.stderr.contains("becomes white"),
-            is_hdr,
-            "{called:?}"
-        );
+        assert_eq!(called.stderr.contains("becomes white"), is_hdr, "{called:?}");
         let info = fs::read_to_string(bench.path("out/dataset.json")).unwrap();
-        assert!(
-            info.contains(&format!("{name}, converted to sRGB")),
-            "{info}"
-        );
+        assert!(info.contains(&format!("{name}, converted to sRGB")), "{info}");
     }
 }
 
@@ -293,10 +243,7 @@ fn colours_that_cannot_be_converted_are_refused() {
         called.messages()
     };
     for (colours, expected) in [
-        (
-            "bt2020nc bt2020 unknown",
-            "setparams=color_trc=arib-std-b67",
-        ),
+        ("bt2020nc bt2020 unknown", "setparams=color_trc=arib-std-b67"),
         ("ycgco bt709 bt709", "zscale=matrix=709"),
         ("bt709 bt709 log100", "zscale=transfer=709"),
         ("bt709 bt709 smpte428", "convert the video to BT.709 first"),
@@ -312,11 +259,7 @@ fn colours_that_cannot_be_converted_are_refused() {
 #[test]
 fn colours_may_not_change_within_a_video() {
     let bench = Bench::new();
-    let colours = [
-        "unknown unknown unknown",
-        "bt709 bt709 bt709",
-        "bt2020nc bt2020 smpte2084",
-    ];
+    let colours = ["unknown unknown unknown", "bt709 bt709 bt709", "bt2020nc bt2020 smpte2084"];
     with_colours(&bench, &colours);
     let called = import_video(&bench, "--every 0 --out out").ended(1);
     insta::assert_snapshot!(called.messages(), @"
@@ -356,125 +299,66 @@ fn ffmpeg(bench: &Bench, line: &str) {
         .args(line.split_whitespace())
         .output()
         .unwrap();
-    assert!(
-        done.status.success(),
-        "{line}: {}",
-        String::from_utf8_lossy(&done.stderr)
-    );
+    assert!(done.status.success(), "{line}: {}", String::from_utf8_lossy(&done.stderr));
 }
 
 /// Mean code of an image that is read as a file of a data set.
 fn mean_of_file(path: &Path) -> Result<f64, String> {
-    let rule = DecodeRule {
-        colour: ColourRule::Clip,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { colour: ColourRule::Clip, ..DecodeRule::default() };
     let file = ImageFile::open(path, rule).unwrap();
     let image = file.decode().map_err(|e| e.to_string())?;
     let sum: u64 = image.samples().iter().map(|code| u64::from(*code)).sum();
     Ok(sum as f64 / image.samples().len() as f64)
 }
 
-/// A frame by `import video`, as the PNG and as the JPEG that the same ffmpeg makes, has one brightness; or the PNG, which ffmpeg 5.1 writes
-/// without the transfer of HDR, is refused.
+/// A frame by `import video`, as the PNG and as the JPEG that the same ffmpeg makes, has one brightness; or the PNG,
+/// which ffmpeg 5.1 writes without the transfer of HDR, is refused.
 #[test]
 fn a_frame_has_one_brightness_on_all_routes() {
     if !has_ffmpeg() {
         return;
     }
     for (name, colours, range, codec) in [
-        (
-            "untagged.mkv",
-            "unknown unknown unknown",
-            "tv",
-            "yuv420p -c:v ffv1",
-        ),
+        ("untagged.mkv", "unknown unknown unknown", "tv", "yuv420p -c:v ffv1"),
         ("709.mkv", "bt709 bt709 bt709", "tv", "yuv420p -c:v ffv1"),
         ("full.mkv", "bt709 bt709 bt709", "pc", "yuv444p -c:v ffv1"),
-        (
-            "601.mkv",
-            "smpte170m smpte170m smpte170m",
-            "tv",
-            "yuv420p -c:v ffv1",
-        ),
-        (
-            "pal.mov",
-            "bt470bg bt470bg bt709",
-            "tv",
-            "yuv422p10le -c:v prores_ks",
-        ),
-        (
-            "709.mov",
-            "bt709 bt709 bt709",
-            "tv",
-            "yuv422p10le -c:v prores_ks",
-        ),
-        (
-            "2020.mkv",
-            "bt2020nc bt2020 bt2020-10",
-            "tv",
-            "yuv420p10le -c:v ffv1",
-        ),
-        (
-            "hlg.mkv",
-            "bt2020nc bt2020 arib-std-b67",
-            "tv",
-            "yuv420p10le -c:v ffv1",
-        ),
-        (
-            "pq.mov",
-            "bt2020nc bt2020 smpte2084",
-            "tv",
-            "yuv422p10le -c:v prores_ks",
-        ),
+        ("601.mkv", "smpte170m smpte170m smpte170m", "tv", "yuv420p -c:v ffv1"),
+        ("pal.mov", "bt470bg bt470bg bt709", "tv", "yuv422p10le -c:v prores_ks"),
+        ("709.mov", "bt709 bt709 bt709", "tv", "yuv422p10le -c:v prores_ks"),
+        ("2020.mkv", "bt2020nc bt2020 bt2020-10", "tv", "yuv420p10le -c:v ffv1"),
+        ("hlg.mkv", "bt2020nc bt2020 arib-std-b67", "tv", "yuv420p10le -c:v ffv1"),
+        ("pq.mov", "bt2020nc bt2020 smpte2084", "tv", "yuv422p10le -c:v prores_ks"),
     ] {
         let bench = Bench::new();
         let words: Vec<&str> = colours.split(' ').collect();
-        let [matrix, primaries, transfer] = words[..] else {
-            panic!("{colours}")
-        };
-        let tags = format!(
-            "-colorspace {matrix} -color_primaries {primaries} -color_trc {transfer} -color_range {range}"
-        );
-        let tagged = format!(
-            "setparams=colorspace={matrix}:color_primaries={primaries}:color_trc={transfer}:range={range}"
-        );
+        let [matrix, primaries, transfer] = words[..] else { panic!("{colours}") };
+        let tags =
+            format!("-colorspace {matrix} -color_primaries {primaries} -color_trc {transfer} -color_range {range}");
+        let tagged =
+            format!("setparams=colorspace={matrix}:color_primaries={primaries}:color_trc={transfer}:range={range}");
         ffmpeg(
             &bench,
-            &format!(
-                "-f lavfi -i testsrc=size=64x48:rate=2:duration=1 -vf {tagged} -pix_fmt {codec} {tags} {name}"
-            ),
+            &format!("-f lavfi -i testsrc=size=64x48:rate=2:duration=1 -vf {tagged} -pix_fmt {codec} {tags} {name}"),
         );
-        let called = bench
-            .call(&["import", "video", name, "--every", "0", "--out", "out"])
-            .ended(0);
+        let called = bench.call(&["import", "video", name, "--every", "0", "--out", "out"]).ended(0);
         assert_eq!(
             called.stderr.contains("becomes white"),
             transfer.contains('2') && transfer != "bt2020-10" || transfer.starts_with("arib"),
             "{called:?}"
         );
-        let imported = bench
-            .path("out")
-            .join(frames(&bench)[0]["rgb"].as_str().unwrap());
+        let imported = bench.path("out").join(frames(&bench)[0]["rgb"].as_str().unwrap());
         let imported = mean_of_file(&imported).unwrap();
         ffmpeg(&bench, &format!("-i {name} -frames:v 1 frame.png"));
         match mean_of_file(&bench.path("frame.png")) {
-            Ok(mean) => assert!(
-                (mean - imported).abs() <= 1.0,
-                "{name}: {mean}, not {imported}"
-            ),
-            Err(problem) => assert!(
-                problem.contains("may be HDR") && called.stderr.contains("HDR"),
-                "{name}: {problem}"
-            ),
+            Ok(mean) => assert!((mean - imported).abs() <= 1.0, "{name}: {mean}, not {imported}"),
+            Err(problem) => {
+                assert!(problem.contains("may be HDR") && called.stderr.contains("HDR"), "{name}: {problem}");
+            }
         }
         if primaries != "bt2020" {
             ffmpeg(&bench, &format!("-i {name} -frames:v 1 -q:v 1 frame.jpg"));
             let mean = mean_of_file(&bench.path("frame.jpg")).unwrap();
-            assert!(
-                (mean - imported).abs() <= 1.5,
-                "{name}: {mean}, not {imported}"
-            );
+            assert!((mean - imported).abs() <= 1.5, "{name}: {mean}, not {imported}");
         }
     }
 }
@@ -492,48 +376,24 @@ fn remedies_for_colours_help() {
     ] {
         let bench = Bench::new();
         let words: Vec<&str> = colours.split(' ').collect();
-        let [matrix, primaries, transfer] = words[..] else {
-            panic!("{colours}")
-        };
-        let tags = format!(
-            "-colorspace {matrix} -color_primaries {primaries} -color_trc {transfer} -color_range tv"
-        );
-        let tagged = format!(
-            "setparams=colorspace={matrix}:color_primaries={primaries}:color_trc={transfer}:range=tv"
-        );
+        let [matrix, primaries, transfer] = words[..] else { panic!("{colours}") };
+        let tags = format!("-colorspace {matrix} -color_primaries {primaries} -color_trc {transfer} -color_range tv");
+        let tagged = format!("setparams=colorspace={matrix}:color_primaries={primaries}:color_trc={transfer}:range=tv");
         let line = format!(
             "-f lavfi -i color=gray:size=64x48:duration=1 -vf format=yuv420p,{tagged} {tags} -c:v ffv1 drive.mkv"
         );
         ffmpeg(&bench, &line);
-        let import = [
-            "import",
-            "video",
-            "drive.mkv",
-            "--every",
-            "0",
-            "--out",
-            "out",
-        ];
+        let import = ["import", "video", "drive.mkv", "--every", "0", "--out", "out"];
         let refused = bench.call(&import).ended(2);
         let (_, command) = refused.stderr.split_once("ffmpeg -i ").unwrap();
         assert!(command.contains(expected), "{refused:?}");
         let filters = Command::new("ffmpeg").arg("-filters").output().unwrap();
-        if expected.contains("zscale")
-            && !String::from_utf8_lossy(&filters.stdout).contains("zscale")
-        {
+        if expected.contains("zscale") && !String::from_utf8_lossy(&filters.stdout).contains("zscale") {
             skip("this ffmpeg has no zscale");
             continue;
         }
         ffmpeg(&bench, &format!("-i {command}"));
-        let import = [
-            "import",
-            "video",
-            "converted.mkv",
-            "--every",
-            "0",
-            "--out",
-            "out",
-        ];
+        let import = ["import", "video", "converted.mkv", "--every", "0", "--out", "out"];
         bench.call(&import).ended(0);
     }
 }

@@ -1,4 +1,5 @@
-//! The manifests for Kubernetes and the scripts in `src/commands/cluster`: their flags exist, and they agree with each other.
+//! The manifests for Kubernetes and the scripts in `src/commands/cluster`: their flags exist, and they agree with each
+//! other.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -38,10 +39,7 @@ fn words(manifest: &str) -> Vec<String> {
 fn field(manifest: &str, name: &str) -> String {
     let text = file(manifest);
     let begin = format!("{name}: ");
-    let found: Vec<&str> = text
-        .lines()
-        .filter_map(|line| line.trim().strip_prefix(&begin))
-        .collect();
+    let found: Vec<&str> = text.lines().filter_map(|line| line.trim().strip_prefix(&begin)).collect();
     assert_eq!(found.len(), 1, "{manifest}: {name}: {found:?}");
     found[0].to_owned()
 }
@@ -50,9 +48,7 @@ fn field(manifest: &str, name: &str) -> String {
 fn value(words: &[String], flag: &str) -> String {
     let begin = format!("{flag}=");
     let value = words.iter().find_map(|word| word.strip_prefix(&begin));
-    value
-        .unwrap_or_else(|| panic!("{flag}: {words:?}"))
-        .to_owned()
+    value.unwrap_or_else(|| panic!("{flag}: {words:?}")).to_owned()
 }
 
 /// Checks that the program takes these words.
@@ -114,21 +110,14 @@ fn the_manifests_are_of_one_run() {
 
 #[test]
 fn evicted_pod_has_not_failed() {
-    for (manifest, ends, codes) in [
-        ("plan.yaml", "FailJob", "[2]"),
-        ("job.yaml", "FailIndex", "[2, 3]"),
-        ("merge.yaml", "FailJob", "[2]"),
-    ] {
+    for (manifest, ends, codes) in
+        [("plan.yaml", "FailJob", "[2]"), ("job.yaml", "FailIndex", "[2, 3]"), ("merge.yaml", "FailJob", "[2]")]
+    {
         let text = file(manifest);
         let rules = text.split_once("rules:\n").unwrap().1;
         let rules = rules.split_once("  template:").unwrap().0;
-        let rules: Vec<&str> = rules
-            .lines()
-            .map(str::trim)
-            .filter(|line| !line.starts_with('#'))
-            .collect();
-        let codes =
-            format!("onExitCodes: {{containerName: darkqa, operator: In, values: {codes}}}");
+        let rules: Vec<&str> = rules.lines().map(str::trim).filter(|line| !line.starts_with('#')).collect();
+        let codes = format!("onExitCodes: {{containerName: darkqa, operator: In, values: {codes}}}");
         let expected = [
             "- action: Ignore",
             "onPodConditions:",
@@ -183,11 +172,7 @@ fn volumes_are_claimed_with_mode() {
             let (claim, rest) = rest.split_at(rest.find([',', '}']).unwrap());
             let name = claim.strip_prefix("darkqa-").unwrap();
             let is_read_only = rest.contains("readOnly: true");
-            let expected = if is_read_only {
-                "ReadOnlyMany"
-            } else {
-                "ReadWriteMany"
-            };
+            let expected = if is_read_only { "ReadOnlyMany" } else { "ReadWriteMany" };
             assert_eq!(mode(claim), expected, "{manifest}: {claim}");
             let mount = format!("- {{name: {name}, mountPath: /{name}");
             let mount = text.lines().find(|line| line.contains(&mount)).unwrap();
@@ -268,19 +253,13 @@ fn slurm_script_submits_three_jobs() {
         let words: Vec<&str> = line.split(' ').collect();
         let (code, told) = sbatch("12", &words);
         assert_eq!(code, Some(0), "{told:?}");
-        let calls: Vec<(&str, &str)> = told
-            .iter()
-            .map(|line| line.split_once(" SCRIPT ").unwrap())
-            .collect();
+        let calls: Vec<(&str, &str)> = told.iter().map(|line| line.split_once(" SCRIPT ").unwrap()).collect();
         let [plan, array, merge] = calls[..] else {
             panic!("{told:?}");
         };
         assert_eq!(plan.1, format!("plan {line}"));
         assert_eq!(array.1, format!("--shard workers=3 {line}"));
-        assert!(
-            array.0.contains("--array=0-11%3") && array.0.contains("--dependency=afterok:1"),
-            "{array:?}"
-        );
+        assert!(array.0.contains("--array=0-11%3") && array.0.contains("--dependency=afterok:1"), "{array:?}");
         assert_eq!(merge.1, "report merge runs/a --out runs/a-whole --quiet");
         assert!(merge.0.contains("--dependency=afterok:2"), "{merge:?}");
         for (_, words) in calls {
@@ -288,10 +267,7 @@ fn slurm_script_submits_three_jobs() {
             parse(&words);
         }
     }
-    for (parts, words) in [
-        ("12", &["--model", "gpt-4o"][..]),
-        ("1", &["--out", "runs/a", "--model", "gpt-4o"]),
-    ] {
+    for (parts, words) in [("12", &["--model", "gpt-4o"][..]), ("1", &["--out", "runs/a", "--model", "gpt-4o"])] {
         let (code, told) = sbatch(parts, words);
         assert_eq!((code, told.len()), (Some(2), 0), "{words:?}");
     }
@@ -317,16 +293,12 @@ fn script_calls_use_existing_flags() {
 #[cfg(unix)]
 #[test]
 fn script_stops_at_step_that_failed() {
-    let failing =
-        "case \"$*\" in *\"wait\"*job.yaml*) exit 1;; *get*) echo MaxFailedIndexesExceeded;; esac";
+    let failing = "case \"$*\" in *\"wait\"*job.yaml*) exit 1;; *get*) echo MaxFailedIndexesExceeded;; esac";
     let (code, told, said) = kubectl(failing);
     assert_eq!(code, Some(1), "{said}");
     insta::assert_snapshot!(redacted(&said), @"
     job.yaml has failed (MaxFailedIndexesExceeded): see its pods' logs; after 'kubectl delete -f job.yaml' this
         script goes on, and only what is missing is asked
     ");
-    assert!(
-        !told.iter().any(|line| line.contains("merge.yaml")),
-        "{told:?}"
-    );
+    assert!(!told.iter().any(|line| line.contains("merge.yaml")), "{told:?}");
 }

@@ -1,7 +1,8 @@
-//! The container image: its file system as a pod has it, only read, without a home, without a network; and the image built.
+//! The container image: its file system as a pod has it, only read, without a home, without a network; and the image
+//! built.
 //!
-//! The file system is the one that `.ci/image-files` puts together, with the libraries of this machine. The program runs in it as
-//! user 65532 in namespaces of its own, which needs no builder of images.
+//! The file system is the one that `.ci/image-files` puts together, with the libraries of this machine. The program
+//! runs in it as user 65532 in namespaces of its own, which needs no builder of images.
 #![cfg(target_os = "linux")]
 #![expect(clippy::print_stdout, reason = "the size of the image")]
 
@@ -23,11 +24,7 @@ fn root() -> &'static Path {
 
 fn ended_well(what: &str, output: &Output) {
     let said = [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
-    assert!(
-        output.status.success(),
-        "{what}: {}: {said:?}",
-        output.status
-    );
+    assert!(output.status.success(), "{what}: {}: {said:?}", output.status);
 }
 
 /// Finds `chroot`, which is not on the PATH of every user.
@@ -35,8 +32,7 @@ const CHROOT: &str = "PATH=$PATH:/usr/sbin:/sbin; command -v chroot";
 
 /// True if this process may have a mount namespace and a network of its own, and can change its root folder.
 fn may_unshare() -> bool {
-    succeeds("unshare", &["--mount", "--net", "sh", "-c", CHROOT])
-        && succeeds("ldd", &["--version"])
+    succeeds("unshare", &["--mount", "--net", "sh", "-c", CHROOT]) && succeeds("ldd", &["--version"])
 }
 
 /// The libraries that a program or library is linked to, as paths of this machine, and the loader.
@@ -44,19 +40,13 @@ fn libraries(file: &Path) -> BTreeSet<PathBuf> {
     let output = Command::new("ldd").arg(file).output().unwrap();
     ended_well("ldd", &output);
     let text = String::from_utf8(output.stdout).unwrap();
-    text.split_whitespace()
-        .filter(|word| word.starts_with('/'))
-        .map(PathBuf::from)
-        .collect()
+    text.split_whitespace().filter(|word| word.starts_with('/')).map(PathBuf::from).collect()
 }
 
 /// The files of the image in `folder/files`, with what they are linked to.
 fn file_system(folder: &Path) -> PathBuf {
     let program = env!("CARGO_BIN_EXE_darkqa-eval");
-    let output = Command::new(root().join(".ci/image-files"))
-        .args([Path::new(program), folder])
-        .output()
-        .unwrap();
+    let output = Command::new(root().join(".ci/image-files")).args([Path::new(program), folder]).output().unwrap();
     ended_well(".ci/image-files", &output);
     let files = folder.join("files");
     let own = fs::read_dir(files.join("opt/darkqa-eval")).unwrap();
@@ -73,7 +63,8 @@ fn file_system(folder: &Path) -> PathBuf {
     files
 }
 
-/// Mounts the file system `$1` to be only read, the folder `$2` at its `/runs`, and runs the rest there without a variable.
+/// Mounts the file system `$1` to be only read, the folder `$2` at its `/runs`, and runs the rest there without a
+/// variable.
 const ENTER: &str = "set -eu
 mount --make-rprivate /
 mount --bind \"$1\" \"$1\"
@@ -129,8 +120,7 @@ fn the_image_is_built_and_runs() {
     bench.file("policy.json", policy);
     bench.file("Base", "FROM scratch\nADD base.tar /\n");
     let buildah = "buildah --storage-driver vfs --root \"$PWD/store\" --runroot \"$PWD/run\"";
-    let build =
-        format!("{buildah} build --isolation chroot --signature-policy \"$PWD/policy.json\"");
+    let build = format!("{buildah} build --isolation chroot --signature-policy \"$PWD/policy.json\"");
     let script = format!(
         "set -eux
 # The distribution of this machine, whose libraries the program is linked to.
@@ -149,11 +139,7 @@ test -s \"$({buildah} mount \"$here\")/runs/a/summary.csv\"
         root().display(),
         env!("CARGO_BIN_EXE_darkqa-eval"),
     );
-    let output = Command::new("bash")
-        .args(["-c", &script])
-        .current_dir(bench.path(""))
-        .output()
-        .unwrap();
+    let output = Command::new("bash").args(["-c", &script]).current_dir(bench.path("")).output().unwrap();
     ended_well("the build", &output);
     println!("{}", String::from_utf8_lossy(&output.stdout));
     let image = fs::read(bench.path("image.json")).unwrap();
@@ -164,13 +150,7 @@ test -s \"$({buildah} mount \"$here\")/runs/a/summary.csv\"
     let labels = config["Labels"].as_object().unwrap();
     for name in ["source", "version", "revision", "licenses"] {
         let label = &labels[&format!("org.opencontainers.image.{name}")];
-        assert!(
-            label.as_str().is_some_and(|text| text != "unknown"),
-            "{name}: {label}"
-        );
+        assert!(label.as_str().is_some_and(|text| text != "unknown"), "{name}: {label}");
     }
-    assert_eq!(
-        labels["org.opencontainers.image.version"],
-        env!("CARGO_PKG_VERSION")
-    );
+    assert_eq!(labels["org.opencontainers.image.version"], env!("CARGO_PKG_VERSION"));
 }

@@ -20,11 +20,8 @@ fn new_run_folder_is_private() {
     let given = mode(&bench, "frames");
     for (flags, expected) in [("", 0o700), ("--shared", given)] {
         let at = |name: &str| format!("{name}{}", flags.len());
-        let [runs, parts, images, merged, planned] =
-            ["runs", "parts", "images", "merged", "planned"].map(at);
-        bench.complete(&words(&format!(
-            "{COMMAND} {flags} --out {runs}/one --images-cache {images}"
-        )));
+        let [runs, parts, images, merged, planned] = ["runs", "parts", "images", "merged", "planned"].map(at);
+        bench.complete(&words(&format!("{COMMAND} {flags} --out {runs}/one --images-cache {images}")));
         bench.complete(&words(&format!("plan {COMMAND} {flags} --out {planned}")));
         for part in ["1/2", "2/2"] {
             let line = format!("{COMMAND} {flags} --out {parts} --shard {part}");
@@ -45,8 +42,6 @@ fn existing_folder_keeps_its_mode() {
     let folder = bench.path("run");
     fs::create_dir(&folder).unwrap();
     fs::set_permissions(&folder, fs::Permissions::from_mode(0o750)).unwrap();
-    bench.complete(&words(
-        "--model random --data set.jsonl --levels L0 --out run",
-    ));
+    bench.complete(&words("--model random --data set.jsonl --levels L0 --out run"));
     assert_eq!(mode(&bench, "run"), 0o750);
 }

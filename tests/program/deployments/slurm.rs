@@ -47,10 +47,7 @@ fn array(bench: &Bench, tasks: usize, args: &[&str]) -> Command {
     let mut command = Command::new("sbatch");
     command
         .args(["--wait", &format!("--array=0-{}%2", tasks - 1)])
-        .arg(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/src/commands/cluster/slurm.sh"
-        ))
+        .arg(concat!(env!("CARGO_MANIFEST_DIR"), "/src/commands/cluster/slurm.sh"))
         .args(args)
         .current_dir(bench.path(""))
         .env("PATH", search)
@@ -84,19 +81,14 @@ fn killed_tasks_resume_in_other_shards() {
     // In the middle of a part, whose requests are one at a time.
     let begun = mock.requests().len();
     wait_until(|| mock.requests().len() > begun + 5);
-    let killed = Command::new("pkill")
-        .args(["-9", "--oldest", "--full", &format!("darkqa-eval .*{out}")])
-        .status();
+    let killed = Command::new("pkill").args(["-9", "--oldest", "--full", &format!("darkqa-eval .*{out}")]).status();
     assert!(killed.unwrap().success());
     assert!(!first.wait().unwrap().success(), "a killed task has failed");
     // Only what is missing is asked.
     let second = array(&bench, 4, &args).status();
     assert!(second.unwrap().success());
     let asked = mock.requests().len() - trials;
-    assert!(
-        (trials..=trials + 1).contains(&asked),
-        "nothing is asked twice but the request in flight: {asked}"
-    );
+    assert!((trials..=trials + 1).contains(&asked), "nothing is asked twice but the request in flight: {asked}");
     bench.complete(&words("merge parts --out merged"));
     assert!(assert_same_products(&bench.path("whole"), &bench.path("merged")) > 5);
 }

@@ -30,10 +30,7 @@ fn quoted_messages_are_in_program() {
         .collect();
     let quoted = quoted(&page.text);
     assert!(quoted.len() > 12, "{quoted:?}");
-    let gone: Vec<&&str> = quoted
-        .iter()
-        .filter(|quoted| !program.iter().any(|text| text.contains(**quoted)))
-        .collect();
+    let gone: Vec<&&str> = quoted.iter().filter(|quoted| !program.iter().any(|text| text.contains(**quoted))).collect();
     assert!(gone.is_empty(), "no message of the program: {gone:?}");
 }
 

@@ -1,7 +1,7 @@
 //! The first command of the README, at its full size: the pages show its numbers.
 //!
-//! The images of an ONNX model may differ by a code between kinds of processors, and with them an answer or two of 177. Numbers may
-//! differ by so much; a table of another version differs by more.
+//! The images of an ONNX model may differ by a code between kinds of processors, and with them an answer or two of 177.
+//! Numbers may differ by so much; a table of another version differs by more.
 
 use super::page::{Block, BlockKind, Page, pages};
 use super::{arguments, shell};
@@ -10,11 +10,7 @@ use crate::support::run::{Bench, called, words};
 /// The arguments of the first command of the README.
 fn first_command() -> Vec<String> {
     let readme = Page::read("README.md");
-    let block = readme
-        .blocks
-        .iter()
-        .find(|block| block.kind == BlockKind::ParseOnly)
-        .unwrap();
+    let block = readme.blocks.iter().find(|block| block.kind == BlockKind::ParseOnly).unwrap();
     let (_, words) = shell::commands(&block.lines).remove(0);
     arguments(&words).unwrap().to_vec()
 }
@@ -26,10 +22,7 @@ const TOLERANCE: f64 = 1.2;
 fn shows(shown: &str, printed: &str) -> bool {
     let (shown, printed) = (words(shown), words(printed));
     shown.len() == printed.len()
-        && shown
-            .iter()
-            .zip(&printed)
-            .all(|(shown, printed)| shown == printed || is_near(shown, printed))
+        && shown.iter().zip(&printed).all(|(shown, printed)| shown == printed || is_near(shown, printed))
 }
 
 fn is_near(shown: &str, printed: &str) -> bool {
@@ -64,12 +57,7 @@ fn pages_show_what_first_command_prints() {
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let ran = called(bench.command(&arguments).env_remove("DARKQA_DATA")).ended(0);
     let full = bench.complete(&["report", "run", "--full"]);
-    let printed: Vec<String> = ran
-        .stdout
-        .lines()
-        .chain(full.lines())
-        .map(str::to_owned)
-        .collect();
+    let printed: Vec<String> = ran.stdout.lines().chain(full.lines()).map(str::to_owned).collect();
 
     let (mut missing, mut count) = (Vec::new(), 0);
     for page in pages() {
@@ -88,26 +76,11 @@ fn pages_show_what_first_command_prints() {
 fn numbers_of_another_version_are_missing() {
     let row = " with noise + lift         96.6   96.6   96.6   97.7   97.2   −10.1 +2.4";
     for (printed, is_shown) in [
-        (
-            "with noise + lift 96.6 96.6 96.6 97.7 97.2 −10.1 +2.4",
-            true,
-        ),
-        (
-            "with noise + lift 96.6 96.6 96.6 97.2 97.2 −10.1 +2.4",
-            true,
-        ),
-        (
-            "with noise + lift 94.4 93.2 91.5 91.0 91.5 −10.1 +2.4",
-            false,
-        ),
-        (
-            "with noise + lift 96.6 96.6 96.6 97.7 97.2 10.1 +2.4",
-            false,
-        ),
-        (
-            "with noise + ruas 96.6 96.6 96.6 97.7 97.2 −10.1 +2.4",
-            false,
-        ),
+        ("with noise + lift 96.6 96.6 96.6 97.7 97.2 −10.1 +2.4", true),
+        ("with noise + lift 96.6 96.6 96.6 97.2 97.2 −10.1 +2.4", true),
+        ("with noise + lift 94.4 93.2 91.5 91.0 91.5 −10.1 +2.4", false),
+        ("with noise + lift 96.6 96.6 96.6 97.7 97.2 10.1 +2.4", false),
+        ("with noise + ruas 96.6 96.6 96.6 97.7 97.2 −10.1 +2.4", false),
         ("with noise + lift 96.6 96.6 96.6 97.7", false),
     ] {
         assert_eq!(shows(row, printed), is_shown, "{printed}");

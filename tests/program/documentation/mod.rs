@@ -1,10 +1,11 @@
 //! The README and the pages in `src/docs`: their commands parse and run, their links lead somewhere, their flags exist.
 //!
-//! A block with the fence `sh` is run, one with `sh no-run` is only parsed: it needs large data, another machine or an installer.
-//! All blocks of a page are run by one shell in an empty folder, with a mock endpoint, which has batches, at `OPENAI_BASE_URL`, few and small rooms
-//! where no data are named, the folder `models` at `$MODELS`, a recording of a robot at `$DRIVE`, and a LeRobot data set at `$LEROBOT`. A comment `<!-- test: … -->` is a
-//! command that readers do not see. A block with the fence `text` shows what commands of its page print, `text first-command` what the
-//! first command of the README prints, with its numbers; `text no-run` shows what others print.
+//! A block with the fence `sh` is run, one with `sh no-run` is only parsed: it needs large data, another machine or an
+//! installer. All blocks of a page are run by one shell in an empty folder, with a mock endpoint, which has batches, at
+//! `OPENAI_BASE_URL`, few and small rooms where no data are named, the folder `models` at `$MODELS`, a recording of a
+//! robot at `$DRIVE`, and a LeRobot data set at `$LEROBOT`. A comment `<!-- test: … -->` is a command that readers do
+//! not see. A block with the fence `text` shows what commands of its page print, `text first-command` what the first
+//! command of the README prints, with its numbers; `text no-run` shows what others print.
 
 mod faq;
 mod first_command;
@@ -63,8 +64,7 @@ fn arguments(words: &[String]) -> Option<&[String]> {
         let dashes = words.iter().position(|word| word == "--")?;
         return Some(&words[dashes + 1..]);
     }
-    let is_prefix =
-        |word: &&String| *word == "uvx" || word.split('=').next().is_some_and(is_variable);
+    let is_prefix = |word: &&String| *word == "uvx" || word.split('=').next().is_some_and(is_variable);
     let start = words.iter().take_while(is_prefix).count();
     let (program, arguments) = words[start..].split_first()?;
     (program == "darkqa-eval").then_some(arguments)
@@ -79,12 +79,10 @@ fn is_variable(name: &str) -> bool {
 fn every_command_parses() {
     let (mut wrong, mut count) = (Vec::new(), 0);
     for page in pages() {
-        let shown = page.blocks.iter().filter(|block| {
-            matches!(
-                block.kind,
-                BlockKind::SetUp | BlockKind::Run | BlockKind::ParseOnly
-            )
-        });
+        let shown = page
+            .blocks
+            .iter()
+            .filter(|block| matches!(block.kind, BlockKind::SetUp | BlockKind::Run | BlockKind::ParseOnly));
         for block in shown {
             for (line, words) in shell::commands(&block.lines) {
                 let Some(arguments) = arguments(&words) else {
@@ -114,12 +112,7 @@ fn documented_commands_print_shown_output() {
         let bench = Bench::new();
         let ran = run(&page, bench.path("").as_path());
         let said = String::from_utf8_lossy(&ran.stderr);
-        assert!(
-            ran.status.success(),
-            "{}: {}\n{said}",
-            page.name,
-            ran.status
-        );
+        assert!(ran.status.success(), "{}: {}\n{said}", page.name, ran.status);
         let printed = std::fs::read_to_string(bench.path(PRINTED)).unwrap_or_default();
         let missing = missing_lines(&page, &printed);
         assert!(missing.is_empty(), "not printed: {missing:#?}");
@@ -140,10 +133,7 @@ fn run(page: &Page, folder: &Path) -> Output {
         std::fs::write(folder.join(DRIVE), drive(12, Compression::Zstd)).unwrap();
     }
     if page.text.contains("$LEROBOT") {
-        let set = Set {
-            lengths: vec![4; 10],
-            ..Set::default()
-        };
+        let set = Set { lengths: vec![4; 10], ..Set::default() };
         set.write(&folder.join(LEROBOT));
     }
     let mock = MockBatches::start([Course::of("in_progress completed").text("A")]);
@@ -188,8 +178,8 @@ fn script(page: &Page) -> String {
     format!("set -eu\n{}", blocks.collect::<String>())
 }
 
-/// The lines of the page's `text` blocks of which no printed line has the beginning. The numbers of a page are from a larger run,
-/// so each line counts up to its first digit; lines that frame a table do not count.
+/// The lines of the page's `text` blocks of which no printed line has the beginning. The numbers of a page are from a
+/// larger run, so each line counts up to its first digit; lines that frame a table do not count.
 fn missing_lines(page: &Page, printed: &str) -> Vec<String> {
     let printed: Vec<String> = printed.lines().map(on_one_line).collect();
     page.blocks
@@ -199,8 +189,7 @@ fn missing_lines(page: &Page, printed: &str) -> Vec<String> {
         .filter(|(_, line)| {
             let begin = line.split(|c: char| c.is_ascii_digit()).next();
             let begin = on_one_line(begin.unwrap_or_default());
-            begin.chars().any(char::is_alphabetic)
-                && !printed.iter().any(|line| line.starts_with(&begin))
+            begin.chars().any(char::is_alphabetic) && !printed.iter().any(|line| line.starts_with(&begin))
         })
         .map(|(number, line)| format!("{}: {line}", page.at(number)))
         .collect()
@@ -209,19 +198,14 @@ fn missing_lines(page: &Page, printed: &str) -> Vec<String> {
 #[test]
 fn links_lead_to_existing_headings() {
     let mut wrong = Vec::new();
-    for page in pages()
-        .into_iter()
-        .chain([Page::read("src/docs/SUMMARY.md")])
-    {
+    for page in pages().into_iter().chain([Page::read("src/docs/SUMMARY.md")]) {
         for (line, link) in page.links() {
             let Some((path, anchor)) = page.target(link) else {
                 continue;
             };
             let place = page.at(line);
             if link.starts_with("../") {
-                wrong.push(format!(
-                    "{place}: {link}: the site has no file outside of src/docs"
-                ));
+                wrong.push(format!("{place}: {link}: the site has no file outside of src/docs"));
             } else if !path.exists() {
                 wrong.push(format!("{place}: {link}: no such file"));
             } else if !anchor.is_empty() {
@@ -286,10 +270,8 @@ fn pages_name_exactly_all_flags() {
     }
     assert!(unknown.is_empty(), "no such flag: {unknown:#?}");
     let builtin = ["--help", "--version"];
-    let silent: Vec<&String> = all
-        .iter()
-        .filter(|flag| !named.contains(*flag) && !builtin.contains(&&***flag))
-        .collect();
+    let silent: Vec<&String> =
+        all.iter().filter(|flag| !named.contains(*flag) && !builtin.contains(&&***flag)).collect();
     assert!(silent.is_empty(), "on no page: {silent:?}");
 }
 
@@ -299,11 +281,9 @@ fn readme_works_in_a_clone() {
     let words = readme.text.split_whitespace().count();
     let lines = readme.text.lines().count();
     assert!(words < 1200 && lines <= 120, "{words} words, {lines} lines");
-    // Links to this repository are relative, so that they work in a clone; `.ci/absolute_links.py` changes them for package indexes.
-    let absolute: Vec<(usize, &str)> = readme
-        .links()
-        .into_iter()
-        .filter(|(_, link)| link.contains("github.com/darkqa-eval"))
-        .collect();
+    // Links to this repository are relative, so that they work in a clone; `.ci/absolute_links.py` changes them for
+    // package indexes.
+    let absolute: Vec<(usize, &str)> =
+        readme.links().into_iter().filter(|(_, link)| link.contains("github.com/darkqa-eval")).collect();
     assert!(absolute.is_empty(), "{absolute:?}");
 }

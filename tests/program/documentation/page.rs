@@ -45,15 +45,8 @@ pub(crate) fn root() -> &'static Path {
 /// The README and all pages, in the order of the summary.
 pub(crate) fn pages() -> Vec<Page> {
     let summary = Page::read(SUMMARY);
-    let listed = summary
-        .links()
-        .into_iter()
-        .map(|(_, link)| link)
-        .map(|link| format!("src/docs/{link}"));
-    std::iter::once("README.md".to_owned())
-        .chain(listed)
-        .map(|name| Page::read(&name))
-        .collect()
+    let listed = summary.links().into_iter().map(|(_, link)| link).map(|link| format!("src/docs/{link}"));
+    std::iter::once("README.md".to_owned()).chain(listed).map(|name| Page::read(&name)).collect()
 }
 
 /// The Markdown files in the folder of the pages, the summary aside.
@@ -71,11 +64,7 @@ impl Page {
     pub(crate) fn read(name: &str) -> Self {
         let text = fs::read_to_string(root().join(name));
         let text = text.unwrap_or_else(|e| panic!("{name}: {e}"));
-        Self {
-            name: name.to_owned(),
-            blocks: blocks(&text),
-            text,
-        }
+        Self { name: name.to_owned(), blocks: blocks(&text), text }
     }
 
     /// The place of a line for messages.
@@ -175,11 +164,7 @@ fn blocks(text: &str) -> Vec<Block> {
 
 impl Block {
     fn new(kind: BlockKind, line: usize) -> Self {
-        Self {
-            kind,
-            line,
-            lines: Vec::new(),
-        }
+        Self { kind, line, lines: Vec::new() }
     }
 }
 
@@ -200,10 +185,8 @@ impl BlockKind {
 fn blocks_have_their_kinds_and_lines() {
     let text = "# T\n\n<!-- test: a -->\n```sh\nb\nc\n```\n```sh no-run\nd\n```\n```text\n```\n```json\n```\n";
     let found = blocks(text);
-    let kinds: Vec<(BlockKind, usize, usize)> = found
-        .iter()
-        .map(|block| (block.kind, block.line, block.lines.len()))
-        .collect();
+    let kinds: Vec<(BlockKind, usize, usize)> =
+        found.iter().map(|block| (block.kind, block.line, block.lines.len())).collect();
     let expected = [
         (BlockKind::SetUp, 2, 1),
         (BlockKind::Run, 4, 2),

@@ -24,10 +24,7 @@ pub(crate) fn commands(lines: &[String]) -> Vec<(usize, Vec<String>)> {
 }
 
 fn simple_commands(line: &str) -> Vec<Vec<String>> {
-    let mut reader = Reader {
-        commands: vec![Vec::new()],
-        ..Reader::default()
-    };
+    let mut reader = Reader { commands: vec![Vec::new()], ..Reader::default() };
     let mut quote = None;
     let mut chars = line.chars();
     while let Some(c) = chars.next() {
@@ -85,12 +82,7 @@ impl Reader {
 
 #[test]
 fn command_splitting_follows_shell() {
-    let lines = [
-        "A=1 b 'c d' \"e $F\" g\\ h # i",
-        "j \\",
-        "  --k 'l|m' > n | o && p; q",
-        "# r",
-    ];
+    let lines = ["A=1 b 'c d' \"e $F\" g\\ h # i", "j \\", "  --k 'l|m' > n | o && p; q", "# r"];
     let found = commands(&lines.map(str::to_owned));
     let expected = [
         (0, vec!["A=1", "b", "c d", "e $F", "g h"]),
@@ -99,7 +91,6 @@ fn command_splitting_follows_shell() {
         (1, vec!["p"]),
         (1, vec!["q"]),
     ];
-    let expected =
-        expected.map(|(line, words)| (line, words.into_iter().map(str::to_owned).collect()));
+    let expected = expected.map(|(line, words)| (line, words.into_iter().map(str::to_owned).collect()));
     assert_eq!(found, expected);
 }

@@ -12,9 +12,8 @@ use darkqa_base::types::{
     Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
 };
 use darkqa_eval::internals::ask::{
-    Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model,
-    Parameters, Prompts, Query, Random, Remote, Script, Secret, Sending, SettingsOrigin,
-    Temperature, TokenField, WireSetting,
+    Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model, Parameters, Prompts, Query,
+    Random, Remote, Script, Secret, Sending, SettingsOrigin, Temperature, TokenField, WireSetting,
 };
 use darkqa_pictures::Payload;
 use darkqa_pictures::PayloadFormat;
@@ -23,17 +22,11 @@ use serde_json::{Value, json};
 const KEY: &str = "sk-very-secret-0123";
 
 fn quick() -> Sending {
-    Sending {
-        first_delay: Duration::from_millis(1),
-        ..Sending::default()
-    }
+    Sending { first_delay: Duration::from_millis(1), ..Sending::default() }
 }
 
 fn endpoint_at(base: &str, key: Option<&str>, sending: Sending) -> Arc<Endpoint> {
-    let access = Access {
-        key: key.map(|key| Secret::new(key, "KEY").unwrap()),
-        ..Access::new(base.parse().unwrap())
-    };
+    let access = Access { key: key.map(|key| Secret::new(key, "KEY").unwrap()), ..Access::new(base.parse().unwrap()) };
     Arc::new(Endpoint::open(access, sending).unwrap())
 }
 
@@ -64,10 +57,7 @@ async fn request_is_smallest_every_server_takes() {
     let mock = MockEndpoint::start([Answer::text("B")]);
     let hostile = "say \"url\":\"\" \u{1F512} \\\"}}]}]} \n{{ x }}\u{0}";
     let images = [Arc::new(image())];
-    let message = Message {
-        images: &images,
-        ..Message::text_only(hostile)
-    };
+    let message = Message { images: &images, ..Message::text_only(hostile) };
     let reply = model_at(&mock, quick()).ask(message, 2).await.unwrap();
     assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
     assert_eq!(reply.finish, Finish::Stop);
@@ -76,10 +66,7 @@ async fn request_is_smallest_every_server_takes() {
 
     let request = &mock.requests()[0];
     assert_eq!(request.line, "POST /v1/chat/completions HTTP/1.1");
-    assert_eq!(
-        request.header("authorization"),
-        Some("Bearer sk-very-secret-0123")
-    );
+    assert_eq!(request.header("authorization"), Some("Bearer sk-very-secret-0123"));
     assert_eq!(request.header("content-type"), Some("application/json"));
     let length = request.body.len().to_string();
     assert_eq!(request.header("content-length"), Some(length.as_str()));
@@ -88,11 +75,7 @@ async fn request_is_smallest_every_server_takes() {
 
     let mut body = request.json();
     let url = body["messages"][0]["content"][1]["image_url"]["url"].take();
-    let base64 = url
-        .as_str()
-        .unwrap()
-        .strip_prefix("data:image/png;base64,")
-        .unwrap();
+    let base64 = url.as_str().unwrap().strip_prefix("data:image/png;base64,").unwrap();
     let file = STANDARD.decode(base64).unwrap();
     assert_eq!(Digest::from_bytes(&file), images[0].facts().digest);
     let expected = json!({
@@ -128,27 +111,17 @@ async fn only_configured_settings_are_sent() {
     };
     let model = Remote::open(endpoint.clone(), parameters).unwrap();
     let images = [image(), image()].map(Arc::new);
-    let message = Message {
-        images: &images,
-        after: "\"url\":\"\" Red?",
-        ..Message::text_only("Look \\\"url\":\"\"")
-    };
+    let message = Message { images: &images, after: "\"url\":\"\" Red?", ..Message::text_only("Look \\\"url\":\"\"") };
     model.ask(message, 2).await.unwrap();
-    let bare = Parameters {
-        temperature: Temperature::Server,
-        token_field: TokenField::Omit,
-        ..Parameters::new("m".into())
-    };
+    let bare =
+        Parameters { temperature: Temperature::Server, token_field: TokenField::Omit, ..Parameters::new("m".into()) };
     let model = Remote::open(endpoint, bare).unwrap();
     model.ask(Message::text_only("Red?"), 2).await.unwrap();
 
     let requests = mock.requests();
     assert_eq!(requests[0].header("authorization"), None);
     let body = requests[0].json();
-    assert_eq!(
-        body["messages"][0]["content"][1]["image_url"]["detail"],
-        "high"
-    );
+    assert_eq!(body["messages"][0]["content"][1]["image_url"]["detail"], "high");
     assert_eq!(body["max_completion_tokens"], 16);
     assert_eq!(body["reasoning_effort"], "low");
     assert_eq!(body["top_p"], 0.25);
@@ -170,10 +143,7 @@ async fn base_urls_keep_path_and_query() {
     let root = mock.base_url().replace("/v1", "");
     for (base, line) in [
         ("", "POST /chat/completions HTTP/1.1"),
-        (
-            "/openai/deployments/d/?api-version=1",
-            "POST /openai/deployments/d/chat/completions?api-version=1 HTTP/1.1",
-        ),
+        ("/openai/deployments/d/?api-version=1", "POST /openai/deployments/d/chat/completions?api-version=1 HTTP/1.1"),
     ] {
         let endpoint = endpoint_at(&format!("{root}{base}"), None, quick());
         let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
@@ -188,10 +158,7 @@ async fn closed_port_is_connection_failure() {
         let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
         listener.local_addr().unwrap().port()
     };
-    let sending = Sending {
-        retries: 0,
-        ..quick()
-    };
+    let sending = Sending { retries: 0, ..quick() };
     let endpoint = endpoint_at(&format!("http://127.0.0.1:{port}/v1"), None, sending);
     let model = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
     let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
@@ -204,36 +171,17 @@ async fn closed_port_is_connection_failure() {
 
 #[tokio::test]
 async fn requested_wait_holds_for_all() {
-    let limited = |name: &str, value: &str| {
-        Answer::error(429, "rate_limit_exceeded", "slow down").header(name, value)
-    };
-    for answer in [
-        limited("retry-after-ms", "50"),
-        limited("retry-after", "0.05"),
-    ] {
+    let limited = |name: &str, value: &str| Answer::error(429, "rate_limit_exceeded", "slow down").header(name, value);
+    for answer in [limited("retry-after-ms", "50"), limited("retry-after", "0.05")] {
         let mock = MockEndpoint::start([answer, Answer::text("B")]);
         let model = model_at(&mock, quick());
         let start = Instant::now();
-        assert_eq!(
-            model
-                .ask(Message::text_only("Red?"), 2)
-                .await
-                .unwrap()
-                .attempts,
-            2
-        );
+        assert_eq!(model.ask(Message::text_only("Red?"), 2).await.unwrap().attempts, 2);
         assert!(start.elapsed() >= Duration::from_millis(50));
     }
     // One request is turned away; another one, asked in the meanwhile, waits as well.
     let mock = MockEndpoint::start([limited("retry-after-ms", "80"), Answer::text("B")]);
-    let endpoint = endpoint_at(
-        &mock.base_url(),
-        None,
-        Sending {
-            retries: 0,
-            ..quick()
-        },
-    );
+    let endpoint = endpoint_at(&mock.base_url(), None, Sending { retries: 0, ..quick() });
     let first = Remote::open(endpoint.clone(), Parameters::new("m".into())).unwrap();
     let second = Remote::open(endpoint, Parameters::new("n".into())).unwrap();
     let start = Instant::now();
@@ -250,15 +198,9 @@ async fn requested_wait_holds_for_all() {
 async fn request_dropped_leaves_model_usable() {
     let mock = MockEndpoint::start([Answer::silent(), Answer::text("B")]);
     let model = model_at(&mock, quick());
-    let asked = tokio::time::timeout(
-        Duration::from_millis(50),
-        model.ask(Message::text_only("Red?"), 2),
-    );
+    let asked = tokio::time::timeout(Duration::from_millis(50), model.ask(Message::text_only("Red?"), 2));
     assert!(asked.await.is_err());
-    assert_eq!(
-        model.ask(Message::text_only("Red?"), 2).await.unwrap().text,
-        "B"
-    );
+    assert_eq!(model.ask(Message::text_only("Red?"), 2).await.unwrap().text, "B");
 }
 
 #[tokio::test]
@@ -268,20 +210,11 @@ async fn errors_and_debug_hide_keys() {
         Answer::error(400, "x", &echo),
         Answer::new(418, echo.clone()),
         Answer::new(200, echo.clone()).header("x-should-retry", "false"),
-        Answer::json(
-            200,
-            &json!({"choices": [{"error": {"message": echo, "code": 400}}]}),
-        ),
+        Answer::json(200, &json!({"choices": [{"error": {"message": echo, "code": 400}}]})),
         Answer::new(307, "").header("location", &format!("https://x.example/?k={KEY}")),
     ] {
         let mock = MockEndpoint::start([answer]);
-        let model = model_at(
-            &mock,
-            Sending {
-                retries: 0,
-                ..quick()
-            },
-        );
+        let model = model_at(&mock, Sending { retries: 0, ..quick() });
         let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
         let text = format!("{error:?} {error} {model:?}");
         assert!(!text.contains("sk-very"), "{text}");
@@ -289,27 +222,16 @@ async fn errors_and_debug_hide_keys() {
         assert!(!error.failure.message.contains(char::is_control));
         assert!(error.failure.message.len() < 500);
     }
-    let mock = MockEndpoint::start([Answer::error(
-        400,
-        "x",
-        "user us3r with passw0rd and t0ken, aks us3r:passw0rd",
-    )]);
+    let mock = MockEndpoint::start([Answer::error(400, "x", "user us3r with passw0rd and t0ken, aks us3r:passw0rd")]);
     let base = mock.base_url().replace("//", "//us3r:passw0rd@") + "?token=t0ken";
-    let model = Remote::open(
-        endpoint_at(&base, None, quick()),
-        Parameters::new("m".into()),
-    )
-    .unwrap();
+    let model = Remote::open(endpoint_at(&base, None, quick()), Parameters::new("m".into())).unwrap();
     let error = model.ask(Message::text_only("Red?"), 2).await.unwrap_err();
     let text = format!("{error:?} {model:?}");
     check_rows(["us3r", "passw0rd", "t0ken"], |secret| {
         assert!(!error.failure.message.contains(secret), "{text}");
         assert!(!format!("{error:?}").contains(secret), "{text}");
     });
-    let basic = mock.requests()[0]
-        .header("authorization")
-        .unwrap()
-        .to_owned();
+    let basic = mock.requests()[0].header("authorization").unwrap().to_owned();
     assert_eq!(basic, format!("Basic {}", STANDARD.encode("us3r:passw0rd")));
 }
 
@@ -317,11 +239,7 @@ async fn errors_and_debug_hide_keys() {
 fn keys_do_not_travel_in_open() {
     let key = Secret::new(KEY, "KEY").unwrap();
     let open = |base: &str, key: Option<&Secret>, allow_http| {
-        let access = Access {
-            key: key.cloned(),
-            allow_http,
-            ..Access::new(base.parse::<BaseUrl>().unwrap())
-        };
+        let access = Access { key: key.cloned(), allow_http, ..Access::new(base.parse::<BaseUrl>().unwrap()) };
         Endpoint::open(access, quick())
     };
     let refused = open("http://10.0.0.7:8000/v1", Some(&key), false).unwrap_err();
@@ -344,10 +262,7 @@ async fn scripts_and_guesses_answer_without_endpoint() {
     let condition = "L3-noise".parse().unwrap();
     let other = "L0".parse().unwrap();
     let asked = question("q1", "Red?");
-    let prompt = Prompts::built_in()
-        .unwrap()
-        .render(View::Blind, &asked)
-        .unwrap();
+    let prompt = Prompts::built_in().unwrap().render(View::Blind, &asked).unwrap();
     let call = |question, condition| Call {
         query: Query::Choice(question),
         condition,
@@ -361,20 +276,14 @@ async fn scripts_and_guesses_answer_without_endpoint() {
     .unwrap();
     let script = Model::Script(Script::load(&path).unwrap());
     let unknown = question("q2", "Red?");
-    for (question, condition, said) in [
-        (&asked, Some(&condition), "A"),
-        (&asked, Some(&other), "B"),
-        (&asked, None, "B"),
-        (&unknown, None, "C"),
-    ] {
+    for (question, condition, said) in
+        [(&asked, Some(&condition), "A"), (&asked, Some(&other), "B"), (&asked, None, "B"), (&unknown, None, "C")]
+    {
         let reply = script.ask(call(question, condition)).await.unwrap();
         assert_eq!(reply, Reply::local(said.into()));
     }
     // Who only guesses letters knows nothing to say to an open question.
-    let open = Call {
-        query: Query::Open(&unknown.id),
-        ..call(&asked, None)
-    };
+    let open = Call { query: Query::Open(&unknown.id), ..call(&asked, None) };
     assert_eq!(script.ask(open).await.unwrap().text, "C");
     let random = Model::Random(Random { seed: 1 });
     let error = random.ask(open).await.unwrap_err();
@@ -387,10 +296,7 @@ async fn scripts_and_guesses_answer_without_endpoint() {
     let endpoint = endpoint_at("http://127.0.0.1:1/v1", None, quick());
     let remote = Remote::open(endpoint, Parameters::new("m".into())).unwrap();
     let content = Model::Remote(Box::new(remote)).content();
-    assert_eq!(
-        (&content["wire"], &content["model"]),
-        (&json!("chat"), &json!("m"))
-    );
+    assert_eq!((&content["wire"], &content["model"]), (&json!("chat"), &json!("m")));
 
     std::fs::write(&path, "{\"question\":\"q1\",\"reply\":\"B\"}").unwrap();
     let script = Model::Script(Script::load(&path).unwrap());

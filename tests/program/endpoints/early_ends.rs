@@ -1,4 +1,5 @@
-//! Replies that the server ends early, or refuses for their content: scored in the same way under any word, and paid for twice at most.
+//! Replies that the server ends early, or refuses for their content: scored in the same way under any word, and paid
+//! for twice at most.
 
 use std::collections::HashMap;
 use std::sync::Mutex;
@@ -18,12 +19,11 @@ const ENDED: [usize; 3] = [1, 4, 8];
 /// Index of the question in a request.
 fn question(body: &Value) -> usize {
     let text = body["messages"][0]["content"].to_string();
-    (0..QUESTIONS)
-        .find(|i| text.contains(&format!("is it, {i}?")))
-        .unwrap()
+    (0..QUESTIONS).find(|i| text.contains(&format!("is it, {i}?"))).unwrap()
 }
 
-/// An endpoint that answers right, except at the questions in [`ENDED`]: there `event` gets the number of earlier requests about it.
+/// An endpoint that answers right, except at the questions in [`ENDED`]: there `event` gets the number of earlier
+/// requests about it.
 fn endpoint(event: impl Fn(usize) -> Answer + Send + Sync + 'static) -> MockEndpoint {
     let asked = Mutex::new(HashMap::<usize, usize>::new());
     MockEndpoint::answering(move |body| {
@@ -31,11 +31,7 @@ fn endpoint(event: impl Fn(usize) -> Answer + Send + Sync + 'static) -> MockEndp
         let mut asked = asked.lock().unwrap();
         let times = asked.entry(question).or_default();
         *times += 1;
-        if ENDED.contains(&question) {
-            event(*times - 1)
-        } else {
-            Answer::text("C")
-        }
+        if ENDED.contains(&question) { event(*times - 1) } else { Answer::text("C") }
     })
 }
 
@@ -80,9 +76,7 @@ fn ended(word: &str, text: &str) -> Answer {
 /// A made-up word of letters.
 fn word(random: &mut StdRng) -> String {
     let length = random.random_range(4..12);
-    (0..length)
-        .map(|_| char::from(b'a' + random.random_range(0..26_u8)))
-        .collect()
+    (0..length).map(|_| char::from(b'a' + random.random_range(0..26_u8))).collect()
 }
 
 /// The same event under any name of the vendor: the trials count as unread, and are paid for twice at most.
@@ -90,13 +84,7 @@ fn word(random: &mut StdRng) -> String {
 fn renaming_an_early_end_moves_no_accuracy() {
     let mut random = StdRng::seed_from_u64(7);
     let mut events: Vec<(String, Answer)> = Vec::new();
-    for name in [
-        "content_filter",
-        "length",
-        "sensitive",
-        "repetition",
-        "model_context_window_exceeded",
-    ] {
+    for name in ["content_filter", "length", "sensitive", "repetition", "model_context_window_exceeded"] {
         events.push((name.to_owned(), ended(name, "")));
     }
     for text in ["", "It looks like a", "The answer is C."] {
@@ -105,10 +93,7 @@ fn renaming_an_early_end_moves_no_accuracy() {
     }
     for status in [400, 403, 404, 410, 418, 422, 451] {
         let (code, message) = (word(&mut random), word(&mut random));
-        events.push((
-            format!("{status} {code}"),
-            Answer::error(status, &code, &message),
-        ));
+        events.push((format!("{status} {code}"), Answer::error(status, &code, &message)));
     }
     for body in [
         json!({"choices": null, "base_resp": {"status_code": 1026, "status_msg": "input new_sensitive"}}),
@@ -120,12 +105,7 @@ fn renaming_an_early_end_moves_no_accuracy() {
     check_rows(events, |(name, answer)| {
         let mock = endpoint(move |_| answer.clone());
         let run = run(&mock, "");
-        assert_eq!(
-            (run.right, run.scored, run.failed),
-            (7, 10, 0),
-            "{name}: {:?}",
-            run.called
-        );
+        assert_eq!((run.right, run.scored, run.failed), (7, 10, 0), "{name}: {:?}", run.called);
         assert!(run.requests.iter().all(|requests| *requests <= 2), "{name}");
         let total: usize = run.requests.iter().sum();
         // The first trial with an unknown word or cause is asked again; before the first answer each one may be.
@@ -175,11 +155,7 @@ fn refusal_that_heals_is_answered() {
 
 #[test]
 fn refusals_of_all_requests_stop_the_model() {
-    let rows = [
-        (Answer::error(401, "x", "no"), 1),
-        (Answer::error(403, "x", "no"), 3),
-        (Answer::new(404, ""), 3),
-    ];
+    let rows = [(Answer::error(401, "x", "no"), 1), (Answer::error(403, "x", "no"), 3), (Answer::new(404, ""), 3)];
     check_rows(rows, |(answer, requests)| {
         let mock = MockEndpoint::start([answer]);
         let run = run(&mock, "");
@@ -191,11 +167,7 @@ fn refusals_of_all_requests_stop_the_model() {
 /// A server that begins to refuse everything is no filter of the content.
 #[test]
 fn revoked_key_is_no_filter() {
-    let mock = MockEndpoint::start([
-        Answer::text("C"),
-        Answer::text("C"),
-        Answer::error(403, "x", "no"),
-    ]);
+    let mock = MockEndpoint::start([Answer::text("C"), Answer::text("C"), Answer::error(403, "x", "no")]);
     let run = run(&mock, "--concurrency 1");
     assert_eq!((run.right, run.scored), (2, 2), "{:?}", run.called);
 }
@@ -227,10 +199,7 @@ fn refused_content_is_not_asked_again() {
     let again = run.bench.call(&model_args(&base, line));
     assert_eq!((again.code, mock.requests().len()), (Some(0), QUESTIONS));
     let records = records(&run.bench.path("run"));
-    let refused = records
-        .iter()
-        .find(|record| record["finish"] == "filter")
-        .unwrap();
+    let refused = records.iter().find(|record| record["finish"] == "filter").unwrap();
     assert_eq!(refused["refusal"], "400: The prompt was filtered");
     assert_eq!(refused["strict"]["why"], "filtered");
 }
@@ -270,19 +239,11 @@ fn stored_refusals_count_as_filtered() {
         .into_iter()
         .map(|mut record| {
             if record["finish"] == "filter" {
-                for field in [
-                    "reply",
-                    "refusal",
-                    "finish",
-                    "strict",
-                    "lenient",
-                    "latency_ms",
-                ] {
+                for field in ["reply", "refusal", "finish", "strict", "lenient", "latency_ms"] {
                     record[field] = Value::Null;
                 }
                 record["outcome"] = "failed".into();
-                record["failure"] =
-                    json!({"kind": "filtered", "status": 400, "message": "filtered"});
+                record["failure"] = json!({"kind": "filtered", "status": 400, "message": "filtered"});
             }
             format!("{record}\n")
         })

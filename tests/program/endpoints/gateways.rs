@@ -22,11 +22,7 @@ fn cutting(is_cut: fn(&str) -> bool) -> MockEndpoint {
         if body["stream"] == true {
             return Answer::streamed_text("C");
         }
-        if is_cut(&text) {
-            Answer::new(524, "<html><title>524: A timeout occurred</title>")
-        } else {
-            Answer::text("C")
-        }
+        if is_cut(&text) { Answer::new(524, "<html><title>524: A timeout occurred</title>") } else { Answer::text("C") }
     })
 }
 
@@ -39,11 +35,7 @@ fn streams_replace_cut_replies() {
     let (bench, mock) = (Bench::with_questions(8), cutting(long));
     let called = call(&bench, &mock, "--concurrency 1");
     assert_eq!((called.code, mock.requests().len()), (Some(0), 9));
-    let streamed = mock
-        .requests()
-        .iter()
-        .filter(|request| request.json()["stream"] == true)
-        .count();
+    let streamed = mock.requests().iter().filter(|request| request.json()["stream"] == true).count();
     assert_eq!(streamed, 5, "the cut one, and the four after it");
     insta::assert_snapshot!(redacted(&called.stderr), @r#"
     WARN m: http://127.0.0.1:[PORT]/v1 answered 524: an HTML page titled "524: A timeout occurred"; asked again
@@ -84,13 +76,7 @@ fn cut_trial_is_asked_once_in_next_call() {
     let third = call(&bench, &mock, "--wire chat-stream");
     assert_eq!((third.code, mock.requests().len()), (Some(0), 11));
     let stored = records(&bench.path("run"));
-    assert_eq!(
-        stored
-            .iter()
-            .filter(|record| record["failure"].is_null())
-            .count(),
-        8
-    );
+    assert_eq!(stored.iter().filter(|record| record["failure"].is_null()).count(), 8);
 }
 
 /// An endpoint that names these models in turn.
@@ -99,26 +85,20 @@ fn serving(names: &'static [&'static str]) -> MockEndpoint {
     MockEndpoint::answering(move |_| {
         let name = names[asked.fetch_add(1, Ordering::SeqCst) % names.len()];
         let message = json!({"role": "assistant", "content": "C"});
-        Answer::json(
-            200,
-            &json!({"model": name, "choices": [{"message": message, "finish_reason": "stop"}]}),
-        )
+        Answer::json(200, &json!({"model": name, "choices": [{"message": message, "finish_reason": "stop"}]}))
     })
 }
 
 /// Warnings and alerts about served models.
 fn about_served(bench: &Bench, mock: &MockEndpoint, more: &str) -> String {
     let base = mock.base_url();
-    let line =
-        format!("{RUN} --concurrency 1 --model gpt-4o --base-url {base} --api-key-env none {more}");
+    let line = format!("{RUN} --concurrency 1 --model gpt-4o --base-url {base} --api-key-env none {more}");
     let called = bench.call(&crate::support::run::words(&line)).ended(0);
     let warnings = called.stderr.lines().filter(|line| line.contains("gpt-4o"));
     let summary = std::fs::read_to_string(bench.path("run/summary.json")).unwrap();
     let summary: Value = serde_json::from_str(&summary).unwrap();
     let alerts = summary["alerts"].as_array().unwrap().iter();
-    let alerts = alerts
-        .map(|alert| alert["text"].as_str().unwrap_or_default())
-        .filter(|text| text.contains("gpt-4o"));
+    let alerts = alerts.map(|alert| alert["text"].as_str().unwrap_or_default()).filter(|text| text.contains("gpt-4o"));
     let lines: Vec<&str> = warnings.chain(alerts).collect();
     redacted(&lines.join("\n"))
 }
@@ -163,14 +143,8 @@ fn fallbacks_in_headers_are_an_alert() {
                 200,
                 &json!({"model": "gpt-4o", "choices": [{"message": {"content": "C"}, "finish_reason": "stop"}]}),
             );
-            let (count, group) = if is_fallback && fallbacks == "1" {
-                ("1", "gpt-4o-mini")
-            } else {
-                ("0", "gpt-4o")
-            };
-            answer
-                .header("x-litellm-attempted-fallbacks", count)
-                .header("x-litellm-model-group", group)
+            let (count, group) = if is_fallback && fallbacks == "1" { ("1", "gpt-4o-mini") } else { ("0", "gpt-4o") };
+            answer.header("x-litellm-attempted-fallbacks", count).header("x-litellm-model-group", group)
         });
         let text = about_served(&bench, &mock, "--levels L0");
         assert_eq!(text.contains("gpt-4o-mini (2 at L0)"), is_alert, "{text}");
@@ -194,11 +168,7 @@ fn renewed_key_of_file_is_used() {
         Answer::text(&format!("C {}", request.header("authorization").unwrap()))
     });
     let called = call(&bench, &mock, "--concurrency 1 --api-key-file key");
-    assert_eq!(
-        (called.code, mock.requests().len()),
-        (Some(0), 7),
-        "{called:?}"
-    );
+    assert_eq!((called.code, mock.requests().len()), (Some(0), 7), "{called:?}");
     let stored = format!("{called:?} {:?}", records(&bench.path("run")));
     assert!(!stored.contains("sk-"), "{stored}");
 
@@ -207,9 +177,5 @@ fn renewed_key_of_file_is_used() {
     bench.file("key", "sk-first-0123456789\n");
     let mock = MockEndpoint::start([Answer::error(401, "x", "no")]);
     let called = call(&bench, &mock, "--api-key-file key");
-    assert_eq!(
-        (called.code, mock.requests().len()),
-        (Some(2), 1),
-        "{called:?}"
-    );
+    assert_eq!((called.code, mock.requests().len()), (Some(2), 1), "{called:?}");
 }

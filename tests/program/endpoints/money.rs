@@ -14,15 +14,12 @@ use crate::support::run::{Bench, Called, model_args, records, words};
 use crate::support::snapshot::{lines_with, on_one_line, redacted};
 use crate::support::table::{check_rows, check_rows_at_once};
 
-const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
+const PRICES: &str =
+    "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 70 }\n";
 
 /// The arguments of every run here, and more of them.
 fn args<'a>(base: &'a str, more: &'a str) -> Vec<&'a str> {
-    [
-        model_args(base, "--data set.jsonl --levels L0"),
-        words(more),
-    ]
-    .concat()
+    [model_args(base, "--data set.jsonl --levels L0"), words(more)].concat()
 }
 
 #[test]
@@ -44,18 +41,9 @@ fn dry_run_sends_and_writes_nothing() {
     let json = args(&base, "--out run --dry-run --prices prices.toml --json");
     let estimate: Value = serde_json::from_str(&bench.complete(&json)).unwrap();
     let line = &estimate["lines"][0];
-    assert_eq!(
-        (&line["requests"], &line["image_tokens"]),
-        (&3.into(), &210.0.into())
-    );
-    let (text, dollars) = (
-        line["text_tokens"].as_f64().unwrap(),
-        line["dollars"].as_f64().unwrap(),
-    );
-    assert!(
-        (dollars - (text + 210.0) / 1000.0).abs() < 1e-9,
-        "{estimate}"
-    );
+    assert_eq!((&line["requests"], &line["image_tokens"]), (&3.into(), &210.0.into()));
+    let (text, dollars) = (line["text_tokens"].as_f64().unwrap(), line["dollars"].as_f64().unwrap());
+    assert!((dollars - (text + 210.0) / 1000.0).abs() < 1e-9, "{estimate}");
 
     // What is answered is not counted again.
     bench.complete(&args(&base, "--out run --limit 3"));
@@ -91,11 +79,7 @@ fn budget_stops_run_until_raised() {
     ! run: over budget: 5 of 12 trials answered, 0 failed. The same command asks the
     ");
     let again = call("0.5");
-    assert_eq!(
-        (again.code, mock.requests().len()),
-        (Some(3), 5),
-        "nothing is asked beyond it"
-    );
+    assert_eq!((again.code, mock.requests().len()), (Some(3), 5), "nothing is asked beyond it");
     let on = call("2");
     assert_eq!((on.code, mock.requests().len()), (Some(0), 12), "{on:?}");
     assert_eq!(records(&bench.path("run")).len(), 12);
@@ -112,10 +96,7 @@ fn a_limit_needs_a_price() {
     ");
     check_rows(["0", "-1", "NaN"], |wrong| {
         let flag = format!("--max-cost={wrong}");
-        assert_eq!(
-            bench.call(&args("http://127.0.0.1:9/v1", &flag)).code,
-            Some(2)
-        );
+        assert_eq!(bench.call(&args("http://127.0.0.1:9/v1", &flag)).code, Some(2));
     });
 }
 
@@ -179,7 +160,8 @@ fn charged_prompts_correct_estimate() {
 }
 
 /// Prices of a short prompt and a long reply: 100 tokens of prompt and 1024 of reply cost $0.1025.
-const DEAR: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 100, image-tokens = 80 }\n";
+const DEAR: &str =
+    "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 100, image-tokens = 80 }\n";
 
 /// The tokens of a reply at [`DEAR`], in dollars.
 fn dollars(replies: u64) -> f64 {
@@ -199,9 +181,7 @@ fn charged(tokens: u64, usage: &Value) -> Answer {
 }
 
 /// Answers by their number, each with the tokens of its reply that are charged. The cost of all so far comes with them.
-fn counting(
-    answer: impl Fn(u64) -> (Answer, u64) + Send + Sync + 'static,
-) -> (MockEndpoint, Arc<Mutex<f64>>) {
+fn counting(answer: impl Fn(u64) -> (Answer, u64) + Send + Sync + 'static) -> (MockEndpoint, Arc<Mutex<f64>>) {
     let cost = Arc::new(Mutex::new(0.0));
     let number = AtomicU64::new(0);
     let mock = MockEndpoint::answering({
@@ -217,12 +197,7 @@ fn counting(
 }
 
 /// A run with a limit, and the cost of all its requests.
-fn limited(
-    bench: &Bench,
-    mock: &MockEndpoint,
-    cost: &Mutex<f64>,
-    (limit, more): (f64, &str),
-) -> (Called, f64) {
+fn limited(bench: &Bench, mock: &MockEndpoint, cost: &Mutex<f64>, (limit, more): (f64, &str)) -> (Called, f64) {
     bench.file("prices.toml", DEAR);
     let base = mock.base_url();
     let line = format!("--out run --prices prices.toml --max-cost {limit} {more}");
@@ -251,19 +226,12 @@ fn limit_holds_whatever_is_charged_for() {
                     (charged(1, &Value::Null), 1)
                 } else {
                     let usage = json!({"prompt_tokens": 100, "completion_tokens": 1000});
-                    (
-                        Answer::json(200, &json!({"choices": [], "usage": usage})),
-                        1000,
-                    )
+                    (Answer::json(200, &json!({"choices": [], "usage": usage})), 1000)
                 }
             },
             0.6,
         ),
-        (
-            "no tokens stated",
-            |_| (charged(1024, &json!({})), 1024),
-            0.8,
-        ),
+        ("no tokens stated", |_| (charged(1024, &json!({})), 1024), 0.8),
         (
             "zero tokens stated",
             |_| {
@@ -272,11 +240,7 @@ fn limit_holds_whatever_is_charged_for() {
             },
             0.8,
         ),
-        (
-            "only the prompt stated",
-            |_| (charged(1024, &json!({"prompt_tokens": 100})), 1024),
-            0.8,
-        ),
+        ("only the prompt stated", |_| (charged(1024, &json!({"prompt_tokens": 100})), 1024), 0.8),
         (
             "an error after the work",
             |i| match i % 3 {
@@ -329,10 +293,7 @@ fn limit_holds_whatever_is_charged_for() {
             last = cost;
         }
         let (called, cost) = limited(&bench, &mock, &cost, (1.2, more));
-        assert!(
-            cost > last && cost <= 1.2 + 1e-9,
-            "{case}: {cost}: {called:?}"
-        );
+        assert!(cost > last && cost <= 1.2 + 1e-9, "{case}: {cost}: {called:?}");
     });
 }
 
@@ -341,10 +302,7 @@ fn limit_holds_whatever_is_charged_for() {
 fn refusals_cost_nothing() {
     let bench = Bench::with_questions(12);
     let (mock, cost) = counting(|i| match i % 2 {
-        0 => (
-            Answer::error(429, "rate_limit_exceeded", "slow down").header("retry-after", "0"),
-            0,
-        ),
+        0 => (Answer::error(429, "rate_limit_exceeded", "slow down").header("retry-after", "0"), 0),
         _ => (charged(1, &Value::Null), 1),
     });
     let (called, _) = limited(&bench, &mock, &cost, (0.11, "--concurrency 4"));
@@ -352,7 +310,8 @@ fn refusals_cost_nothing() {
     assert_eq!(records(&bench.path("run")).len(), 12);
 }
 
-/// A server that charges more than the token limit, once it is seen, exceeds the limit by the requests in flight at most.
+/// A server that charges more than the token limit, once it is seen, exceeds the limit by the requests in flight at
+/// most.
 #[test]
 fn replies_beyond_their_limit_are_said() {
     let bench = Bench::with_questions(40);
@@ -364,10 +323,7 @@ fn replies_beyond_their_limit_are_said() {
     assert_eq!(called.code, Some(3), "{called:?}");
     // Seven of up to $0.1026 fit at once.
     assert!(cost <= 7.0 * dollars(5000) + 0.001, "{cost}");
-    assert!(
-        called.stderr.contains("more than its limit of 1024"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("more than its limit of 1024"), "{called:?}");
     let requests = mock.requests().len() as u64;
     let sentence = format!("than --max-tokens: m ({})", requests - 2);
     for text in [&called.stderr, &called.stdout] {
@@ -376,10 +332,7 @@ fn replies_beyond_their_limit_are_said() {
     }
     // The same command asks nothing more.
     let (again, _) = limited(&bench, &mock, &Mutex::new(0.0), (0.75, ""));
-    assert_eq!(
-        (again.code, mock.requests().len() as u64),
-        (Some(3), requests)
-    );
+    assert_eq!((again.code, mock.requests().len() as u64), (Some(3), requests));
 }
 
 /// Without a token limit the cost has no bound, which is said before anything is sent.
@@ -414,18 +367,12 @@ fn requests_that_are_given_up_count() {
         _ => (Answer::silent(), 1024),
     });
     let base = mock.base_url();
-    let line =
-        "--out run --prices prices.toml --max-cost 0.75 --concurrency 4 --timeout 60 --grace 0.1";
+    let line = "--out run --prices prices.toml --max-cost 0.75 --concurrency 4 --timeout 60 --grace 0.1";
     let mut first = bench.spawn(&args(&base, line), Stdio::null());
     wait_until(|| mock.requests().len() == 5);
     signal(&first, "-INT");
     assert_eq!(first.wait().unwrap().code(), Some(130));
-    let (again, cost) = limited(
-        &bench,
-        &mock,
-        &cost,
-        (0.75, "--concurrency 16 --timeout 0.5 --retries 0"),
-    );
+    let (again, cost) = limited(&bench, &mock, &cost, (0.75, "--concurrency 16 --timeout 0.5 --retries 0"));
     assert!(cost <= 0.75, "{cost}: {again:?}");
 }
 
@@ -444,10 +391,7 @@ const PRICED: &str = "--models models.toml --data set.jsonl --levels L0 --out ru
 fn billed(usage: &Value) -> Answer {
     let message = json!({"role": "assistant", "content": "C"});
     let choice = json!({"index": 0, "message": message, "finish_reason": "stop"});
-    Answer::json(
-        200,
-        &json!({"model": "m", "choices": [choice], "usage": usage}),
-    )
+    Answer::json(200, &json!({"model": "m", "choices": [choice], "usage": usage}))
 }
 
 #[test]
@@ -467,10 +411,7 @@ fn bill_is_that_of_vendors() {
             1.0 + 51.0,
         ),
         // Gemini: reasoning in the total alone.
-        (
-            json!({"prompt_tokens": 1000, "completion_tokens": 5, "total_tokens": 1805}),
-            1.0 + 8.05,
-        ),
+        (json!({"prompt_tokens": 1000, "completion_tokens": 5, "total_tokens": 1805}), 1.0 + 8.05),
         // Perplexity: reasoning beside both.
         (
             json!({"prompt_tokens": 1000, "completion_tokens": 30, "total_tokens": 1030, "reasoning_tokens": 400}),
@@ -488,10 +429,7 @@ fn bill_is_that_of_vendors() {
             1.0 + 0.1,
         ),
         // A gateway that writes texts and fractions.
-        (
-            json!({"prompt_tokens": "1000", "completion_tokens": 20.0, "total_tokens": " 1060.5 "}),
-            1.0 + 0.61,
-        ),
+        (json!({"prompt_tokens": "1000", "completion_tokens": 20.0, "total_tokens": " 1060.5 "}), 1.0 + 0.61),
     ];
     let bench = Bench::with_questions(vendors.len());
     let mock = MockEndpoint::start(vendors.iter().map(|(usage, _)| billed(usage)));
@@ -500,21 +438,13 @@ fn bill_is_that_of_vendors() {
     let by_hand: f64 = vendors.iter().map(|(_, dollars)| dollars).sum();
     assert!((by_hand - 77.15).abs() < 1e-9);
     let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
-    assert!(
-        page.contains("$77.15 at the prices of the models file"),
-        "{by_hand}"
-    );
+    assert!(page.contains("$77.15 at the prices of the models file"), "{by_hand}");
     let mut all = records(&bench.path("run"));
     all.sort_by_key(|record| record["question"].to_string());
-    let totals: Vec<&Value> = all
-        .iter()
-        .map(|record| &record["usage"]["total_tokens"])
-        .collect();
+    let totals: Vec<&Value> = all.iter().map(|record| &record["usage"]["total_tokens"]).collect();
     assert_eq!(totals[1], 6100, "the record keeps the stated total");
     // What is paid counts against the limit of the next call.
-    let over = bench.call(&words(&format!(
-        "{PRICED} --limit 7 --max-cost 77 --repeats 2"
-    )));
+    let over = bench.call(&words(&format!("{PRICED} --limit 7 --max-cost 77 --repeats 2")));
     assert_eq!((over.code, mock.requests().len()), (Some(3), 7), "{over:?}");
 }
 
@@ -528,10 +458,7 @@ fn report_counts_cost_of_failures() {
     priced(&bench, &mock);
     bench.complete(&words(PRICED));
     let page = std::fs::read_to_string(bench.path("run/report.html")).unwrap();
-    let cost = page
-        .split("at the prices of the models file")
-        .next()
-        .unwrap();
+    let cost = page.split("at the prices of the models file").next().unwrap();
     assert!(cost.ends_with("$2.60 "), "{}", &cost[cost.len() - 60..]);
     assert!(page.contains(", $2.00 of it for 1 attempt without a usable reply"));
 }
@@ -563,10 +490,7 @@ fn report_has_prices_that_run_had() {
     report: run/report.html
     ");
     let stated = cost();
-    assert!(
-        stated.ends_with("$1.00 at the prices of 2026-01-01"),
-        "{stated}"
-    );
+    assert!(stated.ends_with("$1.00 at the prices of 2026-01-01"), "{stated}");
     // Made again from the folder alone, without the file of prices.
     std::fs::remove_file(bench.path("prices.toml")).unwrap();
     bench.complete(&words("report run"));

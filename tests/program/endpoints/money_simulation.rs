@@ -1,5 +1,5 @@
-//! A simulation of `--max-cost`: runs in four shards at servers of random prices, reply lengths and failures, which count what they
-//! charge. The charge never exceeds the limit.
+//! A simulation of `--max-cost`: runs in four shards at servers of random prices, reply lengths and failures, which
+//! count what they charge. The charge never exceeds the limit.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
@@ -90,11 +90,7 @@ impl Setting {
         let text = text.split("data:image").next().map_or(0, str::len);
         let prompt = 90 + text as u64 / 4;
         let cached = (numbers.share() * prompt as f64) as u64;
-        let reply = if numbers.share() < self.long {
-            self.max_tokens
-        } else {
-            1 + numbers.next() % self.max_tokens
-        };
+        let reply = if numbers.share() < self.long { self.max_tokens } else { 1 + numbers.next() % self.max_tokens };
         let tokens = (prompt - cached) as f64 * self.input + cached as f64 * self.cached;
         let dollars = (tokens + reply as f64 * self.output) / 1e6;
         let usage = json!({
@@ -106,17 +102,11 @@ impl Setting {
             return (whole, dollars);
         }
         match numbers.next() % 8 {
-            0 => (
-                Answer::error(429, "rate_limit_exceeded", "slow down").header("retry-after", "0"),
-                0.0,
-            ),
+            0 => (Answer::error(429, "rate_limit_exceeded", "slow down").header("retry-after", "0"), 0.0),
             1 => (Answer::error(400, "invalid", "no such image"), 0.0),
             2 => (Answer::error(500, "x", "oops"), dollars),
             3 => (Answer::error(504, "x", "oops"), dollars),
-            4 => (
-                Answer::json(200, &json!({"choices": [], "usage": usage})),
-                dollars,
-            ),
+            4 => (Answer::json(200, &json!({"choices": [], "usage": usage})), dollars),
             5 => (Answer::json(200, &json!({"choices": choices})), dollars),
             6 => (whole.cut(10), dollars),
             _ => (Answer::silent(), dollars),
@@ -143,12 +133,7 @@ fn simulate(setting: Setting) -> (f64, bool) {
         }
     }
     bench.file("set.jsonl", lines);
-    let Setting {
-        input,
-        cached,
-        output,
-        ..
-    } = setting;
+    let Setting { input, cached, output, .. } = setting;
     bench.file(
         "prices.toml",
         format!(
@@ -180,23 +165,12 @@ fn simulate(setting: Setting) -> (f64, bool) {
             let bench = &bench;
             scope.spawn(move || bench.call(&words(&line)).code)
         }).collect();
-        shards
-            .into_iter()
-            .map(|shard| shard.join().unwrap())
-            .collect()
+        shards.into_iter().map(|shard| shard.join().unwrap()).collect()
     });
     let share = *charged.lock().unwrap() / setting.limit;
     let is_over = codes.iter().all(|code| *code == Some(3));
-    assert!(
-        codes.iter().all(|code| matches!(code, Some(0..=3))),
-        "seed {}: {codes:?}",
-        setting.seed
-    );
-    assert!(
-        share <= 1.0 + 1e-9,
-        "seed {}: {share} of the limit",
-        setting.seed
-    );
+    assert!(codes.iter().all(|code| matches!(code, Some(0..=3))), "seed {}: {codes:?}", setting.seed);
+    assert!(share <= 1.0 + 1e-9, "seed {}: {share} of the limit", setting.seed);
     (share, is_over)
 }
 

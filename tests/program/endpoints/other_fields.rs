@@ -15,10 +15,8 @@ fn run(bench: &Bench, message: Value, more: &str) -> Called {
 }
 
 fn replies(bench: &Bench) -> Vec<Value> {
-    let mut replies: Vec<Value> = records(&bench.path("run"))
-        .into_iter()
-        .map(|record| record["reply"].clone())
-        .collect();
+    let mut replies: Vec<Value> =
+        records(&bench.path("run")).into_iter().map(|record| record["reply"].clone()).collect();
     replies.dedup();
     replies
 }
@@ -40,10 +38,7 @@ fn letters_among_the_thoughts_are_read() {
 #[test]
 fn sentences_among_the_thoughts_are_named() {
     for (message, more) in [
-        (
-            json!({"content": "", "reasoning": "The answer is B."}),
-            "--thinking off",
-        ),
+        (json!({"content": "", "reasoning": "The answer is B."}), "--thinking off"),
         (json!({"content": "", "zork_text": "The answer is B."}), ""),
         (json!({"content": null, "reasoning": "B"}), "--thinking on"),
     ] {
@@ -66,10 +61,7 @@ fn answers_in_tool_calls_are_read() {
     let message = json!({"content": null, "tool_calls": [{"id": "1", "type": "function", "function": function}]});
     let called = run(&bench, message, "");
     assert_eq!(replies(&bench), [json!("B")]);
-    assert!(
-        called.stderr.contains("tool_calls (answer, reply)"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("tool_calls (answer, reply)"), "{called:?}");
 }
 
 #[test]

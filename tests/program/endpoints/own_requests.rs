@@ -62,25 +62,14 @@ fn key_goes_only_to_vendor() {
     assert!(!error.contains("is set, and"), "{error}");
     // A server that is not in the table may want any key, as ever.
     let (_, request) = request(&[], &openai);
-    assert_eq!(
-        request.header("authorization"),
-        Some("Bearer sk-openai-0123456789")
-    );
+    assert_eq!(request.header("authorization"), Some("Bearer sk-openai-0123456789"));
 }
 
 #[test]
 fn key_given_as_name_is_hidden() {
-    for key in [
-        "sk-proj-0123",
-        "AIzaSyAbc",
-        "gsk_abcdef",
-        "0123456789abcdef0123",
-    ] {
+    for key in ["sk-proj-0123", "AIzaSyAbc", "gsk_abcdef", "0123456789abcdef0123"] {
         let error = refusal("https://h.example/v1", &["--api-key-env", key], &[]);
-        assert!(
-            error.contains("--api-key-env: the name of a variable"),
-            "{error}"
-        );
+        assert!(error.contains("--api-key-env: the name of a variable"), "{error}");
         assert!(!error.contains(key), "{error}");
     }
     let error = refusal("https://h.example/v1", &["--api-key-env", "MY_KEY"], &[]);
@@ -92,13 +81,7 @@ fn headers_are_sent_and_secrets_hidden() {
     let bench = Bench::with_questions(1);
     let echo = Answer::error(400, "bad", &format!("{SECRET} may not do that"));
     let mock = MockEndpoint::start([echo, Answer::text(&format!("A {SECRET}"))]);
-    let line = [
-        "run",
-        "--header",
-        "X-Team: vision",
-        "--header-env",
-        "X-Auth=GATEWAY",
-    ];
+    let line = ["run", "--header", "X-Team: vision", "--header-env", "X-Auth=GATEWAY"];
     let variables = [("GATEWAY", SECRET), ("RUST_LOG", "trace")];
     for code in [1, 0] {
         let called = run(&bench, &mock.base_url(), &line, &variables);
@@ -132,25 +115,14 @@ fn secret_header_needs_https() {
     error: --header: authorization is sent already, with the key or the account: leave it out of --header and
         --header-env, or the key with --api-key-env none
     ");
-    let error = refusal(
-        "http://127.0.0.1:9/v1",
-        &["--header-env", "X-A=NOWHERE"],
-        &[],
-    );
+    let error = refusal("http://127.0.0.1:9/v1", &["--header-env", "X-A=NOWHERE"], &[]);
     insta::assert_snapshot!(redacted(&error), @"error: --header-env: the variable NOWHERE is not set");
 }
 
 #[test]
 fn extra_body_merges_and_drops_fields() {
     let body = r#"{"chat_template_kwargs": {"enable_thinking": false}, "stop": ["\"url\":\"\""], "max": {"a": {}}}"#;
-    let line = [
-        "--extra-body",
-        body,
-        "--omit-field",
-        "temperature",
-        "--system",
-        "Answer briefly.",
-    ];
+    let line = ["--extra-body", body, "--omit-field", "temperature", "--system", "Answer briefly."];
     let (bench, request) = request(&line, &[]);
     let mut sent = request.json();
     let question = sent["messages"][1]["content"].take();
@@ -168,8 +140,7 @@ fn extra_body_merges_and_drops_fields() {
         "messages": [{"role": "system", "content": "Answer briefly."}, {"role": "user", "content": null}],
     });
     assert_eq!(sent, expected);
-    let manifest: Value =
-        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
     let model = &manifest["columns"]["model"]["m"];
     assert_eq!(model["--system"], "Answer briefly.");
     assert_eq!(model["--omit-field"], json!(["temperature"]));
@@ -181,12 +152,7 @@ fn extra_body_merges_and_drops_fields() {
     bench.complete(&model_args(&url, flags));
     let mut sent = mock.requests()[0].json();
     let image = sent["messages"][0]["content"][1]["image_url"]["url"].take();
-    assert!(
-        image
-            .as_str()
-            .unwrap()
-            .starts_with("data:image/png;base64,")
-    );
+    assert!(image.as_str().unwrap().starts_with("data:image/png;base64,"));
     assert_eq!(sent["stop"], json!(["\"url\":\"\""]));
 }
 
@@ -195,16 +161,7 @@ fn program_fields_are_refused_by_name() {
     let url = "http://127.0.0.1:9/v1";
     let error = refusal(url, &["--extra-body", r#"{"temperature": 1}"#], &[]);
     insta::assert_snapshot!(redacted(&error), @"error: --extra-body: temperature is set by the program: use --temperature");
-    let error = refusal(
-        url,
-        &[
-            "--extra-body",
-            r#"{"response_format": {}}"#,
-            "--constrain",
-            "json",
-        ],
-        &[],
-    );
+    let error = refusal(url, &["--extra-body", r#"{"response_format": {}}"#, "--constrain", "json"], &[]);
     insta::assert_snapshot!(
         redacted(&error),
         @"error: --extra-body: response_format is set by --request constrain; leave one of them out"
@@ -218,18 +175,13 @@ fn secret_in_body_is_refused() {
     let mock = MockEndpoint::start([Answer::text("C")]);
     let body = format!("{{\"litellm\": {{\"api_key\": \"{SECRET}\"}}}}");
     bench.file("body.json", &body);
-    let table = format!(
-        "[[model]]\nid = \"m\"\nendpoints = [\"{}\"]\nbody = \"@body.json\"\n",
-        mock.base_url()
-    );
+    let table = format!("[[model]]\nid = \"m\"\nendpoints = [\"{}\"]\nbody = \"@body.json\"\n", mock.base_url());
     bench.file("models.toml", table);
     let url = mock.base_url();
     let flags = ["--model", "m", "--base-url", &url, "--extra-body"];
-    for words in [
-        [&flags[..], &[&*body]].concat(),
-        [&flags[..], &["@body.json"]].concat(),
-        vec!["--models", "models.toml"],
-    ] {
+    for words in
+        [[&flags[..], &[&*body]].concat(), [&flags[..], &["@body.json"]].concat(), vec!["--models", "models.toml"]]
+    {
         let line = ["--data", "set.jsonl", "--levels", "L0", "--out", "run"];
         let refused = bench.call(&[&line[..], &words].concat());
         assert_eq!(refused.code, Some(2), "{refused:?}");
@@ -262,20 +214,13 @@ fn refused_field_of_user_is_named() {
 fn trial_keys_ignore_absent_fields() {
     let key = |line: &str| {
         let (bench, _) = request(&words(line), &[]);
-        records(&bench.path("run"))[0]["key"]
-            .as_str()
-            .unwrap()
-            .to_owned()
+        records(&bench.path("run"))[0]["key"].as_str().unwrap().to_owned()
     };
     let plain = key("");
     assert_eq!(plain, PLAIN_KEY);
     assert_eq!(key("--header X-Team:vision --header-env X-A=PATH"), plain);
     let mut keys = vec![plain];
-    for line in [
-        "--system Look!",
-        "--extra-body {\"a\":null}",
-        "--omit-field seed",
-    ] {
+    for line in ["--system Look!", "--extra-body {\"a\":null}", "--omit-field seed"] {
         keys.push(key(line));
     }
     keys.sort();

@@ -1,4 +1,5 @@
-//! A process that is stopped for longer than its time limits (Ctrl-Z, `scontrol suspend`, a closed laptop): no reply is paid for twice.
+//! A process that is stopped for longer than its time limits (Ctrl-Z, `scontrol suspend`, a closed laptop): no reply is
+//! paid for twice.
 #![cfg(unix)]
 
 use std::process::Stdio;
@@ -16,7 +17,8 @@ const STOPPED: Duration = Duration::from_millis(2500);
 /// Requests of these runs: 6 questions at 2 levels.
 const TRIALS: usize = 12;
 
-const RUN: &str = "--data set.jsonl --levels L0,L3 --variant ev --concurrency 4 --timeout 1 --grace 1 --retries 0 --out run";
+const RUN: &str =
+    "--data set.jsonl --levels L0,L3 --variant ev --concurrency 4 --timeout 1 --grace 1 --retries 0 --out run";
 
 /// The way in which the endpoint answers.
 #[derive(Debug, Clone, Copy)]
@@ -54,10 +56,7 @@ fn pauses_longer_than_timeout_cost_nothing() {
     check_rows([Reply::Whole, Reply::Dripping, Reply::Stream], |reply| {
         let bench = Bench::with_questions(6);
         let endpoint = reply.endpoint();
-        let (url, line) = (
-            endpoint.base_url(),
-            format!("{RUN} --wire {}", reply.wire()),
-        );
+        let (url, line) = (endpoint.base_url(), format!("{RUN} --wire {}", reply.wire()));
         let mut program = bench.spawn(&model_args(&url, &line), Stdio::null());
         for requests in [1, 4, 9] {
             wait_until(|| endpoint.requests().len() >= requests);

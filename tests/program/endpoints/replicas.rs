@@ -18,20 +18,11 @@ fn run(bench: &Bench, replicas: &[&MockEndpoint], more: &str, line: &str) -> Cal
 }
 
 /// A run of models, each with more lines of its table, that all have these replicas.
-fn run_models(
-    bench: &Bench,
-    replicas: &[&MockEndpoint],
-    models: &[(&str, &str)],
-    line: &str,
-) -> Called {
-    let urls: Vec<String> = replicas
-        .iter()
-        .map(|mock| format!("\"{}\"", mock.base_url()))
-        .collect();
+fn run_models(bench: &Bench, replicas: &[&MockEndpoint], models: &[(&str, &str)], line: &str) -> Called {
+    let urls: Vec<String> = replicas.iter().map(|mock| format!("\"{}\"", mock.base_url())).collect();
     let endpoints = urls.join(", ");
-    let tables = models
-        .iter()
-        .map(|(id, more)| format!("[[model]]\nid = \"{id}\"\nendpoints = [{endpoints}]\n{more}\n"));
+    let tables =
+        models.iter().map(|(id, more)| format!("[[model]]\nid = \"{id}\"\nendpoints = [{endpoints}]\n{more}\n"));
     bench.file("models.toml", tables.collect::<String>());
     bench.call(&words(&format!("{RUN} {line}")))
 }
@@ -39,10 +30,7 @@ fn run_models(
 /// The number of chat requests that a replica was sent.
 fn asked(mock: &MockEndpoint) -> usize {
     let requests = mock.requests();
-    requests
-        .iter()
-        .filter(|request| request.line.starts_with("POST"))
-        .count()
+    requests.iter().filter(|request| request.line.starts_with("POST")).count()
 }
 
 /// A server that answers after a time.
@@ -60,11 +48,7 @@ fn the_load_is_shared() {
     let called = run(&bench, &mocks.each_ref(), "", "");
     assert_eq!(called.code, Some(0), "{called:?}");
     let shares = mocks.each_ref().map(asked);
-    assert_eq!(
-        shares.iter().sum::<usize>(),
-        80,
-        "none was sent twice: {shares:?}"
-    );
+    assert_eq!(shares.iter().sum::<usize>(), 80, "none was sent twice: {shares:?}");
     assert!(shares.iter().all(|share| *share >= 12), "{shares:?}");
     for (index, share) in shares.into_iter().enumerate() {
         let records = records(&bench.path("run"));
@@ -108,10 +92,7 @@ fn replicas_without_access_drop_out() {
     let called = run(&bench, &[&locked, &open], "", "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(asked(&open), 20);
-    assert_eq!(
-        called.stderr.matches("gets no more requests").count(),
-        usize::from(asked(&locked) > 0)
-    );
+    assert_eq!(called.stderr.matches("gets no more requests").count(), usize::from(asked(&locked) > 0));
     let other = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
     let bench = Bench::with_questions(20);
     let called = run(&bench, &[&locked, &other], "", "");
@@ -144,20 +125,12 @@ fn replica_of_other_model_is_unused() {
     let called = run(&bench, &[&one, &two], "", "");
     assert_eq!(called.code, Some(0), "{called:?}");
     let served: BTreeMap<String, usize> =
-        records(&bench.path("run"))
-            .iter()
-            .fold(BTreeMap::new(), |mut counts, record| {
-                *counts
-                    .entry(record["served_model"].as_str().unwrap().to_owned())
-                    .or_default() += 1;
-                counts
-            });
+        records(&bench.path("run")).iter().fold(BTreeMap::new(), |mut counts, record| {
+            *counts.entry(record["served_model"].as_str().unwrap().to_owned()).or_default() += 1;
+            counts
+        });
     assert_eq!(served.len(), 1, "{served:?}");
-    assert_eq!(
-        called.stderr.matches("it gets no more requests").count(),
-        1,
-        "{called:?}"
-    );
+    assert_eq!(called.stderr.matches("it gets no more requests").count(), 1, "{called:?}");
 }
 
 /// A server of only these models; its replies name the model.
@@ -177,34 +150,18 @@ fn serving_models(known: &'static [&'static str]) -> MockEndpoint {
 fn outcomes(bench: &Bench, model: &str) -> (usize, usize, [usize; 2]) {
     let records = records(&bench.path("run"));
     let own = records.iter().filter(|record| record["model"] == model);
-    let (failed, answered): (Vec<_>, Vec<_>) =
-        own.partition(|record| record["outcome"] == "failed");
-    let at = |index: u64| {
-        answered
-            .iter()
-            .filter(move |record| record["endpoint"] == index)
-    };
+    let (failed, answered): (Vec<_>, Vec<_>) = own.partition(|record| record["outcome"] == "failed");
+    let at = |index: u64| answered.iter().filter(move |record| record["endpoint"] == index);
     (answered.len(), failed.len(), [at(0).count(), at(1).count()])
 }
 
 #[test]
 fn models_share_replicas() {
     let bench = Bench::with_questions(40);
-    let mocks = [
-        serving_models(&["qwen", "internvl"]),
-        serving_models(&["qwen", "internvl"]),
-    ];
-    let called = run_models(
-        &bench,
-        &mocks.each_ref(),
-        &[("qwen", ""), ("internvl", "")],
-        "",
-    );
+    let mocks = [serving_models(&["qwen", "internvl"]), serving_models(&["qwen", "internvl"])];
+    let called = run_models(&bench, &mocks.each_ref(), &[("qwen", ""), ("internvl", "")], "");
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        !called.stderr.contains("gets no more requests"),
-        "{called:?}"
-    );
+    assert!(!called.stderr.contains("gets no more requests"), "{called:?}");
     for model in ["qwen", "internvl"] {
         let (answered, failed, shares) = outcomes(&bench, model);
         assert_eq!((answered, failed), (40, 0), "{model}");
@@ -216,30 +173,14 @@ fn models_share_replicas() {
 fn model_without_replica_leaves_others() {
     let bench = Bench::with_questions(40);
     let mocks = [serving_models(&["m"]), serving_models(&["m"])];
-    let called = run_models(
-        &bench,
-        &mocks.each_ref(),
-        &[("mistyped", ""), ("m", "")],
-        "",
-    );
-    assert_eq!(
-        called.code,
-        Some(1),
-        "the mistyped one was stopped: {called:?}"
-    );
+    let called = run_models(&bench, &mocks.each_ref(), &[("mistyped", ""), ("m", "")], "");
+    assert_eq!(called.code, Some(1), "the mistyped one was stopped: {called:?}");
     let (answered, failed, shares) = outcomes(&bench, "m");
     assert_eq!((answered, failed), (40, 0));
     assert!(shares.iter().all(|share| *share > 0), "{shares:?}");
     let (answered, _, _) = outcomes(&bench, "mistyped");
     assert_eq!(answered, 0);
-    assert_eq!(
-        called
-            .stderr
-            .matches("gets no more requests for mistyped")
-            .count(),
-        2,
-        "{called:?}"
-    );
+    assert_eq!(called.stderr.matches("gets no more requests for mistyped").count(), 2, "{called:?}");
     // One replica that lacks a model is left out for that model alone.
     let bench = Bench::with_questions(40);
     let mocks = [serving_models(&["m"]), serving_models(&["m", "n"])];
@@ -262,25 +203,18 @@ fn refused_api_keeps_replicas() {
                 return Answer::new(404, "");
             }
             if request.line.contains("/chat/completions") {
-                let message =
-                    "This model is only supported in v1/responses and not in v1/chat/completions.";
+                let message = "This model is only supported in v1/responses and not in v1/chat/completions.";
                 return Answer::error(404, "unsupported", message);
             }
             let content = json!([{"type": "output_text", "text": "A"}]);
             let output = json!([{"type": "message", "role": "assistant", "content": content}]);
-            Answer::json(
-                200,
-                &json!({"model": "m", "status": "completed", "output": output}),
-            )
+            Answer::json(200, &json!({"model": "m", "status": "completed", "output": output}))
         })
     };
     let mocks = [responses_alone(), responses_alone()];
     let called = run(&bench, &mocks.each_ref(), "", "");
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        !called.stderr.contains("gets no more requests"),
-        "{called:?}"
-    );
+    assert!(!called.stderr.contains("gets no more requests"), "{called:?}");
 }
 
 #[test]
@@ -337,8 +271,7 @@ fn limited(rate: f64) -> MockEndpoint {
             taken
         };
         if !taken {
-            return Answer::error(429, "rate_limit_exceeded", "slow down")
-                .header("retry-after", "1");
+            return Answer::error(429, "rate_limit_exceeded", "slow down").header("retry-after", "1");
         }
         std::thread::sleep(Duration::from_millis(100));
         Answer::text("A")
@@ -362,14 +295,12 @@ fn rate_limit_covers_all_replicas() {
     let called = run(&bench, &mocks.each_ref(), "rpm = 300", "");
     assert_eq!(called.code, Some(0), "{called:?}");
     let times = times.lock().unwrap();
-    let took = times
-        .back()
-        .unwrap()
-        .duration_since(*times.front().unwrap());
+    let took = times.back().unwrap().duration_since(*times.front().unwrap());
     assert!(took >= Duration::from_millis(950), "{took:?}");
 }
 
-/// Four replicas of ten a second each. What is turned away tells how well each is known; the time depends on the machine.
+/// Four replicas of ten a second each. What is turned away tells how well each is known; the time depends on the
+/// machine.
 #[test]
 fn four_replicas_quadruple_speed() {
     let bench = Bench::with_questions(240);
@@ -378,10 +309,6 @@ fn four_replicas_quadruple_speed() {
     assert_eq!(called.code, Some(0), "{called:?}");
     let sent: usize = mocks.iter().map(asked).sum();
     let records = records(&bench.path("run"));
-    assert!(
-        records
-            .iter()
-            .all(|record: &Value| record["outcome"] != "failed")
-    );
+    assert!(records.iter().all(|record: &Value| record["outcome"] != "failed"));
     assert!(sent < 300, "{sent}");
 }

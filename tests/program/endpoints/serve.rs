@@ -21,14 +21,9 @@ impl Server {
         let args = words("serve --data rooms:frames=4,size=200x150 --port 0 --quiet");
         let mut process = bench.spawn(&args, Stdio::piped());
         let mut url = String::new();
-        BufReader::new(process.stdout.take().unwrap())
-            .read_line(&mut url)
-            .unwrap();
+        BufReader::new(process.stdout.take().unwrap()).read_line(&mut url).unwrap();
         let url = url.trim().to_owned();
-        assert!(
-            url.starts_with("http://127.0.0.1:") && url.ends_with("/v1"),
-            "{url}"
-        );
+        assert!(url.starts_with("http://127.0.0.1:") && url.ends_with("/v1"), "{url}");
         Self { process, url }
     }
 
@@ -37,20 +32,14 @@ impl Server {
         // An error says that another test was faster.
         let _ = rustls::crypto::ring::default_provider().install_default();
         runtime.block_on(async {
-            let client = reqwest::Client::builder()
-                .no_proxy()
-                .timeout(std::time::Duration::from_mins(1))
-                .build()
-                .unwrap();
+            let client =
+                reqwest::Client::builder().no_proxy().timeout(std::time::Duration::from_mins(1)).build().unwrap();
             let request = client.post(format!("{}/chat/completions", self.url));
             let request = request.header("content-type", "application/json");
             let reply = request.body(body.to_string()).send().await.unwrap();
             let status = reply.status().as_u16();
             let text = reply.text().await.unwrap();
-            (
-                status,
-                serde_json::from_str(&text).unwrap_or(Value::String(text)),
-            )
+            (status, serde_json::from_str(&text).unwrap_or(Value::String(text)))
         })
     }
 }
@@ -106,16 +95,10 @@ fn served_observer_matches_program() {
             })
             .collect()
     };
-    let (here, there) = (
-        replies("observer", "here"),
-        replies("darkqa-observer", "there"),
-    );
+    let (here, there) = (replies("observer", "here"), replies("darkqa-observer", "there"));
     assert!(here.len() >= 30, "{}", here.len());
     // Where it sees nothing that bears on the question it guesses, there as it likes.
-    let apart = here
-        .iter()
-        .filter(|(item, reply)| there[*item] != **reply)
-        .count();
+    let apart = here.iter().filter(|(item, reply)| there[*item] != **reply).count();
     assert!(apart * 10 <= here.len(), "{apart} of {}", here.len());
 }
 
@@ -124,23 +107,17 @@ fn client_errors_use_client_format() {
     let bench = Bench::new();
     let server = Server::start(&bench);
     let user = |content: Value| json!([{"role": "user", "content": content}]);
-    let (status, reply) =
-        server.ask(&json!({"model": "darkqa-random", "messages": user(json!(WORDS))}));
+    let (status, reply) = server.ask(&json!({"model": "darkqa-random", "messages": user(json!(WORDS))}));
     assert_eq!((status, &reply["object"]), (200, &json!("chat.completion")));
     let answer = reply["choices"][0]["message"]["content"].as_str().unwrap();
     assert!(["A", "B"].contains(&answer), "{reply}");
     let parts = json!([{"type": "text", "text": WORDS}]);
-    let (_, again) =
-        server.ask(&json!({"model": "darkqa-random", "messages": user(parts), "temperature": 1}));
+    let (_, again) = server.ask(&json!({"model": "darkqa-random", "messages": user(parts), "temperature": 1}));
     assert_eq!(again["choices"][0]["message"]["content"], answer);
-    let stream =
-        json!({"model": "darkqa-observer", "messages": user(json!(WORDS)), "stream": true});
+    let stream = json!({"model": "darkqa-observer", "messages": user(json!(WORDS)), "stream": true});
     let (status, events) = server.ask(&stream);
     let events = events.as_str().unwrap();
-    assert!(
-        status == 200 && events.starts_with("data: {") && events.ends_with("data: [DONE]\n\n"),
-        "{events}"
-    );
+    assert!(status == 200 && events.starts_with("data: {") && events.ends_with("data: [DONE]\n\n"), "{events}");
     let rows = [
         (
             json!({"model": "gpt-4o", "messages": user(json!(WORDS))}),
@@ -149,11 +126,7 @@ fn client_errors_use_client_format() {
         ),
         (json!({"messages": []}), 400, "missing field `model`"),
         (json!([1]), 400, "not a valid chat completion"),
-        (
-            json!({"model": "darkqa-random", "messages": user(json!("hi"))}),
-            400,
-            "no choices in the text",
-        ),
+        (json!({"model": "darkqa-random", "messages": user(json!("hi"))}), 400, "no choices in the text"),
         (
             json!({"model": "darkqa-observer", "messages": user(json!([
                 {"type": "text", "text": WORDS},
@@ -173,10 +146,7 @@ fn client_errors_use_client_format() {
     check_rows(rows, |(body, status, part)| {
         let (found, reply) = server.ask(&body);
         let message = reply["error"]["message"].as_str().unwrap();
-        assert!(
-            found == status && message.contains(part),
-            "{body}: {found} {reply}"
-        );
+        assert!(found == status && message.contains(part), "{body}: {found} {reply}");
     });
 }
 
@@ -199,27 +169,12 @@ fn cross_site_requests_are_refused() {
     let rows = [
         (post(host, json), "HTTP/1.1 200 OK"),
         (post(&format!("localhost:{port}"), json), "HTTP/1.1 200 OK"),
-        (
-            post(host, &format!("{json}Origin: http://localhost:5173\r\n")),
-            "HTTP/1.1 200 OK",
-        ),
-        (
-            post(&format!("evil.example:{port}"), json),
-            "HTTP/1.1 421 Misdirected Request",
-        ),
+        (post(host, &format!("{json}Origin: http://localhost:5173\r\n")), "HTTP/1.1 200 OK"),
+        (post(&format!("evil.example:{port}"), json), "HTTP/1.1 421 Misdirected Request"),
         (post("127.0.0.1", json), "HTTP/1.1 421 Misdirected Request"),
-        (
-            post(host, &format!("{json}Origin: http://evil.example\r\n")),
-            "HTTP/1.1 403 Forbidden",
-        ),
-        (
-            post(host, &format!("{json}Origin: null\r\n")),
-            "HTTP/1.1 403 Forbidden",
-        ),
-        (
-            post(host, "Content-Type: text/plain\r\n"),
-            "HTTP/1.1 415 Unsupported Media Type",
-        ),
+        (post(host, &format!("{json}Origin: http://evil.example\r\n")), "HTTP/1.1 403 Forbidden"),
+        (post(host, &format!("{json}Origin: null\r\n")), "HTTP/1.1 403 Forbidden"),
+        (post(host, "Content-Type: text/plain\r\n"), "HTTP/1.1 415 Unsupported Media Type"),
         (post(host, ""), "HTTP/1.1 415 Unsupported Media Type"),
     ];
     check_rows(rows, |(request, expected)| {
@@ -240,10 +195,7 @@ fn endless_or_nested_bodies_are_refused() {
         )
     };
     let deep = format!("{}{}", "[".repeat(200_000), "]".repeat(200_000));
-    let rows = [
-        (head(300_000_000), "HTTP/1.1 413"),
-        (head(deep.len()) + &deep, "HTTP/1.1 400"),
-    ];
+    let rows = [(head(300_000_000), "HTTP/1.1 413"), (head(deep.len()) + &deep, "HTTP/1.1 400")];
     check_rows(rows, |(request, expected)| {
         let answer = server.answer_to(&request);
         assert!(answer.starts_with(expected), "{answer}");
@@ -259,13 +211,8 @@ fn large_images_and_many_values_are_refused() {
     let server = Server::start(&bench);
     let ask = |width: u32, height: u32| {
         let mut file = std::io::Cursor::new(Vec::new());
-        image::GrayImage::new(width, height)
-            .write_to(&mut file, image::ImageFormat::Png)
-            .unwrap();
-        let data = base64::Engine::encode(
-            &base64::engine::general_purpose::STANDARD,
-            file.into_inner(),
-        );
+        image::GrayImage::new(width, height).write_to(&mut file, image::ImageFormat::Png).unwrap();
+        let data = base64::Engine::encode(&base64::engine::general_purpose::STANDARD, file.into_inner());
         server.ask(&json!({"model": "darkqa-observer", "messages": [{"role": "user", "content": [
             {"type": "text", "text": "Is it dark?\nA. yes\nB. no"},
             {"type": "image_url", "image_url": {"url": format!("data:image/png;base64,{data}")}},
@@ -274,13 +221,9 @@ fn large_images_and_many_values_are_refused() {
     let (status, body) = ask(8001, 4000);
     assert_eq!(status, 413, "{body}");
     let message = body["error"]["message"].as_str().unwrap();
-    assert!(
-        message.contains("8001 × 4000 pixels; at most 32 million"),
-        "{message}"
-    );
+    assert!(message.contains("8001 × 4000 pixels; at most 32 million"), "{message}");
     let parts = vec![json!({"type": "text", "text": ""}); 100_000];
-    let many =
-        json!({"model": "darkqa-observer", "messages": [{"role": "user", "content": parts}]});
+    let many = json!({"model": "darkqa-observer", "messages": [{"role": "user", "content": parts}]});
     let (status, body) = server.ask(&many);
     assert_eq!(status, 413, "{body}");
     let (status, body) = ask(400, 300);
@@ -293,9 +236,7 @@ fn idle_connections_block_no_one() {
     let server = Server::start(&bench);
     let mut idle: Vec<TcpStream> = (0..80).map(|_| server.connection()).collect();
     for stream in &mut idle {
-        stream
-            .write_all(b"POST /v1/chat/completions HTTP/1.1\r\nHost: a")
-            .unwrap();
+        stream.write_all(b"POST /v1/chat/completions HTTP/1.1\r\nHost: a").unwrap();
     }
     let words = json!([{"role": "user", "content": WORDS}]);
     let (status, _) = server.ask(&json!({"model": "darkqa-random", "messages": words}));

@@ -12,13 +12,12 @@ use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use crate::support::run::{Bench, model_args, records, words};
 use crate::support::snapshot::lines_with;
 
-/// A folder with three pictures and `set.json`: a question with two marks, one without marks, and one about a single picture.
+/// A folder with three pictures and `set.json`: a question with two marks, one without marks, and one about a single
+/// picture.
 fn bench() -> Bench {
     let bench = Bench::new();
     for (name, shade, size) in [("a", 200, 64), ("b", 120, 48), ("c", 220, 40)] {
-        let picture = RgbImage::from_fn(size, 40, |x, y| {
-            image::Rgb([shade, (x * 3) as u8, (y * 5) as u8])
-        });
+        let picture = RgbImage::from_fn(size, 40, |x, y| image::Rgb([shade, (x * 3) as u8, (y * 5) as u8]));
         picture.save(bench.path(&format!("{name}.png"))).unwrap();
     }
     let rows = json!([
@@ -52,10 +51,7 @@ fn parts(body: &Value) -> Vec<Result<String, RgbImage>> {
 
 /// Words, and the width of each picture.
 fn outline(body: &Value) -> Vec<String> {
-    parts(body)
-        .into_iter()
-        .map(|part| part.unwrap_or_else(|picture| picture.width().to_string()))
-        .collect()
+    parts(body).into_iter().map(|part| part.unwrap_or_else(|picture| picture.width().to_string())).collect()
 }
 
 fn mean(picture: &RgbImage) -> f64 {
@@ -95,44 +91,29 @@ fn row_images_share_one_request() {
         found.len() == 4 && found[0].contains("Which is wide?") && found[1..] == ["64", "48", "40"]
     };
     assert_eq!(outlines.iter().filter(three).count(), 3);
-    let one = |found: &&Vec<String>| {
-        found.len() == 2 && found[0].starts_with("What?") && found[1] == "40"
-    };
+    let one = |found: &&Vec<String>| found.len() == 2 && found[0].starts_with("What?") && found[1] == "40";
     assert_eq!(outlines.iter().filter(one).count(), 3);
     // Without images the words keep the marks.
-    let blind = |found: &&Vec<String>| {
-        found.len() == 1 && found[0].contains("Is <image 2> like <image 1>?")
-    };
+    let blind = |found: &&Vec<String>| found.len() == 1 && found[0].contains("Is <image 2> like <image 1>?");
     assert_eq!(outlines.iter().filter(blind).count(), 1);
     // All images of a request are darkened alike: both are dark, or none is.
     let mut lights = BTreeSet::new();
     for body in bodies.iter().filter(|body| outline(body) == two) {
         let pictures: Vec<RgbImage> = parts(body).into_iter().filter_map(Result::err).collect();
-        let dark = pictures
-            .iter()
-            .map(|picture| mean(picture) < 40.0)
-            .collect::<BTreeSet<bool>>();
+        let dark = pictures.iter().map(|picture| mean(picture) < 40.0).collect::<BTreeSet<bool>>();
         assert_eq!(dark.len(), 1);
         lights.extend(dark);
     }
     assert_eq!(lights.len(), 2);
     // A record has all of them, and nothing is asked again.
     let stored = records(&bench.path("run"));
-    let seen = stored
-        .iter()
-        .filter(|record| record["question"] == "three" && record["view"] == "image");
+    let seen = stored.iter().filter(|record| record["question"] == "three" && record["view"] == "image");
     for record in seen {
         let more = record["more_images"].as_array().unwrap();
-        assert_eq!(
-            [&record["image"], &more[0], &more[1]].map(|image| image["width"].as_u64()),
-            [64, 48, 40].map(Some)
-        );
+        assert_eq!([&record["image"], &more[0], &more[1]].map(|image| image["width"].as_u64()), [64, 48, 40].map(Some));
     }
     assert!(
-        stored
-            .iter()
-            .filter(|record| record["question"] == "one")
-            .all(|record| record.get("more_images").is_none())
+        stored.iter().filter(|record| record["question"] == "one").all(|record| record.get("more_images").is_none())
     );
     bench.complete(&model_args(&url, &line));
     assert_eq!(endpoint.requests().len(), 12);
@@ -143,11 +124,7 @@ fn row_images_share_one_request() {
 fn images_are_made_again(bench: &Bench) {
     let shown = bench.complete(&words("show run three"));
     insta::assert_snapshot!(lines_with(&shown, "images: "), @"three, about 3 images: a.png, b.png, c.png");
-    assert_eq!(
-        shown.matches("the same bytes as were sent").count(),
-        3,
-        "{shown}"
-    );
+    assert_eq!(shown.matches("the same bytes as were sent").count(), 3, "{shown}");
     let files = fs::read_dir(bench.path("run/shown")).unwrap().count();
     assert_eq!(files, 9);
     bench.complete(&words("show run two --sheet sheet.png"));
@@ -159,20 +136,11 @@ fn images_are_made_again(bench: &Bench) {
         .map(|line| serde_json::from_str::<Value>(line).unwrap())
         .map(|question| question["images"].clone())
         .collect();
-    assert_eq!(
-        images,
-        [
-            json!(["a.png", "b.png"]),
-            json!(["a.png", "b.png", "c.png"]),
-            Value::Null
-        ]
-    );
+    assert_eq!(images, [json!(["a.png", "b.png"]), json!(["a.png", "b.png", "c.png"]), Value::Null]);
     let small = fs::read_to_string(bench.path("run/thumbnails.jsonl")).unwrap();
     assert_eq!(small.lines().count(), 9);
     // Another picture in its place is noticed.
-    RgbImage::from_pixel(48, 40, image::Rgb([1, 2, 3]))
-        .save(bench.path("b.png"))
-        .unwrap();
+    RgbImage::from_pixel(48, 40, image::Rgb([1, 2, 3])).save(bench.path("b.png")).unwrap();
     let called = bench.call(&words("show run two"));
     insta::assert_snapshot!(called.lines_with("bytes"), @"
     exit code: 1
@@ -187,22 +155,12 @@ fn noise_is_independent_of_position() {
     let bench = bench();
     let endpoint = MockEndpoint::start([Answer::text("A")]);
     let url = endpoint.base_url();
-    bench.complete(&model_args(
-        &url,
-        "--data set.json --levels L3 --variant noise --multi-image send --out run",
-    ));
+    bench.complete(&model_args(&url, "--data set.json --levels L3 --variant noise --multi-image send --out run"));
     let requests = endpoint.requests();
-    let pictures: Vec<RgbImage> = requests
-        .iter()
-        .flat_map(|request| parts(&request.json()))
-        .filter_map(Result::err)
-        .collect();
+    let pictures: Vec<RgbImage> =
+        requests.iter().flat_map(|request| parts(&request.json())).filter_map(Result::err).collect();
     // Six images of three frames: those of one frame are alike, whichever question shows them, and in whichever place.
-    let by_width = |width: u32| {
-        pictures
-            .iter()
-            .filter(move |picture| picture.width() == width)
-    };
+    let by_width = |width: u32| pictures.iter().filter(move |picture| picture.width() == width);
     for width in [64, 48, 40] {
         let first = by_width(width).next().unwrap();
         assert_eq!(by_width(width).count(), 2);
@@ -213,9 +171,7 @@ fn noise_is_independent_of_position() {
 #[test]
 fn what_shows_one_image_refuses_several() {
     let bench = bench();
-    let called = bench.call(&words(
-        "export llava set.json --out sets --levels L0 --multi-image send",
-    ));
+    let called = bench.call(&words("export llava set.json --out sets --levels L0 --multi-image send"));
     insta::assert_snapshot!(called.messages(), @r#"
     exit code: 2
     set: 3 questions on 3 images in 1 family (no column of families)
@@ -225,13 +181,9 @@ fn what_shows_one_image_refuses_several() {
     error: --multi-image: the question "two" shows 2 images, and an exported set has one image per question;
         --multi-image skip leaves such rows out
     "#);
-    let called = bench.call(&words(
-        "--data set.json --model observer --levels L0 --multi-image send",
-    ));
+    let called = bench.call(&words("--data set.json --model observer --levels L0 --multi-image send"));
     assert_eq!(called.code, Some(2));
-    bench.complete(&words(
-        "check --data set.json --multi-image send --save-questions read.jsonl",
-    ));
+    bench.complete(&words("check --data set.json --multi-image send --save-questions read.jsonl"));
     let read = fs::read_to_string(bench.path("read.jsonl")).unwrap();
     let counts = read.lines().map(|line| {
         let line: Value = serde_json::from_str(line).unwrap();

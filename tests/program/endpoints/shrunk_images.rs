@@ -32,9 +32,7 @@ fn size(request: &Value) -> (u64, u64) {
     use base64::Engine as _;
     let text = request.to_string();
     let data = text.split("base64,").nth(1).unwrap();
-    let bytes = base64::engine::general_purpose::STANDARD
-        .decode(&data[..64])
-        .unwrap();
+    let bytes = base64::engine::general_purpose::STANDARD.decode(&data[..64]).unwrap();
     let side = |at: usize| u64::from(u32::from_be_bytes(bytes[at..at + 4].try_into().unwrap()));
     (side(16), side(20))
 }
@@ -47,8 +45,7 @@ fn told(sizes: &[(u32, u32)], tokens: fn(u64, u64) -> u64) -> [String; 2] {
         Answer::message_charged("C", 60 + tokens(width, height))
     });
     let base = mock.base_url();
-    let line =
-        format!("--model qwen2.5-vl-7b --base-url {base} --data set.jsonl --levels L0 --out run");
+    let line = format!("--model qwen2.5-vl-7b --base-url {base} --data set.jsonl --levels L0 --out run");
     let run = bench.call(&words(&line)).ended(0);
     let report = bench.call(&words("report run")).ended(0);
     [run.stderr, report.stdout].map(|text| {
@@ -71,17 +68,11 @@ fn shrunk_images_are_said_in_run_and_report() {
     let fixed = |_, _| 280;
     let [run, report] = told(&[(1280, 960), (640, 480)], fixed);
     // In the run after five replies, about the larger image.
-    assert!(
-        run.contains("rule of the model's family gives 1564"),
-        "{run}"
-    );
+    assert!(run.contains("rule of the model's family gives 1564"), "{run}");
     assert!(report.contains("at all sizes, where the rule"), "{report}");
     let longer_side = |width, height| patches(500, 500 * height / width);
     let [run, report] = told(&[(1280, 960)], longer_side);
-    assert!(
-        run.contains("tokens an image, where") && run.contains("gives 1564"),
-        "{run}"
-    );
+    assert!(run.contains("tokens an image, where") && run.contains("gives 1564"), "{run}");
     assert!(report.contains("gives 1564"), "{report}");
 }
 

@@ -12,7 +12,8 @@ use crate::support::snapshot::on_one_line;
 use crate::support::table::check_rows_at_once;
 
 /// A prompt of 100 tokens costs $0.10, a reply nothing.
-const PRICES: &str = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 30 }\n";
+const PRICES: &str =
+    "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1000, output = 0, image-tokens = 30 }\n";
 
 /// The list price of a reply here, in dollars.
 const LIST: f64 = 0.1;
@@ -24,10 +25,7 @@ fn stated(usage: Value, beside: Value, header: Option<(&str, f64)>) -> Answer {
         "usage": {"prompt_tokens": 100, "completion_tokens": 1},
     });
     for (into, fields) in [("/usage", usage), ("", beside)] {
-        let target = body
-            .pointer_mut(into)
-            .and_then(Value::as_object_mut)
-            .unwrap();
+        let target = body.pointer_mut(into).and_then(Value::as_object_mut).unwrap();
         target.extend(fields.as_object().cloned().unwrap_or_default());
     }
     let answer = Answer::json(200, &body);
@@ -48,45 +46,17 @@ fn call(bench: &Bench, mock: &MockEndpoint, more: &str) -> Called {
 type Vendor = fn(f64) -> Answer;
 
 const VENDORS: [(&str, Vendor); 6] = [
-    ("OpenRouter", |dollars| {
-        stated(
-            json!({"cost": dollars, "is_byok": false}),
-            Value::Null,
-            None,
-        )
-    }),
-    ("xAI", |dollars| {
-        stated(
-            json!({"cost_in_usd_ticks": (dollars * 1e10).round()}),
-            Value::Null,
-            None,
-        )
-    }),
+    ("OpenRouter", |dollars| stated(json!({"cost": dollars, "is_byok": false}), Value::Null, None)),
+    ("xAI", |dollars| stated(json!({"cost_in_usd_ticks": (dollars * 1e10).round()}), Value::Null, None)),
     ("Perplexity", |dollars| {
         let cost = json!({"input_tokens_cost": 0.001, "total_cost": dollars});
         stated(json!({"cost": cost}), Value::Null, None)
     }),
-    ("LiteLLM", |dollars| {
-        stated(
-            Value::Null,
-            Value::Null,
-            Some(("x-litellm-response-cost", dollars)),
-        )
-    }),
-    ("LLM Gateway", |dollars| {
-        stated(
-            json!({"cost_usd_total": dollars, "cost_usd_input": 9.0}),
-            Value::Null,
-            None,
-        )
-    }),
+    ("LiteLLM", |dollars| stated(Value::Null, Value::Null, Some(("x-litellm-response-cost", dollars)))),
+    ("LLM Gateway", |dollars| stated(json!({"cost_usd_total": dollars, "cost_usd_input": 9.0}), Value::Null, None)),
     ("own key at OpenRouter", |dollars| {
         let details = json!({"upstream_inference_cost": dollars - 0.01});
-        stated(
-            json!({"cost": 0.01, "is_byok": true, "cost_details": details}),
-            Value::Null,
-            None,
-        )
+        stated(json!({"cost": 0.01, "is_byok": true, "cost_details": details}), Value::Null, None)
     }),
 ];
 
@@ -110,10 +80,7 @@ fn bills_are_those_of_the_vendors() {
         let bill = *bill.lock().unwrap();
         assert!((bill - 3.375).abs() < 1e-9, "{vendor}");
         let records = records(&bench.path("run"));
-        let kept: f64 = records
-            .iter()
-            .map(|record| record["usage"]["cost"].as_f64().unwrap())
-            .sum();
+        let kept: f64 = records.iter().map(|record| record["usage"]["cost"].as_f64().unwrap()).sum();
         assert!((kept - bill).abs() < 1e-9, "{vendor}: {kept}");
         let report = on_one_line(&bench.complete(&words("report run")));
         for text in [on_one_line(&called.stdout), report] {
@@ -121,15 +88,8 @@ fn bills_are_those_of_the_vendors() {
             assert!(text.contains(cost), "{vendor}: {text}");
         }
         let told = on_one_line(&called.stderr);
-        assert_eq!(
-            told.matches("as its server states").count(),
-            1,
-            "{vendor}: {told}"
-        );
-        assert!(
-            told.contains("where the price table gives $0.1000"),
-            "{vendor}: {told}"
-        );
+        assert_eq!(told.matches("as its server states").count(), 1, "{vendor}: {told}");
+        assert!(told.contains("where the price table gives $0.1000"), "{vendor}: {told}");
     });
 }
 
@@ -143,11 +103,7 @@ fn a_limit_counts_stated_charges() {
         let asked = mock.requests().len();
         assert_eq!((called.code, asked), (Some(3), 5), "{vendor}: {called:?}");
         let again = call(&bench, &mock, "--max-cost 2.6");
-        assert_eq!(
-            (again.code, mock.requests().len()),
-            (Some(3), 5),
-            "{vendor}"
-        );
+        assert_eq!((again.code, mock.requests().len()), (Some(3), 5), "{vendor}");
         // The estimate of the rest follows the charges.
         let estimate = call(&bench, &mock, "--dry-run --json").ended(0);
         let estimate: Value = serde_json::from_str(&estimate.stdout).unwrap();
@@ -156,10 +112,7 @@ fn a_limit_counts_stated_charges() {
         assert!((ratio - 5.0).abs() < 1e-6, "{vendor}: {estimate}");
         let tokens = line["text_tokens"].as_f64().unwrap() + line["image_tokens"].as_f64().unwrap();
         let dollars = line["dollars"].as_f64().unwrap();
-        assert!(
-            (dollars - 5.0 * tokens / 1000.0).abs() < 1e-6,
-            "{vendor}: {estimate}"
-        );
+        assert!((dollars - 5.0 * tokens / 1000.0).abs() < 1e-6, "{vendor}: {estimate}");
     });
 }
 
@@ -182,19 +135,12 @@ fn list_prices_stated_change_nothing() {
 fn records_keep_what_is_stated_and_nothing_else() {
     let bench = Bench::with_questions(2);
     let answers = [
-        stated(
-            json!({"cost": 0.125}),
-            json!({"service_tier": "default"}),
-            None,
-        ),
+        stated(json!({"cost": 0.125}), json!({"service_tier": "default"}), None),
         stated(Value::Null, Value::Null, None),
     ];
     let mock = MockEndpoint::start(answers);
     call(&bench, &mock, "--concurrency 1").ended(0);
-    let usages: Vec<Value> = records(&bench.path("run"))
-        .iter()
-        .map(|record| record["usage"].clone())
-        .collect();
+    let usages: Vec<Value> = records(&bench.path("run")).iter().map(|record| record["usage"].clone()).collect();
     let plain = json!({"prompt_tokens": 100, "completion_tokens": 1});
     let mut first = plain.clone();
     first["cost"] = 0.125.into();
@@ -206,35 +152,16 @@ fn records_keep_what_is_stated_and_nothing_else() {
 fn odd_charges_are_ignored_and_said() {
     for (usage, said) in [
         (json!({"cost": -3}), "usage.cost of -3, no plausible charge"),
-        (
-            json!({"cost": "NaN"}),
-            "usage.cost of NaN, no plausible charge",
-        ),
-        (
-            json!({"cost": 3, "currency": "CNY"}),
-            "a charge in CNY, not in US dollars",
-        ),
-        (
-            json!({"cost": 25, "cost_unit": "credits"}),
-            "a charge in credits, not in US dollars",
-        ),
-        (
-            json!({"cost": 25}),
-            "states a charge of $25, where the price table gives $0.1000",
-        ),
-        (
-            json!({"cost": 0}),
-            "states a charge of $0, where the price table gives $0.1000",
-        ),
+        (json!({"cost": "NaN"}), "usage.cost of NaN, no plausible charge"),
+        (json!({"cost": 3, "currency": "CNY"}), "a charge in CNY, not in US dollars"),
+        (json!({"cost": 25, "cost_unit": "credits"}), "a charge in credits, not in US dollars"),
+        (json!({"cost": 25}), "states a charge of $25, where the price table gives $0.1000"),
+        (json!({"cost": 0}), "states a charge of $0, where the price table gives $0.1000"),
     ] {
         let bench = Bench::with_questions(12);
         let mock = MockEndpoint::start([stated(usage.clone(), Value::Null, None)]);
         let called = call(&bench, &mock, "--max-cost 0.75");
-        assert_eq!(
-            (called.code, mock.requests().len()),
-            (Some(3), 7),
-            "{usage}: {called:?}"
-        );
+        assert_eq!((called.code, mock.requests().len()), (Some(3), 7), "{usage}: {called:?}");
         let told = on_one_line(&called.stderr);
         assert_eq!(told.matches(said).count(), 1, "{usage}: {told}");
     }
@@ -248,16 +175,12 @@ fn stated_charges_need_no_price() {
     let base = mock.base_url();
     let line = "--data set.jsonl --levels L0 --out run";
     let called = bench.call(&model_args(&base, line)).ended(0);
-    assert!(
-        on_one_line(&called.stdout).contains("$1.00 as its replies state"),
-        "{called:?}"
-    );
+    assert!(on_one_line(&called.stdout).contains("$1.00 as its replies state"), "{called:?}");
 }
 
 #[test]
 fn streams_and_responses_state_charges() {
-    let piece =
-        json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
+    let piece = json!({"choices": [{"index": 0, "delta": {"content": "C"}, "finish_reason": "stop"}]});
     let usage = json!({"choices": [], "usage": {"prompt_tokens": 100, "completion_tokens": 1, "cost": 0.25}});
     let stream = Answer::stream(&[&piece.to_string(), &usage.to_string(), "[DONE]"]);
     let response = json!({
@@ -265,17 +188,11 @@ fn streams_and_responses_state_charges() {
         "output": [{"type": "message", "content": [{"type": "output_text", "text": "C"}]}],
         "usage": {"input_tokens": 100, "output_tokens": 1, "cost_in_usd_ticks": 2_500_000_000_u64},
     });
-    for (wire, answer) in [
-        ("chat-stream", stream),
-        ("responses", Answer::json(200, &response)),
-    ] {
+    for (wire, answer) in [("chat-stream", stream), ("responses", Answer::json(200, &response))] {
         let bench = Bench::with_questions(2);
         let mock = MockEndpoint::start([answer]);
         let called = call(&bench, &mock, &format!("--request wire={wire}")).ended(0);
-        assert!(
-            on_one_line(&called.stdout).contains("$0.5000 as its replies state"),
-            "{wire}: {called:?}"
-        );
+        assert!(on_one_line(&called.stdout).contains("$0.5000 as its replies state"), "{wire}: {called:?}");
     }
 }
 
@@ -320,12 +237,7 @@ fn service_tiers_have_their_own_prices() {
     }
     let (_, called) = within_limit(at(json!("flex")), "");
     let told = on_one_line(&called.stderr);
-    assert_eq!(
-        told.matches("a service tier without a price in the table")
-            .count(),
-        1,
-        "{told}"
-    );
+    assert_eq!(told.matches("a service tier without a price in the table").count(), 1, "{told}");
 }
 
 /// The remedy in the message helps.
@@ -347,18 +259,16 @@ fn a_tier_without_a_price_is_refused_before_the_first_request() {
     let mut args = model_args(&base, line);
     args.extend(["--extra-body", r#"{"service_tier":"flex"}"#]);
     let called = bench.call(&args).ended(0);
-    assert!(
-        on_one_line(&called.stdout).contains("$0.1000 at the prices"),
-        "{called:?}"
-    );
+    assert!(on_one_line(&called.stdout).contains("$0.1000 at the prices"), "{called:?}");
     // Without a limit and without a price, the run says why its cost is not known.
     bench.file("prices.toml", TIERS);
-    let again = args
-        .iter()
-        .map(|word| if *word == "run" { "other" } else { word });
+    let again = args.iter().map(|word| if *word == "run" { "other" } else { word });
     let called = bench.call(&again.collect::<Vec<_>>()).ended(0);
     let told = on_one_line(&called.stderr);
-    assert!(told.contains("m: its cost is not known: the table of 2026-01-01 has no price of m at the service tier"), "{told}");
+    assert!(
+        told.contains("m: its cost is not known: the table of 2026-01-01 has no price of m at the service tier"),
+        "{told}"
+    );
 }
 
 #[test]
@@ -408,8 +318,8 @@ struct State {
     excess: f64,
 }
 
-/// A run at a server that charges up to ten times the list price: its charge beyond the limit, and the most that it may be, which is what
-/// was in flight when replies were dearer than any before.
+/// A run at a server that charges up to ten times the list price: its charge beyond the limit, and the most that it may
+/// be, which is what was in flight when replies were dearer than any before.
 fn simulate(seed: u64) -> (f64, f64) {
     let of = |place: u64| share(seed.wrapping_mul(1000) + place);
     let factor = 10_f64.powf(of(1));
@@ -425,11 +335,7 @@ fn simulate(seed: u64) -> (f64, f64) {
         let state = Arc::clone(&state);
         move |_| {
             let place = number.fetch_add(1, Ordering::SeqCst) as u64;
-            let ratio = if varies {
-                factor.powf(share(seed.wrapping_mul(7919) + place))
-            } else {
-                factor
-            };
+            let ratio = if varies { factor.powf(share(seed.wrapping_mul(7919) + place)) } else { factor };
             let dollars = LIST * ratio;
             state.lock().unwrap().in_flight += dollars;
             std::thread::sleep(Duration::from_millis(1 + place % 7));
@@ -443,30 +349,19 @@ fn simulate(seed: u64) -> (f64, f64) {
             vendor(dollars)
         }
     });
-    let called = call(
-        &bench,
-        &mock,
-        &format!("--max-cost {limit} --concurrency {concurrency}"),
-    );
+    let called = call(&bench, &mock, &format!("--max-cost {limit} --concurrency {concurrency}"));
     let state = state.lock().unwrap();
     let over = state.charged - limit;
-    assert!(
-        matches!(called.code, Some(0 | 3)),
-        "seed {seed}: {called:?}"
-    );
+    assert!(matches!(called.code, Some(0 | 3)), "seed {seed}: {called:?}");
     if over > 1e-6 {
         let told = on_one_line(&called.stderr);
         assert!(
-            told.contains("more than the")
-                && told.contains("charged more than the price table: m ("),
+            told.contains("more than the") && told.contains("charged more than the price table: m ("),
             "seed {seed}: {told}"
         );
     }
     if factor > 1.06 && !varies {
-        assert!(
-            called.stderr.contains("as its server"),
-            "seed {seed}: {called:?}"
-        );
+        assert!(called.stderr.contains("as its server"), "seed {seed}: {called:?}");
     }
     (over, state.excess)
 }
@@ -475,10 +370,7 @@ fn simulate(seed: u64) -> (f64, f64) {
 fn a_limit_holds_against_dear_servers() {
     for seed in 1..=6 {
         let (over, excess) = simulate(seed);
-        assert!(
-            over <= excess + 1e-6,
-            "seed {seed}: {over} over, {excess} in flight"
-        );
+        assert!(over <= excess + 1e-6, "seed {seed}: {over} over, {excess} in flight");
     }
 }
 
@@ -490,10 +382,7 @@ fn a_limit_holds_against_200_dear_servers() {
     let (mut over, mut largest) = (0, 0.0_f64);
     for seed in 1..=200 {
         let (dollars, excess) = simulate(seed);
-        assert!(
-            dollars <= excess + 1e-6,
-            "seed {seed}: {dollars} over, {excess} in flight"
-        );
+        assert!(dollars <= excess + 1e-6, "seed {seed}: {dollars} over, {excess} in flight");
         over += usize::from(dollars > 1e-6);
         largest = largest.max(dollars);
     }

@@ -39,11 +39,7 @@ fn larger_limit_repeats_truncated_only() {
     assert_eq!((again.code, mock.requests().len()), (Some(0), 10));
 
     let grown = call(&bench, &mock, "--max-tokens 512");
-    assert_eq!(
-        (grown.code, mock.requests().len()),
-        (Some(0), 14),
-        "{grown:?}"
-    );
+    assert_eq!((grown.code, mock.requests().len()), (Some(0), 14), "{grown:?}");
     insta::assert_snapshot!(grown.messages(), @"
     exit code: 0
     4 truncated replies are asked again with the larger --max-tokens
@@ -59,10 +55,7 @@ fn larger_limit_repeats_truncated_only() {
     untouched 100.0   −27.8 0.0
     ");
     let alerts = summary(&bench)["alerts"].to_string();
-    assert!(
-        alerts.contains("6 replies with 64, 4 replies with 512"),
-        "{alerts}"
-    );
+    assert!(alerts.contains("6 replies with 64, 4 replies with 512"), "{alerts}");
 
     // Nothing is asked again with this limit, a larger one, or the first.
     for limit in ["512", "4096", "64"] {

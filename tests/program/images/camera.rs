@@ -1,5 +1,5 @@
-//! Variants of a camera that does what cameras do: automatic exposure, which is measured in EV, and motion blur, which has an axis of
-//! its own; through evaluations, their reports, and everything that makes images again.
+//! Variants of a camera that does what cameras do: automatic exposure, which is measured in EV, and motion blur, which
+//! has an axis of its own; through evaluations, their reports, and everything that makes images again.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -28,8 +28,7 @@ fn bench(wrong: &[&str]) -> Bench {
         });
         let _ = writeln!(questions, "{question}");
         for condition in wrong {
-            let reply =
-                json!({"question": format!("q{frame}"), "condition": condition, "reply": "no"});
+            let reply = json!({"question": format!("q{frame}"), "condition": condition, "reply": "no"});
             let _ = writeln!(replies, "{reply}");
         }
     }
@@ -46,26 +45,17 @@ fn read(path: &Path) -> String {
 /// The values of some columns of a table, row by row.
 fn columns(run: &Path, file: &str, names: &[&str]) -> Vec<Vec<String>> {
     let table = read(&run.join(file));
-    let mut lines = table
-        .lines()
-        .map(|line| line.split(',').collect::<Vec<_>>());
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let head = lines.next().unwrap();
-    let places: Vec<usize> = names
-        .iter()
-        .map(|name| head.iter().position(|column| column == name).unwrap())
-        .collect();
-    lines
-        .map(|row| places.iter().map(|at| row[*at].to_owned()).collect())
-        .collect()
+    let places: Vec<usize> = names.iter().map(|name| head.iter().position(|column| column == name).unwrap()).collect();
+    lines.map(|row| places.iter().map(|at| row[*at].to_owned()).collect()).collect()
 }
 
 /// Every table and figure of a run with all four variants keeps exposure times and exposure drops apart.
 #[test]
 fn exposure_times_have_own_axis() {
     let bench = bench(&["T66.67-motion", "T133.33-motion", "L5-noise", "L5-auto"]);
-    let stdout = bench.complete(&words(
-        "--model script:m.jsonl --data frames --variant all --out run",
-    ));
+    let stdout = bench.complete(&words("--model script:m.jsonl --data frames --variant all --out run"));
     let run = bench.path("run");
     let findings = bench.complete(&words("report run --findings"));
     for sentence in [
@@ -78,10 +68,7 @@ fn exposure_times_have_own_axis() {
         let page = read(&run.join("report.html"));
         assert!(page.contains(sentence), "{sentence}");
     }
-    let lines: Vec<Vec<&str>> = stdout
-        .lines()
-        .map(|line| line.split_whitespace().collect())
-        .collect();
+    let lines: Vec<Vec<&str>> = stdout.lines().map(|line| line.split_whitespace().collect()).collect();
     let after = |name: &str| {
         lines
             .iter()
@@ -91,11 +78,7 @@ fn exposure_times_have_own_axis() {
     assert!(after("L0 L1 L2 L3 L4 L5"), "{stdout}");
     assert!(after("L0 T8.33 T16.67 T33.33 T66.67 T133.33"), "{stdout}");
     // The accuracy falls from 1 at 33.33 ms to 0 at 66.67 ms; halfway between 1 and chance is 3/4.
-    let blur = columns(
-        &run,
-        "blur_thresholds.csv",
-        &["variant", "family", "threshold_ms", "longest_ms"],
-    );
+    let blur = columns(&run, "blur_thresholds.csv", &["variant", "family", "threshold_ms", "longest_ms"]);
     // Each curve in both parsings.
     assert_eq!(blur.len(), 4);
     for row in &blur {
@@ -106,11 +89,7 @@ fn exposure_times_have_own_axis() {
     let light = columns(&run, "thresholds.csv", &["variant", "darkest_ev"]);
     let of_light = |row: &Vec<String>| ["ev", "noise", "auto"].contains(&&*row[0]) && row[1] == "9";
     assert!(light.len() == 12 && light.iter().all(of_light), "{light:?}");
-    let pooled = columns(
-        &run,
-        "pooled.csv",
-        &["kind", "variant", "family", "level", "mode"],
-    );
+    let pooled = columns(&run, "pooled.csv", &["kind", "variant", "family", "level", "mode"]);
     let levels = |kind: &str, variant: &str| -> String {
         pooled
             .iter()
@@ -119,18 +98,11 @@ fn exposure_times_have_own_axis() {
             .collect::<Vec<_>>()
             .join(" ")
     };
-    assert_eq!(
-        levels("motion blur", "motion"),
-        "T8.33 T16.67 T33.33 T66.67 T133.33 T66.67–T133.33"
-    );
+    assert_eq!(levels("motion blur", "motion"), "T8.33 T16.67 T33.33 T66.67 T133.33 T66.67–T133.33");
     assert_eq!(levels("darkness", "auto"), "L1 L2 L3 L4 L5 L4–L5");
     assert_eq!(levels("darkness", "motion"), "");
     assert_eq!(levels("noise", "noise"), "L1 L2 L3 L4 L5 L4–L5 L1–L3");
-    assert_eq!(
-        levels("noise", "auto"),
-        "",
-        "only noise extends the exposure drop"
-    );
+    assert_eq!(levels("noise", "auto"), "", "only noise extends the exposure drop");
     let mut rows = columns(&run, "summary.csv", &["level", "family", "mode"]);
     rows.retain(|row| row[1] == "all" && row[2] == "strict");
     let mut in_order: Vec<String> = rows.iter().map(|row| row[0].clone()).collect();
@@ -150,15 +122,12 @@ fn exposure_times_have_own_axis() {
         assert_eq!(record["ev"].is_null(), is_motion);
         assert_eq!(record["severity"].is_number(), is_motion);
         let has_camera = is_motion || record["variant"] == "auto";
-        assert_eq!(
-            record["image"]["exposure"].is_object(),
-            has_camera,
-            "{record}"
-        );
+        assert_eq!(record["image"]["exposure"].is_object(), has_camera, "{record}");
     }
 }
 
-/// What can still be read from the pixels: the observer loses little at L3 with automatic exposure, and much in a long exposure.
+/// What can still be read from the pixels: the observer loses little at L3 with automatic exposure, and much in a long
+/// exposure.
 #[test]
 fn the_observer_loses_what_moves() {
     let bench = Bench::new();
@@ -187,8 +156,7 @@ fn the_observer_loses_what_moves() {
 fn what_camera_made_is_made_again() {
     let bench = Bench::new();
     let rooms = "--data rooms:frames=4,size=96x64";
-    let light =
-        "--variant all --levels L0,L5,T33.33 --seed 3 --motion speed=90,angle=random --auto gain=3";
+    let light = "--variant all --levels L0,L5,T33.33 --seed 3 --motion speed=90,angle=random --auto gain=3";
     let all = |more: &str| format!("--model random {rooms} {light} {more}");
     bench.complete(&words(&all("--out whole")));
     let whole = bench.path("whole");
@@ -196,20 +164,14 @@ fn what_camera_made_is_made_again() {
     let id = sent[0]["question"].as_str().unwrap();
     let shown = bench.call(&["show", "whole", id, "--out", "shown"]);
     assert_eq!(shown.code, Some(0), "{shown:?}");
-    assert_eq!(
-        shown.stdout.matches("the same bytes as were sent").count(),
-        5,
-        "{shown:?}"
-    );
+    assert_eq!(shown.stdout.matches("the same bytes as were sent").count(), 5, "{shown:?}");
     let sheet = bench.call(&["show", "whole", id, "--sheet", "item.png"]);
     assert_eq!(sheet.code, Some(0), "{sheet:?}");
     let left_out = "not drawn: L5-auto, L5-ev, T33.33-motion\n";
     assert!(sheet.stdout.contains(left_out), "{sheet:?}");
     // In parts, and on one thread.
     for part in ["1/2", "2/2"] {
-        bench.complete(&words(&all(&format!(
-            "--out parts --threads 1 --shard {part}"
-        ))));
+        bench.complete(&words(&all(&format!("--out parts --threads 1 --shard {part}"))));
     }
     bench.complete(&words("merge parts --out merged"));
     assert!(assert_same_products(&whole, &bench.path("merged")) > 8);
@@ -255,20 +217,12 @@ fn what_camera_made_is_made_again() {
     };
     for condition in ["L5-auto", "T33.33-motion"] {
         let (sent, made) = (digests(condition), made(condition));
-        assert!(
-            !made.is_empty() && made.iter().all(|digest| sent.contains(digest)),
-            "{condition}"
-        );
+        assert!(!made.is_empty() && made.iter().all(|digest| sent.contains(digest)), "{condition}");
     }
-    let batch = format!(
-        "batch export --model m --base-url http://127.0.0.1:9/v1 {rooms} {light} --out batch"
-    );
+    let batch = format!("batch export --model m --base-url http://127.0.0.1:9/v1 {rooms} {light} --out batch");
     bench.complete(&words(&batch));
     let trials = read(&bench.path("batch/batch/trials.jsonl"));
-    assert!(
-        trials.contains("T33.33-motion") && trials.contains("blur_px"),
-        "{trials}"
-    );
+    assert!(trials.contains("T33.33-motion") && trials.contains("blur_px"), "{trials}");
 }
 
 /// Walks through houses: each frame of a walk has a direction of its own, if it is drawn, and one blur otherwise.
@@ -284,15 +238,10 @@ fn walks_are_blurred_frame_by_frame() {
         let called = house.call(&words(&line));
         assert_eq!(called.code, Some(0), "{called:?}");
         let all = records(&house.0.path(out));
-        all.into_iter()
-            .filter(|record| record["step"] == "answer")
-            .collect()
+        all.into_iter().filter(|record| record["step"] == "answer").collect()
     };
     let exposure = |records: &[Value], condition: &str| {
-        let found = records
-            .iter()
-            .find(|record| record["condition"] == condition)
-            .unwrap();
+        let found = records.iter().find(|record| record["condition"] == condition).unwrap();
         found["images"]["exposure"].clone()
     };
     let (fixed, drawn) = (run("angle=45", "a"), run("angle=random", "b"));
@@ -300,9 +249,7 @@ fn walks_are_blurred_frame_by_frame() {
     let focal = 48.0 / 39.5_f64.to_radians().tan();
     let expected = focal * 30_f64.to_radians() * 0.06667;
     for records in [&fixed, &drawn] {
-        let found = exposure(records, "T66.67-motion")["blur_px"]
-            .as_f64()
-            .unwrap();
+        let found = exposure(records, "T66.67-motion")["blur_px"].as_f64().unwrap();
         assert!((found - expected).abs() < 1e-9, "{found}");
         assert_eq!(exposure(records, "L5-auto")["system_gain"], 6.0);
         assert!(exposure(records, "L0").is_null());
@@ -310,10 +257,7 @@ fn walks_are_blurred_frame_by_frame() {
     assert_eq!(exposure(&fixed, "T66.67-motion")["blur_angle"], 45.0);
     assert!(exposure(&drawn, "T66.67-motion")["blur_angle"].is_null());
     let table = read(&house.0.path("a/summary.csv"));
-    assert!(
-        table.contains("T66.67,motion") && table.contains("L5,auto"),
-        "{table}"
-    );
+    assert!(table.contains("T66.67,motion") && table.contains("L5,auto"), "{table}");
     let scores = read(&house.0.path("a/figures/scores.svg"));
     for axis in ["level; exposure drop in EV", "level; exposure time in ms"] {
         assert_eq!(scores.matches(axis).count(), 1, "{axis}");

@@ -30,26 +30,14 @@ fn data() -> TempDir {
 }
 
 fn run(data: &Path, kind: &str, out: &Path, flags: &[&str]) -> Called {
-    called(
-        Command::new(PROGRAM)
-            .args(["export", kind])
-            .arg(data)
-            .arg("--out")
-            .arg(out)
-            .args(flags),
-    )
+    called(Command::new(PROGRAM).args(["export", kind]).arg(data).arg("--out").arg(out).args(flags))
 }
 
 /// The content of questions, in the order of their words.
 fn words(set: &Dataset) -> Vec<(String, Vec<String>, usize, String)> {
     let word = |question: &Question| {
         let choices = &question.choices;
-        (
-            question.text.clone(),
-            choices.texts().to_vec(),
-            choices.truth().unwrap(),
-            question.family.to_string(),
-        )
+        (question.text.clone(), choices.texts().to_vec(), choices.truth().unwrap(), question.family.to_string())
     };
     let mut words: Vec<_> = set.questions().iter().map(word).collect();
     words.sort();
@@ -58,23 +46,14 @@ fn words(set: &Dataset) -> Vec<(String, Vec<String>, usize, String)> {
 
 /// The pixels that a question is about, by its words.
 fn pixels(set: &Dataset, text: &str) -> Rgb {
-    let question = set
-        .questions()
-        .iter()
-        .find(|question| question.text == text)
-        .unwrap();
+    let question = set.questions().iter().find(|question| question.text == text).unwrap();
     set.picture(&question.frame).unwrap().decode().unwrap()
 }
 
 #[test]
 fn every_form_is_read_back() {
     let data = data();
-    let original = Dataset::open(
-        &DataPlace::Path(data.path().to_owned()),
-        None,
-        &SetArgs::default(),
-    )
-    .unwrap();
+    let original = Dataset::open(&DataPlace::Path(data.path().to_owned()), None, &SetArgs::default()).unwrap();
     let name = original.name().to_owned();
     let rows = [
         ("vlmevalkit", format!("{name}_CONDITION.tsv")),
@@ -84,25 +63,14 @@ fn every_form_is_read_back() {
     ];
     check_rows(rows, |(kind, file)| {
         let out = tempfile::tempdir().unwrap();
-        run(
-            data.path(),
-            kind,
-            out.path(),
-            &["--levels", "L0,L2", "--variant", "ev"],
-        )
-        .ended(0);
+        run(data.path(), kind, out.path(), &["--levels", "L0,L2", "--variant", "ev"]).ended(0);
         for (condition, degraded) in [("L0", false), ("L2-ev", true)] {
             let path = out.path().join(file.replace("CONDITION", condition));
-            let set =
-                Dataset::open(&DataPlace::Path(path.clone()), None, &SetArgs::default()).unwrap();
+            let set = Dataset::open(&DataPlace::Path(path.clone()), None, &SetArgs::default()).unwrap();
             assert_eq!(words(&set), words(&original), "{}", path.display());
             for question in original.questions() {
                 let clean = original.picture(&question.frame).unwrap().decode().unwrap();
-                let expected = if degraded {
-                    expose(&clean, Severity::L2)
-                } else {
-                    clean
-                };
+                let expected = if degraded { expose(&clean, Severity::L2) } else { clean };
                 assert_eq!(pixels(&set, &question.text), expected, "{kind} {condition}");
             }
         }
@@ -113,22 +81,11 @@ fn every_form_is_read_back() {
 fn a_table_holds_each_image_once() {
     let (data, out) = (data(), tempfile::tempdir().unwrap());
     run(data.path(), "vlmevalkit", out.path(), &["--levels", "L0"]).ended(0);
-    let table = fs::read_dir(out.path())
-        .unwrap()
-        .next()
-        .unwrap()
-        .unwrap()
-        .path();
-    let mut reader = csv::ReaderBuilder::new()
-        .delimiter(b'\t')
-        .from_path(table)
-        .unwrap();
+    let table = fs::read_dir(out.path()).unwrap().next().unwrap().unwrap().path();
+    let mut reader = csv::ReaderBuilder::new().delimiter(b'\t').from_path(table).unwrap();
     assert_eq!(
         reader.headers().unwrap(),
-        [
-            "index", "image", "question", "answer", "category", "id", "A", "B", "C"
-        ]
-        .as_slice()
+        ["index", "image", "question", "answer", "category", "id", "A", "B", "C"].as_slice()
     );
     let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
     let images: Vec<bool> = rows.iter().map(|row| row[1].len() > 64).collect();
@@ -139,35 +96,21 @@ fn a_table_holds_each_image_once() {
 
 #[test]
 fn noise_is_that_of_evaluation() {
-    let (data, out, dark) = (
-        data(),
-        tempfile::tempdir().unwrap(),
-        tempfile::tempdir().unwrap(),
-    );
-    run(
-        data.path(),
-        "imagefolder",
-        out.path(),
-        &["--levels", "L3", "--variant", "noise", "--seed", "5"],
-    )
-    .ended(0);
-    called(
-        Command::new(PROGRAM)
-            .arg("synthesize")
-            .arg(data.path())
-            .arg("--out")
-            .arg(dark.path())
-            .args(["--levels", "L3", "--variant", "noise", "--seed", "5"]),
-    )
+    let (data, out, dark) = (data(), tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    run(data.path(), "imagefolder", out.path(), &["--levels", "L3", "--variant", "noise", "--seed", "5"]).ended(0);
+    called(Command::new(PROGRAM).arg("synthesize").arg(data.path()).arg("--out").arg(dark.path()).args([
+        "--levels",
+        "L3",
+        "--variant",
+        "noise",
+        "--seed",
+        "5",
+    ]))
     .ended(0);
     let open = |path: std::path::PathBuf| image::open(path).unwrap().into_rgb8();
     for name in ["a", "b"] {
         let exported = open(out.path().join(format!("L3-noise/images/{name}.png")));
-        assert_eq!(
-            exported,
-            open(dark.path().join(format!("{name}_L3-noise.png"))),
-            "{name}"
-        );
+        assert_eq!(exported, open(dark.path().join(format!("{name}_L3-noise.png"))), "{name}");
     }
 }
 
@@ -176,23 +119,13 @@ fn nothing_is_written_over_unasked() {
     let (data, out) = (data(), tempfile::tempdir().unwrap());
     let flags = ["--levels", "L0"];
     run(data.path(), "llava", out.path(), &flags).ended(0);
-    let message = run(data.path(), "llava", out.path(), &flags)
-        .ended(2)
-        .stderr;
+    let message = run(data.path(), "llava", out.path(), &flags).ended(2).stderr;
     insta::assert_snapshot!(
         redacted(&message),
         @"error: [TMP]/L0/questions.jsonl: the set exists already; --force overwrites it, another --out keeps both"
     );
-    run(
-        data.path(),
-        "llava",
-        out.path(),
-        &["--levels", "L0", "--force"],
-    )
-    .ended(0);
-    let message = run(data.path(), "parquet", out.path(), &flags)
-        .ended(2)
-        .stderr;
+    run(data.path(), "llava", out.path(), &["--levels", "L0", "--force"]).ended(0);
+    let message = run(data.path(), "parquet", out.path(), &flags).ended(2).stderr;
     insta::assert_snapshot!(
         redacted(&message),
         @"error: invalid value 'parquet' for '<KIND>' [possible values: vlmevalkit, imagefolder, llava]"

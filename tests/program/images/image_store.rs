@@ -57,7 +57,8 @@ fn without_times(value: &mut Value) {
     }
 }
 
-/// Asserts that two runs say the same of the same images: records, measures of fidelity, thumbnails, and the notes about enhancers.
+/// Asserts that two runs say the same of the same images: records, measures of fidelity, thumbnails, and the notes
+/// about enhancers.
 fn assert_same(bench: &Bench, [one, other]: [&str; 2]) {
     let [one, other] = [one, other].map(|run| bench.path(run));
     assert_eq!(untimed(&one), untimed(&other));
@@ -65,9 +66,7 @@ fn assert_same(bench: &Bench, [one, other]: [&str; 2]) {
     for name in ["fidelity.jsonl", "thumbnails.jsonl"] {
         let lines = |run: &PathBuf| {
             let text = fs::read_to_string(run.join(name)).unwrap();
-            text.lines()
-                .map(str::to_owned)
-                .collect::<BTreeSet<String>>()
+            text.lines().map(str::to_owned).collect::<BTreeSet<String>>()
         };
         assert!(!lines(&one).is_empty());
         assert_eq!(lines(&one), lines(&other), "{name}");
@@ -93,9 +92,7 @@ fn stored_as(bench: &Bench, content: &str) -> Vec<PathBuf> {
     entries.retain(|path| {
         let file = fs::read(path).unwrap();
         // The facts stand at the end.
-        file.windows(wanted.len())
-            .rev()
-            .any(|part| part == wanted.as_bytes())
+        file.windows(wanted.len()).rev().any(|part| part == wanted.as_bytes())
     });
     entries.sort_unstable();
     entries
@@ -127,10 +124,7 @@ fn second_model_reuses_stored_images() {
     assert_same(&bench, ["observer-alone", "observer"]);
 
     // Another size, format or model of the same name is another image.
-    for (number, more) in ["--max-side 50", "--image jpeg:80", "--seed 9"]
-        .iter()
-        .enumerate()
-    {
+    for (number, more) in ["--max-side 50", "--image jpeg:80", "--seed 9"].iter().enumerate() {
         let more = format!("{more} --images-cache images --out other-{number}");
         let other = evaluate(&bench, "random", &more);
         // Only what is drawn depends on the seed.
@@ -189,11 +183,7 @@ fn missing_image_opens_the_enhancer() {
     evaluate(&bench, "observer", "--out again-alone");
     assert_same(&bench, ["again-alone", "again"]);
     // Less is asked, so the enhancer is tried on other frames, and its note says so.
-    let other = evaluate(
-        &bench,
-        "random",
-        "--images-cache images --limit 1 --out other",
-    );
+    let other = evaluate(&bench, "random", "--images-cache images --limit 1 --out other");
     assert!(!other.stderr.contains(NOT_OPENED), "{}", other.stderr);
     evaluate(&bench, "random", "--limit 1 --out other-alone");
     assert_same(&bench, ["other-alone", "other"]);
@@ -250,9 +240,7 @@ fn dry_run_estimates_image_store() {
         0.05 in a scene)
     only 3 frames (8 are needed): intervals and tests would be rough
     ");
-    let narrow = bench.complete(&words(&format!(
-        "{line} --images-cache images --images-cache-size 0.00001"
-    )));
+    let narrow = bench.complete(&words(&format!("{line} --images-cache images --images-cache-size 0.00001")));
     insta::assert_snapshot!(redacted(&narrow), @"
     Nothing was sent. 60 of 60 trials are left to ask.
     at no endpoint, built in: random 60
@@ -270,11 +258,7 @@ fn dry_run_estimates_image_store() {
 fn shards_try_an_enhancer_once() {
     let bench = bench();
     for shard in ["1/3", "2/3", "3/3"] {
-        evaluate(
-            &bench,
-            "random",
-            &format!("--images-cache images --out run --shard {shard}"),
-        );
+        evaluate(&bench, "random", &format!("--images-cache images --out run --shard {shard}"));
         // The result of the probe, and that the model was opened.
         assert_eq!(stored_as(&bench, "probe").len(), 2, "{shard}");
     }
@@ -306,10 +290,7 @@ fn processes_share_one_image_store() {
     assert_same(&bench, ["random-alone", "random"]);
     assert_same(&bench, ["observer-alone", "observer"]);
     let listed = bench.complete(&words("cache images"));
-    assert!(
-        listed.contains("L3-noise, enhanced by one, png"),
-        "{listed}"
-    );
+    assert!(listed.contains("L3-noise, enhanced by one, png"), "{listed}");
     assert!(listed.contains("in all, in images"), "{listed}");
     let foreign = bench.file("images/v1/notes.txt", "mine");
     let cleared = bench.complete(&words("cache images --clear"));

@@ -9,15 +9,15 @@ use serde_json::Value;
 use crate::support::run::{Bench, assert_same_products, files, records, words};
 
 /// All noise profiles and variants, with settings that are drawn for each frame.
-const LIGHT: &str = "--profile all --variant all --levels L0,L2,9,T33.33 --seed 3 --motion speed=90,angle=random --auto gain=3";
-/// Conditions of `LIGHT`: L0, and by level exposure drop alone, four readings of noise, automatic exposure; and a motion blur.
+const LIGHT: &str =
+    "--profile all --variant all --levels L0,L2,9,T33.33 --seed 3 --motion speed=90,angle=random --auto gain=3";
+/// Conditions of `LIGHT`: L0, and by level exposure drop alone, four readings of noise, automatic exposure; and a
+/// motion blur.
 const CONDITIONS: usize = 1 + 2 * 6 + 1;
 
 /// Random answers about room frames with a known camera.
 fn evaluate(bench: &Bench, more: &str) {
-    bench.complete(&words(&format!(
-        "--model random --data rooms:frames=3,size=96x64 {more}"
-    )));
+    bench.complete(&words(&format!("--model random --data rooms:frames=3,size=96x64 {more}")));
 }
 
 /// Digests of the images that a run has sent, by condition.
@@ -41,10 +41,7 @@ fn threads_and_shards_keep_bytes() {
     let different: BTreeSet<_> = images.values().flatten().collect();
     assert_eq!(different.len(), 3 * CONDITIONS, "no two images are alike");
 
-    evaluate(
-        &bench,
-        &format!("{LIGHT} --threads 3 --concurrency 16 --out many"),
-    );
+    evaluate(&bench, &format!("{LIGHT} --threads 3 --concurrency 16 --out many"));
     assert!(assert_same_products(&whole, &bench.path("many")) > 8);
 
     for part in ["2/3", "1/3", "3/3"] {
@@ -79,9 +76,7 @@ fn image_files_match_sent_images() {
 
     let mut digests = BTreeMap::<String, BTreeSet<String>>::new();
     let sidecars = files(&bench.path("made"));
-    let sidecars = sidecars
-        .iter()
-        .filter(|path| path.extension().is_some_and(|e| e == "json"));
+    let sidecars = sidecars.iter().filter(|path| path.extension().is_some_and(|e| e == "json"));
     for (index, sidecar) in sidecars.enumerate() {
         let facts: Value = serde_json::from_slice(&fs::read(sidecar).unwrap()).unwrap();
         let image = fs::read(sidecar.with_extension("png")).unwrap();

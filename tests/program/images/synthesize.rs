@@ -10,9 +10,7 @@ use serde_json::{Value, json};
 
 /// A folder with one image, and one question about it.
 fn frames(bench: &Bench) {
-    let image = image::RgbImage::from_fn(37, 21, |x, y| {
-        image::Rgb([(x * 6) as u8, (y * 12) as u8, 90])
-    });
+    let image = image::RgbImage::from_fn(37, 21, |x, y| image::Rgb([(x * 6) as u8, (y * 12) as u8, 90]));
     fs::create_dir_all(bench.path("frames")).unwrap();
     image.save(bench.path("frames/a.png")).unwrap();
     let question = json!({"id": "q", "frame": "a.png", "question": "Is it?", "choices": ["yes", "no"], "answer": "no"});
@@ -48,7 +46,8 @@ fn files_are_what_an_evaluation_sends() {
     assert!(bench.path("out/a_L4-noise@physical.png").exists());
 }
 
-/// Free drops of light and two readings at once: exposure has no readings, and each noisy image has the name of its own.
+/// Free drops of light and two readings at once: exposure has no readings, and each noisy image has the name of its
+/// own.
 #[test]
 fn any_drop_and_profile_is_made() {
     let bench = Bench::new();
@@ -64,13 +63,7 @@ fn any_drop_and_profile_is_made() {
     let states = ["E3.3-noise", "E3.3-noise@eld"]
         .map(|name| json_of(&bench.path(&format!("out/a_{name}.json")))["sensor"]["state"].clone());
     assert_eq!(states[0], states[1]);
-    let refused = bench.call(
-        &[
-            &["synthesize", "frames", "--out", "more", "--tone", "none"],
-            &light[..],
-        ]
-        .concat(),
-    );
+    let refused = bench.call(&[&["synthesize", "frames", "--out", "more", "--tone", "none"], &light[..]].concat());
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 2
     error: --noise tone: cannot be combined with several profiles; name one in --profile
@@ -90,16 +83,10 @@ fn existing_images_stay_unless_different() {
         bench.call(&words(&line))
     };
     assert_eq!(call(&[]).stdout, "out: 2 made of 1 frame\n");
-    assert_eq!(
-        call(&[]).stdout,
-        "out: 0 made of 1 frame, 2 left as they were (--force makes them again)\n"
-    );
+    assert_eq!(call(&[]).stdout, "out: 0 made of 1 frame, 2 left as they were (--force makes them again)\n");
     let other = call(&["--seed", "1"]);
     assert_eq!(other.code, Some(1));
-    assert_eq!(
-        other.stdout,
-        "out: 0 made of 1 frame, 1 left as they were (--force makes them again), 1 failed\n"
-    );
+    assert_eq!(other.stdout, "out: 0 made of 1 frame, 1 left as they were (--force makes them again), 1 failed\n");
     insta::assert_snapshot!(other.messages(), @"
     exit code: 1
     ERROR out/a_L2-noise.png: made with --seed 0, now 1; --force overwrites it, another --out keeps both
@@ -113,11 +100,7 @@ fn existing_images_stay_unless_different() {
     ");
     let other = at_two_levels("--seed 9");
     let lines: Vec<&str> = other.stderr.lines().collect();
-    assert!(
-        lines.len() == 1
-            && lines[0].contains("a_L2-noise.png and 1 more: made with --seed 0, now 9"),
-        "{lines:?}"
-    );
+    assert!(lines.len() == 1 && lines[0].contains("a_L2-noise.png and 1 more: made with --seed 0, now 9"), "{lines:?}");
     let before = fs::read(bench.path("out/a_L2-noise.png")).unwrap();
     assert_eq!(call(&["--seed", "1", "--force"]).code, Some(0));
     assert_ne!(before, fs::read(bench.path("out/a_L2-noise.png")).unwrap());
@@ -127,9 +110,7 @@ fn existing_images_stay_unless_different() {
 fn as_jpeg(path: &Path) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
     let image = image::open(path).unwrap();
-    image
-        .write_to(&mut bytes, image::ImageFormat::Jpeg)
-        .unwrap();
+    image.write_to(&mut bytes, image::ImageFormat::Jpeg).unwrap();
     bytes.into_inner()
 }
 
@@ -138,8 +119,7 @@ fn encoded_again(path: &Path) -> Vec<u8> {
     use image::codecs::png::{CompressionType, FilterType, PngEncoder};
     let image = image::open(path).unwrap();
     let mut bytes = Vec::new();
-    let encoder =
-        PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter);
+    let encoder = PngEncoder::new_with_quality(&mut bytes, CompressionType::Fast, FilterType::NoFilter);
     image.write_with_encoder(encoder).unwrap();
     bytes
 }
@@ -152,10 +132,7 @@ fn json_file_verifies_image_bytes() {
         let line = format!("synthesize frames/a.png --out out --levels L2 --variant ev {more}");
         bench.call(&words(&line))
     };
-    let (image, json) = (
-        bench.path("out/a_L2-ev.png"),
-        bench.path("out/a_L2-ev.json"),
-    );
+    let (image, json) = (bench.path("out/a_L2-ev.png"), bench.path("out/a_L2-ev.json"));
     assert_eq!(call("").code, Some(0));
     let written = fs::read(&image).unwrap();
     let output = &json_of(&json)["output"];
@@ -273,20 +250,14 @@ fn a_file_makes_its_image_again() {
     assert_eq!(sidecar["drop"], 6.0);
     check_rows(["L3-noise@custom", "L3-ev"], |condition| {
         let from = format!("out/a_{condition}.json");
-        let again = bench.call(&words(&format!(
-            "synthesize frames/a.png --out again --from {from}"
-        )));
+        let again = bench.call(&words(&format!("synthesize frames/a.png --out again --from {from}")));
         assert_eq!(again.code, Some(0), "{again:?}");
-        let [old, new] = ["out", "again"]
-            .map(|folder| fs::read(bench.path(&format!("{folder}/a_{condition}.png"))).unwrap());
+        let [old, new] =
+            ["out", "again"].map(|folder| fs::read(bench.path(&format!("{folder}/a_{condition}.png"))).unwrap());
         assert_eq!(old, new);
     });
-    image::RgbImage::new(2, 2)
-        .save(bench.path("b.png"))
-        .unwrap();
-    let wrong = bench.call(&words(
-        "synthesize b.png --out again --from out/a_L3-noise@custom.json",
-    ));
+    image::RgbImage::new(2, 2).save(bench.path("b.png")).unwrap();
+    let wrong = bench.call(&words("synthesize b.png --out again --from out/a_L3-noise@custom.json"));
     insta::assert_snapshot!(wrong.messages(), @"
     exit code: 2
     error: out/a_L3-noise@custom.json: made from another image than INPUT (their contents differ, or the flags by
@@ -299,9 +270,7 @@ fn broken_frame_fails_alone() {
     let bench = Bench::new();
     frames(&bench);
     bench.file("frames/b.png", "no image");
-    let made = bench.call(&words(
-        "synthesize frames --out out --levels L0-L1 --variant noise",
-    ));
+    let made = bench.call(&words("synthesize frames --out out --levels L0-L1 --variant noise"));
     assert_eq!(made.code, Some(1));
     assert_eq!(made.stdout, "out: 2 made of 2 frames, 2 failed\n");
     assert_eq!(made.stderr.matches("b.png").count(), 1, "{}", made.stderr);
@@ -397,20 +366,12 @@ fn sheets_are_drawn_for_each_frame() {
 
 /// The numbers of an exposure in a file or a record.
 fn exposure(of: &Value) -> [Option<f64>; 7] {
-    let fields = [
-        "shutter",
-        "gain",
-        "dark",
-        "time_ms",
-        "system_gain",
-        "blur_px",
-        "blur_angle",
-    ];
+    let fields = ["shutter", "gain", "dark", "time_ms", "system_gain", "blur_px", "blur_angle"];
     fields.map(|field| of["exposure"][field].as_f64())
 }
 
-/// Automatic exposure and motion blur: their files hold what the camera did, make the image again byte for byte, and are what an
-/// evaluation sends.
+/// Automatic exposure and motion blur: their files hold what the camera did, make the image again byte for byte, and
+/// are what an evaluation sends.
 #[test]
 fn camera_that_meets_dark_and_moves() {
     let bench = Bench::new();
@@ -427,47 +388,26 @@ fn camera_that_meets_dark_and_moves() {
         let all = [1.0, 3.0, dark, 1000.0 / 60.0, 3.0, blur(1.0 / 60.0), 30.0];
         all.map(Some)
     };
-    let motion = [
-        None,
-        None,
-        None,
-        Some(66.67),
-        None,
-        Some(blur(0.06667)),
-        Some(30.0),
-    ];
+    let motion = [None, None, None, Some(66.67), None, Some(blur(0.06667)), Some(30.0)];
     check_rows(
-        [
-            ("L3-auto", auto(2.0), 6.0),
-            ("L5-auto", auto(5.0), 9.0),
-            ("T66.67-motion", motion, 0.0),
-        ],
+        [("L3-auto", auto(2.0), 6.0), ("L5-auto", auto(5.0), 9.0), ("T66.67-motion", motion, 0.0)],
         |(condition, expected, drop)| {
             let file = json_of(&bench.path(&format!("out/a_{condition}.json")));
             for (found, expected) in exposure(&file).iter().zip(expected) {
                 let off = found.zip(expected).map_or(0.0, |(a, b)| (a - b).abs());
-                assert!(
-                    found.is_some() == expected.is_some() && off < 1e-9,
-                    "{file}"
-                );
+                assert!(found.is_some() == expected.is_some() && off < 1e-9, "{file}");
             }
             assert_eq!(file["drop"], drop);
             let from = format!("out/a_{condition}.json");
-            let again = bench.call(&words(&format!(
-                "synthesize frames/a.png --out again --from {from}"
-            )));
+            let again = bench.call(&words(&format!("synthesize frames/a.png --out again --from {from}")));
             assert_eq!(again.code, Some(0), "{again:?}");
-            let [old, new] = ["out", "again"].map(|folder| {
-                fs::read(bench.path(&format!("{folder}/a_{condition}.png"))).unwrap()
-            });
+            let [old, new] =
+                ["out", "again"].map(|folder| fs::read(bench.path(&format!("{folder}/a_{condition}.png"))).unwrap());
             assert_eq!(old, new);
         },
     );
     let sensor = json_of(&bench.path("out/a_L5-auto.json"))["sensor"].clone();
-    assert_eq!(
-        (&sensor["reading"], &sensor["state"]["system_gain"]),
-        (&json!("physical"), &json!(3.0))
-    );
+    assert_eq!((&sensor["reading"], &sensor["state"]["system_gain"]), (&json!("physical"), &json!(3.0)));
     assert_eq!(sensor["state"]["ratio"], 32.0);
     let run = words("--data frames --model random --out run");
     let run = bench.call(&[&run[..], &light[..]].concat());
@@ -572,8 +512,7 @@ fn what_camera_cannot_do_is_refused() {
         are possible: ask for a shorter exposure, or set a lower speed with --motion speed=…
     ");
     // An evaluation is refused before anything is asked.
-    let run =
-        "--data frames --model random --out run --variant motion --levels T500 --motion speed=2000";
+    let run = "--data frames --model random --out run --variant motion --levels T500 --motion speed=2000";
     let run = bench.call(&words(run));
     assert_eq!(run.code, Some(2), "{run:?}");
     assert!(run.stderr.contains(message) && !bench.path("run").exists());

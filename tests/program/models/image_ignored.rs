@@ -60,9 +60,7 @@ impl Asked {
         let parts = body["messages"][0]["content"].as_array().unwrap();
         let text = parts.iter().find_map(|part| part["text"].as_str()).unwrap();
         let question = (0..4).find(|i| text.contains(&format!("Question {i}?")));
-        let url = parts
-            .iter()
-            .find_map(|part| part["image_url"]["url"].as_str());
+        let url = parts.iter().find_map(|part| part["image_url"]["url"].as_str());
         let (_, data) = url.unwrap().split_once(',').unwrap();
         let image = image::load_from_memory(&STANDARD.decode(data).unwrap()).unwrap();
         Self {
@@ -82,10 +80,7 @@ impl Asked {
 }
 
 fn call(answer: impl Fn(&Asked) -> Answer + Send + Sync + 'static) -> (Called, Vec<Value>) {
-    let (bench, mock) = (
-        bench(),
-        MockEndpoint::answering(move |body| answer(&Asked::new(body))),
-    );
+    let (bench, mock) = (bench(), MockEndpoint::answering(move |body| answer(&Asked::new(body))));
     let base = mock.base_url();
     let line = "--data set.jsonl --levels L0,L5 --variant ev --out run";
     let called = bench.call(&model_args(&base, line));
@@ -113,12 +108,10 @@ fn dropped_images_raise_first_alert() {
 #[test]
 fn every_second_image_lost_is_found() {
     let count = AtomicUsize::new(0);
-    let (called, alerts) = call(
-        move |asked| match count.fetch_add(1, Ordering::Relaxed) % 2 {
-            0 => asked.by_words(),
-            _ => asked.by_image(),
-        },
-    );
+    let (called, alerts) = call(move |asked| match count.fetch_add(1, Ordering::Relaxed) % 2 {
+        0 => asked.by_words(),
+        _ => asked.by_image(),
+    });
     let words = "A part of the replies of m does not depend on the image: ";
     assert_eq!(called.stderr.matches(words).count(), 1, "{called:?}");
     assert!(alerts[0]["text"].as_str().unwrap().starts_with(words));
@@ -126,13 +119,7 @@ fn every_second_image_lost_is_found() {
 
 #[test]
 fn word_guessing_in_dark_is_allowed() {
-    let (called, alerts) = call(|asked| {
-        if asked.is_dark {
-            asked.by_words()
-        } else {
-            asked.by_image()
-        }
-    });
+    let (called, alerts) = call(|asked| if asked.is_dark { asked.by_words() } else { asked.by_image() });
     assert!(!called.stderr.contains("depend on the image"), "{called:?}");
     assert!(alerts.iter().all(|alert| alert["kind"] != "image_ignored"));
 }

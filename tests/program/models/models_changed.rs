@@ -1,5 +1,5 @@
-//! A run whose file of models changes: models that are taken out, that get other settings or another name; and what reports say of
-//! each model.
+//! A run whose file of models changes: models that are taken out, that get other settings or another name; and what
+//! reports say of each model.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -30,16 +30,8 @@ fn accuracies(bench: &Bench) -> BTreeMap<String, String> {
     let summary: Value = serde_json::from_str(&text).unwrap();
     let rows = summary["rows"].as_array().unwrap();
     rows.iter()
-        .filter(|row| {
-            (&row["mode"], &row["family"]) == (&"strict".into(), &"all".into())
-                && row["model"] != "chance"
-        })
-        .map(|row| {
-            (
-                row["model"].as_str().unwrap().to_owned(),
-                row["value"].to_string(),
-            )
-        })
+        .filter(|row| (&row["mode"], &row["family"]) == (&"strict".into(), &"all".into()) && row["model"] != "chance")
+        .map(|row| (row["model"].as_str().unwrap().to_owned(), row["value"].to_string()))
         .collect()
 }
 
@@ -65,11 +57,7 @@ fn removed_model_is_excluded_but_kept() {
     let all = ["one", "random", "two"];
     assert_eq!(names(&bench), all);
     // Asking some of them leaves the others in.
-    let run = complete(
-        &bench,
-        &[one.clone(), two.clone()],
-        "--model random --only one",
-    );
+    let run = complete(&bench, &[one.clone(), two.clone()], "--model random --only one");
     assert!(!run.stdout.contains("left out"), "{}", run.stdout);
     assert_eq!(names(&bench), all);
     let asked = mock.requests().len();
@@ -167,15 +155,9 @@ fn changed_settings_make_another_model() {
     report: run/report.html
     ");
     assert_eq!(mock.requests().len(), 6);
-    assert_eq!(
-        accuracies(&bench),
-        BTreeMap::from([("m".into(), "1.0".into())])
-    );
+    assert_eq!(accuracies(&bench), BTreeMap::from([("m".into(), "1.0".into())]));
     bench.complete(&["report", "run", "--all", "--rescore"]);
-    let both = BTreeMap::from([
-        ("m".into(), "1.0".into()),
-        ("m (before)".into(), "0.0".into()),
-    ]);
+    let both = BTreeMap::from([("m".into(), "1.0".into()), ("m (before)".into(), "0.0".into())]);
     assert_eq!(accuracies(&bench), both);
     // Back and forth nothing is asked, and nothing is mixed.
     for (limit, now, before) in [(20, "0.0", "1.0"), (9, "1.0", "0.0"), (20, "0.0", "1.0")] {
@@ -183,11 +165,7 @@ fn changed_settings_make_another_model() {
         assert_eq!(names(&bench), ["m"]);
         bench.complete(&["report", "run", "--all"]);
         let found = accuracies(&bench);
-        assert_eq!(
-            (&*found["m"], &*found["m (before)"]),
-            (now, before),
-            "{limit}"
-        );
+        assert_eq!((&*found["m"], &*found["m (before)"]), (now, before), "{limit}");
         assert_eq!(found.len(), 2);
     }
     assert_eq!(mock.requests().len(), 6);
@@ -200,8 +178,7 @@ fn changed_settings_make_another_model() {
     assert_eq!(names(&bench), ["m", "m (before 2)", "m (before)"]);
     assert_eq!(records(&bench.path("run")).len(), 9);
     // A model that a flag names is held to what it was, as ever.
-    let flags =
-        format!("--data set.jsonl --levels L0 --out run --model m --max-tokens 7 --base-url {url}");
+    let flags = format!("--data set.jsonl --levels L0 --out run --model m --max-tokens 7 --base-url {url}");
     let refused = bench.call(&words(&flags));
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 2
@@ -215,12 +192,8 @@ fn two_models_may_exchange_their_names() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(2);
-    let tables = |good: &str, bad: &str| {
-        [
-            table(good, "m", &url, "max-tokens = 9"),
-            table(bad, "m", &url, "max-tokens = 20"),
-        ]
-    };
+    let tables =
+        |good: &str, bad: &str| [table(good, "m", &url, "max-tokens = 9"), table(bad, "m", &url, "max-tokens = 20")];
     complete(&bench, &tables("x", "y"), "");
     let found = accuracies(&bench);
     assert_eq!((&*found["x"], &*found["y"]), ("1.0", "0.0"));
@@ -242,8 +215,7 @@ fn renamed_models_separate_blind_replies() {
         Answer::text(if has_image { "C" } else { "A" })
     });
     let url = mock.base_url();
-    let tables =
-        |image: &str, blind: &str| [table(blind, "m", &url, BLIND), table(image, "m", &url, "")];
+    let tables = |image: &str, blind: &str| [table(blind, "m", &url, BLIND), table(image, "m", &url, "")];
     let is = |bench: &Bench, image: &str, blind: &str| {
         let expected = [(image, "1.0"), (blind, "0.0")];
         let expected = expected.map(|(name, value)| (name.to_owned(), value.to_owned()));
@@ -254,12 +226,7 @@ fn renamed_models_separate_blind_replies() {
     complete(&bench, &tables("GPT-4o", "GPT-4o (blind)"), "");
     is(&bench, "GPT-4o", "GPT-4o (blind)");
     assert_eq!(mock.requests().len(), 4);
-    for (image, blind) in [
-        ("4o", "4o (blind)"),
-        ("seeing", "a"),
-        ("a", "seeing"),
-        ("a", "b"),
-    ] {
+    for (image, blind) in [("4o", "4o (blind)"), ("seeing", "a"), ("a", "seeing"), ("a", "b")] {
         complete(&bench, &tables(image, blind), "");
         is(&bench, image, blind);
         bench.complete(&["report", "run", "--all"]);
@@ -292,10 +259,7 @@ fn renamed_models_separate_blind_replies() {
     run: run
     report: run/report.html
     ");
-    assert_eq!(
-        accuracies(&bench),
-        BTreeMap::from([("x".into(), "0.0".into())])
-    );
+    assert_eq!(accuracies(&bench), BTreeMap::from([("x".into(), "0.0".into())]));
 }
 
 #[test]
@@ -310,10 +274,8 @@ fn models_with_adapted_requests_are_marked() {
     });
     let mock = endpoint();
     let bench = Bench::with_questions(2);
-    let tables = [
-        table("thinker", "t", &strict.base_url(), ""),
-        table("plain", "p", &mock.base_url(), "max-tokens = 9"),
-    ];
+    let tables =
+        [table("thinker", "t", &strict.base_url(), ""), table("plain", "p", &mock.base_url(), "max-tokens = 9")];
     let run = complete(&bench, &tables, "");
     let foot = "† requests were changed because the server refused what was set (thinker: no";
     insta::assert_snapshot!(run.lines_with("†"), @"
@@ -330,21 +292,13 @@ fn models_with_adapted_requests_are_marked() {
         own is used)
     ");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-    assert!(
-        page.contains("<p class=\"foot\">† requests were changed"),
-        "the foot is on the page"
-    );
+    assert!(page.contains("<p class=\"foot\">† requests were changed"), "the foot is on the page");
     let tex = fs::read_to_string(bench.path("run/tables.tex")).unwrap();
-    assert!(
-        tex.contains("thinker $\\dagger$ &") && tex.contains("{\\footnotesize $\\dagger$ requests"),
-        "{tex}"
-    );
+    assert!(tex.contains("thinker $\\dagger$ &") && tex.contains("{\\footnotesize $\\dagger$ requests"), "{tex}");
     // The name in files is the name alone; under another name the mark stays.
     assert_eq!(names(&bench), ["plain", "thinker"]);
-    let tables = [
-        table("renamed", "t", &strict.base_url(), ""),
-        table("plain", "p", &mock.base_url(), "max-tokens = 9"),
-    ];
+    let tables =
+        [table("renamed", "t", &strict.base_url(), ""), table("plain", "p", &mock.base_url(), "max-tokens = 9")];
     let run = complete(&bench, &tables, "");
     insta::assert_snapshot!(run.lines_with("†"), @"
     exit code: 0
@@ -361,10 +315,7 @@ fn model_columns_show_on_demand() {
     let mock = endpoint();
     let url = mock.base_url();
     let bench = Bench::with_questions(2);
-    let tables = [
-        table("First", "org/first", &url, "deployment = \"fp8\""),
-        table("Second", "org/second", &url, ""),
-    ];
+    let tables = [table("First", "org/first", &url, "deployment = \"fp8\""), table("Second", "org/second", &url, "")];
     let run = complete(&bench, &tables, "");
     assert!(!run.stdout.contains("org/first"), "{}", run.stdout);
     let line = "report run --columns id,deployment,served";
@@ -385,32 +336,17 @@ fn model_columns_show_on_demand() {
     report: run/report.html
     ");
     let full = bench.complete(&words(&format!("{line} --full")));
-    let row = full
-        .lines()
-        .find(|line| line.starts_with(" First "))
-        .unwrap();
+    let row = full.lines().find(|line| line.starts_with(" First ")).unwrap();
     insta::assert_snapshot!(
         redacted(row.trim_start()),
         @"First    untouched   0.0   org/first    fp8          mock-1      2          0        0   0.0 +65.8"
     );
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-    assert!(
-        page.contains("<th scope=\"col\">served as</th>"),
-        "the column is on the page"
-    );
+    assert!(page.contains("<th scope=\"col\">served as</th>"), "the column is on the page");
     let summary = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
     let mut lines = summary.lines();
-    assert!(
-        lines
-            .next()
-            .unwrap()
-            .ends_with(",id,deployment,served_model"),
-        "{summary}"
-    );
-    assert!(
-        lines.next().unwrap().ends_with(",org/first,fp8,mock-1"),
-        "{summary}"
-    );
+    assert!(lines.next().unwrap().ends_with(",id,deployment,served_model"), "{summary}");
+    assert!(lines.next().unwrap().ends_with(",org/first,fp8,mock-1"), "{summary}");
     bench.complete(&["report", "run"]);
     let summary = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
     assert!(!summary.contains("org/first"), "{summary}");

@@ -53,10 +53,7 @@ fn keys(bench: &Bench, run: &str) -> BTreeMap<(String, String), String> {
 
 #[test]
 fn one_run_asks_several_endpoints() {
-    let (one, two) = (
-        MockEndpoint::start([Answer::text("A")]),
-        MockEndpoint::start([Answer::text("C")]),
-    );
+    let (one, two) = (MockEndpoint::start([Answer::text("A")]), MockEndpoint::start([Answer::text("C")]));
     let bench = bench(
         3,
         &format!(
@@ -89,33 +86,20 @@ id = "random"
         ),
     );
     let mut command = bench.command(&words(RUN));
-    command
-        .env("SECOND_KEY", "second-key-0123456789")
-        .env("GATEWAY", "gateway-0123456789");
-    command
-        .env("OPENAI_API_KEY", "openai-key-0123456789")
-        .env("RUST_LOG", "trace");
+    command.env("SECOND_KEY", "second-key-0123456789").env("GATEWAY", "gateway-0123456789");
+    command.env("OPENAI_API_KEY", "openai-key-0123456789").env("RUST_LOG", "trace");
     let run = called(&mut command);
     assert_eq!(run.code, Some(0), "{run:?}");
     let (first, second) = (one.requests(), two.requests());
     assert_eq!((first.len(), second.len()), (3, 6));
     let body = first[0].json();
-    assert_eq!(
-        (&body["model"], &body["max_tokens"]),
-        (&json!("org/first"), &json!(64))
-    );
+    assert_eq!((&body["model"], &body["max_tokens"]), (&json!("org/first"), &json!(64)));
     assert_eq!(body["chat_template_kwargs"]["enable_thinking"], false);
-    let seen: Vec<_> = second
-        .iter()
-        .filter(|request| request.header("x-auth").is_some())
-        .collect();
+    let seen: Vec<_> = second.iter().filter(|request| request.header("x-auth").is_some()).collect();
     assert_eq!(seen.len(), 3);
     for request in seen {
         let body = request.json();
-        assert_eq!(
-            request.header("authorization"),
-            Some("Bearer second-key-0123456789")
-        );
+        assert_eq!(request.header("authorization"), Some("Bearer second-key-0123456789"));
         assert_eq!(request.header("x-team"), Some("a"));
         assert!(body.get("temperature").is_none());
         assert_eq!(body["messages"][0]["content"], "Be brief.");
@@ -123,19 +107,11 @@ id = "random"
         let image = &body["messages"][1]["content"][1];
         assert_eq!(*image, first[0].json()["messages"][0]["content"][1]);
     }
-    let names: Vec<String> = keys(&bench, "run")
-        .into_keys()
-        .map(|(model, _)| model)
-        .collect();
+    let names: Vec<String> = keys(&bench, "run").into_keys().map(|(model, _)| model).collect();
     for name in ["First", "second", "words", "random"] {
-        assert_eq!(
-            names.iter().filter(|other| *other == name).count(),
-            3,
-            "{name}"
-        );
+        assert_eq!(names.iter().filter(|other| *other == name).count(), 3, "{name}");
     }
-    let manifest: Value =
-        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
     let models = manifest["settings"]["models"].as_array().unwrap();
     assert_eq!(models.len(), 4);
     assert_eq!(models[1]["key"], "the variable SECOND_KEY");
@@ -174,33 +150,23 @@ fn model_overrides_flags_override_defaults() {
     assert_eq!(limit_sent(&defaults, "", Some("11")), 12);
     assert_eq!(limit_sent(&defaults, "--max-tokens 13", Some("11")), 13);
     assert_eq!(limit_sent(&own, "--max-tokens 13", Some("11")), 14);
-    assert_eq!(
-        limit_sent(&own, "--max-tokens 13 --set m.max-tokens=15", None),
-        15
-    );
+    assert_eq!(limit_sent(&own, "--max-tokens 13 --set m.max-tokens=15", None), 15);
 }
 
 #[test]
 fn overridden_flag_is_reported_once() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
-    let table =
-        |id: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\nmax-tokens = 14\n");
+    let table = |id: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\nmax-tokens = 14\n");
     let bench = bench(1, &(table("m") + &table("n")));
     let stderr = call(&bench, "--max-tokens 13").stderr;
-    assert_eq!(
-        stderr.matches("models with their own max-tokens").count(),
-        1,
-        "{stderr}"
-    );
+    assert_eq!(stderr.matches("models with their own max-tokens").count(), 1, "{stderr}");
     assert!(!call(&bench, "").stderr.contains("of their own"));
 }
 
 #[test]
 fn file_errors_name_their_line() {
-    let table = |line: &str| {
-        format!("[[model]]\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{line}\n")
-    };
+    let table = |line: &str| format!("[[model]]\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{line}\n");
     let lines = [
         "max-token = 3",
         "base-url = \"a\"",
@@ -262,16 +228,8 @@ fn file_errors_name_their_line() {
         @"error: models.toml, line 2: a model without id: what the endpoint calls it, or random, observer, script:FILE"
     );
     let secret = refusal(&table("key-env = \"sk-0123456789\""), "");
-    assert!(
-        secret.contains("line 4") && !secret.contains("0123"),
-        "{secret}"
-    );
-    let flags = [
-        "--set n.rpm=3",
-        "--set m.rpms=3",
-        "--set m.id=n",
-        "--only n",
-    ];
+    assert!(secret.contains("line 4") && !secret.contains("0123"), "{secret}");
+    let flags = ["--set n.rpm=3", "--set m.rpms=3", "--set m.id=n", "--only n"];
     let errors = each(flags, |flag| redacted(&refusal(&table(""), flag)));
     insta::assert_snapshot!(errors, @"
     --set n.rpm=3
@@ -288,9 +246,7 @@ fn file_errors_name_their_line() {
 #[test]
 fn models_with_same_trials_are_refused() {
     let table = |name: &str, more: &str| {
-        format!(
-            "[[model]]\nname = \"{name}\"\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{more}\n"
-        )
+        format!("[[model]]\nname = \"{name}\"\nid = \"m\"\nendpoints = [\"http://127.0.0.1:9/v1\"]\n{more}\n")
     };
     let error = refusal(&(table("a", "") + &table("b", "rpm = 3")), "");
     insta::assert_snapshot!(redacted(&error), @"
@@ -303,14 +259,7 @@ fn models_with_same_trials_are_refused() {
     let called = call(&bench, "--dry-run");
     assert_eq!(called.code, Some(0), "{called:?}");
     for name in ["a", "b"] {
-        assert!(
-            called
-                .stdout
-                .lines()
-                .any(|line| line.trim_start().starts_with(name)),
-            "{}",
-            called.stdout
-        );
+        assert!(called.stdout.lines().any(|line| line.trim_start().starts_with(name)), "{}", called.stdout);
     }
 }
 
@@ -318,12 +267,7 @@ fn models_with_same_trials_are_refused() {
 fn flags_and_file_make_same_trials() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
-    let bench = bench(
-        2,
-        &format!(
-            "[[model]]\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 9\nview = \"both\"\n"
-        ),
-    );
+    let bench = bench(2, &format!("[[model]]\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 9\nview = \"both\"\n"));
     complete(&bench, "");
     let asked = mock.requests().len();
     assert_eq!(asked, 4);
@@ -332,26 +276,16 @@ fn flags_and_file_make_same_trials() {
     bench.complete(&model_args(&url, flags));
     bench.file(
         "models.toml",
-        format!(
-            "[[model]]\nname = \"Renamed\"\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 9\n"
-        ),
+        format!("[[model]]\nname = \"Renamed\"\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 9\n"),
     );
     complete(&bench, "");
     assert_eq!(mock.requests().len(), asked);
     let summary = || fs::read_to_string(bench.path("run/summary.csv")).unwrap();
-    assert!(
-        summary().contains("Renamed,image") && !summary().contains("\nm,"),
-        "{}",
-        summary()
-    );
+    assert!(summary().contains("Renamed,image") && !summary().contains("\nm,"), "{}", summary());
     // The name back, in a report alone, too.
     bench.complete(&model_args(&url, flags));
     bench.complete(&["report", "run"]);
-    assert!(
-        summary().contains("m,blind") && !summary().contains("Renamed"),
-        "{}",
-        summary()
-    );
+    assert!(summary().contains("m,blind") && !summary().contains("Renamed"), "{}", summary());
     bench.file(
         "models.toml",
         format!("[[model]]\nname = \"New\"\nid = \"m\"\nendpoints = [\"{url}\"]\nmax-tokens = 8\n"),
@@ -364,19 +298,16 @@ fn flags_and_file_make_same_trials() {
 fn fatal_answer_stops_one_model_alone() {
     let refused = MockEndpoint::start([Answer::error(401, "invalid_api_key", "no such key")]);
     let good = MockEndpoint::start([Answer::text("A")]);
-    let table =
-        |id: &str, url: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n");
-    let bench = bench(
-        8,
-        &(table("locked", &refused.base_url()) + &table("open", &good.base_url())),
-    );
+    let table = |id: &str, url: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n");
+    let bench = bench(8, &(table("locked", &refused.base_url()) + &table("open", &good.base_url())));
     let run = call(&bench, "");
     assert_eq!(run.code, Some(1), "{run:?}");
     assert_eq!((refused.requests().len(), good.requests().len()), (1, 8));
     assert!(
-        run.stdout.lines().last().is_some_and(|last| {
-            last.starts_with("! not asked any further: ") && last.contains("locked: ")
-        }),
+        run.stdout
+            .lines()
+            .last()
+            .is_some_and(|last| { last.starts_with("! not asked any further: ") && last.contains("locked: ") }),
         "{run:?}"
     );
     insta::assert_snapshot!(run.lines_with("open"), @"
@@ -392,23 +323,15 @@ fn fatal_answer_stops_one_model_alone() {
     // The same command asks it again, and nothing else.
     let answered = good.requests().len();
     assert_eq!(call(&bench, "").code, Some(1));
-    assert_eq!(
-        (refused.requests().len(), good.requests().len()),
-        (3, answered)
-    );
+    assert_eq!((refused.requests().len(), good.requests().len()), (3, answered));
 }
 
 #[test]
 fn models_and_questions_can_be_selected() {
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
-    let table = |id: &str, more: &str| {
-        format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
-    };
-    let bench = bench(
-        5,
-        &(table("m-1.5", "limit = 2") + &table("m-1", "") + &table("left", "")),
-    );
+    let table = |id: &str, more: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n");
+    let bench = bench(5, &(table("m-1.5", "limit = 2") + &table("m-1", "") + &table("left", "")));
     complete(&bench, "--only m-1.5,m-1 --set m-1.5.max-tokens=7");
     let sent = |model: &str| {
         mock.requests()
@@ -417,10 +340,7 @@ fn models_and_questions_can_be_selected() {
             .filter(|body| body["model"] == *model)
             .collect::<Vec<Value>>()
     };
-    assert_eq!(
-        (sent("m-1.5").len(), sent("m-1").len(), sent("left").len()),
-        (2, 5, 0)
-    );
+    assert_eq!((sent("m-1.5").len(), sent("m-1").len(), sent("left").len()), (2, 5, 0));
     assert_eq!(sent("m-1.5")[0]["max_tokens"], 7);
     assert_eq!(sent("m-1")[0]["max_tokens"], 1024);
 }
@@ -435,32 +355,14 @@ fn slow_model_does_not_delay_others() {
         std::thread::sleep(Duration::from_millis(5));
         Answer::text("A")
     });
-    let table = |id: &str, url: &str| {
-        format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\nconcurrency = \"1\"\n")
-    };
-    let bench = bench(
-        12,
-        &(table("slow", &slow.base_url()) + &table("fast", &fast.base_url())),
-    );
+    let table =
+        |id: &str, url: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\nconcurrency = \"1\"\n");
+    let bench = bench(12, &(table("slow", &slow.base_url()) + &table("fast", &fast.base_url())));
     complete(&bench, "");
     let records = records(&bench.path("run"));
-    let last = |model: &str| {
-        records
-            .iter()
-            .rposition(|record| record["model"] == model)
-            .unwrap()
-    };
-    assert!(
-        last("fast") < last("slow"),
-        "{} {}",
-        last("fast"),
-        last("slow")
-    );
-    assert!(
-        last("fast") <= 15,
-        "fast ended as number {} of 24",
-        last("fast")
-    );
+    let last = |model: &str| records.iter().rposition(|record| record["model"] == model).unwrap();
+    assert!(last("fast") < last("slow"), "{} {}", last("fast"), last("slow"));
+    assert!(last("fast") <= 15, "fast ended as number {} of 24", last("fast"));
 }
 
 #[test]
@@ -471,10 +373,7 @@ fn model_price_decides_its_cost() {
     error: --max-cost: the price of unpriced is not in the table of [DATE]; add it to your own table and name that
         with --prices FILE, or set price in a file of models
     ");
-    let bench = bench(
-        1,
-        &format!("{table}price = {{ input = 1000000, output = 0, image-tokens = 100 }}\n"),
-    );
+    let bench = bench(1, &format!("{table}price = {{ input = 1000000, output = 0, image-tokens = 100 }}\n"));
     let called = call(&bench, "--max-cost 500000000 --dry-run --json");
     let forecast: Value = serde_json::from_str(&called.stdout).unwrap();
     let dollars = forecast.to_string();
@@ -496,11 +395,7 @@ fn model_price_decides_its_cost() {
 
 #[test]
 fn models_command_shows_resolved_settings() {
-    let mock = MockEndpoint::start([
-        Answer::text("B"),
-        Answer::text("A"),
-        Answer::error(401, "x", "no"),
-    ]);
+    let mock = MockEndpoint::start([Answer::text("B"), Answer::text("A"), Answer::error(401, "x", "no")]);
     let url = mock.base_url();
     let bench = bench(
         1,
@@ -509,25 +404,13 @@ fn models_command_shows_resolved_settings() {
         ),
     );
     let shown = bench.complete(&["models", "models.toml"]);
-    for part in [
-        "A (image)",
-        "id        a",
-        &url,
-        "none: A_KEY is not set",
-        "\"top_k\":1",
-        "digest",
-        "random",
-    ] {
+    for part in ["A (image)", "id        a", &url, "none: A_KEY is not set", "\"top_k\":1", "digest", "random"] {
         assert!(shown.contains(part), "{part}: {shown}");
     }
     assert!(mock.requests().is_empty());
     let mut command = bench.command(&["models", "models.toml", "--check", "--quiet"]);
     let checked = called(command.env("A_KEY", "secret-0123456789"));
-    for part in [
-        "A: \"B\" about a red image, of which B is true, in ",
-        "A: \"A\" without an image",
-        "b: FAILED",
-    ] {
+    for part in ["A: \"B\" about a red image, of which B is true, in ", "A: \"A\" without an image", "b: FAILED"] {
         assert!(checked.stdout.contains(part), "{part}: {checked:?}");
     }
     assert!(!checked.stdout.contains("secret-0123"));
@@ -550,18 +433,9 @@ fn open_questions_take_file_of_models() {
     let line = "openeqa --questions questions.json --frames walks --num-frames 2 --image-size 32 --levels L0 --models models.toml --out run";
     house.0.complete(&words(line));
     let bodies: Vec<Value> = mock.requests().iter().map(Request::json).collect();
-    let of = |model: &str| {
-        bodies
-            .iter()
-            .filter(|body| body["model"] == *model)
-            .cloned()
-            .collect::<Vec<_>>()
-    };
+    let of = |model: &str| bodies.iter().filter(|body| body["model"] == *model).cloned().collect::<Vec<_>>();
     assert_eq!((of("m").len(), of("n").len()), (1, 3));
-    assert_eq!(
-        (&of("m")[0]["seed"], &of("n")[0]["seed"]),
-        (&json!(1234), &json!(7))
-    );
+    assert_eq!((&of("m")[0]["seed"], &of("n")[0]["seed"]), (&json!(1234), &json!(7)));
     assert_eq!(of("m")[0]["max_tokens"], 50);
     let house_models = "[[model]]\nid = \"random\"\n";
     house.0.file("models.toml", house_models);
@@ -582,10 +456,7 @@ fn headers_enter_the_trial_key() {
         )
     };
     let decides = "reply-headers = [\"x-beta\"]";
-    let bench = bench(
-        1,
-        &(table("one", "1", decides) + &table("two", "2", decides) + &table("none", "3", "")),
-    );
+    let bench = bench(1, &(table("one", "1", decides) + &table("two", "2", decides) + &table("none", "3", "")));
     complete(&bench, "");
     let keys: std::collections::BTreeSet<String> = keys(&bench, "run").into_values().collect();
     assert_eq!((keys.len(), mock.requests().len()), (3, 3));
@@ -603,52 +474,31 @@ fn headers_enter_the_trial_key() {
 
 #[test]
 fn vendor_notes_come_before_requests() {
-    let table = |id: &str, url: &str, more: &str| {
-        format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n")
-    };
-    let anthropic = table(
-        "claude-opus-5",
-        "https://api.anthropic.com/v1",
-        "constrain = \"json\"",
-    );
+    let table =
+        |id: &str, url: &str, more: &str| format!("[[model]]\nid = \"{id}\"\nendpoints = [\"{url}\"]\n{more}\n");
+    let anthropic = table("claude-opus-5", "https://api.anthropic.com/v1", "constrain = \"json\"");
     let error = refusal(&anthropic, "--dry-run");
     insta::assert_snapshot!(
         redacted(&error),
         @"error: --request constrain: Anthropic takes a constraint and ignores it, so it would be none; leave it out"
     );
     for (base, name) in [
-        (
-            "https://api.anthropic.com/v1",
-            "Anthropic takes the request",
-        ),
-        (
-            "https://generativelanguage.googleapis.com/v1beta/openai",
-            "Gemini states no",
-        ),
+        ("https://api.anthropic.com/v1", "Anthropic takes the request"),
+        ("https://generativelanguage.googleapis.com/v1beta/openai", "Gemini states no"),
         ("https://api.mistral.ai/v1", "Mistral states no"),
         ("https://api.groq.com/openai/v1", "Groq states no"),
     ] {
         let error = refusal(&table("m", base, "probabilities = true"), "--dry-run");
-        assert!(
-            error.contains(&format!("--request probabilities: {name}")),
-            "{error}"
-        );
+        assert!(error.contains(&format!("--request probabilities: {name}")), "{error}");
     }
     let some = table("m", "https://api.openai.com/v1", "probabilities = true");
     let called = call(&bench(1, &some), "--dry-run");
     assert_eq!(called.code, Some(0), "{called:?}");
     let mixed = table("q/m", "https://openrouter.ai/api/v1", "");
-    let pinned = table(
-        "q/n",
-        "https://openrouter.ai/api/v1",
-        "body = { provider = { order = [\"a\"] } }",
-    );
+    let pinned = table("q/n", "https://openrouter.ai/api/v1", "body = { provider = { order = [\"a\"] } }");
     let called = call(&bench(1, &(mixed + &pinned)), "--dry-run");
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("q/m: OpenRouter may answer") && !called.stderr.contains("q/n"),
-        "{called:?}"
-    );
+    assert!(called.stderr.contains("q/m: OpenRouter may answer") && !called.stderr.contains("q/n"), "{called:?}");
 }
 
 #[test]
@@ -663,17 +513,6 @@ fn misspelled_built_in_model_is_refused() {
     ");
     let mock = MockEndpoint::start([Answer::text("A")]);
     let url = mock.base_url();
-    bench.complete(&[
-        "--model",
-        "rndom",
-        "--base-url",
-        &url,
-        "--data",
-        "set.jsonl",
-        "--levels",
-        "L0",
-        "--out",
-        "run",
-    ]);
+    bench.complete(&["--model", "rndom", "--base-url", &url, "--data", "set.jsonl", "--levels", "L0", "--out", "run"]);
     assert_eq!(mock.requests()[0].json()["model"], "rndom");
 }

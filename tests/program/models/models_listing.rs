@@ -25,10 +25,7 @@ fn complete(bench: &Bench, line: &str) -> Called {
 
 /// The names in the order in which they first stand in a text.
 fn order<'a>(text: &str, names: &[&'a str]) -> Vec<&'a str> {
-    let mut found: Vec<(usize, &str)> = names
-        .iter()
-        .filter_map(|name| Some((text.find(name)?, *name)))
-        .collect();
+    let mut found: Vec<(usize, &str)> = names.iter().filter_map(|name| Some((text.find(name)?, *name))).collect();
     found.sort_unstable();
     found.into_iter().map(|(_, name)| name).collect()
 }
@@ -41,10 +38,7 @@ fn read(bench: &Bench, file: &str) -> String {
 fn between<'a>(text: &'a str, start: &str, end: &str) -> &'a str {
     let from = text.find(start).unwrap_or_else(|| panic!("no {start}"));
     let rest = &text[from..];
-    &rest[..rest[start.len()..]
-        .find(end)
-        .unwrap_or(rest.len() - start.len())
-        + start.len()]
+    &rest[..rest[start.len()..].find(end).unwrap_or(rest.len() - start.len()) + start.len()]
 }
 
 #[test]
@@ -85,9 +79,7 @@ fn rows_stand_in_order_of_file() {
     let flags = "--data set.jsonl --levels L0 --out flags --model random --model observer";
     let called = bench.call(&words(flags));
     assert_eq!(called.code, Some(2), "{called:?}");
-    let flags = format!(
-        "--data set.jsonl --levels L0 --out flags --model zebra --model cow --base-url {url}"
-    );
+    let flags = format!("--data set.jsonl --levels L0 --out flags --model zebra --model cow --base-url {url}");
     bench.complete(&words(&flags));
     let summary = read(&bench, "flags/summary.csv");
     assert_eq!(order(&summary, &["cow", "zebra"]), ["cow", "zebra"]);
@@ -129,10 +121,7 @@ fn tables_are_divided_by_groups() {
     assert_eq!(found[..6], parts[..6], "{tex}");
     let page = read(&bench, "run/report.html");
     let shown = between(&page, "Accuracy in % by level, with", "</table>");
-    assert!(
-        shown.contains("<tr class=\"group\"><th scope=\"rowgroup\" colspan="),
-        "{shown}"
-    );
+    assert!(shown.contains("<tr class=\"group\"><th scope=\"rowgroup\" colspan="), "{shown}");
     // The model without images stands below the same model with them, and chance at the end.
     let rows = ["7-8B", "with noise", "without images", "guessing"];
     assert_eq!(order(between(shown, "7-8B", "</table>"), &rows), rows);
@@ -170,10 +159,7 @@ fn open_report_keeps_file_order() {
     let house = House::new();
     let mock = MockEndpoint::start([Answer::text("4")]);
     let url = mock.base_url();
-    house.0.file(
-        "models.toml",
-        table("zebra", &url, "group = \"striped\"") + &table("cow", &url, ""),
-    );
+    house.0.file("models.toml", table("zebra", &url, "group = \"striped\"") + &table("cow", &url, ""));
     let line = format!(
         "openeqa --questions questions.json --frames walks --num-frames 2 --image-size 32 --levels L0 --models models.toml --judge j --judge-base-url {url} --out run"
     );

@@ -1,4 +1,5 @@
-//! What a file of models that came with data may not do, tables of vendors of the user's own, and settings of the run in `[defaults]`.
+//! What a file of models that came with data may not do, tables of vendors of the user's own, and settings of the run
+//! in `[defaults]`.
 
 use std::fs;
 
@@ -24,9 +25,7 @@ fn strange(models: &str, line: &str, variables: &[(&str, &str)]) -> Called {
     bench.file("data/inside.txt", "Be brief.");
     bench.file("outside.txt", "private");
     fs::create_dir_all(bench.path("work")).unwrap();
-    let line = format!(
-        "--data ../data/set.jsonl --models ../data/models.toml --levels L0 --dry-run --out run {line}"
-    );
+    let line = format!("--data ../data/set.jsonl --models ../data/models.toml --levels L0 --dry-run --out run {line}");
     let mut command = bench.command(&words(&line));
     command.current_dir(bench.path("work"));
     for (name, value) in variables {
@@ -47,41 +46,13 @@ fn supplied_file_gets_no_foreign_key() {
             "key-env = \"OPENAI_API_KEY\"",
             "line 3: key-env: OPENAI_API_KEY is not a variable of evil.example's own tools",
         ),
-        (
-            OPENAI,
-            "key-env = \"AWS_SECRET\"",
-            "line 3: key-env: AWS_SECRET is not a variable of api.openai.com's",
-        ),
-        (
-            ELSEWHERE,
-            header,
-            "line 3: headers: GATEWAY is not a variable",
-        ),
-        (
-            ELSEWHERE,
-            "",
-            "line 2: endpoints: OPENAI_API_KEY would be sent to evil.example",
-        ),
-        (
-            OPENAI,
-            "key-file = \"../outside.txt\"",
-            "line 3: key-file: ../outside.txt is outside its folder",
-        ),
-        (
-            OPENAI,
-            "system-file = \"../outside.txt\"",
-            "line 3: system-file: ../outside.txt is outside",
-        ),
-        (
-            OPENAI,
-            "body = \"@../outside.txt\"",
-            "line 3: body: ../outside.txt is outside",
-        ),
-        (
-            OPENAI,
-            "vendor = \"../data/inside.txt\"",
-            "line 3: vendor: such a table decides",
-        ),
+        (OPENAI, "key-env = \"AWS_SECRET\"", "line 3: key-env: AWS_SECRET is not a variable of api.openai.com's"),
+        (ELSEWHERE, header, "line 3: headers: GATEWAY is not a variable"),
+        (ELSEWHERE, "", "line 2: endpoints: OPENAI_API_KEY would be sent to evil.example"),
+        (OPENAI, "key-file = \"../outside.txt\"", "line 3: key-file: ../outside.txt is outside its folder"),
+        (OPENAI, "system-file = \"../outside.txt\"", "line 3: system-file: ../outside.txt is outside"),
+        (OPENAI, "body = \"@../outside.txt\"", "line 3: body: ../outside.txt is outside"),
+        (OPENAI, "vendor = \"../data/inside.txt\"", "line 3: vendor: such a table decides"),
     ];
     for (url, more, part) in cases {
         // The lines of the file are those of the table, which begins with its head.
@@ -89,12 +60,7 @@ fn supplied_file_gets_no_foreign_key() {
         let refused = strange(&table("m", url, more), "", &key);
         assert_eq!(refused.code, Some(2), "{more}: {refused:?}");
         assert!(refused.stderr.contains(&part), "{more}: {}", refused.stderr);
-        assert!(
-            refused
-                .stderr
-                .contains("--allow models-file states that you trust it"),
-            "{refused:?}"
-        );
+        assert!(refused.stderr.contains("--allow models-file states that you trust it"), "{refused:?}");
     }
     let taken = [
         (ELSEWHERE, "key-env = \"none\"", ""),
@@ -102,26 +68,15 @@ fn supplied_file_gets_no_foreign_key() {
         (OPENAI, "key-env = \"OPENAI_API_KEY\"", ""),
         (OPENAI, "system-file = \"../data/inside.txt\"", ""),
         ("http://127.0.0.1:9/v1", "", ""),
-        (
-            ELSEWHERE,
-            "key-env = \"OPENAI_API_KEY\"",
-            "--allow models-file",
-        ),
-        (
-            OPENAI,
-            "system-file = \"../outside.txt\"",
-            "--allow models-file",
-        ),
+        (ELSEWHERE, "key-env = \"OPENAI_API_KEY\"", "--allow models-file"),
+        (OPENAI, "system-file = \"../outside.txt\"", "--allow models-file"),
     ];
     for (url, more, line) in taken {
         let called = strange(&table("m", url, more), line, &key);
         assert_eq!(called.code, Some(0), "{more}: {called:?}");
     }
     // What [defaults] names is refused in the same way, and a variable that is not set cannot be sent.
-    let defaults = format!(
-        "[defaults]\nkey-env = \"AWS_SECRET\"\n{}",
-        table("m", OPENAI, "")
-    );
+    let defaults = format!("[defaults]\nkey-env = \"AWS_SECRET\"\n{}", table("m", OPENAI, ""));
     let refused = strange(&defaults, "", &key);
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 2
@@ -134,10 +89,7 @@ fn supplied_file_gets_no_foreign_key() {
 #[test]
 fn inherited_defaults_check_model_address() {
     let evil = "https://evil.example/v1";
-    let variables = [
-        ("OPENAI_API_KEY", "sk-0123456789"),
-        ("AWS_SECRET_ACCESS_KEY", "aws-0123456789"),
-    ];
+    let variables = [("OPENAI_API_KEY", "sk-0123456789"), ("AWS_SECRET_ACCESS_KEY", "aws-0123456789")];
     let secret = "headers = { X-A = { env = \"AWS_SECRET_ACCESS_KEY\" } }";
     let none = "key-env = \"none\"";
     let cases = [
@@ -149,12 +101,7 @@ fn inherited_defaults_check_model_address() {
             "line 2: headers: AWS_SECRET_ACCESS_KEY is not a variable of evil.example's own tools",
         ),
         // A key of a flag is not sent to the address of a table, which leaves the default.
-        (
-            none.to_owned(),
-            String::new(),
-            "--api-key-env AWS_SECRET_ACCESS_KEY",
-            "",
-        ),
+        (none.to_owned(), String::new(), "--api-key-env AWS_SECRET_ACCESS_KEY", ""),
         // A flag names a secret for an address, and the table names another address.
         (
             none.to_owned(),
@@ -162,32 +109,12 @@ fn inherited_defaults_check_model_address() {
             "--header-env X-A=AWS_SECRET_ACCESS_KEY",
             "line 5: endpoints: AWS_SECRET_ACCESS_KEY would be sent to evil.example",
         ),
-        (
-            none.to_owned(),
-            "allow-http = true".to_owned(),
-            "",
-            "line 6: allow-http: ",
-        ),
-        (
-            none.to_owned(),
-            "ca-file = \"../data/inside.txt\"".to_owned(),
-            "",
-            "line 6: ca-file: ",
-        ),
+        (none.to_owned(), "allow-http = true".to_owned(), "", "line 6: allow-http: "),
+        (none.to_owned(), "ca-file = \"../data/inside.txt\"".to_owned(), "", "line 6: ca-file: "),
         // Neither goes there.
         (none.to_owned(), String::new(), "", ""),
-        (
-            format!("{secret}\n{none}"),
-            "headers = { X-B = \"b\" }".to_owned(),
-            "",
-            "",
-        ),
-        (
-            format!("{secret}\n{none}"),
-            "headers = {}".to_owned(),
-            "",
-            "",
-        ),
+        (format!("{secret}\n{none}"), "headers = { X-B = \"b\" }".to_owned(), "", ""),
+        (format!("{secret}\n{none}"), "headers = {}".to_owned(), "", ""),
     ];
     for (defaults, more, line, part) in cases {
         let file = format!("[defaults]\n{defaults}\n{}", table("m", evil, &more));
@@ -224,20 +151,10 @@ fn default_key_goes_everywhere() {
     for (defaults, more, line, key) in [
         (gateway, "", "", bearer("gateway-0123456789")),
         // The key of a flag belongs to the address of the flags.
-        (
-            gateway,
-            "",
-            "--api-key-env FLAG_KEY",
-            bearer("gateway-0123456789"),
-        ),
+        (gateway, "", "--api-key-env FLAG_KEY", bearer("gateway-0123456789")),
         ("", "", "--api-key-env FLAG_KEY", bearer("sk-openai-0123")),
         ("key-env = \"none\"", "", "", None),
-        (
-            "key-env = \"none\"",
-            gateway,
-            "",
-            bearer("gateway-0123456789"),
-        ),
+        ("key-env = \"none\"", gateway, "", bearer("gateway-0123456789")),
     ] {
         let request = sent(defaults, more, line);
         let found = request.header("authorization");
@@ -246,11 +163,7 @@ fn default_key_goes_everywhere() {
     let request = sent(secret, "", "");
     assert_eq!(request.header("x-a"), Some("aws-0123456789"));
     // A table of headers replaces the other one whole.
-    for headers in [
-        "{ X-B = \"b\" }",
-        "{ X-B = { env = \"GATEWAY_KEY\" } }",
-        "{}",
-    ] {
+    for headers in ["{ X-B = \"b\" }", "{ X-B = { env = \"GATEWAY_KEY\" } }", "{}"] {
         let request = sent(secret, &format!("headers = {headers}"), "");
         assert_eq!(request.header("x-a"), None, "{headers}");
         assert_eq!(request.header("x-b").is_some(), headers != "{}");
@@ -266,25 +179,19 @@ fn foreign_file_is_checked_without_key() {
     fs::create_dir_all(bench.path("work")).unwrap();
     let call = |folder: &str, line: &str| {
         let mut command = bench.command(&words(&format!("models {line}")));
-        command
-            .env("AWS_SECRET_ACCESS_KEY", "aws-0123456789")
-            .current_dir(bench.path(folder));
+        command.env("AWS_SECRET_ACCESS_KEY", "aws-0123456789").current_dir(bench.path(folder));
         called(&mut command)
     };
     for (folder, file) in [(".", "data/models.toml"), ("work", "../data/models.toml")] {
         let refused = call(folder, &format!("{file} --check"));
         assert_eq!(refused.code, Some(2), "{refused:?}");
-        let part =
-            "line 4: key-env: AWS_SECRET_ACCESS_KEY is not a variable of 127.0.0.1's own tools";
+        let part = "line 4: key-env: AWS_SECRET_ACCESS_KEY is not a variable of 127.0.0.1's own tools";
         assert!(refused.stderr.contains(part), "{}", refused.stderr);
         // Nothing is sent without --check.
         assert_eq!(call(folder, file).code, Some(0));
     }
     assert_eq!(mock.requests().len(), 0);
-    for (folder, line) in [
-        ("data", "models.toml --check"),
-        (".", "data/models.toml --check --trust-models"),
-    ] {
+    for (folder, line) in [("data", "models.toml --check"), (".", "data/models.toml --check --trust-models")] {
         let called = call(folder, line);
         assert_eq!(called.code, Some(0), "{called:?}");
     }
@@ -298,13 +205,9 @@ fn vendor_table_defines_host_requests() {
     let row = "[[vendor]]\nname = \"Mine\"\nhosts = [\"127.0.0.1\"]\nkey = [\"MY_KEY\"]\nheader = \"api-key\"\ntoken-field = \"max_completion_tokens\"\n";
     bench.file("vendors.toml", row);
     let url = mock.base_url();
-    let line = format!(
-        "--model m --base-url {url} --data set.jsonl --levels L0 --out run --vendor vendors.toml"
-    );
+    let line = format!("--model m --base-url {url} --data set.jsonl --levels L0 --out run --vendor vendors.toml");
     let mut command = bench.command(&words(&line));
-    command
-        .env("MY_KEY", "secret-0123456789")
-        .env("OPENAI_API_KEY", "sk-other-0123");
+    command.env("MY_KEY", "secret-0123456789").env("OPENAI_API_KEY", "sk-other-0123");
     let run = called(&mut command);
     assert_eq!(run.code, Some(0), "{run:?}");
     let request = mock.requests().remove(0);
@@ -319,20 +222,11 @@ fn vendor_table_defines_host_requests() {
     let ignoring = format!("{row}constrain = \"ignored\"\nimage-bytes = 10\n");
     bench.file("ignoring.toml", ignoring);
     let vendor = "vendor = \"ignoring.toml\"";
-    for (more, part) in [
-        (
-            "constrain = \"json\"",
-            "Mine takes a constraint and ignores it",
-        ),
-        ("", "more than the 0.00001 MB of Mine"),
-    ] {
-        bench.file(
-            "models.toml",
-            table("m", &url, &format!("{vendor}\n{more}")),
-        );
-        let refused = bench.call(&words(
-            "--models models.toml --data set.jsonl --levels L0 --out other",
-        ));
+    for (more, part) in
+        [("constrain = \"json\"", "Mine takes a constraint and ignores it"), ("", "more than the 0.00001 MB of Mine")]
+    {
+        bench.file("models.toml", table("m", &url, &format!("{vendor}\n{more}")));
+        let refused = bench.call(&words("--models models.toml --data set.jsonl --levels L0 --out other"));
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(refused.stderr.contains(part), "{}", refused.stderr);
     }
@@ -366,46 +260,23 @@ fn defaults_may_hold_run_settings() {
         let called = called(&mut command);
         assert_eq!(called.code, Some(0), "{called:?}");
     };
-    bench.file(
-        "models.toml",
-        models("image = \"jpeg:90\"\nmax_side = 32\nimage-first = true"),
-    );
+    bench.file("models.toml", models("image = \"jpeg:90\"\nmax_side = 32\nimage-first = true"));
     run("file", "", &[("DARKQA_MAX_SIDE", "16")]);
     let sent = image("file");
-    assert_eq!(
-        (&sent["format"], &sent["width"]),
-        (&"jpeg".into(), &32.into()),
-        "{sent}"
-    );
+    assert_eq!((&sent["format"], &sent["width"]), (&"jpeg".into(), &32.into()), "{sent}");
     let content = mock.requests()[0].json()["messages"][0]["content"].clone();
     assert_eq!(content[0]["type"], "image_url");
     // The manifest has them, so that the images can be made again.
-    let manifest: Value =
-        serde_json::from_slice(&fs::read(bench.path("file/manifest.json")).unwrap()).unwrap();
-    assert_eq!(
-        (
-            &manifest["images"]["image"],
-            &manifest["images"]["max-side"]
-        ),
-        (&"jpeg:90".into(), &"32".into())
-    );
+    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("file/manifest.json")).unwrap()).unwrap();
+    assert_eq!((&manifest["images"]["image"], &manifest["images"]["max-side"]), (&"jpeg:90".into(), &"32".into()));
     // A flag is above them, and they are above a variable.
     run("flag", "--max-side 24 --image png", &[]);
     let sent = image("flag");
-    assert_eq!(
-        (&sent["format"], &sent["width"]),
-        (&"png".into(), &24.into()),
-        "{sent}"
-    );
+    assert_eq!((&sent["format"], &sent["width"]), (&"png".into(), &24.into()), "{sent}");
     bench.file("models.toml", models("max-tokens = 9"));
     run("variable", "", &[("DARKQA_MAX_SIDE", "16")]);
     assert_eq!(image("variable")["width"], 16);
-    let lines = [
-        ("max-side = \"wide\"", ""),
-        ("max-side = [3]", ""),
-        ("", "max-side = 3"),
-        ("", "image = \"png\""),
-    ];
+    let lines = [("max-side = \"wide\"", ""), ("max-side = [3]", ""), ("", "max-side = 3"), ("", "image = \"png\"")];
     let errors = lines.map(|(defaults, more)| {
         bench.file("models.toml", models(defaults) + more);
         bench.call(&words(&format!("{line} wrong"))).messages()
@@ -425,7 +296,8 @@ fn defaults_may_hold_run_settings() {
     ");
     // Where the command has no such flag, the line says so; and open questions have no choices.
     let house = House::new();
-    let line = "openeqa --questions questions.json --frames walks --num-frames 2 --levels L0 --models models.toml --out run";
+    let line =
+        "openeqa --questions questions.json --frames walks --num-frames 2 --levels L0 --models models.toml --out run";
     let defaults = ["max-side = 32", "temperature = 0\nprobabilities = true"];
     let errors = each(defaults, |defaults| {
         house.0.file("models.toml", models(defaults));

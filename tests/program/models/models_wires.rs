@@ -73,11 +73,7 @@ fn each_model_has_own_wire() {
             "wire = \"responses\"\nbody = { metadata = { team = \"a\" }, reasoning = { summary = \"auto\" } }\nreasoning-effort = \"low\""
         ),
         table("streamed", &url, ""),
-        table(
-            "whole",
-            &url,
-            "wire = \"chat\"\nthinking = \"off\"\nbody = { top_k = 1 }"
-        ),
+        table("whole", &url, "wire = \"chat\"\nthinking = \"off\"\nbody = { top_k = 1 }"),
     ));
     let run = call(&bench, "");
     assert_eq!(run.code, Some(0), "{run:?}");
@@ -88,10 +84,7 @@ fn each_model_has_own_wire() {
     assert_eq!(response["instructions"], "Be brief.");
     assert_eq!(response["input"].as_array().unwrap().len(), 1);
     assert_eq!(response["metadata"], json!({"team": "a"}));
-    assert_eq!(
-        response["reasoning"],
-        json!({"effort": "low", "summary": "auto"})
-    );
+    assert_eq!(response["reasoning"], json!({"effort": "low", "summary": "auto"}));
     assert!(response.get("messages").is_none());
     for (model, is_stream) in [("streamed", true), ("whole", false)] {
         assert!(sent[model].line.contains("/v1/chat/completions "));
@@ -102,16 +95,8 @@ fn each_model_has_own_wire() {
     }
     let whole = sent["whole"].json();
     assert_eq!(whole["top_k"], 1);
-    assert_eq!(
-        whole["chat_template_kwargs"],
-        json!({"enable_thinking": false})
-    );
-    assert!(
-        sent["streamed"]
-            .json()
-            .get("chat_template_kwargs")
-            .is_none()
-    );
+    assert_eq!(whole["chat_template_kwargs"], json!({"enable_thinking": false}));
+    assert!(sent["streamed"].json().get("chat_template_kwargs").is_none());
     // The same again asks nothing: by each wire a reply was kept.
     let asked = requests.len();
     assert_eq!(call(&bench, "").code, Some(0));
@@ -126,10 +111,7 @@ fn trial_key_follows_reply_settings() {
         let bench = bench(&table("m", &url, more));
         let run = call(&bench, "");
         assert_eq!(run.code, Some(0), "{more}: {run:?}");
-        records(&bench.path("run"))[0]["key"]
-            .as_str()
-            .unwrap()
-            .to_owned()
+        records(&bench.path("run"))[0]["key"].as_str().unwrap().to_owned()
     };
     let plain = key("");
     for same in [
@@ -176,10 +158,7 @@ fn model_is_above_flag_for_probabilities() {
     assert_eq!(sent["with"].json()["top_logprobs"], 20);
     assert!(sent["without"].json().get("logprobs").is_none());
     // A model that draws its replies cannot have any, and the message names its line.
-    bench.file(
-        "models.toml",
-        table("hot", &url, "temperature = 1\nprobabilities = true"),
-    );
+    bench.file("models.toml", table("hot", &url, "temperature = 1\nprobabilities = true"));
     let refused = call(&bench, "--dry-run");
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 2
@@ -194,43 +173,31 @@ fn fields_repeating_flags_are_refused() {
     let url = mock.base_url();
     let switch = "body = { chat_template_kwargs = { enable_thinking = false } }";
     for (more, part) in [
-        (
-            format!("thinking = \"off\"\n{switch}"),
-            "chat_template_kwargs is set by --thinking",
-        ),
+        (format!("thinking = \"off\"\n{switch}"), "chat_template_kwargs is set by --thinking"),
         (
             "constrain = \"json\"\nbody = { response_format = { type = \"text\" } }".to_owned(),
             "response_format is set by --request constrain",
         ),
         (
-            "constrain = \"json\"\nwire = \"responses\"\nbody = { text = { verbosity = \"low\" } }"
-                .to_owned(),
+            "constrain = \"json\"\nwire = \"responses\"\nbody = { text = { verbosity = \"low\" } }".to_owned(),
             "text is set by --request constrain",
         ),
         (
-            "reasoning-effort = \"low\"\nwire = \"responses\"\nbody = { reasoning = { effort = \"high\" } }"
-                .to_owned(),
+            "reasoning-effort = \"low\"\nwire = \"responses\"\nbody = { reasoning = { effort = \"high\" } }".to_owned(),
             "reasoning.effort is set by --reasoning-effort",
         ),
         (
             "probabilities = true\nwire = \"responses\"\nbody = { include = [] }".to_owned(),
             "include is set by --request probabilities",
         ),
-        (
-            "body = { instructions = \"a\" }".to_owned(),
-            "use --system",
-        ),
+        ("body = { instructions = \"a\" }".to_owned(), "use --system"),
     ] {
         let bench = bench(&table("m", &url, &more));
         let refused = call(&bench, "");
         assert_eq!(refused.code, Some(2), "{more}: {refused:?}");
         assert!(refused.stderr.contains(part), "{more}: {}", refused.stderr);
     }
-    assert!(
-        mock.requests()
-            .iter()
-            .all(|request| request.body.is_empty())
-    );
+    assert!(mock.requests().iter().all(|request| request.body.is_empty()));
     // Alone, each of them is taken.
     for alone in [switch, "thinking = \"off\"", "body = { include = [] }"] {
         let bench = bench(&table("m", &url, alone));
@@ -243,7 +210,6 @@ fn listing_shows_wire_of_models() {
     let mock = endpoint();
     let bench = bench(&table("m", &mock.base_url(), "wire = \"responses\""));
     assert_eq!(call(&bench, "").code, Some(0));
-    let manifest: Value =
-        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
     assert_eq!(manifest["settings"]["models"][0]["wire"], "responses");
 }

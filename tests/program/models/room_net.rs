@@ -38,12 +38,8 @@ fn images(bench: &Bench) -> Vec<PathBuf> {
 fn gain(records: &[Value]) -> (f64, usize) {
     let n = records.len() as f64;
     let right = records.iter().filter(|record| record["outcome"] == "right");
-    let chance = records
-        .iter()
-        .map(|record| 1.0 / record["choices"].as_array().unwrap().len() as f64);
-    let guesses = records
-        .iter()
-        .filter(|record| record["finish"]["other"] == "guess");
+    let chance = records.iter().map(|record| 1.0 / record["choices"].as_array().unwrap().len() as f64);
+    let guesses = records.iter().filter(|record| record["finish"]["other"] == "guess");
     let gain = (right.count() as f64 - chance.sum::<f64>()) / n;
     (gain, guesses.count())
 }
@@ -79,20 +75,14 @@ fn threads_keep_room_net_answers() {
     let bench = rooms();
     let flags = "--levels L0,L3 --llie lift";
     ask(&bench, &format!("{flags} --threads 1"), "one");
-    ask(
-        &bench,
-        &format!("{flags} --threads 3 --concurrency 16"),
-        "many",
-    );
+    ask(&bench, &format!("{flags} --threads 3 --concurrency 16"), "many");
     assert!(assert_same_products(&bench.path("one"), &bench.path("many")) > 8);
 }
 
 #[test]
 fn unloadable_runtime_is_named() {
     let bench = Bench::new();
-    let called = bench.call(&words(
-        "--model room-net --out run --llie-options ort-lib=no-such.so",
-    ));
+    let called = bench.call(&words("--model room-net --out run --llie-options ort-lib=no-such.so"));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
     error: ONNX Runtime: [TMP]/no-such.so cannot be read: [OS ERROR]; name a library of 1.17 or later with
@@ -100,9 +90,7 @@ fn unloadable_runtime_is_named() {
     ");
     assert!(!bench.path("run").exists());
     // Without images it needs none.
-    bench.complete(&words(
-        "--model room-net --blind --out run --llie-options ort-lib=no-such.so",
-    ));
+    bench.complete(&words("--model room-net --blind --out run --llie-options ort-lib=no-such.so"));
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! What several runs share: the same trials with the same replies count once, all else stands apart, and the report says why.
+//! What several runs share: the same trials with the same replies count once, all else stands apart, and the report
+//! says why.
 
 use std::fs;
 use std::path::Path;
@@ -44,11 +45,7 @@ fn answer(record: &mut Value, chosen: u8) {
 
 /// The texts of the alerts that hold a word.
 fn holding<'a>(alerts: &'a [String], word: &str) -> Vec<&'a str> {
-    alerts
-        .iter()
-        .map(String::as_str)
-        .filter(|text| text.contains(word))
-        .collect()
+    alerts.iter().map(String::as_str).filter(|text| text.contains(word)).collect()
 }
 
 #[test]
@@ -71,14 +68,10 @@ fn equal_trials_need_equal_replies() {
             assert!(text.contains(name), "{name}: {text}");
         });
         let alerts = scene.alerts(line);
-        let apart =
-            "m stands apart as m (g1) and m (g2): 160 of 160 replies to the same trials differ.";
+        let apart = "m stands apart as m (g1) and m (g2): 160 of 160 replies to the same trials differ.";
         assert_eq!(holding(&alerts, "apart"), [apart], "{alerts:#?}");
         let served = holding(&alerts, "m was served as ");
-        assert!(
-            served[0].contains("mock-1 in g1") && served[0].contains("mock-2 in g2"),
-            "{alerts:#?}"
-        );
+        assert!(served[0].contains("mock-1 in g1") && served[0].contains("mock-2 in g2"), "{alerts:#?}");
     }
     // Of three runs, those that agree are one.
     let alerts = scene.alerts("report g1 g3 same");
@@ -90,10 +83,7 @@ fn equal_trials_need_equal_replies() {
     let alerts = scene.alerts("report g2 --baseline g1");
     assert_eq!(alerts, ["m was served as mock-2 in g2 and mock-1 in g1."]);
     let named_twice = scene.alerts("report same ./same g1");
-    assert!(
-        named_twice.contains(&"same is named twice and counted once.".to_owned()),
-        "{named_twice:#?}"
-    );
+    assert!(named_twice.contains(&"same is named twice and counted once.".to_owned()), "{named_twice:#?}");
 }
 
 #[test]
@@ -115,10 +105,8 @@ fn run_in_other_light_is_compared() {
         .filter(|row| row[0] == "light" && row[5] == "all" && row.last().unwrap() == "strict")
         .map(|row| [&*row[1], &*row[2], &*row[3], &*row[4]])
         .collect();
-    let expected = [
-        ["m (a)", "L3-noise @a", "m (b)", "L3-noise @b"],
-        ["m (a)", "L3-noise+one @a", "m (b)", "L3-noise+one @b"],
-    ];
+    let expected =
+        [["m (a)", "L3-noise @a", "m (b)", "L3-noise @b"], ["m (a)", "L3-noise+one @a", "m (b)", "L3-noise+one @b"]];
     assert_eq!(lights, expected);
 }
 
@@ -199,12 +187,7 @@ fn runs_under_other_rules_keep_controls() {
     let short = bench.complete(&words("report a b"));
     let joined = on_one_line(&short);
     check_rows(
-        [
-            "observer: known-signal observer",
-            "shown images of other rooms, scores ",
-            " (a) and ",
-            " (b); chance is ",
-        ],
+        ["observer: known-signal observer", "shown images of other rooms, scores ", " (a) and ", " (b); chance is "],
         |part| assert!(joined.contains(part), "{part}: {joined}"),
     );
 }
@@ -231,8 +214,7 @@ fn only_models_decide_worse() {
     assert_eq!(code, Some(0));
     let joined = on_one_line(&stdout);
     assert!(
-        joined.contains("No verdict against few is possible")
-            && !joined.contains("It is not shown that any"),
+        joined.contains("No verdict against few is possible") && !joined.contains("It is not shown that any"),
         "{stdout}"
     );
     let (code, _, stderr) = judged("report fewer --baseline few --fail-if-worse");
@@ -258,8 +240,5 @@ fn only_models_decide_worse() {
     join("m", "wrong", "new");
     let (code, stdout, _) = judged("report new --baseline old --fail-if-worse");
     assert_eq!(code, Some(0), "{stdout}");
-    assert!(
-        stdout.contains("It is not shown that any model is worse"),
-        "{stdout}"
-    );
+    assert!(stdout.contains("It is not shown that any model is worse"), "{stdout}");
 }

@@ -27,17 +27,11 @@ fn texts(folder: &Path) -> Vec<(String, String)> {
     for path in files(folder) {
         let name = path.display().to_string();
         let text = String::from_utf8_lossy(&fs::read(&path).unwrap()).into_owned();
-        let packed = text
-            .split(['"', '>', '<', '`'])
-            .filter(|part| part.starts_with("H4sI"));
+        let packed = text.split(['"', '>', '<', '`']).filter(|part| part.starts_with("H4sI"));
         for part in packed {
-            let bytes = base64::engine::general_purpose::STANDARD
-                .decode(part)
-                .unwrap();
+            let bytes = base64::engine::general_purpose::STANDARD.decode(part).unwrap();
             let mut inside = String::new();
-            flate2::read::GzDecoder::new(&*bytes)
-                .read_to_string(&mut inside)
-                .unwrap();
+            flate2::read::GzDecoder::new(&*bytes).read_to_string(&mut inside).unwrap();
             texts.push((format!("{name}, packed"), inside));
         }
         texts.push((name, text));
@@ -88,43 +82,27 @@ fn bundle_is_reproducible() {
     let sums = fs::read_to_string(bench.path("unpacked/run/SHA256SUMS")).unwrap();
     assert_eq!(sums.lines().count(), names.len() - 1);
     let readme = fs::read_to_string(bench.path("unpacked/run/README.md")).unwrap();
-    for part in [
-        "darkqa-eval report run",
-        "--data frames",
-        "--blind-model random",
-        "--levels L0,L5",
-    ] {
+    for part in ["darkqa-eval report run", "--data frames", "--blind-model random", "--levels L0,L5"] {
         assert!(readme.contains(part), "{part}: {readme}");
     }
     // The command asks the very same trials again.
-    let command = readme
-        .lines()
-        .find(|line| line.starts_with("darkqa-eval --"));
+    let command = readme.lines().find(|line| line.starts_with("darkqa-eval --"));
     let command = command.unwrap().trim_start_matches("darkqa-eval ");
     bench.complete(&words(&format!("{command} --out again")));
     let keys = |run: &str| -> BTreeSet<String> {
-        records(&bench.path(run))
-            .into_iter()
-            .map(|record| record["key"].to_string())
-            .collect()
+        records(&bench.path(run)).into_iter().map(|record| record["key"].to_string()).collect()
     };
     assert_eq!(keys("again"), keys("run"));
     let summary = fs::read_to_string(bench.path("run/summary.json")).unwrap();
     let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
     let plain = readme.replace('\\', "");
     for finding in summary["findings"].as_array().unwrap() {
-        assert!(
-            plain.contains(finding["text"].as_str().unwrap()),
-            "{readme}"
-        );
+        assert!(plain.contains(finding["text"].as_str().unwrap()), "{readme}");
     }
     // Without images it is smaller, and the page has none; with all it has the file of the run.
     bench.complete(&words("bundle run --out none.zip --thumbnails none"));
     let names = unpack(&bench.path("none.zip"), &bench.path("none"));
-    assert!(
-        !names.iter().any(|name| name.ends_with("thumbnails.jsonl")),
-        "{names:?}"
-    );
+    assert!(!names.iter().any(|name| name.ends_with("thumbnails.jsonl")), "{names:?}");
     for (name, text) in texts(&bench.path("none")) {
         assert!(!text.contains("data:image/"), "{name}");
     }
@@ -147,31 +125,19 @@ fn readme_includes_models_file() {
         )
     };
     let more = "view = \"both\"\nmax-tokens = 77\ntop-p = 0.5";
-    bench.file(
-        "my.toml",
-        table("One \\\"1\\\"", &one, more) + &table("Two", &two, ""),
-    );
-    bench.complete(&words(
-        "--models my.toml --data frames --levels L0 --out run",
-    ));
+    bench.file("my.toml", table("One \\\"1\\\"", &one, more) + &table("Two", &two, ""));
+    bench.complete(&words("--models my.toml --data frames --levels L0 --out run"));
     bench.complete(&words("bundle run --out run.zip"));
     unpack(&bench.path("run.zip"), &bench.path("all"));
     let readme = fs::read_to_string(bench.path("all/run/README.md")).unwrap();
     let (_, file) = readme.split_once("cat > models.toml <<'END'\n").unwrap();
     let (file, command) = file.split_once("END\n").unwrap();
-    assert!(
-        command.starts_with("darkqa-eval --models models.toml"),
-        "{command}"
-    );
+    assert!(command.starts_with("darkqa-eval --models models.toml"), "{command}");
     bench.file("models.toml", file);
     let [before, again] = ["my.toml", "models.toml"].map(|file| {
         let shown = bench.complete(&["models", file]);
         let same = |line: &&str| !line.trim_start().starts_with("key ");
-        shown
-            .lines()
-            .filter(same)
-            .map(str::to_owned)
-            .collect::<Vec<_>>()
+        shown.lines().filter(same).map(str::to_owned).collect::<Vec<_>>()
     });
     assert_eq!(again, before, "{file}");
 }
@@ -182,9 +148,7 @@ fn judge_keeps_address_without_file() {
     let mock = MockEndpoint::start([Answer::text("5")]);
     let base = mock.base_url();
     let readme = |run: &str| {
-        house
-            .0
-            .complete(&words(&format!("bundle {run} --out {run}.zip")));
+        house.0.complete(&words(&format!("bundle {run} --out {run}.zip")));
         unpack(&house.0.path(&format!("{run}.zip")), &house.0.path("all"));
         fs::read_to_string(house.0.path(&format!("all/{run}/README.md"))).unwrap()
     };
@@ -197,9 +161,7 @@ fn judge_keeps_address_without_file() {
     }
     let elsewhere = MockEndpoint::start([Answer::text("5")]);
     let address = format!("--judge-base-url {}", elsewhere.base_url());
-    house.call(&words(&format!(
-        "--model m {line} {address} --out elsewhere"
-    )));
+    house.call(&words(&format!("--model m {line} {address} --out elsewhere")));
     let two_addresses = readme("elsewhere");
     for part in [&format!("--base-url {base}"), &address] {
         assert!(two_addresses.contains(part), "{part}: {two_addresses}");
@@ -208,11 +170,7 @@ fn judge_keeps_address_without_file() {
     house.0.file("models.toml", table);
     house.call(&words(&format!("--models models.toml {line} --out named")));
     let named = readme("named");
-    for part in [
-        "name = \"One\"",
-        "--judge j",
-        &format!("--judge-base-url {base}"),
-    ] {
+    for part in ["name = \"One\"", "--judge j", &format!("--judge-base-url {base}")] {
         assert!(named.contains(part), "{part}: {named}");
     }
     assert!(!named.contains("name = \"j\""), "{named}");
@@ -238,10 +196,7 @@ fn only_a_bundle_is_replaced() {
         bench.file("mine.zip", mine);
         let refused = bench.call(&words("bundle run --out mine.zip"));
         assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(
-            refused.stderr.contains("mine.zip") && refused.stderr.contains("not a bundle"),
-            "{refused:?}"
-        );
+        assert!(refused.stderr.contains("mine.zip") && refused.stderr.contains("not a bundle"), "{refused:?}");
         assert_eq!(fs::read_to_string(bench.path("mine.zip")).unwrap(), mine);
     }
     let refused = bench.call(&words("bundle nowhere --out none.zip"));
@@ -272,28 +227,13 @@ fn nothing_private_is_in_a_bundle() {
     let place = home.display().to_string();
     let said = format!("I see {place}/photo.png with {KEY}");
     let endpoint = MockEndpoint::answering(move |_| Answer::text(&said));
-    let address = endpoint
-        .base_url()
-        .replace("http://", "http://ann:password@");
+    let address = endpoint.base_url().replace("http://", "http://ann:password@");
     let data = home.join("data set/set.jsonl").display().to_string();
-    let mut run = bench.command(&[
-        "--model",
-        "m",
-        "--base-url",
-        &address,
-        "--data",
-        &data,
-        "--levels",
-        "L0,L3",
-        "--out",
-        "run",
-    ]);
+    let mut run =
+        bench.command(&["--model", "m", "--base-url", &address, "--data", &data, "--levels", "L0,L3", "--out", "run"]);
     let ran = called(run.env("HOME", &home));
     assert_ne!(ran.code, Some(2), "{ran:?}");
-    let stored: String = texts(&bench.path("run"))
-        .into_iter()
-        .map(|(_, text)| text)
-        .collect();
+    let stored: String = texts(&bench.path("run")).into_iter().map(|(_, text)| text).collect();
     // Without the bundle they are there.
     assert!(stored.contains(&place) && stored.contains(KEY));
     let mut bundle = bench.command(&["bundle", "run", "--out", "run.zip"]);
@@ -346,7 +286,9 @@ fn open_runs_can_be_bundled() {
     let readme = fs::read_to_string(house.0.path("unpacked/run/README.md")).unwrap();
     assert!(readme.contains("OpenEQA by LLM-Match"), "{readme}");
     assert!(
-        readme.contains("darkqa-eval openeqa --questions DIR/questions.json --model script:a.jsonl --judge script:j.jsonl"),
+        readme.contains(
+            "darkqa-eval openeqa --questions DIR/questions.json --model script:a.jsonl --judge script:j.jsonl"
+        ),
         "{readme}"
     );
 }

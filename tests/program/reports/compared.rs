@@ -1,4 +1,5 @@
-//! Two runs in one report: what it says of each setting in which they differ, and that it compares only what shows the same.
+//! Two runs in one report: what it says of each setting in which they differ, and that it compares only what shows the
+//! same.
 
 use std::fs;
 
@@ -34,9 +35,7 @@ impl Scene {
             bench.file(&name, lines.collect::<String>());
             for frame in 0..10 {
                 let shade = 60 + 10 * frame as u8 + u8::from(folder == "elsewhere");
-                let picture = image::RgbImage::from_fn(48, 32, |x, y| {
-                    image::Rgb([shade + x as u8, 90 + y as u8, 40])
-                });
+                let picture = image::RgbImage::from_fn(48, 32, |x, y| image::Rgb([shade + x as u8, 90 + y as u8, 40]));
                 let name = format!("{folder}/{frame}.png");
                 picture.save(bench.path(&name)).unwrap();
             }
@@ -49,10 +48,7 @@ impl Scene {
             let text = fs::read_to_string(built_in).unwrap();
             bench.file(&format!("own/{name}"), format!("Look closely.\n{text}"));
         }
-        Self {
-            bench,
-            endpoint: MockEndpoint::start([Answer::text("A")]),
-        }
+        Self { bench, endpoint: MockEndpoint::start([Answer::text("A")]) }
     }
 
     /// A run of the model `m`, with these flags in place of others.
@@ -85,18 +81,14 @@ impl Scene {
         // Below the head. A long alert goes on in indented lines.
         let mut lines: Vec<String> = Vec::new();
         for line in text.lines().skip(1) {
-            match (
-                line.strip_prefix("! "),
-                line.strip_prefix("  "),
-                lines.last_mut(),
-            ) {
+            match (line.strip_prefix("! "), line.strip_prefix("  "), lines.last_mut()) {
                 (Some(alert), ..) => lines.push(alert.to_owned()),
                 (None, Some(rest), Some(alert)) => alert.extend([" ", rest]),
                 _ => break,
             }
         }
-        // The enhancer and the frames are made for tests, the scripted model answers one letter, and nearly all of these runs have the
-        // noise of the default reading.
+        // The enhancer and the frames are made for tests, the scripted model answers one letter, and nearly all of
+        // these runs have the noise of the default reading.
         let of_all = [
             "--allow bad-enhancer",
             "whatever the image",
@@ -109,9 +101,7 @@ impl Scene {
 
     pub(crate) fn csv(&self, path: &str) -> Vec<Vec<String>> {
         let text = fs::read_to_string(self.bench.path(path)).unwrap();
-        text.lines()
-            .map(|line| line.split(',').map(str::to_owned).collect())
-            .collect()
+        text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
     }
 }
 
@@ -156,10 +146,7 @@ const SETTINGS: [(&str, &str); 32] = [
 fn every_setting_that_decides_is_named() {
     let scene = Scene::new();
     scene.run("", "base");
-    assert_eq!(
-        scene.alerts("report base base"),
-        ["base is named twice and counted once."]
-    );
+    assert_eq!(scene.alerts("report base base"), ["base is named twice and counted once."]);
     check_rows(SETTINGS, |(otherwise, expected)| {
         let _ = fs::remove_dir_all(scene.bench.path("other-run/other"));
         scene.run(otherwise, "other-run/other");
@@ -189,8 +176,7 @@ fn shared_light_is_compared() {
         .collect();
     assert!(tables.len() > 6, "{tables:?}");
     for name in tables {
-        let [one, other] =
-            ["abc", "cba"].map(|folder| fs::read(scene.bench.path(folder).join(&name)).unwrap());
+        let [one, other] = ["abc", "cba"].map(|folder| fs::read(scene.bench.path(folder).join(&name)).unwrap());
         assert_eq!(one, other, "{name} depends on the order of the runs");
     }
     let rows = scene.csv("abc/comparisons.csv");
@@ -202,16 +188,10 @@ fn shared_light_is_compared() {
     };
     // Models are compared in the same light alone; c has the light of a.
     let models = of_kind("model");
-    assert!(
-        models.contains(&["m", "L3-noise @a", "n", "L3-noise @a"]),
-        "{models:?}"
-    );
+    assert!(models.contains(&["m", "L3-noise @a", "n", "L3-noise @a"]), "{models:?}");
     assert!(models.iter().all(|row| row[1] == row[3]), "{models:?}");
     let lights = of_kind("light");
-    let expected = [
-        ["m", "L3-noise @a", "m", "L3-noise @b"],
-        ["m", "L3-noise+one @a", "m", "L3-noise+one @b"],
-    ];
+    let expected = [["m", "L3-noise @a", "m", "L3-noise @b"], ["m", "L3-noise+one @a", "m", "L3-noise+one @b"]];
     assert_eq!(lights, expected);
     // L0 and the exposure drop are shown by all runs, and belong to the curve of each.
     let thresholds = scene.csv("abc/thresholds.csv");
@@ -234,26 +214,15 @@ fn shared_light_is_compared() {
     curves.sort();
     assert_eq!(curves, expected);
     let levels = of_kind("level");
-    assert!(
-        levels.contains(&["m", "L3-noise @b", "m", "L0"]),
-        "{levels:?}"
-    );
+    assert!(levels.contains(&["m", "L3-noise @b", "m", "L0"]), "{levels:?}");
     // The summary names the run whose light it is.
     let summary = scene.csv("abc/summary.csv");
     assert_eq!(summary[0].last().unwrap(), "light");
     assert!(summary.iter().any(|row| row.last().unwrap() == "b"));
-    let json: Value =
-        serde_json::from_slice(&fs::read(scene.bench.path("abc/summary.json")).unwrap()).unwrap();
+    let json: Value = serde_json::from_slice(&fs::read(scene.bench.path("abc/summary.json")).unwrap()).unwrap();
     // The scripted models answer one letter, which is said before all else.
-    let kinds: Vec<&Value> = json["alerts"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|alert| &alert["kind"])
-        .collect();
-    let first = kinds
-        .iter()
-        .find(|kind| !["image_ignored", "answers"].contains(&kind.as_str().unwrap()));
+    let kinds: Vec<&Value> = json["alerts"].as_array().unwrap().iter().map(|alert| &alert["kind"]).collect();
+    let first = kinds.iter().find(|kind| !["image_ignored", "answers"].contains(&kind.as_str().unwrap()));
     assert_eq!(first.unwrap(), &"light", "{kinds:?}");
     let page = fs::read_to_string(scene.bench.path("abc/report.html")).unwrap();
     assert!(page.contains("The light differs: --seed is 0 in a and c and 1 in b."));
@@ -266,12 +235,9 @@ fn equal_names_show_their_difference() {
     scene.run("--detail low", "b");
     scene.run("--detail low --temperature 1 --max-tokens 9", "c");
     let pair = scene.bench.complete(&words("report a b --full"));
-    check_rows(
-        ["m (--image detail unset)", "m (--image detail low)"],
-        |name| {
-            assert!(pair.contains(name), "{name}: {pair}");
-        },
-    );
+    check_rows(["m (--image detail unset)", "m (--image detail low)"], |name| {
+        assert!(pair.contains(name), "{name}: {pair}");
+    });
     let three = scene.bench.complete(&words("report a b c --full"));
     check_rows(["m (a)", "m (b)", "m (c)"], |name| {
         assert!(three.contains(name), "{name}: {three}");
@@ -286,23 +252,13 @@ fn other_questions_compare_shared_ones() {
     let text = scene.bench.complete(&words("report a b --full"));
     let alert = "! Models were asked different questions: n was asked 20 of 40 questions. Compare by the 20 shared";
     assert!(text.contains(alert), "{text}");
-    assert!(
-        text.contains("Accuracy in % on the 20 questions that all models with images answered"),
-        "{text}"
-    );
+    assert!(text.contains("Accuracy in % on the 20 questions that all models with images answered"), "{text}");
     assert!(text.contains("chance: 33.33 over 20 questions"), "{text}");
-    assert!(
-        text.contains("too few: fewer than 30 items are shared in 4 rows"),
-        "{text}"
-    );
-    let common = scene
-        .bench
-        .complete(&words("report a b --common --out common"));
+    assert!(text.contains("too few: fewer than 30 items are shared in 4 rows"), "{text}");
+    let common = scene.bench.complete(&words("report a b --common --out common"));
     assert!(!common.contains("asked different questions"), "{common}");
     let rows = scene.csv("common/summary.csv");
-    let all = rows
-        .iter()
-        .filter(|row| row[5] == "all" && row[6] == "strict");
+    let all = rows.iter().filter(|row| row[5] == "all" && row[6] == "strict");
     assert!(all.clone().count() > 8);
     for row in all {
         assert_eq!(row[7], "20", "{row:?}");
@@ -312,15 +268,10 @@ fn other_questions_compare_shared_ones() {
 #[test]
 fn baseline_sides_keep_their_cost() {
     let scene = Scene::new();
-    for (run, levels, dollars) in [
-        ("old", "L1,L3", 10),
-        ("new", "L1,L3", 30),
-        ("bright", "L1", 20),
-        ("dark", "L3", 40),
-    ] {
-        let prices = format!(
-            "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = {{ input = {dollars}, output = {dollars} }}\n"
-        );
+    for (run, levels, dollars) in [("old", "L1,L3", 10), ("new", "L1,L3", 30), ("bright", "L1", 20), ("dark", "L3", 40)]
+    {
+        let prices =
+            format!("as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = {{ input = {dollars}, output = {dollars} }}\n");
         scene.bench.file("prices.toml", prices);
         scene.run(&format!("--prices prices.toml --levels {levels}"), run);
     }
@@ -337,13 +288,12 @@ fn baseline_sides_keep_their_cost() {
         }
     };
     has_ratio("report new --baseline old --out out", |_| 3.0);
-    has_ratio("report bright dark --baseline old --out out", |condition| {
-        if condition.starts_with("L1") {
-            2.0
-        } else {
-            4.0
-        }
-    });
+    has_ratio(
+        "report bright dark --baseline old --out out",
+        |condition| {
+            if condition.starts_with("L1") { 2.0 } else { 4.0 }
+        },
+    );
 }
 
 #[test]
@@ -351,37 +301,26 @@ fn new_run_is_held_against_baseline() {
     let scene = Scene::new();
     let run = |answers: &str, more: &str, out: &str| {
         scene.bench.file("m.jsonl", answers);
-        let line =
-            format!("--model script:m.jsonl --data frames --levels L0,L3 --out {out} {more}");
+        let line = format!("--model script:m.jsonl --data frames --levels L0,L3 --out {out} {more}");
         scene.bench.complete(&words(&line));
     };
     run("{\"default\": \"red\"}", "", "old");
     run("{\"default\": \"blue\"}", "", "worse");
     run("{\"default\": \"blue\"}", "--seed 1", "light");
-    let worse = scene
-        .bench
-        .call(&words("report worse --baseline old --out out"));
+    let worse = scene.bench.call(&words("report worse --baseline old --out out"));
     assert_eq!(worse.code, Some(0), "{worse:?}");
     let rows = scene.csv("out/baseline.csv");
     let place = |name: &str| rows[0].iter().position(|head| head == name).unwrap();
-    let conditions: Vec<&str> = rows[1..]
-        .iter()
-        .map(|row| &*row[place("condition")])
-        .collect();
+    let conditions: Vec<&str> = rows[1..].iter().map(|row| &*row[place("condition")]).collect();
     assert_eq!(conditions, ["L0", "L3-ev", "L3-noise"]);
     for row in &rows[1..] {
-        let found =
-            ["n", "only_new", "only_old", "difference", "verdict"].map(|name| &*row[place(name)]);
+        let found = ["n", "only_new", "only_old", "difference", "verdict"].map(|name| &*row[place(name)]);
         assert_eq!(found, ["40", "0", "20", "-0.5", "worse"], "{row:?}");
     }
-    let json: Value =
-        serde_json::from_slice(&fs::read(scene.bench.path("out/summary.json")).unwrap()).unwrap();
+    let json: Value = serde_json::from_slice(&fs::read(scene.bench.path("out/summary.json")).unwrap()).unwrap();
     assert_eq!(json["baseline"].as_array().unwrap().len(), 3);
     let finding = &json["findings"][0];
-    assert_eq!(
-        finding["text"],
-        "script:m.jsonl is worse than in old at L0, L3-ev, L3-noise, by up to 50.0 points."
-    );
+    assert_eq!(finding["text"], "script:m.jsonl is worse than in old at L0, L3-ev, L3-noise, by up to 50.0 points.");
     assert_eq!(finding["verdict"], "worse");
     insta::assert_snapshot!(worse.lines_with("worse"), @"
     exit code: 0
@@ -390,31 +329,20 @@ fn new_run_is_held_against_baseline() {
     ");
     let tex = fs::read_to_string(scene.bench.path("out/tables.tex")).unwrap();
     assert!(tex.contains("New less old"), "{tex}");
-    let failing = scene
-        .bench
-        .call(&words("report worse --baseline old --fail-if-worse"));
+    let failing = scene.bench.call(&words("report worse --baseline old --fail-if-worse"));
     assert_eq!(failing.code, Some(1), "{failing:?}");
-    let same = scene
-        .bench
-        .call(&words("report old --baseline old --fail-if-worse"));
+    let same = scene.bench.call(&words("report old --baseline old --fail-if-worse"));
     assert_eq!(same.code, Some(0), "{same:?}");
     let unshown = "It is not shown that any model is worse or better than in old.";
     let printed: Vec<&str> = same.stdout.split_whitespace().collect();
     assert!(printed.join(" ").contains(unshown), "{same:?}");
     // Only the same images count.
-    scene
-        .bench
-        .complete(&words("report light --baseline old --out out"));
+    scene.bench.complete(&words("report light --baseline old --out out"));
     let rows = scene.csv("out/baseline.csv");
-    let conditions: Vec<&str> = rows[1..]
-        .iter()
-        .map(|row| &*row[place("condition")])
-        .collect();
+    let conditions: Vec<&str> = rows[1..].iter().map(|row| &*row[place("condition")]).collect();
     assert_eq!(conditions, ["L0", "L3-ev"]);
     // What was not compared does not pass.
-    let passed_over = scene
-        .bench
-        .call(&words("report old --baseline light --fail-if-worse"));
+    let passed_over = scene.bench.call(&words("report old --baseline light --fail-if-worse"));
     assert_eq!(passed_over.code, Some(2), "{passed_over:?}");
     let gap = "script:m.jsonl L3-noise of light is not compared: the new run has no reply about the same images";
     insta::assert_snapshot!(passed_over.messages(), @"
@@ -437,13 +365,8 @@ fn marks_of_different_judges_stay_apart() {
     let house = House::new();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
     for (judge, mark) in [("one", "2"), ("two", "4")] {
-        house.0.file(
-            &format!("{judge}.jsonl"),
-            format!("{{\"default\": \"{mark}\"}}"),
-        );
-        let line = format!(
-            "--model script:a.jsonl --levels L0 --judge script:{judge}.jsonl --out {judge}"
-        );
+        house.0.file(&format!("{judge}.jsonl"), format!("{{\"default\": \"{mark}\"}}"));
+        let line = format!("--model script:a.jsonl --levels L0 --judge script:{judge}.jsonl --out {judge}");
         assert_eq!(house.call(&words(&line)).code, Some(0));
     }
     let refused = house.0.call(&words("report one two"));

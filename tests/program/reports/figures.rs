@@ -1,4 +1,5 @@
-//! `figures`: the numbers are those of the tables, the same command writes the same bytes, and what cannot be drawn is said.
+//! `figures`: the numbers are those of the tables, the same command writes the same bytes, and what cannot be drawn is
+//! said.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -19,18 +20,9 @@ fn runs() -> Scene {
     let scene = Scene::new();
     let mut lines = String::new();
     for question in 0..40 {
-        for (condition, right) in [
-            ("L0", 9),
-            ("L3-ev", 7),
-            ("L3-noise", 5),
-            ("L3-noise+one", 6),
-        ] {
+        for (condition, right) in [("L0", 9), ("L3-ev", 7), ("L3-noise", 5), ("L3-noise+one", 6)] {
             let answer = ["red", "brown"][question % 2];
-            let reply = if question % 10 < right {
-                answer
-            } else {
-                "blue"
-            };
+            let reply = if question % 10 < right { answer } else { "blue" };
             let _ = writeln!(
                 lines,
                 "{{\"question\": \"q{question}\", \"condition\": \"{condition}\", \"reply\": \"{reply}\"}}"
@@ -38,9 +30,7 @@ fn runs() -> Scene {
         }
     }
     scene.bench.file("m.jsonl", &lines);
-    scene
-        .bench
-        .file(&format!("{LONG}.jsonl"), "{\"default\": \"red\"}");
+    scene.bench.file(&format!("{LONG}.jsonl"), "{\"default\": \"red\"}");
     let line = format!(
         "--model script:m.jsonl --model script:{LONG}.jsonl --blind-model random --data frames --levels L0,L3 --llie one.onnx --llie-anyway --out run"
     );
@@ -51,23 +41,15 @@ fn runs() -> Scene {
 /// The rows of a `.dat` file by level, with the names of its columns.
 fn data(scene: &Scene, name: &str) -> (BTreeMap<String, String>, Vec<BTreeMap<String, String>>) {
     let text = fs::read_to_string(scene.bench.path(name)).unwrap();
-    let (comments, rows): (Vec<&str>, Vec<&str>) =
-        text.lines().partition(|line| line.starts_with('#'));
+    let (comments, rows): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| line.starts_with('#'));
     let names = comments.iter().map(|line| {
         let (columns, name) = line[2..].split_once(": ").unwrap();
         let column = columns.split(',').next().unwrap().to_owned();
-        (
-            column,
-            name.strip_suffix(", in percent").unwrap().to_owned(),
-        )
+        (column, name.strip_suffix(", in percent").unwrap().to_owned())
     });
     let heads: Vec<&str> = rows[0].split(' ').collect();
     let rows = rows[1..].iter().map(|row| {
-        heads
-            .iter()
-            .zip(row.split(' '))
-            .map(|(head, cell)| ((*head).to_owned(), cell.to_owned()))
-            .collect()
+        heads.iter().zip(row.split(' ')).map(|(head, cell)| ((*head).to_owned(), cell.to_owned())).collect()
     });
     (names.collect(), rows.collect())
 }
@@ -82,8 +64,7 @@ fn figures_match_tables_reproducibly() {
     let made = files(&scene.bench.path("first"));
     assert!(made.len() > 15, "{made:?}");
     for file in &made {
-        let [first, second] =
-            ["first", "second"].map(|out| fs::read(scene.bench.path(out).join(file)).unwrap());
+        let [first, second] = ["first", "second"].map(|out| fs::read(scene.bench.path(out).join(file)).unwrap());
         assert_eq!(first, second, "{}", file.display());
     }
     let captions = fs::read_to_string(scene.bench.path("first/captions.txt")).unwrap();
@@ -102,11 +83,9 @@ fn figures_match_tables_reproducibly() {
                 let start = format!("script:{model}.jsonl,image,{level},{variant},,all,strict,");
                 let cells = summary.lines().find_map(|line| line.strip_prefix(&start));
                 let cells: Vec<&str> = cells.unwrap().split(',').collect();
-                for (place, column) in [
-                    (4, column.clone()),
-                    (5, column.replace('y', "low")),
-                    (6, column.replace('y', "high")),
-                ] {
+                for (place, column) in
+                    [(4, column.clone()), (5, column.replace('y', "low")), (6, column.replace('y', "high"))]
+                {
                     let table: f64 = cells[place].parse().unwrap();
                     let drawn: f64 = row[&column].parse().unwrap();
                     assert!((100.0 * table - drawn).abs() < 1e-9, "{start} {column}");
@@ -120,10 +99,7 @@ fn figures_match_tables_reproducibly() {
     let has = |words: &str| pdf.windows(words.len()).any(|at| at == words.as_bytes());
     assert!(has("/FontFile2") && has("/Image") && !has("/Type3"));
     let svg = fs::read_to_string(scene.bench.path("first/paper.svg")).unwrap();
-    assert!(
-        svg.contains("(d) samples") && svg.contains("<image "),
-        "{svg}"
-    );
+    assert!(svg.contains("(d) samples") && svg.contains("<image "), "{svg}");
     assert!(!svg.contains("95 % intervals"));
     assert!(captions.contains("(d) The frame 0.png") && captions.contains("95 % intervals"));
 }
@@ -138,10 +114,7 @@ fn names_and_widths_are_the_readers() {
     let said = scene.bench.complete(&words(&line));
     assert!(!said.contains("paper"), "{said}");
     let svg = fs::read_to_string(scene.bench.path("out/accuracy.svg")).unwrap();
-    assert!(
-        svg.contains(">Short</text>") && !svg.contains(LONG),
-        "{svg}"
-    );
+    assert!(svg.contains(">Short</text>") && !svg.contains(LONG), "{svg}");
     assert!(svg.contains("width=\"240.94pt\"") && svg.contains("stroke=\"#000000\""));
     assert!(svg.find(">Short<") < svg.find(">m<"));
     let enhancers = fs::read_to_string(scene.bench.path("out/enhancers.svg")).unwrap();
@@ -174,19 +147,14 @@ fn unknown_names_list_the_known() {
         ("--only accuracies", "accuracy"),
         ("--label one", "OLD=NEW"),
         ("--label one=A --label one=B", "two names"),
-        (
-            "--label script:m.jsonl=A --label random=A",
-            "both be called",
-        ),
+        ("--label script:m.jsonl=A --label random=A", "both be called"),
         ("--label script:m.jsonl=模型", "Latin and Greek"),
         ("--width nature", "millimetres"),
         ("--width neurips --columns 2", "one column"),
         ("--font-size 3", "from 4 to 24"),
     ];
     for (flags, said) in wrong {
-        let called = scene
-            .bench
-            .call(&words(&format!("figures run --out no {flags}")));
+        let called = scene.bench.call(&words(&format!("figures run --out no {flags}")));
         assert_eq!(called.code, Some(2), "{flags}: {called:?}");
         assert!(called.stderr.contains(said), "{flags}: {}", called.stderr);
     }
@@ -232,27 +200,18 @@ fn single_bright_model_has_figures() {
     thresholds: left out, no curve has a threshold: L0 has 2 replies in 2 clusters
     blur_thresholds: left out, the runs have no records for it
     ");
-    assert!(
-        said.contains("blur_thresholds: left out, the runs have no records"),
-        "{said}"
-    );
+    assert!(said.contains("blur_thresholds: left out, the runs have no records"), "{said}");
 }
 
 #[test]
 fn sheet_names_models_not_asked() {
     let scene = Scene::new();
     for (name, more) in [("a", "--seed 0"), ("b", "--seed 1")] {
-        scene
-            .bench
-            .file(&format!("{name}.jsonl"), "{\"default\": \"red\"}");
-        let line = format!(
-            "--model script:{name}.jsonl --data frames --levels L0,L3 {more} --out {name}-run"
-        );
+        scene.bench.file(&format!("{name}.jsonl"), "{\"default\": \"red\"}");
+        let line = format!("--model script:{name}.jsonl --data frames --levels L0,L3 {more} --out {name}-run");
         scene.bench.complete(&words(&line));
     }
-    let said = scene
-        .bench
-        .complete(&words("figures a-run b-run --only paper --out out"));
+    let said = scene.bench.complete(&words("figures a-run b-run --only paper --out out"));
     insta::assert_snapshot!(redacted(&said), @"
     note: script:a.jsonl answers A whatever the image and the question: 20 of 20 replies to untouched images with
         another true answer. Its accuracy measures no sight.
@@ -271,10 +230,7 @@ fn sheet_names_models_not_asked() {
     paper, the panel enhancers: left out, no enhancer was asked
     ");
     let captions = fs::read_to_string(scene.bench.path("out/captions.txt")).unwrap();
-    assert!(
-        captions.contains("with noise @a-run") && captions.contains(" Not asked in this light: b."),
-        "{captions}"
-    );
+    assert!(captions.contains("with noise @a-run") && captions.contains(" Not asked in this light: b."), "{captions}");
 }
 
 #[test]
@@ -307,44 +263,26 @@ fn document(width: f64) -> String {
 #[test]
 fn tex_fits_its_columns() {
     // Packages that `document` loads, and the metrics of its font.
-    let files = [
-        "mathptmx.sty",
-        "booktabs.sty",
-        "graphicx.sty",
-        "pgfplots.sty",
-        "ptmr8t.tfm",
-    ];
+    let files = ["mathptmx.sty", "booktabs.sty", "graphicx.sty", "pgfplots.sty", "ptmr8t.tfm"];
     if !succeeds("pdflatex", &["--version"]) || !succeeds("kpsewhich", &files) {
         skip("there is no pdflatex with mathptmx, booktabs, graphicx and pgfplots");
         return;
     }
     let scene = runs();
-    for (venue, columns, width) in [
-        ("acl", 1, 219.1),
-        ("cvpr", 1, 237.1),
-        ("ieee", 1, 252.0),
-        ("neurips", 1, 397.5),
-        ("ieee", 2, 516.0),
-    ] {
+    for (venue, columns, width) in
+        [("acl", 1, 219.1), ("cvpr", 1, 237.1), ("ieee", 1, 252.0), ("neurips", 1, 397.5), ("ieee", 2, 516.0)]
+    {
         let out = format!("{venue}{columns}");
-        let line =
-            format!("figures run --out {out} --format pdf,tex --width {venue} --columns {columns}");
+        let line = format!("figures run --out {out} --format pdf,tex --width {venue} --columns {columns}");
         scene.bench.complete(&words(&line));
-        scene
-            .bench
-            .file(&format!("{out}/paper.tex"), document(width));
+        scene.bench.file(&format!("{out}/paper.tex"), document(width));
         let mut log = String::new();
         // The legend is placed in the second pass.
         for _ in 0..2 {
             let mut tex = Command::new("pdflatex");
-            tex.args(["-interaction=nonstopmode", "paper.tex"])
-                .current_dir(scene.bench.path(&out));
+            tex.args(["-interaction=nonstopmode", "paper.tex"]).current_dir(scene.bench.path(&out));
             let said = tex.output().unwrap();
-            assert!(
-                said.status.success(),
-                "{}",
-                String::from_utf8_lossy(&said.stdout)
-            );
+            assert!(said.status.success(), "{}", String::from_utf8_lossy(&said.stdout));
             log = String::from_utf8_lossy(&said.stdout).into_owned();
         }
         for wrong in ["Overfull \\hbox", "Float too large", "PDF inclusion"] {

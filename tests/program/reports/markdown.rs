@@ -39,10 +39,7 @@ fn markdown_repeats_findings_safely() {
     for row in &rows {
         assert_eq!(bars(row), bars(rows[0]), "{row}");
     }
-    assert!(
-        rows.iter().any(|row| row.contains("a\\|\\`b\\`\\<b\\>")),
-        "{text}"
-    );
+    assert!(rows.iter().any(|row| row.contains("a\\|\\`b\\`\\<b\\>")), "{text}");
     assert!(!text.contains("<b>"), "{text}");
     // Nothing but Markdown is printed, and the folder has its report as ever.
     assert!(text.starts_with("### Seeing in the dark: run\n"), "{text}");
@@ -57,9 +54,7 @@ fn markdown_repeats_findings_safely() {
 fn open_and_unlabelled_runs_have_markdown() {
     let bench = Bench::new();
     bench.rooms("frames", 2, "96x64");
-    bench.complete(&words(
-        "--model random --data frames --ask home --levels L0,L3 --out own",
-    ));
+    bench.complete(&words("--model random --data frames --ask home --levels L0,L3 --out own"));
     let text = bench.complete(&words("report own --markdown"));
     insta::assert_snapshot!(
         lines_with(&text, "without answers"),
@@ -86,8 +81,5 @@ fn open_and_unlabelled_runs_have_markdown() {
     Made by darkqa-eval [VERSION].
     ");
     // A mark of 4 is 75 %.
-    assert!(
-        table(&text).iter().any(|row| row.contains("| 75.0 (")),
-        "{text}"
-    );
+    assert!(table(&text).iter().any(|row| row.contains("| 75.0 (")), "{text}");
 }

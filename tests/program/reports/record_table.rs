@@ -18,7 +18,8 @@ use serde_json::{Map, Value, json};
 
 const NAME: &str = "records.parquet";
 
-/// The replies and right ones of each row of `summary.csv` that is of one family and one reading, from a table of records.
+/// The replies and right ones of each row of `summary.csv` that is of one family and one reading, from a table of
+/// records.
 type Counts = BTreeMap<[String; 8], [u64; 3]>;
 
 /// The counts of a summary, without chance, which is asked nothing.
@@ -28,9 +29,7 @@ fn of_summary(run: &Path) -> Counts {
     rows.map(Result::unwrap)
         .filter(|row| row["model"] != "chance" && row["family"] != "all")
         .map(|row| {
-            let columns = [
-                "model", "view", "level", "variant", "enhancer", "family", "mode", "reading",
-            ];
+            let columns = ["model", "view", "level", "variant", "enhancer", "family", "mode", "reading"];
             let number = |name: &str| row[name].parse::<u64>().unwrap();
             let counts = [number("n"), number("right"), number("failed")];
             (columns.map(|name| row[name].clone()), counts)
@@ -115,10 +114,8 @@ fn flat(record: &Value) -> Map<String, Value> {
 /// Asserts that each trial of a run is a row with the values of its last record.
 fn assert_rows_are_records(run: &Path) {
     let rows = rows(&run.join(NAME));
-    let last: BTreeMap<String, Value> = records(run)
-        .into_iter()
-        .map(|record| (record["key"].to_string(), record))
-        .collect();
+    let last: BTreeMap<String, Value> =
+        records(run).into_iter().map(|record| (record["key"].to_string(), record)).collect();
     assert_eq!(rows.len(), last.len());
     for row in rows {
         for (name, value) in flat(&last[&row["key"].to_string()]) {
@@ -157,10 +154,7 @@ fn record_table_matches_the_summary() {
     let mut asked: Vec<Value> = rows.iter().map(|row| row["question"].clone()).collect();
     asked.dedup();
     assert_eq!(asked, questions.collect::<Vec<_>>());
-    assert_eq!(
-        metadata(&run.join(NAME))["darkqa.schema"],
-        "darkqa.records/1"
-    );
+    assert_eq!(metadata(&run.join(NAME))["darkqa.schema"], "darkqa.records/1");
 }
 
 #[test]
@@ -188,15 +182,11 @@ fn rebuilt_record_table_is_identical() {
     };
     assert_eq!(timeless(&merged), timeless(&path));
     // It stands in the order in which merge writes the records.
-    let keys = |rows: Vec<Value>| -> Vec<Value> {
-        rows.into_iter().map(|mut row| row["key"].take()).collect()
-    };
+    let keys = |rows: Vec<Value>| -> Vec<Value> { rows.into_iter().map(|mut row| row["key"].take()).collect() };
     let table = rows(&merged).into_iter().map(Value::Object).collect();
     assert_eq!(keys(table), keys(records(&bench.path("merged"))));
     // The same parts, joined again in another order, are the same bytes of values.
-    bench.complete(&words(
-        "merge parts/shard-3-of-3 parts/shard-1-of-3 parts/shard-2-of-3 --out again",
-    ));
+    bench.complete(&words("merge parts/shard-3-of-3 parts/shard-1-of-3 parts/shard-2-of-3 --out again"));
     assert_eq!(body(&bench.path("again/records.parquet")), body(&merged));
 }
 
@@ -211,10 +201,7 @@ fn record_table_keeps_odd_texts() {
         Answer::message_charged("C", 5_000_000_000),
     ]);
     let base_url = endpoint.base_url();
-    let call = bench.call(&model_args(
-        &base_url,
-        "--data set.jsonl --levels L0 --concurrency 1 --out run",
-    ));
+    let call = bench.call(&model_args(&base_url, "--data set.jsonl --levels L0 --concurrency 1 --out run"));
     insta::assert_snapshot!(call.messages(), @"
     exit code: 1
      WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered 413: no such image (send smaller
@@ -235,32 +222,16 @@ fn record_table_keeps_odd_texts() {
             assert_eq!(row[&name], value, "{name}");
         }
     }
-    let failed: Vec<_> = rows
-        .iter()
-        .filter(|row| row["outcome"] == "failed")
-        .collect();
+    let failed: Vec<_> = rows.iter().filter(|row| row["outcome"] == "failed").collect();
     assert_eq!(failed.len(), 1);
     assert_eq!(failed[0]["failure_status"], 413);
-    for name in [
-        "right",
-        "right_lenient",
-        "strict",
-        "predicted",
-        "reply",
-        "finish",
-    ] {
+    for name in ["right", "right_lenient", "strict", "predicted", "reply", "finish"] {
         assert!(failed[0][name].is_null(), "{name}: {failed:?}");
     }
     // The trial that failed is asked again, and its row has the reply.
-    bench.complete(&model_args(
-        &base_url,
-        "--data set.jsonl --levels L0 --concurrency 1 --out run",
-    ));
+    bench.complete(&model_args(&base_url, "--data set.jsonl --levels L0 --concurrency 1 --out run"));
     assert_eq!(records(&bench.path("run")).len(), 5);
-    assert_eq!(
-        of_table(&self::rows(&bench.path("run/records.parquet"))),
-        of_summary(&bench.path("run"))
-    );
+    assert_eq!(of_table(&self::rows(&bench.path("run/records.parquet"))), of_summary(&bench.path("run")));
 }
 
 #[test]
@@ -306,21 +277,13 @@ fn open_record_table_has_marks() {
         "a.jsonl",
         "{\"question\": \"q1\", \"reply\": \"grey\"}\n{\"question\": \"q2\", \"reply\": \" \"}\n{\"default\": \"an answer. Cut\"}",
     );
-    house.0.file(
-        "j.jsonl",
-        "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}",
-    );
-    let called = house.call(&words(
-        "--model script:a.jsonl --judge script:j.jsonl --levels L0,L2 --out run",
-    ));
+    house.0.file("j.jsonl", "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}");
+    let called = house.call(&words("--model script:a.jsonl --judge script:j.jsonl --levels L0,L2 --out run"));
     assert_eq!(called.code, Some(0), "{called:?}");
     let run = house.0.path("run");
     let rows = rows(&run.join(NAME));
     let all = records(&run);
-    let answers = all
-        .iter()
-        .filter(|record| record["step"] == "answer")
-        .count();
+    let answers = all.iter().filter(|record| record["step"] == "answer").count();
     assert_eq!(rows.len(), answers);
     assert!(answers < all.len());
     for row in &rows {
@@ -339,10 +302,7 @@ fn open_record_table_has_marks() {
         assert_eq!(found, expected);
         assert_eq!(row["image_count"], 3);
     }
-    assert_eq!(
-        metadata(&run.join(NAME))["darkqa.schema"],
-        "darkqa.openeqa-records/1"
-    );
+    assert_eq!(metadata(&run.join(NAME))["darkqa.schema"], "darkqa.openeqa-records/1");
 }
 
 /// Skipped where Python has no DuckDB.
@@ -362,14 +322,8 @@ fn duckdb_counts_as_the_summary_does() {
     }
     let bench = Bench::new();
     bench.rooms("frames", 4, "120x90");
-    bench.complete(&words(
-        "--model random --blind-model random --data frames --levels L0,L3 --out run",
-    ));
-    let output = Command::new(python)
-        .args(["-c", &script])
-        .current_dir(bench.path(""))
-        .output()
-        .unwrap();
+    bench.complete(&words("--model random --blind-model random --data frames --levels L0,L3 --out run"));
+    let output = Command::new(python).args(["-c", &script]).current_dir(bench.path("")).output().unwrap();
     assert!(output.status.success(), "{output:?}");
     let counted: Vec<([String; 8], [u64; 3])> = serde_json::from_slice(&output.stdout).unwrap();
     let counted = Counts::from_iter(counted);
@@ -402,10 +356,7 @@ fn example_computes_accuracy_of_summary() {
 #[test]
 fn exported_records_match_table() {
     let run = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
-    let records = darkqa_eval::StoredRun::open(&run)
-        .unwrap()
-        .records()
-        .unwrap();
+    let records = darkqa_eval::StoredRun::open(&run).unwrap().records().unwrap();
     assert!(records.columns().any(|column| column == "right_lenient"));
     let records: Vec<_> = records.map(Result::unwrap).collect();
     let first = &records[0];

@@ -16,9 +16,7 @@ fn run(bench: &Bench, out: &str, more: &str) {
 
 fn csv(path: &Path) -> Vec<Vec<String>> {
     let text = fs::read_to_string(path).unwrap();
-    text.lines()
-        .map(|line| line.split(',').map(str::to_owned).collect())
-        .collect()
+    text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
 #[test]
@@ -54,21 +52,12 @@ fn several_runs_become_one_comparison() {
     let compared: Vec<_> = compared.iter().filter(|row| row[0] == "model").collect();
     assert!(!compared.is_empty());
     for row in compared {
-        assert!(
-            !row[1].starts_with("random") && !row[3].starts_with("random"),
-            "{row:?}"
-        );
+        assert!(!row[1].starts_with("random") && !row[3].starts_with("random"), "{row:?}");
     }
     let page = fs::read_to_string(bench.path("all/report.html")).unwrap();
     assert!(page.contains(" in the dark: 3 runs compared"));
-    let rows = [
-        "summary.csv",
-        "comparisons.csv",
-        "thresholds.csv",
-        "agreement.csv",
-        "tables.tex",
-        "figures/accuracy.svg",
-    ];
+    let rows =
+        ["summary.csv", "comparisons.csv", "thresholds.csv", "agreement.csv", "tables.tex", "figures/accuracy.svg"];
     check_rows(rows, |name| {
         assert!(bench.path("all").join(name).is_file(), "{name}");
     });
@@ -77,9 +66,7 @@ fn several_runs_become_one_comparison() {
     let files = files.map(|file| file.unwrap().file_name().into_string().unwrap());
     let missing: Vec<String> = files
         .filter(|file| {
-            Path::new(file)
-                .extension()
-                .is_some_and(|ending| ending == "csv")
+            Path::new(file).extension().is_some_and(|ending| ending == "csv")
                 && !described.contains(&format!("`{file}`"))
         })
         .collect();
@@ -167,10 +154,7 @@ fn broken_records_are_named_or_skipped() {
     // A run of another schema.
     fs::write(&path, &whole).unwrap();
     let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
-    bench.file(
-        "run/manifest.json",
-        manifest.replace("darkqa.run/2", "darkqa.run/9"),
-    );
+    bench.file("run/manifest.json", manifest.replace("darkqa.run/2", "darkqa.run/9"));
     let newer = report();
     insta::assert_snapshot!(newer.messages(), @r#"
     exit code: 2
@@ -188,8 +172,7 @@ fn active_run_is_counted_by_records() {
     let some: String = text.split_inclusive('\n').take(2).collect();
     fs::write(&path, some).unwrap();
     let file = bench.path("run/manifest.json");
-    let mut manifest: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
+    let mut manifest: serde_json::Value = serde_json::from_str(&fs::read_to_string(&file).unwrap()).unwrap();
     manifest["status"] = "started".into();
     manifest["counts"]["answered"] = 0.into();
     fs::write(&file, manifest.to_string()).unwrap();
@@ -206,12 +189,7 @@ fn runs_of_earlier_versions_are_read() {
     let bench = Bench::with_questions(3);
     run(&bench, "run", "");
     // What the first version wrote: no questions, no small copies, no recipe, records of the first fields alone.
-    for later in [
-        "questions.jsonl",
-        "thumbnails.jsonl",
-        "fidelity.jsonl",
-        "report.html",
-    ] {
+    for later in ["questions.jsonl", "thumbnails.jsonl", "fidelity.jsonl", "report.html"] {
         fs::remove_file(bench.path("run").join(later)).unwrap();
     }
     let path = bench.path("run/manifest.json");
@@ -242,45 +220,22 @@ fn runs_of_earlier_versions_are_read() {
 #[test]
 fn what_was_sent_is_made_again() {
     let bench = Bench::new();
-    bench.complete(&words(
-        "--model random --levels L0,L4 --limit 4 --seed 3 --out run",
-    ));
+    bench.complete(&words("--model random --levels L0,L4 --limit 4 --seed 3 --out run"));
     let first = records(&bench.path("run")).remove(0);
     let id = first["question"].as_str().unwrap();
     let called = bench.call(&["show", "run", id]);
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert_eq!(
-        called.stdout.matches("the same bytes as were sent").count(),
-        3,
-        "{called:?}"
-    );
-    for record in records(&bench.path("run"))
-        .iter()
-        .filter(|record| record["question"] == id)
-    {
+    assert_eq!(called.stdout.matches("the same bytes as were sent").count(), 3, "{called:?}");
+    for record in records(&bench.path("run")).iter().filter(|record| record["question"] == id) {
         let condition = record["condition"].as_str().unwrap();
         let frame = record["frame"].as_str().unwrap();
         let file = fs::read(bench.path(&format!("run/shown/{frame}_{condition}.png"))).unwrap();
-        assert_eq!(
-            json!(darkqa_base::types::Digest::from_bytes(&file)),
-            record["image"]["digest"]
-        );
+        assert_eq!(json!(darkqa_base::types::Digest::from_bytes(&file)), record["image"]["digest"]);
     }
     // Other rooms: what is made is something else, and that is said.
-    let other = bench.call(&[
-        "show",
-        "run",
-        id,
-        "--data",
-        "rooms:frames=6,size=120x90,seed=8",
-        "--out",
-        "other",
-    ]);
+    let other = bench.call(&["show", "run", id, "--data", "rooms:frames=6,size=120x90,seed=8", "--out", "other"]);
     assert_eq!(other.code, Some(1), "{other:?}");
-    assert_eq!(
-        other.stdout.matches("NOT the bytes that were sent").count(),
-        3
-    );
+    assert_eq!(other.stdout.matches("NOT the bytes that were sent").count(), 3);
     let missing = bench.call(&["show", "run", id, "--condition", "L1-ev"]);
     insta::assert_snapshot!(missing.messages(), @"
     exit code: 2
@@ -328,9 +283,7 @@ fn item_is_drawn_as_one_picture() {
     NOT the bytes that were sent: L0, L4-noise, L4-noise+gray-gain, L4-noise+lift; the data, an enhancer or this
         program has changed since the run
     ");
-    bench.complete(&words(&format!(
-        "--model random --levels L0 --limit 3 --data {rooms} --out light"
-    )));
+    bench.complete(&words(&format!("--model random --levels L0 --limit 3 --data {rooms} --out light")));
     check_rows(
         [
             ("run", "nothing", "did not ask \"nothing\" with images"),
@@ -350,10 +303,7 @@ fn item_is_drawn_as_one_picture() {
 }
 
 #[test]
-#[allow(
-    clippy::too_many_lines,
-    reason = "one study, from its pack to its report"
-)]
+#[allow(clippy::too_many_lines, reason = "one study, from its pack to its report")]
 fn people_enter_as_a_model() {
     let bench = Bench::with_questions(6);
     bench.file("said.jsonl", "{\"default\": \"A\"}\n");
@@ -386,27 +336,13 @@ fn people_enter_as_a_model() {
     assert_eq!(read.code, Some(0), "{read:?}");
     assert_eq!(read.stderr, "");
     assert!(
-        read.stdout.contains(
-            "answers imported: 18\nitems in the files that the run did not ask: 1, as nobody at L0"
-        ),
+        read.stdout.contains("answers imported: 18\nitems in the files that the run did not ask: 1, as nobody at L0"),
         "{read:?}"
     );
     let imported = records(&bench.path("people"));
     assert_eq!(imported.len(), 18);
-    assert_eq!(
-        imported
-            .iter()
-            .filter(|record| record["outcome"] == "right")
-            .count(),
-        12
-    );
-    assert_eq!(
-        imported
-            .iter()
-            .filter(|record| record["strict"]["why"] == "cannot_tell")
-            .count(),
-        6
-    );
+    assert_eq!(imported.iter().filter(|record| record["outcome"] == "right").count(), 12);
+    assert_eq!(imported.iter().filter(|record| record["strict"]["why"] == "cannot_tell").count(), 6);
     // The same again changes nothing.
     bench.call(&args);
     assert!(records(&bench.path("people")) == imported);
@@ -415,20 +351,10 @@ fn people_enter_as_a_model() {
     let page = fs::read_to_string(bench.path("both/report.html")).unwrap();
     assert!(page.contains("The summary and the chart are about models, not about people."));
     // Who cannot tell says so: that is no reply that cannot be read, and stays so if replies are read again.
-    assert!(
-        !both.stdout.contains("could not be read"),
-        "{}",
-        both.stdout
-    );
+    assert!(!both.stdout.contains("could not be read"), "{}", both.stdout);
     let health = csv(&bench.path("both/health.csv"));
-    let column = health[0]
-        .iter()
-        .position(|name| name == "cannot_tell")
-        .unwrap();
-    let cannot_tell: usize = health[1..]
-        .iter()
-        .map(|row| row[column].parse::<usize>().unwrap())
-        .sum();
+    let column = health[0].iter().position(|name| name == "cannot_tell").unwrap();
+    let cannot_tell: usize = health[1..].iter().map(|row| row[column].parse::<usize>().unwrap()).sum();
     assert_eq!(cannot_tell, 6);
     let again = bench.call(&["report", "people", "--rescore"]);
     insta::assert_snapshot!(again.lines_with("read differently"), @"
@@ -438,12 +364,7 @@ fn people_enter_as_a_model() {
     // People are in no mean over models, and take no question from it.
     let pooled = csv(&bench.path("both/pooled.csv"));
     let names = pooled[0].iter().position(|name| name == "names").unwrap();
-    assert!(
-        pooled[1..]
-            .iter()
-            .all(|row| row[names] == "script:said.jsonl"),
-        "{pooled:?}"
-    );
+    assert!(pooled[1..].iter().all(|row| row[names] == "script:said.jsonl"), "{pooled:?}");
     insta::assert_snapshot!(both.lines_with("people"), @"
     exit code: 0
     script:said.jsonl, people (people) · 6 questions · 1 frame · 36 replies, 0 failed · intervals by question
@@ -452,18 +373,11 @@ fn people_enter_as_a_model() {
     run: people
     ");
     let rows = csv(&bench.path("both/comparisons.csv"));
-    let held = rows
-        .iter()
-        .find(|row| row[0] == "model" && row[2] == "L0")
-        .unwrap();
-    assert_eq!(
-        (&*held[1], &*held[3], &*held[6]),
-        ("people", "script:said.jsonl", "6")
-    );
+    let held = rows.iter().find(|row| row[0] == "model" && row[2] == "L0").unwrap();
+    assert_eq!((&*held[1], &*held[3], &*held[6]), ("people", "script:said.jsonl", "6"));
     // What is no choice is named with its place, and counted in the report.
-    let odd = line("q0", "L0", 3, json!("castle"))
-        + &line("q1", "L0", 3, json!("F"))
-        + &line("q2", "L0", 3, json!(null));
+    let odd =
+        line("q0", "L0", 3, json!("castle")) + &line("q1", "L0", 3, json!("F")) + &line("q2", "L0", 3, json!(null));
     bench.file("odd.jsonl", &odd);
     let read = bench.call(&words("study read run odd.jsonl --out odd"));
     assert_eq!(read.code, Some(0), "{read:?}");
@@ -475,8 +389,7 @@ fn people_enter_as_a_model() {
     check_rows(rows, |text| {
         assert!(read.stderr.contains(text), "{text}: {read:?}");
     });
-    let counted =
-        "! 2 of 3 answers of people are not choices of their questions, and count as\n  wrong.";
+    let counted = "! 2 of 3 answers of people are not choices of their questions, and count as\n  wrong.";
     assert!(read.stdout.contains(counted), "{read:?}");
     bench.file("answers.jsonl", "{\"question\": 1}\n");
     let broken = bench.call(&args);
@@ -527,10 +440,7 @@ fn symbols_are_coloured_on_demand() {
     assert!(plain.contains("! ") && !plain.contains('\x1b'), "{plain}");
     let wanted = [("CLICOLOR_FORCE", "1")];
     let coloured = said(&[], &wanted);
-    assert!(
-        coloured.contains("\x1b[1m\x1b[33m!\x1b[0m "),
-        "{coloured:?}"
-    );
+    assert!(coloured.contains("\x1b[1m\x1b[33m!\x1b[0m "), "{coloured:?}");
     assert_eq!(said(&["--color", "always"], &[]), coloured);
     let codes = regex::Regex::new("\x1b\\[[0-9;]*m").unwrap();
     assert_eq!(codes.replace_all(&coloured, ""), plain);

@@ -9,9 +9,7 @@ use serde_json::{Value, json};
 /// A run with `lift`.
 fn enhanced(bench: &Bench) {
     bench.rooms("frames", 12, "96x64");
-    bench.complete(&words(
-        "--model observer --data frames --levels L0,L3 --llie lift --out run",
-    ));
+    bench.complete(&words("--model observer --data frames --levels L0,L3 --llie lift --out run"));
 }
 
 /// The parts of a text from the first line that contains each mark on.
@@ -34,22 +32,17 @@ fn every_length_and_every_syntax_combine() {
     has_in_order(&report("--findings"), &groups);
     assert!(!report("--findings").contains("accuracy in %"));
     has_in_order(&report("--full"), &groups);
-    for (flags, folded, tables) in [
-        ("--markdown", 1, 1),
-        ("--markdown --findings", 0, 0),
-        ("--markdown --full", 0, 2),
-    ] {
+    for (flags, folded, tables) in [("--markdown", 1, 1), ("--markdown --findings", 0, 0), ("--markdown --full", 0, 2)]
+    {
         let text = report(flags);
         has_in_order(&text, &groups);
         assert_eq!(text.matches("<details>").count(), folded, "{text}");
         let found = text.matches("\n| --- |").count();
         assert!(found.min(2) == tables, "{flags}: {text}");
     }
-    for (flags, has_rows, has_tables) in [
-        ("--json", true, false),
-        ("--json --findings", false, false),
-        ("--json --full", true, true),
-    ] {
+    for (flags, has_rows, has_tables) in
+        [("--json", true, false), ("--json --findings", false, false), ("--json --full", true, true)]
+    {
         let value: Value = serde_json::from_str(&report(flags)).unwrap();
         assert!(value["findings"].is_array(), "{flags}");
         assert_eq!(value["rows"].is_array(), has_rows, "{flags}");
@@ -66,20 +59,14 @@ fn enhancer_training_data_is_reported() {
     let bench = Bench::new();
     enhanced(&bench);
     let trained = "lift: trained on this program's synthesis";
-    let in_sentence =
-        "lift at L3: no effect detected. lift was trained on this program's synthesis.";
+    let in_sentence = "lift at L3: no effect detected. lift was trained on this program's synthesis.";
     let check = || {
         let text = bench.complete(&words("report run")).replace("\n ", "");
         assert!(text.contains(trained), "{text}");
         let findings = bench.complete(&words("report run --json --findings"));
         let findings: Value = serde_json::from_str(&findings).unwrap();
         let findings = findings["findings"].as_array().unwrap();
-        assert!(
-            findings
-                .iter()
-                .any(|finding| { finding["text"] == in_sentence }),
-            "{findings:?}"
-        );
+        assert!(findings.iter().any(|finding| { finding["text"] == in_sentence }), "{findings:?}");
         let markdown = bench.complete(&words("report run --markdown"));
         assert!(markdown.contains(trained), "{markdown}");
         for file in ["report.html", "tables.tex"] {
@@ -111,21 +98,12 @@ fn page_opens_with_summary() {
         replies.push('\n');
     }
     bench.file("m.jsonl", &replies);
-    let text = bench.complete(&words(
-        "--model script:m.jsonl --model random --data set.jsonl --levels L0,L5 --out run",
-    ));
+    let text =
+        bench.complete(&words("--model script:m.jsonl --model random --data set.jsonl --levels L0,L5 --out run"));
     // `random` is no model under test.
-    assert!(
-        text.starts_with("script:m.jsonl, random · 6 questions"),
-        "{text}"
-    );
+    assert!(text.starts_with("script:m.jsonl, random · 6 questions"), "{text}");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
-    let marks = [
-        "<h1>",
-        "class=\"summary\"",
-        "class=\"alert\"",
-        "class=\"lead\"",
-    ];
+    let marks = ["<h1>", "class=\"summary\"", "class=\"alert\"", "class=\"lead\""];
     has_in_order(&page, &marks);
     // The tables list families and frames; the first screen names none, because no test compares them.
     assert!(!page.contains("First to fail"));

@@ -6,14 +6,8 @@ use std::path::Path;
 use crate::support::run::{Bench, called, words};
 
 /// The files of a run that are no products of its report.
-const OWN_FILES: [&str; 6] = [
-    "manifest.json",
-    "records.jsonl",
-    "records.parquet",
-    "questions.jsonl",
-    "thumbnails.jsonl",
-    "fidelity.jsonl",
-];
+const OWN_FILES: [&str; 6] =
+    ["manifest.json", "records.jsonl", "records.parquet", "questions.jsonl", "thumbnails.jsonl", "fidelity.jsonl"];
 
 /// The command of an evaluation with images of six rooms, and more flags.
 fn evaluation(more: &str) -> Vec<&str> {
@@ -32,17 +26,15 @@ fn assert_report_of(merged: &Path, parts: &Path) {
             assert!(!parts.join(name).exists() || path.is_dir(), "{name}");
             continue;
         }
-        let (one, other) = (
-            fs::read(&path).unwrap(),
-            fs::read(parts.join(name)).unwrap(),
-        );
+        let (one, other) = (fs::read(&path).unwrap(), fs::read(parts.join(name)).unwrap());
         assert!(one == other, "{name} differs");
         compared += 1;
     }
     assert!(compared > 8, "{compared}");
 }
 
-/// Reports on the run `a` in a folder, named as the folder of parts is: a report has the name that its run is called by.
+/// Reports on the run `a` in a folder, named as the folder of parts is: a report has the name that its run is called
+/// by.
 fn report_in(bench: &Bench, folder: &str) -> String {
     let mut command = bench.command(&["report", "a"]);
     let reported = called(command.current_dir(bench.path(folder)));
@@ -69,23 +61,15 @@ fn parts_report_what_merged_run_does() {
     assert_report_of(&bench.path("again/a"), &bench.path("a"));
     // Beside another run it counts as one.
     bench.complete(&evaluation("--out b --seed 5"));
-    let texts = [
-        "report a b --out of-parts",
-        "report whole/a b --out of-merged",
-    ];
+    let texts = ["report a b --out of-parts", "report whole/a b --out of-merged"];
     let texts = texts.map(|line| bench.complete(&words(line)));
-    assert_eq!(
-        texts[0].replace("of-parts", "of-merged"),
-        texts[1].replace("whole/a", "a")
-    );
-    let comparisons = ["of-parts", "of-merged"]
-        .map(|out| fs::read(bench.path(out).join("comparisons.csv")).unwrap());
+    assert_eq!(texts[0].replace("of-parts", "of-merged"), texts[1].replace("whole/a", "a"));
+    let comparisons = ["of-parts", "of-merged"].map(|out| fs::read(bench.path(out).join("comparisons.csv")).unwrap());
     assert_eq!(comparisons[0], comparisons[1]);
     // An item of the page is shown again.
     let question = fs::read_to_string(bench.path("whole/a/questions.jsonl")).unwrap();
     let question = question.split('"').nth(3).unwrap().to_owned();
-    let shown =
-        ["a", "whole/a"].map(|run| bench.complete(&["show", run, &question, "--out", "shown"]));
+    let shown = ["a", "whole/a"].map(|run| bench.complete(&["show", run, &question, "--out", "shown"]));
     assert_eq!(shown[0], shown[1]);
     // A folder of figures that is a link is not written through.
     #[cfg(unix)]
@@ -94,10 +78,7 @@ fn parts_report_what_merged_run_does() {
         fs::create_dir(bench.path("elsewhere")).unwrap();
         std::os::unix::fs::symlink(bench.path("elsewhere"), bench.path("a/figures")).unwrap();
         let said = bench.call(&words("report a"));
-        assert!(
-            said.stderr.contains("the report is not written"),
-            "{said:?}"
-        );
+        assert!(said.stderr.contains("the report is not written"), "{said:?}");
         assert_eq!(fs::read_dir(bench.path("elsewhere")).unwrap().count(), 0);
     }
     let refused = bench.call(&words("report a --rescore"));
@@ -139,11 +120,7 @@ fn missing_shards_name_their_command() {
     assert_ne!(fs::read(bench.path("a/summary.csv")).unwrap(), before);
     // A part of another run among them.
     bench.complete(&words(&format!("{flags} --seed 9 --out other --shard 2/3")));
-    fs::rename(
-        bench.path("other/shard-2-of-3"),
-        bench.path("a/shard-2-of-3-other"),
-    )
-    .unwrap();
+    fs::rename(bench.path("other/shard-2-of-3"), bench.path("a/shard-2-of-3-other")).unwrap();
     let refused = bench.call(&words("report a"));
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 2

@@ -17,35 +17,28 @@ fn rows(bench: &Bench, path: &str) -> Vec<BTreeMap<String, String>> {
         .records()
         .map(|row| {
             let row = row.unwrap();
-            names
-                .iter()
-                .zip(row.iter())
-                .map(|(name, cell)| (name.to_owned(), cell.to_owned()))
-                .collect()
+            names.iter().zip(row.iter()).map(|(name, cell)| (name.to_owned(), cell.to_owned())).collect()
         })
         .collect()
 }
 
-fn find<'r>(
-    rows: &'r [BTreeMap<String, String>],
-    cells: &[(&str, &str)],
-) -> &'r BTreeMap<String, String> {
-    let is_it =
-        |row: &&BTreeMap<String, String>| cells.iter().all(|(name, cell)| row[*name] == *cell);
-    rows.iter()
-        .find(is_it)
-        .unwrap_or_else(|| panic!("{cells:?}: {rows:?}"))
+fn find<'r>(rows: &'r [BTreeMap<String, String>], cells: &[(&str, &str)]) -> &'r BTreeMap<String, String> {
+    let is_it = |row: &&BTreeMap<String, String>| cells.iter().all(|(name, cell)| row[*name] == *cell);
+    rows.iter().find(is_it).unwrap_or_else(|| panic!("{cells:?}: {rows:?}"))
 }
 
 /// Two scripts for these questions: one is right as long as it is not too dark, one never.
 fn scripts(bench: &Bench) {
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
-    let good = set.lines().map(|line| {
-        let question: Value = serde_json::from_str(line).unwrap();
-        let dark =
-            serde_json::json!({"question": question["id"], "condition": "L5-noise", "reply": "A"});
-        format!("{dark}\n")
-    }).collect::<String>() + "{\"default\": \"C\"}\n";
+    let good = set
+        .lines()
+        .map(|line| {
+            let question: Value = serde_json::from_str(line).unwrap();
+            let dark = serde_json::json!({"question": question["id"], "condition": "L5-noise", "reply": "A"});
+            format!("{dark}\n")
+        })
+        .collect::<String>()
+        + "{\"default\": \"C\"}\n";
     bench.file("good.jsonl", good);
     bench.file("bad.jsonl", "{\"default\": \"A\"}\n");
 }
@@ -83,17 +76,10 @@ fn two_runs() -> Bench {
 }
 
 /// Checks numbers of a row against those of a line of a run's file: pairs of names of columns.
-fn assert_equal(
-    row: &BTreeMap<String, String>,
-    own: &BTreeMap<String, String>,
-    pairs: &[(&str, &str)],
-) {
+fn assert_equal(row: &BTreeMap<String, String>, own: &BTreeMap<String, String>, pairs: &[(&str, &str)]) {
     for (name, other) in pairs {
         let numbers = [&row[*name], &own[*other]].map(|text| text.parse::<f64>().unwrap());
-        assert!(
-            (numbers[0] - numbers[1]).abs() < 1e-12,
-            "{name}: {row:?} {own:?}"
-        );
+        assert!((numbers[0] - numbers[1]).abs() < 1e-12, "{name}: {row:?} {own:?}");
     }
 }
 
@@ -108,56 +94,26 @@ fn site_numbers_match_run_files() {
         let all = [("model", model), ("family", "all")];
         let of = |more: &[(&'static str, &'static str)]| [&all[..], more].concat();
         let summary = file("summary");
-        let strict = [
-            ("enhancer", ""),
-            ("mode", "strict"),
-            ("view", "image"),
-            ("level", "L0"),
-        ];
-        let pairs = [
-            ("l0", "value"),
-            ("l0_low", "low"),
-            ("l0_high", "high"),
-            ("n", "n"),
-        ];
+        let strict = [("enhancer", ""), ("mode", "strict"), ("view", "image"), ("level", "L0")];
+        let pairs = [("l0", "value"), ("l0_low", "low"), ("l0_high", "high"), ("n", "n")];
         assert_equal(row, find(&summary, &of(&strict)), &pairs);
         let curves = file("thresholds");
         let curve = find(&curves, &of(&[("variant", "noise"), ("enhancer", "")]));
-        let pairs = [
-            ("area", "area"),
-            ("area_low", "area_low"),
-            ("area_high", "area_high"),
-        ];
+        let pairs = [("area", "area"), ("area_low", "area_low"), ("area_high", "area_high")];
         assert_equal(row, curve, &pairs);
         assert_eq!(row["threshold_ev"], curve["threshold_ev"]);
         let comparisons = file("comparisons");
-        let drop = find(
-            &comparisons,
-            &of(&[("kind", "level"), ("condition", "L5-noise")]),
-        );
-        let pairs = [
-            ("change", "difference"),
-            ("change_low", "low"),
-            ("change_high", "high"),
-        ];
+        let drop = find(&comparisons, &of(&[("kind", "level"), ("condition", "L5-noise")]));
+        let pairs = [("change", "difference"), ("change_low", "low"), ("change_high", "high")];
         assert_equal(row, drop, &pairs);
         assert_eq!(row["change_shown"], drop["shown"]);
         let condition = format!("{}-noise+{}", row["best_level"], row["best_enhancer"]);
-        let gain = [
-            &all[..],
-            &[("kind", "enhancer"), ("condition", &*condition)],
-        ]
-        .concat();
-        let pairs = [
-            ("gain", "difference"),
-            ("gain_low", "low"),
-            ("gain_high", "high"),
-        ];
+        let gain = [&all[..], &[("kind", "enhancer"), ("condition", &*condition)]].concat();
+        let pairs = [("gain", "difference"), ("gain_low", "low"), ("gain_high", "high")];
         assert_equal(row, find(&comparisons, &gain), &pairs);
         let health = file("health");
         let own = || health.iter().filter(|line| line["model"] == model);
-        let sum =
-            |name: &str| -> usize { own().map(|line| line[name].parse::<usize>().unwrap()).sum() };
+        let sum = |name: &str| -> usize { own().map(|line| line[name].parse::<usize>().unwrap()).sum() };
         assert_eq!(row["replies"], sum("replies").to_string());
         assert_eq!(row["unread"], (sum("replies") - sum("read")).to_string());
     }
@@ -203,8 +159,7 @@ fn tables_share_only_equal_settings() {
     let bench = Bench::with_questions(6);
     scripts(&bench);
     let run = |out: &str, more: &str| {
-        let line =
-            format!("--model script:good.jsonl --data set.jsonl --levels L0,L5 --out {out} {more}");
+        let line = format!("--model script:good.jsonl --data set.jsonl --levels L0,L5 --out {out} {more}");
         bench.complete(&words(&line));
     };
     run("one", "");
@@ -231,10 +186,7 @@ fn tables_share_only_equal_settings() {
     insta::assert_snapshot!(redacted(&differs(2)), @r#"["questions is 63dc5e4e… in table 1 and f46cbe54… in this one"]"#);
     // The same model in two runs stands twice, and neither is better.
     let board = rows(&bench, "site/leaderboard.csv");
-    let twice: Vec<_> = board
-        .iter()
-        .filter(|row| row["group"] == "1" && row["model"] == "script:good.jsonl")
-        .collect();
+    let twice: Vec<_> = board.iter().filter(|row| row["group"] == "1" && row["model"] == "script:good.jsonl").collect();
     assert_eq!(twice.len(), 2);
     assert_eq!(twice[0]["rank_first"], twice[1]["rank_first"]);
 }
@@ -246,36 +198,17 @@ fn foreign_text_is_escaped() {
     bench.file(evil, "{\"default\": \"A\"}\n");
     let model = format!("script:{evil}");
     let out = "a\"b'<i>";
-    let line = [
-        "--model",
-        &model,
-        "--data",
-        "set.jsonl",
-        "--levels",
-        "L0,L5",
-        "--out",
-        out,
-    ];
+    let line = ["--model", &model, "--data", "set.jsonl", "--levels", "L0,L5", "--out", out];
     bench.complete(&line);
     // A version and a date of anybody's.
     let manifest = bench.path(out).join("manifest.json");
     let text = fs::read_to_string(&manifest).unwrap();
     let version = format!("\"version\": \"{}\"", env!("CARGO_PKG_VERSION"));
     assert!(text.contains(&version));
-    fs::write(
-        &manifest,
-        text.replace(
-            &version,
-            "\"version\": \"</script><script>alert(2)</script>\"",
-        ),
-    )
-    .unwrap();
+    fs::write(&manifest, text.replace(&version, "\"version\": \"</script><script>alert(2)</script>\"")).unwrap();
     bench.complete(&["site", out, "--out", "site"]);
     let index = fs::read_to_string(bench.path("site/index.html")).unwrap();
-    assert!(
-        index.contains("&lt;img src=x onerror=alert(1)&gt;"),
-        "{index}"
-    );
+    assert!(index.contains("&lt;img src=x onerror=alert(1)&gt;"), "{index}");
     for markup in ["<img", "<i>", "<script>alert", "javascript:"] {
         assert!(!index.contains(markup), "{markup}");
     }
@@ -287,11 +220,7 @@ fn foreign_text_is_escaped() {
     }
     for path in files(&bench.path("site")) {
         let name = path.file_name().unwrap().to_string_lossy().into_owned();
-        assert!(
-            name.chars()
-                .all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)),
-            "{name}"
-        );
+        assert!(name.chars().all(|c| c.is_ascii_alphanumeric() || "-_.".contains(c)), "{name}");
     }
 }
 
@@ -304,16 +233,10 @@ fn unreadable_and_foreign_folders_are_refused() {
     }
     bench.file("broken/records.jsonl", "{\"no\": \"record\"}\n");
     let manifest = fs::read_to_string(bench.path("older/manifest.json")).unwrap();
-    bench.file(
-        "older/manifest.json",
-        manifest.replace("darkqa.run/2", "darkqa.run/1"),
-    );
+    bench.file("older/manifest.json", manifest.replace("darkqa.run/2", "darkqa.run/1"));
     for (runs, expected) in [
         ("one broken", "broken/records.jsonl, line 1"),
-        (
-            "one older",
-            "older/manifest.json: this run was made by an earlier version",
-        ),
+        ("one older", "older/manifest.json: this run was made by an earlier version"),
         ("one nowhere", "nowhere: no run in this folder"),
         ("one one", "one is named twice"),
     ] {
@@ -344,9 +267,7 @@ fn unreadable_and_foreign_folders_are_refused() {
 #[test]
 fn no_page_is_written_through_link() {
     let bench = Bench::with_questions(3);
-    bench.complete(&words(
-        "--model random --data set.jsonl --levels L0,L5 --out one",
-    ));
+    bench.complete(&words("--model random --data set.jsonl --levels L0,L5 --out one"));
     bench.complete(&words("site one --out site"));
     fs::remove_dir_all(bench.path("site/runs")).unwrap();
     fs::create_dir(bench.path("elsewhere")).unwrap();
@@ -365,23 +286,14 @@ fn open_questions_have_own_table() {
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}\n");
     house.0.file("j.jsonl", "{\"default\": \"4\"}\n");
     for out in ["one", "two"] {
-        let line =
-            format!("--model script:a.jsonl --judge script:j.jsonl --levels L0,L3 --out {out}");
+        let line = format!("--model script:a.jsonl --judge script:j.jsonl --levels L0,L3 --out {out}");
         assert_eq!(house.call(&words(&line)).code, Some(0));
     }
     let bench = &house.0;
-    bench.complete(&words(
-        "--model random --data rooms:frames=2,size=96x64 --levels L0,L3 --out closed",
-    ));
-    bench.complete(&words(
-        "--model random --data rooms:frames=2,size=96x64 --ask home --levels L0,L3 --out own",
-    ));
-    bench.complete(&words(
-        "--blind-model random --data rooms:frames=2,size=96x64 --levels L0,L3 --out blind",
-    ));
-    bench.complete(&words(
-        "--model random --data rooms:frames=2,size=96x64 --light dark --out dark",
-    ));
+    bench.complete(&words("--model random --data rooms:frames=2,size=96x64 --levels L0,L3 --out closed"));
+    bench.complete(&words("--model random --data rooms:frames=2,size=96x64 --ask home --levels L0,L3 --out own"));
+    bench.complete(&words("--blind-model random --data rooms:frames=2,size=96x64 --levels L0,L3 --out blind"));
+    bench.complete(&words("--model random --data rooms:frames=2,size=96x64 --light dark --out dark"));
     let said = bench.complete(&words("site one two closed own blind dark --out site"));
     insta::assert_snapshot!(redacted(&said), @"
     own: in no table: nobody knows the true answers to its questions
@@ -397,21 +309,8 @@ fn open_questions_have_own_table() {
             (_, "with noise") => "noise",
             _ => "ev",
         };
-        let own = find(
-            &cells,
-            &[
-                ("level", &row["level"]),
-                ("variant", variant),
-                ("enhancer", ""),
-                ("group", "all"),
-            ],
-        );
-        for (name, other) in [
-            ("score", "value"),
-            ("low", "low"),
-            ("high", "high"),
-            ("n", "n"),
-        ] {
+        let own = find(&cells, &[("level", &row["level"]), ("variant", variant), ("enhancer", ""), ("group", "all")]);
+        for (name, other) in [("score", "value"), ("low", "low"), ("high", "high"), ("n", "n")] {
             assert_eq!(row[name], own[other].trim_end_matches(".0"), "{name}");
         }
         compared += 1;

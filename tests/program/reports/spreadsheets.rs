@@ -35,14 +35,7 @@ fn formulas_stay_text() {
     bench.file("set.jsonl", set.replace("\"color\"", &family));
     let endpoint = MockEndpoint::answering(|_| Answer::text("A"));
     let line = "--data set.jsonl --levels L0,L5 --out run";
-    let models = [
-        "--model",
-        MODEL,
-        "--model",
-        "@SUM(A1)",
-        "--base-url",
-        &endpoint.base_url(),
-    ];
+    let models = ["--model", MODEL, "--model", "@SUM(A1)", "--base-url", &endpoint.base_url()];
     bench.complete(&[&models[..], &words(line)].concat());
     bench.complete(&words("site run --out site"));
     for folder in ["run", "site"] {
@@ -50,10 +43,7 @@ fn formulas_stay_text() {
         assert!(cells.len() > 30, "{folder}: {cells:?}");
         for (file, cell) in &cells {
             let runs = cell.starts_with(['=', '+', '-', '@', '\t', '\r']);
-            assert!(
-                !runs || cell.parse::<f64>().is_ok(),
-                "{folder}/{file}: {cell:?}"
-            );
+            assert!(!runs || cell.parse::<f64>().is_ok(), "{folder}/{file}: {cell:?}");
         }
     }
     let cells = cells(&bench, "run");
@@ -75,11 +65,7 @@ fn formulas_stay_text() {
 fn exported_set_reads_back_unchanged() {
     let bench = Bench::with_questions(2);
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
-    bench.file(
-        "set.jsonl",
-        set.replace("\"red\"", "\"-4\"")
-            .replace("\"blue\"", "\"=1+1\""),
-    );
+    bench.file("set.jsonl", set.replace("\"red\"", "\"-4\"").replace("\"blue\"", "\"=1+1\""));
     bench.complete(&words("export vlmevalkit set.jsonl --levels L0 --out sets"));
     let table = fs::read_dir(bench.path("sets")).unwrap().next().unwrap();
     let table = table.unwrap().path();
@@ -87,8 +73,5 @@ fn exported_set_reads_back_unchanged() {
     let run = format!("--model random --data {table} --levels L0 --out back");
     bench.complete(&words(&run));
     let questions = fs::read_to_string(bench.path("back/questions.jsonl")).unwrap();
-    assert!(
-        questions.contains("\"-4\"") && questions.contains("\"=1+1\""),
-        "{questions}"
-    );
+    assert!(questions.contains("\"-4\"") && questions.contains("\"=1+1\""), "{questions}");
 }

@@ -1,4 +1,5 @@
-//! Damaged files of a run beside its intact records: the command that made the run makes them again, and asks nothing again.
+//! Damaged files of a run beside its intact records: the command that made the run makes them again, and asks nothing
+//! again.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -14,14 +15,8 @@ const RUN: &str = "--data set.jsonl --levels L0,L3 --variant ev --no-parquet --o
 const TRIALS: usize = 12;
 
 /// The ways in which a file is damaged.
-const DAMAGES: [Damage; 6] = [
-    Damage::FirstLine,
-    Damage::Truncated,
-    Damage::Binary,
-    Damage::Empty,
-    Damage::Missing,
-    Damage::Folder,
-];
+const DAMAGES: [Damage; 6] =
+    [Damage::FirstLine, Damage::Truncated, Damage::Binary, Damage::Empty, Damage::Missing, Damage::Folder];
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Damage {
@@ -65,10 +60,7 @@ struct Scene {
 
 impl Scene {
     fn new() -> Self {
-        let scene = Self {
-            bench: Bench::with_questions(6),
-            endpoint: MockEndpoint::start([Answer::text("C")]),
-        };
+        let scene = Self { bench: Bench::with_questions(6), endpoint: MockEndpoint::start([Answer::text("C")]) };
         let first = scene.call(RUN);
         assert_eq!(first.code, Some(0), "{first:?}");
         assert_eq!(scene.endpoint.requests().len(), TRIALS);
@@ -76,8 +68,7 @@ impl Scene {
     }
 
     fn call(&self, line: &str) -> Called {
-        self.bench
-            .call(&model_args(&self.endpoint.base_url(), line))
+        self.bench.call(&model_args(&self.endpoint.base_url(), line))
     }
 
     fn lines(&self, name: &str) -> BTreeSet<String> {
@@ -101,9 +92,7 @@ impl Scene {
 #[test]
 fn damaged_lists_are_made_again() {
     let files = ["thumbnails.jsonl", "fidelity.jsonl", "questions.jsonl"];
-    let rows = files
-        .iter()
-        .flat_map(|name| DAMAGES.map(|damage| (name, damage)));
+    let rows = files.iter().flat_map(|name| DAMAGES.map(|damage| (name, damage)));
     check_rows(rows, |(name, damage)| {
         let scene = Scene::new();
         let before = scene.lines(name);
@@ -125,14 +114,10 @@ fn damaged_lists_are_made_again() {
 fn a_damaged_manifest_is_made_again() {
     check_rows(DAMAGES, |damage| {
         let scene = Scene::new();
-        let whole =
-            scene.call("--data set.jsonl --levels L0,L3 --variant ev --no-parquet --out whole");
+        let whole = scene.call("--data set.jsonl --levels L0,L3 --variant ev --no-parquet --out whole");
         assert_eq!(whole.code, Some(0));
         damage.apply(&scene.bench.path("run/manifest.json"));
-        for words in [
-            RUN,
-            "--data set.jsonl --levels L0,L3 --variant ev --no-parquet --resume run",
-        ] {
+        for words in [RUN, "--data set.jsonl --levels L0,L3 --variant ev --no-parquet --resume run"] {
             let again = scene.call(words);
             assert_eq!(again.code, Some(0), "{damage:?} {again:?}");
         }
@@ -145,17 +130,12 @@ fn a_damaged_manifest_is_made_again() {
 fn manifest_needs_the_same_command() {
     let scene = Scene::new();
     Damage::Binary.apply(&scene.bench.path("run/manifest.json"));
-    for other in [
-        RUN.replace("L0,L3", "L0"),
-        RUN.replace("--data", "--image-first --data"),
-        format!("{RUN} --temperature 0.5"),
-    ] {
+    for other in
+        [RUN.replace("L0,L3", "L0"), RUN.replace("--data", "--image-first --data"), format!("{RUN} --temperature 0.5")]
+    {
         let refused = scene.call(&other);
         assert_eq!(refused.code, Some(2), "{other}: {refused:?}");
-        assert!(
-            refused.stderr.contains("are not of this command"),
-            "{refused:?}"
-        );
+        assert!(refused.stderr.contains("are not of this command"), "{refused:?}");
         assert!(!refused.stderr.contains("another --out"), "{refused:?}");
     }
     scene.assert_nothing_asked();
@@ -168,17 +148,10 @@ fn lost_questions_need_same_data() {
         let scene = Scene::new();
         let set = scene.bench.path("set.jsonl");
         let text = fs::read_to_string(&set).unwrap();
-        fs::write(
-            &set,
-            text.replace("What color is it, 3?", "Which color is it, 3?"),
-        )
-        .unwrap();
+        fs::write(&set, text.replace("What color is it, 3?", "Which color is it, 3?")).unwrap();
         let refused = scene.call_after(damage, "questions.jsonl");
         assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(
-            refused.stderr.contains("1 of 6 lost questions"),
-            "{refused:?}"
-        );
+        assert!(refused.stderr.contains("1 of 6 lost questions"), "{refused:?}");
         assert!(!refused.stderr.contains("another --out"), "{refused:?}");
         scene.assert_nothing_asked();
     }

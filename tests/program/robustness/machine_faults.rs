@@ -1,6 +1,6 @@
-//! Faults of the machine under a run, of questions with choices and of open ones: kills, a full disk, folders that cannot be written
-//! to, a second process, and a clock that jumps. Nothing is lost, nothing is asked twice but what was in flight, and the end is that of
-//! a run without faults.
+//! Faults of the machine under a run, of questions with choices and of open ones: kills, a full disk, folders that
+//! cannot be written to, a second process, and a clock that jumps. Nothing is lost, nothing is asked twice but what was
+//! in flight, and the end is that of a run without faults.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -38,19 +38,10 @@ impl Scene {
             };
             Answer::text(text)
         });
-        let bench = if is_open {
-            House::new().0
-        } else {
-            Bench::with_questions(6)
-        };
+        let bench = if is_open { House::new().0 } else { Bench::with_questions(6) };
         // 3 questions in 11 conditions and 3 marks; 6 questions in 11 conditions.
         let trials = if is_open { 33 + 3 } else { 66 };
-        Self {
-            bench,
-            endpoint,
-            is_open,
-            trials,
-        }
+        Self { bench, endpoint, is_open, trials }
     }
 
     /// The words of the run in a folder.
@@ -61,19 +52,14 @@ impl Scene {
         );
         let open = format!("{line} --judge j");
         let choices = format!("{line} --data set.jsonl");
-        let words = if self.is_open {
-            flags(&words(&open))
-        } else {
-            words(&choices)
-        };
+        let words = if self.is_open { flags(&words(&open)) } else { words(&choices) };
         words.into_iter().map(str::to_owned).collect()
     }
 
     /// The run in a folder, to its end.
     fn call(&self, out: &str) -> Called {
         let args = self.words(out);
-        self.bench
-            .call(&args.iter().map(String::as_str).collect::<Vec<_>>())
+        self.bench.call(&args.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
     /// The run in a folder, to its end, with everything scored.
@@ -111,23 +97,16 @@ impl Scene {
         String::from_utf8_lossy(&text).matches('\n').count()
     }
 
-    /// Completes the run in a folder, and asserts that it is what a run without faults is, for which so many requests were sent
-    /// beyond those of its trials.
+    /// Completes the run in a folder, and asserts that it is what a run without faults is, for which so many requests
+    /// were sent beyond those of its trials.
     fn assert_whole(&self, out: &str, beyond: usize) {
         self.complete(out);
         let run = self.bench.path(out);
-        let keys: Vec<String> = records(&run)
-            .into_iter()
-            .map(|record| record["key"].to_string())
-            .collect();
+        let keys: Vec<String> = records(&run).into_iter().map(|record| record["key"].to_string()).collect();
         let distinct: BTreeSet<&String> = keys.iter().collect();
         assert_eq!((distinct.len(), keys.len()), (self.trials, self.trials));
         let sent = self.endpoint.requests().len();
-        assert!(
-            sent <= self.trials + beyond,
-            "{sent} requests for {} trials",
-            self.trials
-        );
+        assert!(sent <= self.trials + beyond, "{sent} requests for {} trials", self.trials);
         self.complete("whole");
         assert!(assert_same_products(&self.bench.path("whole"), &run) > 5);
     }
@@ -142,10 +121,7 @@ fn kills_cost_what_was_in_flight() {
         for records in [4, 11, 19] {
             scene.kill_at("run", records);
         }
-        assert!(
-            scene.stored("run") < scene.trials,
-            "the kills came too late"
-        );
+        assert!(scene.stored("run") < scene.trials, "the kills came too late");
         scene.assert_whole("run", 3 * AT_ONCE);
     });
 }
@@ -159,10 +135,7 @@ fn full_disk_stops_until_room() {
         let stopped = scene.shell("trap '' XFSZ; ulimit -f 16;", "run");
         let said = String::from_utf8_lossy(&stopped.stderr);
         assert_eq!(stopped.status.code(), Some(2), "{said}");
-        assert!(
-            said.contains("error: run/") && said.contains(".jsonl: cannot write"),
-            "{said}"
-        );
+        assert!(said.contains("error: run/") && said.contains(".jsonl: cannot write"), "{said}");
         assert!(!said.contains("panicked"), "{said}");
         let stored = scene.stored("run");
         assert!(stored > 0 && stored < scene.trials, "{stored}");
@@ -178,12 +151,7 @@ fn second_process_is_refused() {
         let mut first = scene.spawned("run", 2);
         let second = scene.call("run");
         assert_eq!(second.code, Some(2), "{second:?}");
-        assert!(
-            second
-                .stderr
-                .contains("another process is writing to this run"),
-            "{second:?}"
-        );
+        assert!(second.stderr.contains("another process is writing to this run"), "{second:?}");
         assert_eq!(first.wait().unwrap().code(), Some(0));
         scene.assert_whole("run", 0);
     });
@@ -259,10 +227,7 @@ fn unwritable_folder_costs_no_request() {
 /// The files of a folder with their bytes.
 #[cfg(unix)]
 fn contents(folder: &Path) -> Vec<(std::path::PathBuf, Vec<u8>)> {
-    let mut all: Vec<_> = files(folder)
-        .into_iter()
-        .map(|path| (path.clone(), fs::read(path).unwrap()))
-        .collect();
+    let mut all: Vec<_> = files(folder).into_iter().map(|path| (path.clone(), fs::read(path).unwrap())).collect();
     all.sort();
     all
 }
@@ -277,9 +242,7 @@ fn as_nobody(scene: &Scene, program: &Path, out: &str) -> Output {
     use std::os::unix::process::CommandExt as _;
 
     let mut command = Command::new(program);
-    command
-        .args(scene.words(out))
-        .current_dir(scene.bench.path(""));
+    command.args(scene.words(out)).current_dir(scene.bench.path(""));
     if is_root() {
         command.uid(NOBODY).gid(NOBODY);
     }

@@ -76,8 +76,9 @@ impl Random {
     }
 }
 
-/// One file of each kind that is read: colour, grey, 16 bits, alpha; PNG, WebP and TIFF; JPEG, baseline and progressive; a lossy
-/// WebP file of libwebp; files with a profile and with an orientation; OpenEXR in its compressions.
+/// One file of each kind that is read: colour, grey, 16 bits, alpha; PNG, WebP and TIFF; JPEG, baseline and
+/// progressive; a lossy WebP file of libwebp; files with a profile and with an orientation; OpenEXR in its
+/// compressions.
 fn corpus() -> Vec<Vec<u8>> {
     let colour = DynamicImage::ImageRgb8(image::ImageBuffer::from_fn(37, 21, |x, y| {
         Rgb([(x * 7) as u8, (y * 11) as u8, (x * y) as u8])
@@ -126,16 +127,14 @@ fn corpus() -> Vec<Vec<u8>> {
         let mut encoder = jpeg_encoder::Encoder::new(&mut file, 80);
         encoder.set_progressive(progressive);
         let pixels = colour.to_rgb8();
-        encoder
-            .encode(&pixels, 37, 21, jpeg_encoder::ColorType::Rgb)
-            .unwrap();
+        encoder.encode(&pixels, 37, 21, jpeg_encoder::ColorType::Rgb).unwrap();
         files.push(file);
     }
     files
 }
 
-/// Damages a file in one to four places. Half of the PNG files get valid checksums afterwards, so that the damage reaches
-/// what lies behind them.
+/// Damages a file in one to four places. Half of the PNG files get valid checksums afterwards, so that the damage
+/// reaches what lies behind them.
 fn mutate(file: &[u8], random: &mut Random) -> Vec<u8> {
     let mut file = file.to_vec();
     for _ in 0..=random.below(4) {
@@ -228,10 +227,7 @@ fn unbounded_profile_takes_no_memory() {
 fn unbounded_texts_take_no_memory() {
     let pixels = image::RgbImage::new(4, 4);
     let bomb = vec![b'a'; 256 << 20];
-    for (kind, head) in [
-        (*b"zTXt", &b"Comment\0\0"[..]),
-        (*b"iTXt", b"Comment\0\x01\0\0\0"),
-    ] {
+    for (kind, head) in [(*b"zTXt", &b"Comment\0\0"[..]), (*b"iTXt", b"Comment\0\x01\0\0\0")] {
         let chunks = [packed_chunk(kind, head, &bomb)];
         let bytes = with_chunks(&png(&pixels), &chunks);
         let file = ImageFile::new(bytes, "a bomb".to_owned(), DecodeRule::default());
@@ -245,10 +241,7 @@ fn unbounded_texts_take_no_memory() {
 fn ten_thousand_images_survive_damage() {
     LARGEST.set(0);
     let [read, refused] = read_mutated(10_000);
-    assert!(
-        read > 500 && refused > 5000,
-        "{read} read, {refused} refused"
-    );
+    assert!(read > 500 && refused > 5000, "{read} read, {refused} refused");
     assert!(LARGEST.get() <= MOST_BYTES);
 }
 

@@ -22,9 +22,7 @@ fn run(limit: &str, line: &str) -> (Called, Bench, MockEndpoint) {
     let line = format!("--data set.jsonl --levels L0 --out run {line}");
     let words = model_args(&url, &line).join(" ");
     let mut command = Command::new("sh");
-    command
-        .args(["-c", &format!("{limit} exec {PROGRAM} {words}")])
-        .current_dir(bench.path(""));
+    command.args(["-c", &format!("{limit} exec {PROGRAM} {words}")]).current_dir(bench.path(""));
     (called(&mut command), bench, endpoint)
 }
 
@@ -58,11 +56,7 @@ fn several_endpoints_share_the_open_files() {
     assert_eq!(ran.0.code, Some(0), "{:?}", ran.0);
     // The replicas are compared by what they say of the model.
     let asked = |endpoint: &MockEndpoint| {
-        endpoint
-            .requests()
-            .into_iter()
-            .filter(|request| request.line.starts_with("POST "))
-            .count()
+        endpoint.requests().into_iter().filter(|request| request.line.starts_with("POST ")).count()
     };
     let sent = asked(&ran.2) + asked(&other);
     assert_eq!((records(&ran.1.path("run")).len(), sent), (TRIALS, TRIALS));

@@ -16,19 +16,10 @@ const PROMPT: Duration = Duration::from_secs(20);
 
 /// Commands that run for many seconds, and the folder that they write into from the start.
 const LONG: [(&str, Option<&str>); 3] = [
-    (
-        "rooms --out rooms --frames 3000 --size 640x480",
-        Some("rooms"),
-    ),
-    (
-        "synthesize frames --levels L1,L2,L3,L4,L5 --out dark",
-        Some("dark"),
-    ),
+    ("rooms --out rooms --frames 3000 --size 640x480", Some("rooms")),
+    ("synthesize frames --levels L1,L2,L3,L4,L5 --out dark", Some("dark")),
     // It draws the rooms before it makes the folder of the run.
-    (
-        "--model observer --data rooms:frames=3000,size=640x480 --levels L0 --out run",
-        None,
-    ),
+    ("--model observer --data rooms:frames=3000,size=640x480 --levels L0 --out run", None),
 ];
 
 /// Waits until a process of the program handles all signals and does its work.
@@ -85,16 +76,10 @@ fn ended_promptly(process: &mut Child, what: &str) -> Option<i32> {
 fn broken(folder: &std::path::Path) -> Vec<String> {
     let whole = |path: &std::path::Path| match path.extension().and_then(|e| e.to_str()) {
         Some("png" | "jpg") => image::open(path).is_ok(),
-        Some("json") => {
-            serde_json::from_slice::<serde_json::Value>(&fs::read(path).unwrap()).is_ok()
-        }
+        Some("json") => serde_json::from_slice::<serde_json::Value>(&fs::read(path).unwrap()).is_ok(),
         _ => true,
     };
-    files(folder)
-        .into_iter()
-        .filter(|path| !whole(path))
-        .map(|path| path.display().to_string())
-        .collect()
+    files(folder).into_iter().filter(|path| !whole(path)).map(|path| path.display().to_string()).collect()
 }
 
 #[test]
@@ -167,7 +152,8 @@ fn signals_end_the_first_process_of_a_container() {
     }
 }
 
-/// The listener for interrupts of a run that asks stays installed. What follows, such as a report, must end nevertheless.
+/// The listener for interrupts of a run that asks stays installed. What follows, such as a report, must end
+/// nevertheless.
 #[test]
 fn signals_end_a_run_after_its_last_reply() {
     let bench = Bench::new();
@@ -176,8 +162,7 @@ fn signals_end_a_run_after_its_last_reply() {
     writer.write_all(&vec![0; 1 << 16]).unwrap();
     for name in ["-TERM", "-HUP"] {
         let out = format!("run{name}");
-        let line =
-            format!("--model random --levels L0 --data rooms:frames=2,size=96x64 --out {out}");
+        let line = format!("--model random --levels L0 --data rooms:frames=2,size=96x64 --out {out}");
         let stdout = Stdio::from(writer.try_clone().unwrap());
         let mut process = bench.spawn(&words(&line), stdout);
         wait_until(|| bench.path(&out).join("summary.json").exists());

@@ -1,4 +1,5 @@
-//! A run folder of a stranger: links in it lead nothing that is written out of it, and no file is cut before it is known.
+//! A run folder of a stranger: links in it lead nothing that is written out of it, and no file is cut before it is
+//! known.
 
 #![cfg(unix)]
 
@@ -41,10 +42,7 @@ fn nothing_is_written_through_a_link() {
             let called = bench.call(&words(line));
             let is_named = called.stderr.contains(&format!("run/{name}"));
             assert!(is_named, "{line}: {called:?}");
-            assert!(
-                called.code == Some(2) || line == "report run",
-                "{line}: {called:?}"
-            );
+            assert!(called.code == Some(2) || line == "report run", "{line}: {called:?}");
         }
         assert_eq!(fs::read_to_string(bench.path("private")).unwrap(), PRIVATE);
         let inside = fs::read_dir(bench.path("elsewhere")).unwrap().count();
@@ -115,11 +113,7 @@ fn images_are_not_shown_through_link() {
     bench.file("inner/a.png", picture);
     let set = fs::read_to_string(bench.path("set.jsonl")).unwrap();
     bench.file("nested.jsonl", set.replace("a.png", "inner/a.png"));
-    bench.complete(&words(
-        &COMMAND
-            .replace("set.jsonl", "nested.jsonl")
-            .replace("run", "nested"),
-    ));
+    bench.complete(&words(&COMMAND.replace("set.jsonl", "nested.jsonl").replace("run", "nested")));
     fs::create_dir(bench.path("nested/shown")).unwrap();
     symlink("../../elsewhere", bench.path("nested/shown/inner")).unwrap();
     let called = bench.call(&words("show nested q0"));
@@ -133,10 +127,7 @@ fn store_is_not_written_through_links() {
     let line = |run: &str| format!("{COMMAND}{run} --images-cache store");
     bench.complete(&words(&line("1")));
     let before = fs::read_dir(bench.path("store/v1")).unwrap();
-    let folders: Vec<_> = before
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.is_dir())
-        .collect();
+    let folders: Vec<_> = before.map(|entry| entry.unwrap().path()).filter(|path| path.is_dir()).collect();
     assert!(!folders.is_empty());
     for folder in folders {
         fs::remove_dir_all(&folder).unwrap();

@@ -1,4 +1,5 @@
-//! Names in a stranger's run that move a terminal, turn a line, hide, or are formulas: no product holds them as they are.
+//! Names in a stranger's run that move a terminal, turn a line, hide, or are formulas: no product holds them as they
+//! are.
 
 use std::fs;
 use std::path::Path;
@@ -22,10 +23,7 @@ fn exchanged(value: &Value, words: &[(&str, &str)]) -> Value {
     match value {
         Value::String(text) => Value::String(word(text)),
         Value::Array(all) => all.iter().map(|value| exchanged(value, words)).collect(),
-        Value::Object(all) => all
-            .iter()
-            .map(|(key, value)| (word(key), exchanged(value, words)))
-            .collect(),
+        Value::Object(all) => all.iter().map(|(key, value)| (word(key), exchanged(value, words))).collect(),
         other => other.clone(),
     }
 }
@@ -54,22 +52,11 @@ fn hidden(text: &str) -> Vec<char> {
 fn hostile_run_names_are_inert() {
     let bench = Bench::with_questions(8);
     bench.file("m.jsonl", "{\"default\": \"A\"}\n");
-    bench.complete(&words(
-        "--model script:m.jsonl --model random --data set.jsonl --levels L0,L3,L5 --out run",
-    ));
-    let exchange = [
-        ("script:m.jsonl", MODEL),
-        ("color", FAMILY),
-        ("q3", QUESTION),
-        ("a.png", FRAME),
-    ];
+    bench.complete(&words("--model script:m.jsonl --model random --data set.jsonl --levels L0,L3,L5 --out run"));
+    let exchange = [("script:m.jsonl", MODEL), ("color", FAMILY), ("q3", QUESTION), ("a.png", FRAME)];
     let lists = ["records", "questions", "thumbnails", "fidelity"];
     let lists = lists.map(|name| format!("run/{name}.jsonl"));
-    for name in lists
-        .iter()
-        .map(String::as_str)
-        .chain(["run/manifest.json"])
-    {
+    for name in lists.iter().map(String::as_str).chain(["run/manifest.json"]) {
         if bench.path(name).exists() {
             exchange_in(&bench.path(name), &exchange);
         }
@@ -87,13 +74,7 @@ fn hostile_run_names_are_inert() {
     ] {
         let called = bench.call(&words(line));
         for (stream, text) in [("stdout", &called.stdout), ("stderr", &called.stderr)] {
-            let styles = [
-                "\u{1b}[0m",
-                "\u{1b}[1m",
-                "\u{1b}[31m",
-                "\u{1b}[32m",
-                "\u{1b}[33m",
-            ];
+            let styles = ["\u{1b}[0m", "\u{1b}[1m", "\u{1b}[31m", "\u{1b}[32m", "\u{1b}[33m"];
             let text = styles
                 .iter()
                 .filter(|_| line.ends_with("always"))
@@ -104,35 +85,21 @@ fn hostile_run_names_are_inert() {
     }
     let mut kinds = std::collections::BTreeMap::<String, usize>::new();
     for path in [files(&bench.path("run")), files(&bench.path("site"))].concat() {
-        let kind = path
-            .extension()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
+        let kind = path.extension().unwrap_or_default().to_string_lossy().into_owned();
         // What stands for itself in JSON has its own signs for such characters.
         if ["svg", "csv", "tex", "html", "md", "txt"].contains(&&*kind) {
             let text = fs::read_to_string(&path).unwrap();
             let found = hidden(&text);
             assert!(found.is_empty(), "{}: {found:?}", path.display());
             if kind == "csv" {
-                let is_formula = |cell: &str| {
-                    cell.trim_start_matches(['"', ' '])
-                        .starts_with(['=', '@', '+'])
-                };
-                assert!(
-                    !text.split([',', '\n']).any(is_formula),
-                    "{}",
-                    path.display()
-                );
+                let is_formula = |cell: &str| cell.trim_start_matches(['"', ' ']).starts_with(['=', '@', '+']);
+                assert!(!text.split([',', '\n']).any(is_formula), "{}", path.display());
             }
         }
         *kinds.entry(kind).or_default() += 1;
     }
     for (kind, least) in [("svg", 3), ("csv", 8), ("tex", 1), ("html", 2)] {
-        assert!(
-            kinds.get(kind).is_some_and(|count| *count >= least),
-            "{kind}: {kinds:?}"
-        );
+        assert!(kinds.get(kind).is_some_and(|count| *count >= least), "{kind}: {kinds:?}");
     }
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains("⟨U+001B⟩"));

@@ -1,6 +1,8 @@
-//! Whole runs of both experiments, pinned: a change of what is planned, keyed, made, read or scored that nobody meant shows here.
+//! Whole runs of both experiments, pinned: a change of what is planned, keyed, made, read or scored that nobody meant
+//! shows here.
 //!
-//! A failure shows the digest of this version. To write it down is to change the schema, or what is asked: that stands in the CHANGELOG.
+//! A failure shows the digest of this version. To write it down is to change the schema, or what is asked: that stands
+//! in the CHANGELOG.
 
 use std::fs;
 
@@ -58,10 +60,7 @@ fn open_questions_with_marks_and_enhancer() {
         "a.jsonl",
         "{\"question\": \"q1\", \"condition\": \"L2-noise\", \"reply\": \"grey\"}\n{\"default\": \"an answer\"}",
     );
-    house.0.file(
-        "j.jsonl",
-        "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}",
-    );
+    house.0.file("j.jsonl", "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}");
     let called = house.call(&words(
         "--model script:a.jsonl --blind-model script:a.jsonl --judge script:j.jsonl \
          --llie bright.onnx --llie-anyway --protocol tolerant --out run",

@@ -1,5 +1,5 @@
-//! What a run is known by: which command is refused on its folder and by which field, which may add to it, and what enters the
-//! keys of its trials.
+//! What a run is known by: which command is refused on its folder and by which field, which may add to it, and what
+//! enters the keys of its trials.
 
 use std::cell::Cell;
 use std::collections::{BTreeMap, BTreeSet};
@@ -24,14 +24,7 @@ struct Flags {
     said: &'static [(&'static str, &'static str)],
 }
 
-const EVALUATION: Flags = Flags {
-    command: "",
-    said: &[
-        ("--data", "frames"),
-        ("--model", "m"),
-        ("--levels", "L0,L3"),
-    ],
-};
+const EVALUATION: Flags = Flags { command: "", said: &[("--data", "frames"), ("--model", "m"), ("--levels", "L0,L3")] };
 
 const OPEN: Flags = Flags {
     command: "openeqa",
@@ -47,9 +40,7 @@ const OPEN: Flags = Flags {
 
 /// A picture of its own in every pixel.
 fn picture(shade: u8) -> image::RgbImage {
-    image::RgbImage::from_fn(24, 16, |x, y| {
-        image::Rgb([shade.wrapping_add((x * 9) as u8), (y * 15) as u8, shade])
-    })
+    image::RgbImage::from_fn(24, 16, |x, y| image::Rgb([shade.wrapping_add((x * 9) as u8), (y * 15) as u8, shade]))
 }
 
 /// Frames in a folder, with questions about them.
@@ -62,9 +53,7 @@ fn frames(bench: &Bench, folder: &str, shade: u8) {
     let lines: Vec<String> = lines.iter().map(ToString::to_string).collect();
     bench.file(&format!("{folder}/questions.jsonl"), lines.join("\n"));
     for (name, shade) in [("a.png", shade), ("b.png", 150)] {
-        picture(shade)
-            .save(bench.path(&format!("{folder}/{name}")))
-            .unwrap();
+        picture(shade).save(bench.path(&format!("{folder}/{name}"))).unwrap();
     }
 }
 
@@ -75,14 +64,8 @@ impl Scene {
         frames(bench, "frames", 20);
         frames(bench, "elsewhere/frames", 70);
         let asked = |path: &str| fs::read_to_string(bench.path(path)).unwrap();
-        bench.file(
-            "other.jsonl",
-            asked("frames/questions.jsonl").replace("a lamp", "a torch"),
-        );
-        bench.file(
-            "other.json",
-            asked("questions.json").replace("What colour", "Which colour"),
-        );
+        bench.file("other.jsonl", asked("frames/questions.jsonl").replace("a lamp", "a torch"));
+        bench.file("other.json", asked("questions.json").replace("What colour", "Which colour"));
         for name in ["choice.txt", "blind.txt"] {
             let built_in = format!("{}/prompts/{name}", env!("CARGO_MANIFEST_DIR"));
             let text = fs::read_to_string(built_in).unwrap();
@@ -97,11 +80,7 @@ impl Scene {
         bench.file("rules.toml", rules.replace("gap_mm = 300", "gap_mm = 301"));
         onnx::gain(0.5).write(&bench.path(""), "one.onnx");
         onnx::gamma(0.5).write(&bench.path(""), "two.onnx");
-        Self {
-            house,
-            endpoint: MockEndpoint::start([Answer::text("A")]),
-            folders: Cell::new(0),
-        }
+        Self { house, endpoint: MockEndpoint::start([Answer::text("A")]), folders: Cell::new(0) }
     }
 
     /// The name of a folder that is not there.
@@ -160,11 +139,7 @@ impl Scene {
         let (asked, kept) = (self.endpoint.requests().len(), self.kept(out));
         let called = self.call(flags, otherwise, out);
         assert_eq!(called.code, Some(2), "{otherwise}: {called:?}");
-        assert!(
-            called.stderr.contains(field),
-            "{otherwise}: {field} expected: {}",
-            called.stderr
-        );
+        assert!(called.stderr.contains(field), "{otherwise}: {field} expected: {}", called.stderr);
         assert_eq!(self.endpoint.requests().len(), asked, "{otherwise}");
         assert_eq!(self.kept(out), kept, "{otherwise}");
     }
@@ -177,11 +152,7 @@ impl Scene {
         assert_eq!(asked, new, "{otherwise}");
         let now = self.kept(out);
         assert!(now.starts_with(&kept), "{otherwise}");
-        assert_eq!(
-            now.lines().count() - kept.lines().count(),
-            new,
-            "{otherwise}"
-        );
+        assert_eq!(now.lines().count() - kept.lines().count(), new, "{otherwise}");
         let key = |line: &str| serde_json::from_str::<Value>(line).unwrap()["key"].to_string();
         let keys: BTreeSet<String> = now.lines().map(key).collect();
         assert_eq!(keys.len(), now.lines().count(), "{otherwise}");
@@ -315,26 +286,10 @@ const ADDITIONS: [Addition; 23] = [
     ("--variant ev", "--variant both", 3),
     ("", "--variant both,auto", 3),
     ("", "--variant all --levels L0,L3,T33.33", 6),
-    (
-        "--variant all --levels L0,L3,T9",
-        "--variant all --levels L0,L3,T9,T33.33",
-        3,
-    ),
-    (
-        "--llie one.onnx --llie-anyway",
-        "--llie one.onnx --llie two.onnx --llie-anyway",
-        3,
-    ),
-    (
-        "--llie one.onnx --llie-anyway",
-        "--llie one.onnx --llie-on both --llie-anyway",
-        3,
-    ),
-    (
-        "--llie one.onnx --llie-anyway",
-        "--llie one.onnx --llie-on l0,noise --llie-anyway",
-        3,
-    ),
+    ("--variant all --levels L0,L3,T9", "--variant all --levels L0,L3,T9,T33.33", 3),
+    ("--llie one.onnx --llie-anyway", "--llie one.onnx --llie two.onnx --llie-anyway", 3),
+    ("--llie one.onnx --llie-anyway", "--llie one.onnx --llie-on both --llie-anyway", 3),
+    ("--llie one.onnx --llie-anyway", "--llie one.onnx --llie-on l0,noise --llie-anyway", 3),
     ("", "--profile physical", 3),
     ("", "--amplify all", 3),
     ("", "--tone before-ev", 3),
@@ -344,11 +299,7 @@ const ADDITIONS: [Addition; 23] = [
     ("--families presence", "--families presence,color", 3),
     ("", "--repeats 2", 9),
     // Of two images: without an image, at L0 twice, and at L3 twice.
-    (
-        "--ask bank.jsonl --ask-per-image 1",
-        "--ask-per-image 2 --ask bank.jsonl",
-        10,
-    ),
+    ("--ask bank.jsonl --ask-per-image 1", "--ask-per-image 2 --ask bank.jsonl", 10),
     // They come with the observer alone.
     ("", "--observer-controls", 0),
 ];
@@ -361,16 +312,8 @@ const OPEN_ADDITIONS: [Addition; 10] = [
     ("--levels L0,L3", "--levels L0,L3,L5", 3),
     ("--variant noise", "--variant both", 3),
     ("", "--variant noise,auto,motion --levels L0,L3,T33.33", 6),
-    (
-        "--llie one.onnx --llie-anyway",
-        "--llie one.onnx --llie two.onnx --llie-anyway",
-        3,
-    ),
-    (
-        "--variant both --llie one.onnx --llie-anyway",
-        "--variant both --llie one.onnx --llie-on both --llie-anyway",
-        3,
-    ),
+    ("--llie one.onnx --llie-anyway", "--llie one.onnx --llie two.onnx --llie-anyway", 3),
+    ("--variant both --llie one.onnx --llie-anyway", "--variant both --llie one.onnx --llie-on both --llie-anyway", 3),
     ("", "--profile physical", 3),
     ("--limit 2", "--limit 3", 2),
 ];
@@ -426,7 +369,8 @@ fn what_decides_nothing_asks_nothing() {
     let scene = Scene::new();
     let bench = &scene.house.0;
     bench.file("key.txt", "k\n");
-    let vendor = "[[vendor]]\nname = \"Mine\"\nhosts = [\"127.0.0.1\"]\nkey = []\ntoken-field = \"max_completion_tokens\"\n";
+    let vendor =
+        "[[vendor]]\nname = \"Mine\"\nhosts = [\"127.0.0.1\"]\nkey = []\ntoken-field = \"max_completion_tokens\"\n";
     bench.file("vendors.toml", vendor);
     bench.file("other.toml", "retries = 3\n");
     let prices = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 1, output = 1 }\n";
@@ -467,18 +411,9 @@ const ELSEWHERE: [(&str, &str); 60] = [
     ("--pairs", "tests/program/data/photographs.rs"),
     ("--label-folders", "tests/program/data/photographs.rs"),
     ("--choices", "tests/program/data/photographs.rs"),
-    (
-        "--transfer",
-        "it changes images of 16 bits: tests/program/data/inputs/depth.rs",
-    ),
-    (
-        "--exposure",
-        "it changes linear light: tests/program/data/inputs/light.rs",
-    ),
-    (
-        "--colour",
-        "it changes images of other colours than sRGB: tests/program/data/inputs/colour.rs",
-    ),
+    ("--transfer", "it changes images of 16 bits: tests/program/data/inputs/depth.rs"),
+    ("--exposure", "it changes linear light: tests/program/data/inputs/light.rs"),
+    ("--colour", "it changes images of other colours than sRGB: tests/program/data/inputs/colour.rs"),
     ("--auto", "camera_settings_follow_variants"),
     ("--motion", "camera_settings_follow_variants"),
     ("--llie-anyway", "tests/program/images/enhance/probe.rs"),
@@ -494,20 +429,11 @@ const ELSEWHERE: [(&str, &str); 60] = [
     ("--out", "names the folder"),
     ("--resume", "names the folder"),
     ("--shard", "tests/program/runs/shards.rs"),
-    (
-        "--ort-lib",
-        "a library of one machine: tests/program/images/enhance/",
-    ),
-    (
-        "--ca-file",
-        "takes a server with TLS: tests/program/endpoints/ask.rs",
-    ),
+    ("--ort-lib", "a library of one machine: tests/program/images/enhance/"),
+    ("--ca-file", "takes a server with TLS: tests/program/endpoints/ask.rs"),
     ("--frames", "tests/program/runs/openeqa/"),
     ("--answers", "tests/program/runs/openeqa/"),
-    (
-        "--judge",
-        "marks are trials of their own: tests/program/runs/openeqa/",
-    ),
+    ("--judge", "marks are trials of their own: tests/program/runs/openeqa/"),
     ("--protocol", "tests/program/runs/openeqa/"),
     ("--subset", "tests/program/runs/openeqa/"),
     ("--study", "tests/program/runs/openeqa/"),
@@ -534,9 +460,7 @@ fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
     let mut classes: Vec<_> = section(command).lines().filter_map(class_of_row).collect();
     // Flags that an earlier command describes: `As in [darkqa-eval](#darkqa-eval): `--data`, `--map``.
     for line in section(command).lines() {
-        let Some((name, flags)) = line
-            .strip_prefix("As in [darkqa-eval")
-            .and_then(|rest| rest.split_once("): "))
+        let Some((name, flags)) = line.strip_prefix("As in [darkqa-eval").and_then(|rest| rest.split_once("): "))
         else {
             continue;
         };
@@ -553,10 +477,7 @@ fn classes(command: &str) -> Vec<(&'static str, &'static str)> {
 /// The row of a flag from its long form on: `--data DIR` | …` of `| `-d, --data DIR` | …`; `None` for other lines.
 fn long_form(row: &str) -> Option<&str> {
     let flag = row.strip_prefix("| `")?;
-    let flag = flag
-        .split_once(", ")
-        .filter(|(short, _)| short.len() == 2)
-        .map_or(flag, |(_, long)| long);
+    let flag = flag.split_once(", ").filter(|(short, _)| short.len() == 2).map_or(flag, |(_, long)| long);
     flag.starts_with("--").then_some(flag)
 }
 
@@ -565,9 +486,7 @@ fn typed_flag(row: &str) -> String {
     let cell = row.split(['=', '[', '`']).next().unwrap();
     let mut words = cell.split(' ');
     let flag = words.next().unwrap();
-    let key = words
-        .next()
-        .filter(|word| !word.contains(char::is_uppercase));
+    let key = words.next().filter(|word| !word.contains(char::is_uppercase));
     match key {
         Some(key) => format!("`{flag} {key}`"),
         None => format!("`{flag}`"),
@@ -587,14 +506,8 @@ fn class_of_row(row: &'static str) -> Option<(&'static str, &'static str)> {
 #[test]
 fn every_flag_has_its_effect() {
     let first = |args: &&'static str| args.split(' ').next().unwrap();
-    let refused = REFUSED
-        .iter()
-        .chain(&OPEN_REFUSED)
-        .map(|(_, args)| first(args));
-    let added = ADDITIONS
-        .iter()
-        .chain(&OPEN_ADDITIONS)
-        .map(|(_, args, _)| first(args));
+    let refused = REFUSED.iter().chain(&OPEN_REFUSED).map(|(_, args)| first(args));
+    let added = ADDITIONS.iter().chain(&OPEN_ADDITIONS).map(|(_, args, _)| first(args));
     // Of `--llie one.onnx --llie-on both` the last flag is the one that is tried.
     let on = std::iter::once("--llie-on");
     let decide: BTreeSet<&str> = refused.chain(added).chain(on).collect();
@@ -612,9 +525,7 @@ fn every_flag_has_its_effect() {
             };
             // The keys and addresses of a judge are those of a model, in the same structure.
             if !held && !elsewhere.contains(flag) && !flag.starts_with("--judge-") {
-                wrong.push(format!(
-                    "{command} {flag}: {class}, and no row of that kind"
-                ));
+                wrong.push(format!("{command} {flag}: {class}, and no row of that kind"));
             }
         }
     }
@@ -727,10 +638,7 @@ fn camera_settings_follow_variants() {
     assert!(variants["auto"]["--auto"].is_string() && variants["ev"].is_null());
     for (otherwise, field) in [
         ("", "the variant auto has another --motion in this run"),
-        (
-            "--motion speed=31 --auto gain=3",
-            "the variant auto has another --auto",
-        ),
+        ("--motion speed=31 --auto gain=3", "the variant auto has another --auto"),
         ("--motion speed=31 --fixed", "or fixed in this run"),
     ] {
         let otherwise = format!("{ALL} {otherwise}");
@@ -750,12 +658,7 @@ fn answer_key_covers_its_images() {
     assert_eq!(compared(&raw, &first), (set(""), of_raw.clone()));
     let dark = set("L3-noise L3-noise+one");
     let differ = |otherwise: &str| compared(&first, &enhanced(otherwise)).0;
-    for sent in [
-        "--image-size 32",
-        "--image-size native",
-        "--num-frames 2",
-        "--image jpeg:90",
-    ] {
+    for sent in ["--image-size 32", "--image-size native", "--num-frames 2", "--image jpeg:90"] {
         let all = set("L0 L3-noise L3-noise+one");
         assert_eq!(differ(sent), all, "{sent}");
     }
@@ -827,8 +730,7 @@ fn sidecar_decoding_makes_another_enhancer() {
 #[test]
 fn preset_decoding_makes_another_enhancer() {
     let scene = Scene::new();
-    let said =
-        |model: &str| format!("--levels L3 --variant noise --limit 1 --llie-anyway --llie {model}");
+    let said = |model: &str| format!("--levels L3 --variant noise --limit 1 --llie-anyway --llie {model}");
     scene.complete(&EVALUATION, &said("one.onnx"), "run");
     let plain = scene.keys_in("run");
     let preset = said("ruas-upe:one.onnx");

@@ -35,14 +35,12 @@ fn files(folder: &Path) -> Files {
 /// The content of files by name.
 type Files = BTreeMap<String, Vec<u8>>;
 
-/// Calls a command whole into `whole`, and each of three parts into a folder of its own; returns the files of the whole, and those of
-/// each part.
+/// Calls a command whole into `whole`, and each of three parts into a folder of its own; returns the files of the
+/// whole, and those of each part.
 fn in_parts(bench: &Bench, command: &str) -> (Files, Vec<Files>) {
     bench.complete(&words(&format!("{command} --out whole")));
     let parts = [1, 2, 3].map(|part| {
-        bench.complete(&words(&format!(
-            "{command} --out part{part} --shard {part}/3"
-        )));
+        bench.complete(&words(&format!("{command} --out part{part} --shard {part}/3")));
         files(&bench.path(&format!("part{part}")))
     });
     (files(&bench.path("whole")), parts.into())
@@ -53,17 +51,9 @@ fn in_parts(bench: &Bench, command: &str) -> (Files, Vec<Files>) {
 fn assert_together(whole: &Files, parts: &[Files]) {
     let mut all = BTreeMap::new();
     for part in parts {
-        assert!(
-            part.len() * 2 < whole.len(),
-            "{} of {}",
-            part.len(),
-            whole.len()
-        );
+        assert!(part.len() * 2 < whole.len(), "{} of {}", part.len(), whole.len());
         for (name, content) in part {
-            assert!(
-                all.insert(name.clone(), content.clone()).is_none(),
-                "{name} twice"
-            );
+            assert!(all.insert(name.clone(), content.clone()).is_none(), "{name} twice");
         }
     }
     assert!(!whole.is_empty());
@@ -101,11 +91,7 @@ fn sets_are_exported_in_parts() {
         let (whole, parts) = in_parts(&bench, &format!("export {kind} frames --levels L0,L3"));
         let is_image = |name: &str| Path::new(name).extension() == Some(OsStr::new("png"));
         let images = |files: &Files| {
-            files
-                .iter()
-                .filter(|(name, _)| is_image(name))
-                .map(|(name, image)| (name.clone(), image.clone()))
-                .collect()
+            files.iter().filter(|(name, _)| is_image(name)).map(|(name, image)| (name.clone(), image.clone())).collect()
         };
         if kind != "vlmevalkit" {
             let parts: Vec<Files> = parts.iter().map(images).collect();
@@ -137,9 +123,7 @@ fn shard_measurements_make_questions() {
     let bench = with_frames();
     bench.complete(&words("questions frames --out whole/q.jsonl"));
     for part in ["1/3", "2/3", "3/3"] {
-        let said = bench.complete(&words(&format!(
-            "questions frames --out q/q.jsonl --shard {part}"
-        )));
+        let said = bench.complete(&words(&format!("questions frames --out q/q.jsonl --shard {part}")));
         assert!(said.contains("without --shard"), "{said}");
     }
     let measured = files(&bench.path("q"));
@@ -147,10 +131,7 @@ fn shard_measurements_make_questions() {
     let part = |part: usize| format!("q.shard-{part}-of-3.statistics.jsonl");
     assert_eq!(names, [part(1), part(2), part(3)]);
     let whole = files(&bench.path("whole"));
-    assert_eq!(
-        measured.into_values().collect::<Vec<_>>().concat(),
-        whole["q.statistics.jsonl"]
-    );
+    assert_eq!(measured.into_values().collect::<Vec<_>>().concat(), whole["q.statistics.jsonl"]);
     // A line that is changed stays changed: nothing is measured again.
     let path = bench.path(&format!("q/{}", part(2)));
     let text = fs::read_to_string(&path).unwrap();
@@ -164,8 +145,5 @@ fn shard_measurements_make_questions() {
     assert_ne!(changed, text);
     fs::write(&path, changed).unwrap();
     bench.complete(&words("questions frames --out q/q.jsonl"));
-    assert_ne!(
-        files(&bench.path("q"))["q.statistics.jsonl"],
-        whole["q.statistics.jsonl"]
-    );
+    assert_ne!(files(&bench.path("q"))["q.statistics.jsonl"], whole["q.statistics.jsonl"]);
 }

@@ -1,5 +1,5 @@
-//! What no other test would miss: the sets of Holm's correction, a long torn line, the patience with an outage, which frames a
-//! report shows, the warning of replies that were cut, and open questions about enhanced walks.
+//! What no other test would miss: the sets of Holm's correction, a long torn line, the patience with an outage, which
+//! frames a report shows, the warning of replies that were cut, and open questions about enhanced walks.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -21,9 +21,7 @@ use serde_json::{Value, json};
 /// The lines of a file of JSON objects.
 fn lines(path: &std::path::Path) -> Vec<Value> {
     let text = fs::read_to_string(path).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 // ---- Holm's correction ----
@@ -39,8 +37,8 @@ const SKILLS: [(&str, [[usize; 2]; 5]); 3] = [
     ("c", [[4, 3], [4, 6], [2, 11], [11, 2], [5, 3]]),
 ];
 
-/// The exact two-sided p-value of the sign test, Σ over k ≤ min(gained, lost) of 2·C(n, k)/2ⁿ and 1 at most, n = gained + lost:
-/// with one pair a cluster, swapping clusters comes to it.
+/// The exact two-sided p-value of the sign test, Σ over k ≤ min(gained, lost) of 2·C(n, k)/2ⁿ and 1 at most, n = gained
+/// + lost: with one pair a cluster, swapping clusters comes to it.
 fn sign_test(gained: usize, lost: usize) -> f64 {
     let n = gained + lost;
     let (mut mass, mut tail) = (0.5_f64.powi(n as i32), 0.0);
@@ -77,9 +75,7 @@ fn right(model: &str, condition: &str) -> [usize; 2] {
 /// A set of questions, and models that know what is written above.
 fn exam() -> Bench {
     let bench = Bench::with_questions(1);
-    let ids: Vec<[String; 2]> = (0..OF_EACH)
-        .map(|i| FAMILIES.map(|family| format!("{family}{i}")))
-        .collect();
+    let ids: Vec<[String; 2]> = (0..OF_EACH).map(|i| FAMILIES.map(|family| format!("{family}{i}"))).collect();
     let question = |family: usize, id: &String| json!({"id": id, "image": "a.png", "family": FAMILIES[family], "question": format!("Which, {id}?"), "choices": ["one", "two", "three"], "answer": "three"});
     let all: Vec<String> = ids
         .iter()
@@ -92,9 +88,8 @@ fn exam() -> Bench {
         for (condition, right) in CONDITIONS.into_iter().zip(skill) {
             for (family, right) in right.into_iter().enumerate() {
                 let known = ids.iter().take(right).map(|pair| &pair[family]);
-                script.extend(known.map(|id| {
-                    json!({"question": id, "condition": condition, "reply": "C"}).to_string()
-                }));
+                script
+                    .extend(known.map(|id| json!({"question": id, "condition": condition, "reply": "C"}).to_string()));
             }
         }
         bench.file(&format!("{model}.jsonl"), script.join("\n"));
@@ -109,9 +104,7 @@ fn holm_corrects_within_models_and_kind() {
                 --out run";
     bench.complete(&words(line));
     let text = fs::read_to_string(bench.path("run/comparisons.csv")).unwrap();
-    let mut rows = text
-        .lines()
-        .map(|line| line.split(',').collect::<Vec<&str>>());
+    let mut rows = text.lines().map(|line| line.split(',').collect::<Vec<&str>>());
     let header = rows.next().unwrap();
     // The lenient rows have the same numbers here.
     let rows = rows.filter(|row| row.last() == Some(&"strict"));
@@ -124,12 +117,7 @@ fn holm_corrects_within_models_and_kind() {
         };
         // The first so many are right: of two, the one that knows more knows all that the other does.
         let (one, two) = (right(model, condition), right(against, other));
-        let of = |family: usize| {
-            (
-                one[family].saturating_sub(two[family]),
-                two[family].saturating_sub(one[family]),
-            )
-        };
+        let of = |family: usize| (one[family].saturating_sub(two[family]), two[family].saturating_sub(one[family]));
         let (gained, lost) = match FAMILIES.iter().position(|name| *name == family) {
             Some(family) => of(family),
             None => (of(0).0 + of(1).0, of(0).1 + of(1).1),
@@ -138,16 +126,8 @@ fn holm_corrects_within_models_and_kind() {
         let due = sign_test(gained, lost);
         // The larger one of the exact p and that of the interval.
         let alone = number(p_alone);
-        assert!(
-            alone > due - 1e-12 && alone < (3.0 * due).max(0.02),
-            "{due}: {row:?}"
-        );
-        let set = (
-            kind.to_owned(),
-            family == "all",
-            model.to_owned(),
-            against.to_owned(),
-        );
+        assert!(alone > due - 1e-12 && alone < (3.0 * due).max(0.02), "{due}: {row:?}");
+        let set = (kind.to_owned(), family == "all", model.to_owned(), against.to_owned());
         let values = (alone, number(p_holm));
         sets.entry(set).or_default().push(values);
     }
@@ -157,18 +137,12 @@ fn holm_corrects_within_models_and_kind() {
         let alone: Vec<f64> = values.iter().map(|(p, _)| *p).collect();
         for &(p, stated) in values {
             let due = holm(&alone, p);
-            assert!(
-                (stated - due).abs() < 1e-12,
-                "{set:?}: {p} to {due}, not {stated}"
-            );
+            assert!((stated - due).abs() < 1e-12, "{set:?}: {p} to {due}, not {stated}");
             apart += usize::from((holm(&whole, p) - due).abs() > 1e-6);
         }
     }
     let counts = |kind: &str, all: bool| -> Vec<usize> {
-        sets.iter()
-            .filter(|((k, a, ..), _)| k == kind && *a == all)
-            .map(|(_, values)| values.len())
-            .collect()
+        sets.iter().filter(|((k, a, ..), _)| k == kind && *a == all).map(|(_, values)| values.len()).collect()
     };
     // Each pair of models in five conditions; each model dark with L0, and noisy with its exposure alone.
     for (kind, each) in [("model", 5), ("level", 4), ("variant", 2)] {
@@ -186,9 +160,7 @@ fn long_torn_line_is_removed() {
     let bench = Bench::with_questions(3);
     let endpoint = MockEndpoint::start([Answer::text("C")]);
     let base = endpoint.base_url();
-    let line = format!(
-        "--data set.jsonl --model m --base-url {base} --levels L0 --concurrency 1 --out run"
-    );
+    let line = format!("--data set.jsonl --model m --base-url {base} --levels L0 --concurrency 1 --out run");
     bench.complete(&words(&line));
     let path = bench.path("run/records.jsonl");
     let whole = fs::read_to_string(&path).unwrap();
@@ -211,8 +183,8 @@ fn long_torn_line_is_removed() {
 
 // ---- The patience with an outage ----
 
-/// A run of 200 questions, 20 at a time, with a server that answers the first 20, fails so often, and answers again: the code
-/// and the messages, and how many trials failed.
+/// A run of 200 questions, 20 at a time, with a server that answers the first 20, fails so often, and answers again:
+/// the code and the messages, and how many trials failed.
 fn outage(length: usize) -> (Option<i32>, String, usize) {
     const TOGETHER: usize = 20;
     let bench = Bench::with_questions(200);
@@ -284,21 +256,15 @@ fn thumbnails_follow_lowest_digests() {
     bench.complete(&words("merge parts --out merged"));
     let mut ranked: Vec<String> = (0..FRAMES).map(|i| format!("frame-{i:02}.png")).collect();
     ranked.sort_by_key(|frame| *Digest::from_bytes(frame.as_bytes()).as_bytes());
-    let due: BTreeSet<(String, String)> = ranked[..MOST]
-        .iter()
-        .flat_map(|frame| ["L0", "L5-noise"].map(|at| (frame.clone(), at.to_owned())))
-        .collect();
+    let due: BTreeSet<(String, String)> =
+        ranked[..MOST].iter().flat_map(|frame| ["L0", "L5-noise"].map(|at| (frame.clone(), at.to_owned()))).collect();
     let stored = |run: &str| {
         let lines = lines(&bench.path(&format!("{run}/thumbnails.jsonl")));
         let text = |line: &Value, field: &str| line[field].as_str().unwrap().to_owned();
-        let places: BTreeSet<(String, String)> = lines
-            .iter()
-            .map(|line| (text(line, "frame"), text(line, "condition")))
-            .collect();
+        let places: BTreeSet<(String, String)> =
+            lines.iter().map(|line| (text(line, "frame"), text(line, "condition"))).collect();
         assert_eq!(places.len(), lines.len(), "{run}: none twice");
-        let images = lines
-            .iter()
-            .map(|line| (text(line, "image"), text(line, "crop")));
+        let images = lines.iter().map(|line| (text(line, "image"), text(line, "crop")));
         (places, images.collect::<BTreeSet<(String, String)>>())
     };
     let (whole, merged) = (stored("whole"), stored("merged"));
@@ -314,9 +280,7 @@ fn cut_report(cut: usize, output: &Value) -> String {
     let cut = std::iter::repeat_n(Answer::message(&json!({"content": output}), "length"), cut);
     let endpoint = MockEndpoint::start(cut.chain([Answer::text("C")]));
     let base = endpoint.base_url();
-    let line = format!(
-        "--data set.jsonl --model m --base-url {base} --levels L0 --concurrency 1 --out run"
-    );
+    let line = format!("--data set.jsonl --model m --base-url {base} --levels L0 --concurrency 1 --out run");
     let called = bench.call(&words(&line));
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(endpoint.requests().len(), 10);
@@ -339,8 +303,7 @@ fn truncating_limit_warns() {
 
 // ---- Open questions about enhanced walks ----
 
-const OPEN: &str =
-    "--model m --judge j --levels L0,L3 --llie bright.onnx --llie-anyway --out run --base-url";
+const OPEN: &str = "--model m --judge j --levels L0,L3 --llie bright.onnx --llie-anyway --out run --base-url";
 
 /// A house, and a model that makes everything brighter.
 fn bright_house() -> House {
@@ -352,9 +315,7 @@ fn bright_house() -> House {
 /// The mean code of the images of a request.
 fn brightness(request: &Value) -> f64 {
     let parts = request["messages"][0]["content"].as_array().unwrap();
-    let urls = parts
-        .iter()
-        .filter_map(|part| part["image_url"]["url"].as_str());
+    let urls = parts.iter().filter_map(|part| part["image_url"]["url"].as_str());
     let mut samples = Vec::new();
     for url in urls {
         let file = STANDARD.decode(url.strip_prefix("data:image/png;base64,").unwrap());
@@ -371,10 +332,7 @@ fn answer_batch(house: &House, file: &str, reply: &str) -> Vec<Value> {
     let answers = requests.iter().map(|request| {
         let body = json!({"choices": [{"message": {"content": reply}, "finish_reason": "stop"}]});
         let response = json!({"status_code": 200, "body": body});
-        format!(
-            "{}\n",
-            json!({"custom_id": request["custom_id"], "response": response, "error": null})
-        )
+        format!("{}\n", json!({"custom_id": request["custom_id"], "response": response, "error": null}))
     });
     house.0.file("out.jsonl", answers.collect::<String>());
     let called = called(&mut house.0.command(&["batch", "import", "run", "out.jsonl"]));
@@ -416,17 +374,11 @@ fn enhanced_walks_use_batch_and_page() {
     let requests = answer_batch(&house, "run/batch/1-m-001.jsonl", "It is brown");
     let mut light = BTreeMap::<String, Vec<f64>>::new();
     for trial in lines(&house.0.path("run/batch/trials.jsonl")) {
-        let of = requests.iter().find(|request| {
-            trial["key"]
-                .as_str()
-                .unwrap()
-                .starts_with(request["custom_id"].as_str().unwrap())
-        });
+        let of = requests
+            .iter()
+            .find(|request| trial["key"].as_str().unwrap().starts_with(request["custom_id"].as_str().unwrap()));
         let condition = trial["condition"].as_str().unwrap().to_owned();
-        light
-            .entry(condition)
-            .or_default()
-            .push(brightness(&of.unwrap()["body"]));
+        light.entry(condition).or_default().push(brightness(&of.unwrap()["body"]));
     }
     assert_eq!(light.len(), 3);
     // Three times as bright, but for what noise and rounding leave of it.
@@ -458,15 +410,8 @@ fn enhanced_walks_use_batch_and_page() {
     let each = ["L0", "L3-noise", "L3-noise+bright", "marks"];
     assert_eq!(counts(&house), each.map(|name| (name.to_owned(), 3)).into());
     let summary = house.read("run/summary.json");
-    let row = summary["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|row| row["by"] == "all" && row["enhancer"] == "bright");
-    assert_eq!(
-        (&row.unwrap()["n"], &row.unwrap()["value"]),
-        (&json!(3), &json!(0.75))
-    );
+    let row = summary["rows"].as_array().unwrap().iter().find(|row| row["by"] == "all" && row["enhancer"] == "bright");
+    assert_eq!((&row.unwrap()["n"], &row.unwrap()["value"]), (&json!(3), &json!(0.75)));
     let page = fs::read_to_string(house.0.path("run/report.html")).unwrap();
     assert!(page.contains("bright"), "the page names the enhancer");
     assert!(house.0.path("run/upstream/m-L3-noise+bright.json").exists());
@@ -497,13 +442,8 @@ fn stopped_enhanced_walks_resume() {
     let each = ["L0", "L3-noise", "L3-noise+bright", "marks"];
     assert_eq!(counts(&house), each.map(|name| (name.to_owned(), 3)).into());
     let thumbnails = lines(&house.0.path("run/thumbnails.jsonl"));
-    let thumbnails = thumbnails
-        .iter()
-        .map(|line| line["condition"].as_str().unwrap());
-    assert_eq!(
-        thumbnails.collect::<BTreeSet<&str>>(),
-        each[..3].iter().copied().collect()
-    );
+    let thumbnails = thumbnails.iter().map(|line| line["condition"].as_str().unwrap());
+    assert_eq!(thumbnails.collect::<BTreeSet<&str>>(), each[..3].iter().copied().collect());
 }
 
 // ---- Replies without an answer ----
@@ -513,10 +453,7 @@ fn null_or_refused_reply_is_unanswered() {
     let house = House::new();
     let model = MockEndpoint::start([
         Answer::message(&json!({"content": null}), "stop"),
-        Answer::message(
-            &json!({"content": null, "refusal": "I cannot say."}),
-            "stop",
-        ),
+        Answer::message(&json!({"content": null, "refusal": "I cannot say."}), "stop"),
         Answer::text("No"),
     ]);
     let judge = MockEndpoint::start([Answer::text("5")]);
@@ -547,17 +484,9 @@ fn null_or_refused_reply_is_unanswered() {
             {"question_id": "q3", "answer": "No"},
         ])
     );
-    assert_eq!(
-        house.read("run/upstream/m-L0-j-metrics.json"),
-        json!({"q1": 0, "q2": 0, "q3": 5})
-    );
+    assert_eq!(house.read("run/upstream/m-L0-j-metrics.json"), json!({"q1": 0, "q2": 0, "q3": 5}));
     let summary = house.read("run/summary.json");
-    let row = summary["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|row| row["by"] == "all")
-        .unwrap();
+    let row = summary["rows"].as_array().unwrap().iter().find(|row| row["by"] == "all").unwrap();
     assert_eq!((&row["n"], &row["null"]), (&json!(3), &json!(2)));
     assert!((row["value"].as_f64().unwrap() - 1.0 / 3.0).abs() < 1e-12);
     insta::assert_snapshot!(called.lines_with("without an answer"), @r#"

@@ -22,9 +22,7 @@ fn with_frames() -> Bench {
 
 fn lines(path: &Path) -> Vec<Value> {
     let text = fs::read_to_string(path).unwrap();
-    text.lines()
-        .map(|line| serde_json::from_str(line).unwrap())
-        .collect()
+    text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
 }
 
 fn json(path: &Path) -> Value {
@@ -51,18 +49,13 @@ fn planned_shards_equal_one_run() {
     let frames = lines(&plan.join("frames.jsonl"));
     for (place, frame) in frames.iter().enumerate() {
         assert_eq!(frame["place"], place);
-        assert_eq!(
-            (&frame["width"], &frame["height"]),
-            (&160.into(), &120.into())
-        );
+        assert_eq!((&frame["width"], &frame["height"]), (&160.into(), &120.into()));
         let path = bench.path(frame["path"].as_str().unwrap());
         assert_eq!(frame["size"], fs::metadata(path).unwrap().len());
         assert!(frame["digest"].is_string() && frame["mtime"].is_string());
         assert!(frame["cost"]["seconds"].as_f64().unwrap() > 0.0);
     }
-    let requests = frames
-        .iter()
-        .map(|frame| frame["cost"]["requests"].as_u64());
+    let requests = frames.iter().map(|frame| frame["cost"]["requests"].as_u64());
     assert_eq!(requests.sum::<Option<u64>>(), Some(trials as u64));
     for part in 1..=5 {
         bench.complete(&words(&format!("{FLAGS} --out run --shard {part}/5")));
@@ -89,11 +82,7 @@ fn shard_opens_only_its_frames() {
     assert_eq!(found.code, Some(0), "{found:?}");
     let own: BTreeSet<String> = {
         let records = records(&bench.path("run/shard-2-of-4"));
-        records
-            .iter()
-            .map(|record| record["frame"].as_str().unwrap())
-            .map(str::to_owned)
-            .collect()
+        records.iter().map(|record| record["frame"].as_str().unwrap()).map(str::to_owned).collect()
     };
     assert!((2..=4).contains(&own.len()), "{own:?}");
     fs::remove_dir_all(bench.path("run/shard-2-of-4")).unwrap();
@@ -101,8 +90,7 @@ fn shard_opens_only_its_frames() {
     for path in files(&bench.path("frames/scenes")) {
         let is_own = own.iter().any(|frame| {
             let (scene, view) = frame.split_once('/').unwrap();
-            path.file_stem().unwrap() == view
-                && path.components().any(|part| part.as_os_str() == scene)
+            path.file_stem().unwrap() == view && path.components().any(|part| part.as_os_str() == scene)
         });
         if !is_own && path.extension().unwrap() == "png" {
             fs::write(&path, "no image").unwrap();
@@ -130,42 +118,18 @@ fn foreign_plan_names_the_setting() {
         let called = bench.call(&words(line));
         assert_eq!(called.code, Some(2), "{line}: {called:?}");
         assert!(called.stderr.contains(says), "{says}: {}", called.stderr);
-        assert!(
-            called.stderr.contains("plan is of another run"),
-            "{}",
-            called.stderr
-        );
+        assert!(called.stderr.contains("plan is of another run"), "{}", called.stderr);
     };
-    refused(
-        &format!("{flags} --seed 3 --out run"),
-        "its --seed is 0, now it is 3",
-    );
-    refused(
-        &format!("{flags} --limit 3 --out run"),
-        "its --limit is unset",
-    );
-    refused(
-        &format!("{flags} --variant ev --out run"),
-        "its --variant is",
-    );
-    refused(
-        &format!("{flags} --gain 3 --out run"),
-        "of the reading paper is",
-    );
+    refused(&format!("{flags} --seed 3 --out run"), "its --seed is 0, now it is 3");
+    refused(&format!("{flags} --limit 3 --out run"), "its --limit is unset");
+    refused(&format!("{flags} --variant ev --out run"), "its --variant is");
+    refused(&format!("{flags} --gain 3 --out run"), "of the reading paper is");
     let model = "--model random --out run";
-    refused(
-        &format!("{model} --levels L0 --data rooms:frames=4,size=120x90"),
-        "its --levels is",
-    );
-    refused(
-        &format!("{model} --levels L0,L2 --data rooms:frames=6,size=120x90"),
-        "its --data is",
-    );
+    refused(&format!("{model} --levels L0 --data rooms:frames=4,size=120x90"), "its --levels is");
+    refused(&format!("{model} --levels L0,L2 --data rooms:frames=6,size=120x90"), "its --data is");
     assert!(!bench.path("run/manifest.json").exists());
     // Whoever answers, and whatever enhances, takes the same plan.
-    bench.complete(&words(&format!(
-        "{flags} --blind-model random --llie lift --out run"
-    )));
+    bench.complete(&words(&format!("{flags} --blind-model random --llie lift --out run")));
 }
 
 #[test]
@@ -248,9 +212,7 @@ fn missing_planned_shards_name_command() {
     // The command said does what it says.
     let words: Vec<&str> = command.split(' ').skip(1).collect();
     bench.complete(&words);
-    bench.complete(&crate::support::run::words(&format!(
-        "{FLAGS} --out run --shard 5/6"
-    )));
+    bench.complete(&crate::support::run::words(&format!("{FLAGS} --out run --shard 5/6")));
     bench.complete(&crate::support::run::words("merge run --out complete"));
 }
 
@@ -261,9 +223,7 @@ fn parts_of_plan_cost_about_same() {
     let lines = (0..8).map(|i| {
         let side = if i < 4 { 100 } else { 400 };
         let name = format!("{i}.png");
-        image::RgbImage::new(side, side)
-            .save(bench.path(&name))
-            .unwrap();
+        image::RgbImage::new(side, side).save(bench.path(&name)).unwrap();
         let question = serde_json::json!({
             "id": format!("q{i}"), "image": name, "question": format!("Where is it, {i}?"),
             "choices": ["here", "there"], "answer": "here",
@@ -288,9 +248,7 @@ fn shard_may_cost_its_share() {
     // One question about the first frame, and nine about the second.
     let lines = (0..10).map(|i| {
         let name = format!("{}.png", i.min(1));
-        image::RgbImage::new(64, 64)
-            .save(bench.path(&name))
-            .unwrap();
+        image::RgbImage::new(64, 64).save(bench.path(&name)).unwrap();
         let question = serde_json::json!({
             "id": format!("q{i}"), "image": name, "question": format!("Where is it, {i}?"),
             "choices": ["here", "there"], "answer": "here",
@@ -299,20 +257,17 @@ fn shard_may_cost_its_share() {
     });
     bench.file("set.jsonl", lines.collect::<String>());
     let base = mock.base_url();
-    let flags =
-        format!("--model gpt-4o --base-url {base} --levels L0 --data set.jsonl --max-tokens 16");
+    let flags = format!("--model gpt-4o --base-url {base} --levels L0 --data set.jsonl --max-tokens 16");
     bench.complete(&words(&format!("plan {flags} --out run")));
     let frames = self::lines(&bench.path("run/plan/frames.jsonl"));
-    let dollars: Vec<f64> = frames
-        .iter()
-        .map(|frame| frame["cost"]["dollars"].as_f64().unwrap())
-        .collect();
+    let dollars: Vec<f64> = frames.iter().map(|frame| frame["cost"]["dollars"].as_f64().unwrap()).collect();
     let whole = dollars[0] + dollars[1];
     assert!((dollars[0] / whole - 0.1).abs() < 0.02, "{dollars:?}");
     let estimate = &json(&bench.path("run/plan/plan.json"))["estimate"];
     assert!((estimate["dollars"].as_f64().unwrap() - whole).abs() < 1e-9);
-    // Four times what all is estimated to cost: the upper bound of each request is up to twice its estimate. Of a limit of a sixth of the estimate the
-    // first part has a sixtieth, which is less than its one request, and an equal share would be enough for it.
+    // Four times what all is estimated to cost: the upper bound of each request is up to twice its estimate. Of a limit
+    // of a sixth of the estimate the first part has a sixtieth, which is less than its one request, and an equal share
+    // would be enough for it.
     let part = |part: u32, limit: f64| {
         let line = format!("{flags} --out run --shard {part}/2 --max-cost {limit:.9}");
         bench.call(&words(&line)).code

@@ -1,4 +1,5 @@
-//! Remedies that a message prints: the same command with the printed flag, in the same folder, gets all replies and asks none twice.
+//! Remedies that a message prints: the same command with the printed flag, in the same folder, gets all replies and
+//! asks none twice.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -59,10 +60,7 @@ fn tokens(body: &Value) -> u64 {
 
 /// The records of a run by trial, the last of each.
 fn last_records(bench: &Bench) -> BTreeMap<String, Value> {
-    records(&bench.path("run"))
-        .into_iter()
-        .map(|record| (record["key"].to_string(), record))
-        .collect()
+    records(&bench.path("run")).into_iter().map(|record| (record["key"].to_string(), record)).collect()
 }
 
 /// A remedy that is tried in the state in which it is printed.
@@ -81,13 +79,7 @@ const CANNOT: &str = "No endpoints found that can handle the requested parameter
 
 #[expect(clippy::too_many_lines, reason = "a table")]
 fn rows() -> Vec<Row> {
-    let row = |name, flags, remedy, server, report| Row {
-        name,
-        flags,
-        remedy,
-        server,
-        report,
-    };
+    let row = |name, flags, remedy, server, report| Row { name, flags, remedy, server, report };
     vec![
         row(
             "credit for 500 tokens",
@@ -106,13 +98,7 @@ fn rows() -> Vec<Row> {
             "credit that becomes less",
             ["", "--max-tokens 400"],
             "--max-tokens 400",
-            Server::new(|answered, body| {
-                when(
-                    answered >= 4 && tokens(body) > 400,
-                    402,
-                    "You can only afford 400",
-                )
-            }),
+            Server::new(|answered, body| when(answered >= 4 && tokens(body) > 400, 402, "You can only afford 400")),
             "m was asked with several token limits (--max-tokens): 4 replies with 1024, 8 replies with 400",
         ),
         row(
@@ -133,11 +119,7 @@ fn rows() -> Vec<Row> {
             ["--temperature 0.5", "--temperature 1"],
             "--temperature default",
             Server::new(|_, body| {
-                when(
-                    body["temperature"] != 1.0,
-                    400,
-                    "invalid temperature: only 1 is allowed for this model",
-                )
+                when(body["temperature"] != 1.0, 400, "invalid temperature: only 1 is allowed for this model")
             }),
             "The --temperature of m is 1 in all replies; the run began with 0.5.",
         ),
@@ -149,28 +131,15 @@ fn rows() -> Vec<Row> {
                 // One trial fails, so that something is left to ask.
                 let failed = AtomicUsize::new(0);
                 Server::new(move |answered, body| {
-                    when(
-                        body.get("temperature").is_some(),
-                        400,
-                        "`temperature` is deprecated for this model.",
-                    )
-                    .or_else(|| {
-                        when(
-                            answered == 5 && failed.fetch_add(1, Ordering::SeqCst) == 0,
-                            413,
-                            "too large",
-                        )
-                    })
+                    when(body.get("temperature").is_some(), 400, "`temperature` is deprecated for this model.")
+                        .or_else(|| when(answered == 5 && failed.fetch_add(1, Ordering::SeqCst) == 0, 413, "too large"))
                 })
             },
             "The --temperature of m has two values, because the server refused the first: auto in 11 replies, then default.",
         ),
         row(
             "a name of the token limit",
-            [
-                "--request token-field=max_tokens",
-                "--request token-field=max_completion_tokens",
-            ],
+            ["--request token-field=max_tokens", "--request token-field=max_completion_tokens"],
             "--request token-field=max_completion_tokens",
             Server::new(|_, body| {
                 when(
@@ -183,16 +152,11 @@ fn rows() -> Vec<Row> {
         ),
         row(
             "no token limit at all",
-            [
-                "--request token-field=max_tokens",
-                "--request token-field=none",
-            ],
+            ["--request token-field=max_tokens", "--request token-field=none"],
             "(or none)",
             Server::new(|answered, body| {
                 when(
-                    answered >= 2
-                        && (body.get("max_tokens").is_some()
-                            || body.get("max_completion_tokens").is_some()),
+                    answered >= 2 && (body.get("max_tokens").is_some() || body.get("max_completion_tokens").is_some()),
                     400,
                     "Unsupported parameter: 'max_tokens'",
                 )
@@ -203,13 +167,7 @@ fn rows() -> Vec<Row> {
             "a stream",
             ["--request wire=chat", "--request wire=chat-stream"],
             "--request wire=chat-stream",
-            Server::new(|_, body| {
-                when(
-                    body.get("stream").is_none(),
-                    400,
-                    "This model only support stream mode",
-                )
-            }),
+            Server::new(|_, body| when(body.get("stream").is_none(), 400, "This model only support stream mode")),
             "",
         ),
         row(
@@ -223,13 +181,7 @@ fn rows() -> Vec<Row> {
             "a temperature that no provider takes",
             ["", "--temperature default"],
             "--temperature default",
-            Server::new(|answered, body| {
-                when(
-                    answered >= 6 && body.get("temperature").is_some(),
-                    404,
-                    CANNOT,
-                )
-            }),
+            Server::new(|answered, body| when(answered >= 6 && body.get("temperature").is_some(), 404, CANNOT)),
             "auto in 6 replies, then default.",
         ),
         row(
@@ -237,11 +189,7 @@ fn rows() -> Vec<Row> {
             ["--reasoning-effort minimal", ""],
             "--reasoning-effort",
             Server::new(|_, body| {
-                when(
-                    body.get("reasoning_effort").is_some(),
-                    400,
-                    "Unknown parameter: 'reasoning_effort'",
-                )
+                when(body.get("reasoning_effort").is_some(), 400, "Unknown parameter: 'reasoning_effort'")
             }),
             "The --reasoning-effort of m is unset in all replies; the run began with minimal.",
         ),
@@ -250,11 +198,7 @@ fn rows() -> Vec<Row> {
             ["--request constrain=json", ""],
             "--request constrain",
             Server::new(|_, body| {
-                when(
-                    body.get("response_format").is_some(),
-                    400,
-                    "This response_format type is unavailable now",
-                )
+                when(body.get("response_format").is_some(), 400, "This response_format type is unavailable now")
             }),
             "The --request constrain of m is none in all replies; the run began with json.",
         ),
@@ -289,11 +233,7 @@ fn rows() -> Vec<Row> {
             ["--top-p 0.9", ""],
             "--top-p",
             Server::new(|answered, body| {
-                when(
-                    answered >= 1 && body.get("top_p").is_some(),
-                    400,
-                    "`top_p` is not supported by this model",
-                )
+                when(answered >= 1 && body.get("top_p").is_some(), 400, "`top_p` is not supported by this model")
             }),
             "The --top-p of m has two values, because the server refused the first: 0.9 in 1 reply, then unset.",
         ),
@@ -305,14 +245,8 @@ fn rows() -> Vec<Row> {
                 let refused = AtomicUsize::new(0);
                 Server::new(move |answered, _| {
                     let is_out = answered == 3 && refused.fetch_add(1, Ordering::SeqCst) < 2;
-                    let wait = if refused.load(Ordering::SeqCst) < 2 {
-                        "754"
-                    } else {
-                        "1"
-                    };
-                    is_out.then(|| {
-                        refusal(403, "Out of call volume quota.").header("retry-after", wait)
-                    })
+                    let wait = if refused.load(Ordering::SeqCst) < 2 { "754" } else { "1" };
+                    is_out.then(|| refusal(403, "Out of call volume quota.").header("retry-after", wait))
                 })
             },
             "",
@@ -323,55 +257,33 @@ fn rows() -> Vec<Row> {
 #[test]
 fn printed_remedies_help() {
     check_rows_at_once(rows(), |row| {
-        let Row {
-            name,
-            flags,
-            remedy,
-            server,
-            report,
-        } = row;
+        let Row { name, flags, remedy, server, report } = row;
         let bench = Bench::with_questions(QUESTIONS);
         let base = server.mock.base_url();
-        let args = model_args(
-            &base,
-            "--data set.jsonl --levels L0 --out run --concurrency 1 --retries 0",
-        );
+        let args = model_args(&base, "--data set.jsonl --levels L0 --out run --concurrency 1 --retries 0");
         let [first, second] = flags.map(|more| bench.call(&[args.clone(), words(more)].concat()));
         assert_ne!(first.code, Some(0), "{name}: {first:?}");
         assert!(first.stderr.contains(remedy), "{name}: {}", first.stderr);
         assert_eq!(second.code, Some(0), "{name}: {second:?}");
         let last = last_records(&bench);
         assert_eq!(last.len(), QUESTIONS, "{name}");
-        assert!(
-            last.values().all(|record| record["failure"].is_null()),
-            "{name}"
-        );
-        assert_eq!(
-            server.answered(),
-            QUESTIONS,
-            "{name}: a reply was asked twice"
-        );
+        assert!(last.values().all(|record| record["failure"].is_null()), "{name}");
+        assert_eq!(server.answered(), QUESTIONS, "{name}: a reply was asked twice");
         let shown = bench.complete(&["report", "run", "--full"]);
         let plain = on_one_line(&shown);
         assert!(plain.contains(report), "{name}: {shown}");
         // Without a change, the report names none.
-        assert!(
-            !report.is_empty() || !plain.contains("the run began with"),
-            "{name}: {shown}"
-        );
+        assert!(!report.is_empty() || !plain.contains("the run began with"), "{name}: {shown}");
     });
 }
 
-/// Settings that no server refused are another run's once there are replies, and sampling settings that it refused do not open others.
+/// Settings that no server refused are another run's once there are replies, and sampling settings that it refused do
+/// not open others.
 #[test]
 fn settings_that_nobody_refused_stay() {
     let bench = Bench::with_questions(QUESTIONS);
     let server = Server::new(|answered, body| {
-        when(
-            answered >= 3 && body["temperature"] == 0.5,
-            400,
-            "invalid temperature: only 1 is allowed for this model",
-        )
+        when(answered >= 3 && body["temperature"] == 0.5, 400, "invalid temperature: only 1 is allowed for this model")
     });
     let base = server.mock.base_url();
     let run = |flags: &str| {
@@ -409,10 +321,7 @@ fn changed_limits_ask_truncated_replies_again() {
     let fewer = [args.clone(), words("--max-tokens 400")].concat();
     bench.complete(&fewer);
     let cut = last_records(&bench);
-    assert!(
-        cut.values().all(|record| record["max_tokens"] == 400),
-        "{cut:?}"
-    );
+    assert!(cut.values().all(|record| record["max_tokens"] == 400), "{cut:?}");
     // The same limit asks nothing again; that of the first command does, because replies were cut below it.
     let asked = mock.requests().len();
     bench.complete(&fewer);
@@ -421,10 +330,7 @@ fn changed_limits_ask_truncated_replies_again() {
     bench.complete(&args);
     assert_eq!(mock.requests().len(), asked + QUESTIONS);
     let whole = last_records(&bench);
-    assert!(
-        whole.values().all(|record| record["finish"] == "stop"),
-        "{whole:?}"
-    );
+    assert!(whole.values().all(|record| record["finish"] == "stop"), "{whole:?}");
     // What the cut replies cost is not forgotten.
     bench.complete(&args);
     assert_eq!(mock.requests().len(), asked + QUESTIONS);
@@ -440,14 +346,11 @@ fn of_judge(house: &House, server: &Server, flags: &str) -> Called {
 
 fn sent(server: &Server, model: &str) -> Vec<Value> {
     let requests = server.mock.requests();
-    requests
-        .iter()
-        .map(Request::json)
-        .filter(|body| body["model"] == model)
-        .collect()
+    requests.iter().map(Request::json).filter(|body| body["model"] == model).collect()
 }
 
-/// Checks that the first command fails and prints the remedy, and that the second, in the same folder, succeeds and asks no answer again.
+/// Checks that the first command fails and prints the remedy, and that the second, in the same folder, succeeds and
+/// asks no answer again.
 fn check_judge_remedy(server: &Server, flags: [&str; 2], remedy: &str) {
     let house = House::new();
     let [first, second] = flags;
@@ -466,32 +369,17 @@ fn default_temperature_of_the_judge_is_adapted() {
     let house = House::new();
     let server = Server::new(|_, body| {
         let is_refused = body["model"] == "j" && body.get("temperature").is_some();
-        when(
-            is_refused,
-            400,
-            "invalid temperature: only 1 is allowed for this model",
-        )
+        when(is_refused, 400, "invalid temperature: only 1 is allowed for this model")
     });
     let called = of_judge(&house, &server, "");
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert!(
-        called.stderr.contains("j: no temperature is sent"),
-        "{called:?}"
-    );
-    assert!(
-        sent(&server, "m")
-            .iter()
-            .all(|body| body["temperature"] == 0.2)
-    );
+    assert!(called.stderr.contains("j: no temperature is sent"), "{called:?}");
+    assert!(sent(&server, "m").iter().all(|body| body["temperature"] == 0.2));
     assert_eq!(sent(&server, "j").last().unwrap().get("temperature"), None);
     // A temperature of the user is the user's to change: by the judge's flag, in the same folder.
     let server = Server::new(|_, body| {
         let is_refused = body["model"] == "j" && body["temperature"] != 1.0;
-        when(
-            is_refused,
-            400,
-            "invalid temperature: only 1 is allowed for this model",
-        )
+        when(is_refused, 400, "invalid temperature: only 1 is allowed for this model")
     });
     let flags = ["--judge-temperature 0.5", "--judge-temperature 1"];
     check_judge_remedy(&server, flags, "--judge-temperature default");
@@ -521,13 +409,7 @@ fn default_seed_is_adapted_and_a_seed_of_the_user_is_named() {
 
 #[test]
 fn credit_of_the_judge_is_told_by_its_own_flag() {
-    let server = Server::new(|_, body| {
-        when(
-            body["model"] == "j" && tokens(body) > 20,
-            402,
-            "You can only afford 20",
-        )
-    });
+    let server = Server::new(|_, body| when(body["model"] == "j" && tokens(body) > 20, 402, "You can only afford 20"));
     let flags = ["", "--judge-max-tokens 20"];
     check_judge_remedy(&server, flags, "--judge-max-tokens 20");
 }
@@ -538,14 +420,8 @@ fn least_temperature_is_sent() {
     for (least, expected) in [(0.01, Some(0.01)), (0.5, None)] {
         let bench = Bench::with_questions(QUESTIONS);
         let server = Server::new(move |_, body| {
-            let is_refused = body["temperature"]
-                .as_f64()
-                .is_some_and(|sent| sent < least);
-            when(
-                is_refused,
-                422,
-                "Input validation error: `temperature` must be strictly positive",
-            )
+            let is_refused = body["temperature"].as_f64().is_some_and(|sent| sent < least);
+            when(is_refused, 422, "Input validation error: `temperature` must be strictly positive")
         });
         let base = server.mock.base_url();
         let printed = bench.complete(&model_args(&base, "--data set.jsonl --levels L0 --out run"));

@@ -5,9 +5,7 @@ use std::fs;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::process::{signal, wait_until};
-use crate::support::run::{
-    Bench, PROGRAM, assert_same_products, called, model_args, records, words,
-};
+use crate::support::run::{Bench, PROGRAM, assert_same_products, called, model_args, records, words};
 use crate::support::snapshot::redacted;
 use serde_json::Value;
 
@@ -57,10 +55,7 @@ fn shards_equal_one_run() {
     assert_eq!(bench.complete(&args("--out merged")), table);
     assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
     // Merging again changes nothing.
-    assert_eq!(
-        bench.complete(&["merge", "parts", "--out", "merged"]),
-        table
-    );
+    assert_eq!(bench.complete(&["merge", "parts", "--out", "merged"]), table);
     assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
 }
 
@@ -72,11 +67,7 @@ fn batch_system_names_the_shard() {
         command.envs(variables.iter().copied());
         called(&mut command)
     };
-    let slurm = [
-        ("SLURM_ARRAY_TASK_ID", "3"),
-        ("SLURM_ARRAY_TASK_MIN", "2"),
-        ("SLURM_ARRAY_TASK_COUNT", "2"),
-    ];
+    let slurm = [("SLURM_ARRAY_TASK_ID", "3"), ("SLURM_ARRAY_TASK_MIN", "2"), ("SLURM_ARRAY_TASK_COUNT", "2")];
     let array = task(&slurm, "--out array");
     insta::assert_snapshot!(array.messages(), @"
     exit code: 0
@@ -106,11 +97,7 @@ fn missing_and_foreign_shards_are_named() {
     let refused = |line: &str, message: &str| {
         let called = bench.call(&words(&format!("merge {line}")));
         assert_eq!(called.code, Some(2), "{called:?}");
-        assert!(
-            called.stderr.contains(message),
-            "{message}: {}",
-            called.stderr
-        );
+        assert!(called.stderr.contains(message), "{message}: {}", called.stderr);
     };
     refused("parts --out m", "1 shard is missing: 2/3; --partial");
     assert!(!bench.path("m").exists());
@@ -122,10 +109,7 @@ fn missing_and_foreign_shards_are_named() {
     bench.complete(&args("--out other --shard 2/3 --seed 9"));
     refused("parts other --out n", "is of another run than");
     bench.complete(&args("--out four --shard 2/4"));
-    refused(
-        "parts four --out n",
-        "frames or walks 4 of 6 are in no part",
-    );
+    refused("parts four --out n", "frames or walks 4 of 6 are in no part");
     bench.complete(&args("--out whole"));
     refused("whole --out n", "the run is not a shard");
     refused("nowhere --out n", "nowhere");
@@ -236,17 +220,12 @@ fn shards_share_limits_and_resources() {
     let noted = &manifest["settings"]["--max-cost of this part"];
     let number = |name: &str| noted[name].as_f64().unwrap();
     assert!(number("spent") > 0.0, "{noted}");
-    assert!(
-        (number("share") - number("spent") - number("left")).abs() < 1e-9,
-        "{noted}"
-    );
+    assert!((number("share") - number("spent") - number("left")).abs() < 1e-9, "{noted}");
     let whole = paid("--out unshared");
     assert_eq!(whole.code, Some(0), "{whole:?}");
     assert!(!whole.stderr.contains("are left"), "{}", whole.stderr);
     // Half of what may be spent is less than a reply costs.
-    let dear = format!(
-        "--model gpt-4o --base-url {base} --levels L0 --max-cost 0.0001 --out dear --shard 1/2"
-    );
+    let dear = format!("--model gpt-4o --base-url {base} --levels L0 --max-cost 0.0001 --out dear --shard 1/2");
     assert_eq!(bench.call(&words(&dear)).code, Some(3));
 }
 
@@ -265,10 +244,7 @@ fn slurm_script_restarts_stopped_task() {
     std::os::unix::fs::symlink(PROGRAM, bench.path("bin/darkqa-eval")).unwrap();
     let script = concat!(env!("CARGO_MANIFEST_DIR"), "/src/commands/cluster/slurm.sh");
     let base = mock.base_url();
-    let args = model_args(
-        &base,
-        "--data set.jsonl --levels L0 --concurrency 1 --out run",
-    );
+    let args = model_args(&base, "--data set.jsonl --levels L0 --concurrency 1 --out run");
     let variables = [
         ("SLURM_JOB_ID", "8"),
         ("SLURM_ARRAY_JOB_ID", "7"),
@@ -287,10 +263,7 @@ fn slurm_script_restarts_stopped_task() {
     wait_until(|| mock.requests().len() >= 5);
     signal(&task, "-TERM");
     assert_eq!(task.wait().unwrap().code(), Some(130));
-    assert_eq!(
-        fs::read_to_string(bench.path("told")).unwrap(),
-        "requeue 7_0\n"
-    );
+    assert_eq!(fs::read_to_string(bench.path("told")).unwrap(), "requeue 7_0\n");
     let answered = records(&bench.path("run")).len();
     assert!((5..400).contains(&answered), "{answered}");
 }

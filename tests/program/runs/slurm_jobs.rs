@@ -1,4 +1,5 @@
-//! Which part a job of Slurm does: tasks of an array, tasks that are repeated, and jobs that inherit the variables of a task.
+//! Which part a job of Slurm does: tasks of an array, tasks that are repeated, and jobs that inherit the variables of a
+//! task.
 //!
 //! The variables are those that Slurm 22.05.8 sets. A script stands in for `scontrol`.
 
@@ -35,9 +36,7 @@ impl Bench {
             ("SLURM_ARRAY_TASK_STEP", 1),
         ];
         let mut command = self.command(&words(&line));
-        command
-            .envs(variables.map(|(name, value)| (name, value.to_string())))
-            .env("PATH", self.search_path());
+        command.envs(variables.map(|(name, value)| (name, value.to_string()))).env("PATH", self.search_path());
         called(&mut command)
     }
 
@@ -61,12 +60,7 @@ impl Bench {
     }
 }
 
-const ALL: [&str; 4] = [
-    "shard-1-of-4",
-    "shard-2-of-4",
-    "shard-3-of-4",
-    "shard-4-of-4",
-];
+const ALL: [&str; 4] = ["shard-1-of-4", "shard-2-of-4", "shard-3-of-4", "shard-4-of-4"];
 
 #[test]
 fn repeated_tasks_do_the_same_parts() {
@@ -80,21 +74,14 @@ fn repeated_tasks_do_the_same_parts() {
     };
     let before = ALL.map(keys);
     // --array=2, --array=1,3 and --array=2-3.
-    for (tasks, count, first, last) in [(&[2][..], 1, 2, 2), (&[1, 3], 2, 1, 3), (&[2, 3], 2, 2, 3)]
-    {
+    for (tasks, count, first, last) in [(&[2][..], 1, 2, 2), (&[1, 3], 2, 1, 3), (&[2, 3], 2, 2, 3)] {
         for number in tasks {
             fs::remove_dir_all(bench.path("run").join(ALL[*number as usize])).unwrap();
         }
         for number in tasks {
-            let again = bench.job(
-                TASK,
-                120 + number,
-                Task(*number, count, first, last),
-                "--out run",
-            );
+            let again = bench.job(TASK, 120 + number, Task(*number, count, first, last), "--out run");
             assert_eq!(again.code, Some(0), "{again:?}");
-            let said =
-                format!("task {number} of the Slurm array 0-3 again: this process does shard");
+            let said = format!("task {number} of the Slurm array 0-3 again: this process does shard");
             assert!(again.stderr.contains(&said), "{again:?}");
         }
         assert_eq!(bench.parts("run"), ALL, "{tasks:?}");
@@ -112,11 +99,7 @@ fn a_smaller_array_from_the_same_number_is_another_division() {
     let task = bench.job(TASK, 130, Task(0, 2, 0, 1), "--out run");
     assert_eq!(task.code, Some(0), "{task:?}");
     assert!(task.stderr.contains("does shard 1/2"), "{task:?}");
-    assert!(
-        task.stderr
-            .contains("copied from parts of another division"),
-        "{task:?}"
-    );
+    assert!(task.stderr.contains("copied from parts of another division"), "{task:?}");
 }
 
 #[test]
@@ -150,10 +133,7 @@ fn the_only_task_of_a_new_array_says_that_it_does_everything() {
      WARN SLURM_ARRAY_TASK_COUNT is 1: the only task of a Slurm array does everything; --shard I/N does one part
     ");
     assert!(bench.path("run/records.jsonl").exists());
-    assert!(
-        !bench.path("asked").exists(),
-        "the answer would change nothing"
-    );
+    assert!(!bench.path("asked").exists(), "the answer would change nothing");
 }
 
 #[test]

@@ -1,5 +1,5 @@
-//! Runs of open questions and what every run can do: parts and their merging, reports from the folder alone, images made again, and
-//! a kill in the midst of it.
+//! Runs of open questions and what every run can do: parts and their merging, reports from the folder alone, images
+//! made again, and a kill in the midst of it.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -20,10 +20,7 @@ fn scripts(house: &House) {
         "{\"question\": \"q1\", \"condition\": \"L0\", \"reply\": \"brown\"}\n{\"question\": \"q1\", \"reply\": \"grey\"}\n\
          {\"default\": \"an answer\"}",
     );
-    house.0.file(
-        "j.jsonl",
-        "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}",
-    );
+    house.0.file("j.jsonl", "{\"question\": \"q1\", \"reply\": \"4\"}\n{\"default\": \"2\"}");
 }
 
 /// A run with the scripts, and more arguments.
@@ -50,10 +47,7 @@ fn walk_shards_equal_one_run() {
     let table = house.0.complete(&["merge", "parts", "--out", "merged"]);
     let (whole, merged) = (house.0.path("whole"), house.0.path("merged"));
     let keys = |run: &std::path::Path| -> BTreeSet<String> {
-        records(run)
-            .into_iter()
-            .map(|record| record["key"].to_string())
-            .collect()
+        records(run).into_iter().map(|record| record["key"].to_string()).collect()
     };
     assert_eq!(keys(&whole), keys(&merged));
     let compared = assert_same_products(&whole, &merged);
@@ -64,9 +58,7 @@ fn walk_shards_equal_one_run() {
     assert_eq!(fs::read(merged.join("records.jsonl")).unwrap(), before);
     // Runs of the other kind are no part of it.
     fs::remove_dir_all(house.0.path("parts/shard-1-of-2")).unwrap();
-    house.0.complete(&words(
-        "--data rooms:frames=2,size=64x48 --model random --levels L0 --shard 1/2 --out parts",
-    ));
+    house.0.complete(&words("--data rooms:frames=2,size=64x48 --model random --levels L0 --shard 1/2 --out parts"));
     let refused = house.0.call(&["merge", "parts", "--out", "mixed"]);
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 2
@@ -100,10 +92,7 @@ fn comparison_needs_one_judge() {
     ));
     assert_eq!(given.code, Some(0), "{given:?}");
     let summary = fs::read_to_string(house.0.path("given/summary.csv")).unwrap();
-    assert!(
-        summary.contains("again,image,L3,noise,") && !summary.contains("again,image,L0,"),
-        "{summary}"
-    );
+    assert!(summary.contains("again,image,L3,noise,") && !summary.contains("again,image,L0,"), "{summary}");
     house.0.file("b.jsonl", "{\"default\": \"grey\"}");
     let run_other = |judge: &str, out: &str| {
         let line = format!("--model script:b.jsonl --levels L0,L3 --judge {judge} --out {out}");
@@ -111,9 +100,7 @@ fn comparison_needs_one_judge() {
         assert_eq!(called.code, Some(0), "{called:?}");
     };
     run_other("script:j.jsonl", "two");
-    let table = house
-        .0
-        .complete(&["report", "one", "two", "--out", "compared"]);
+    let table = house.0.complete(&["report", "one", "two", "--out", "compared"]);
     insta::assert_snapshot!(lines_with(&table, "script:"), @"
     Score in % (LLM-Match, marked by script:j.jsonl, protocol upstream): mean (difference from L0), and how far
         the widest 95 % interval over 2 episodes reaches down and up
@@ -171,21 +158,16 @@ fn self_marking_model_keeps_its_marks() {
     }
     house.0.complete(&["report", "one", "two", "--out", "both"]);
     let summary = fs::read_to_string(house.0.path("both/summary.csv")).unwrap();
-    let of_all: Vec<&str> = summary
-        .lines()
-        .filter(|line| line.contains(",all,all,"))
-        .collect();
+    let of_all: Vec<&str> = summary.lines().filter(|line| line.contains(",all,all,")).collect();
     // Three of three answers are marked with 2, at the temperature of the judge.
     for (line, temperature) in of_all.iter().zip(["0.5", "1"]) {
-        let begin =
-            format!("m (--temperature {temperature}),image,L0,none,,all,all,3,3,0,0,0,0,0,0.25,");
+        let begin = format!("m (--temperature {temperature}),image,L0,none,,all,all,3,3,0,0,0,0,0,0.25,");
         assert!(line.starts_with(&begin), "{line}");
     }
     assert_eq!(of_all.len(), 2, "{summary}");
     // The temperature of the answers is known beside that of the marks.
-    let again = house.call(&words(&format!(
-        "--model m --judge m --base-url {base} --temperature 1 --levels L0 --out one"
-    )));
+    let again =
+        house.call(&words(&format!("--model m --judge m --base-url {base} --temperature 1 --levels L0 --out one")));
     assert_eq!(again.code, Some(2), "{again:?}");
 }
 
@@ -207,9 +189,8 @@ fn judges_of_one_name_differ() {
         marks of two judges cannot be compared: report each run alone
     ");
     // And in one run.
-    let again = house.call(&words(&format!(
-        "--model m --judge j --base-url {base} --judge-temperature 1 --levels L0 --out one"
-    )));
+    let again = house
+        .call(&words(&format!("--model m --judge j --base-url {base} --judge-temperature 1 --levels L0 --out one")));
     insta::assert_snapshot!(again.messages(), @r#"
     exit code: 2
      WARN 1 of 2 walks has fewer frames than --num-frames 3: they are shown several times in a request, as
@@ -233,22 +214,11 @@ fn walk_images_are_rebuilt_and_verified() {
     complete(&house, "--out run");
     let report = house.0.complete(&["show", "run", "q1"]);
     assert_eq!(report.matches("the same bytes as were sent").count(), 2);
-    assert!(
-        report.contains("brown") && report.contains("grey"),
-        "{report}"
-    );
+    assert!(report.contains("brown") && report.contains("grey"), "{report}");
     let images = files(&house.0.path("run/shown"));
-    assert_eq!(
-        images.len(),
-        6,
-        "three frames in two conditions: {images:?}"
-    );
+    assert_eq!(images.len(), 6, "three frames in two conditions: {images:?}");
     // Another frame in the place of one that was shown is noticed.
-    let [one, other] = ["00002", "00003"].map(|frame| {
-        house
-            .0
-            .path(&format!("walks/hm3d-v0/000-a/{frame}-rgb.png"))
-    });
+    let [one, other] = ["00002", "00003"].map(|frame| house.0.path(&format!("walks/hm3d-v0/000-a/{frame}-rgb.png")));
     fs::copy(other, one).unwrap();
     let called = house.0.call(&["show", "run", "q1"]);
     insta::assert_snapshot!(called.lines_with("bytes"), @"
@@ -272,11 +242,7 @@ fn walks_report_their_timings() {
     let house = House::new();
     scripts(&house);
     let called = run(&house, "--out run --timings");
-    assert!(
-        called.stderr.contains("timings:") && called.stderr.contains("degrade"),
-        "{}",
-        called.stderr
-    );
+    assert!(called.stderr.contains("timings:") && called.stderr.contains("degrade"), "{}", called.stderr);
 }
 
 #[test]

@@ -45,11 +45,7 @@ fn endpoint() -> MockEndpoint {
         std::thread::sleep(Duration::from_millis(40));
         let length = request.to_string().len();
         let is_mark = request["model"] == "j";
-        Answer::text(&if is_mark {
-            (1 + length % 5).to_string()
-        } else {
-            format!("an answer of {} words", length % 3)
-        })
+        Answer::text(&if is_mark { (1 + length % 5).to_string() } else { format!("an answer of {} words", length % 3) })
     })
 }
 
@@ -63,10 +59,7 @@ fn flags(mock: &MockEndpoint, more: &str) -> String {
 
 /// Trials by key.
 fn asked(run: &std::path::Path) -> BTreeMap<String, Value> {
-    records(run)
-        .into_iter()
-        .map(|record| (record["key"].to_string(), record["reply"].clone()))
-        .collect()
+    records(run).into_iter().map(|record| (record["key"].to_string(), record["reply"].clone())).collect()
 }
 
 /// A stranger's list of questions may name any folder, and a walk may be a link.
@@ -80,34 +73,17 @@ fn walks_outside_the_folder_are_not_sent() {
     std::os::unix::fs::symlink(bench.path("private"), walks.join("link")).unwrap();
     fs::create_dir(walks.join("frame")).unwrap();
     let frame = "00000-rgb.png";
-    std::os::unix::fs::symlink(
-        bench.path("private").join(frame),
-        walks.join("frame").join(frame),
-    )
-    .unwrap();
+    std::os::unix::fs::symlink(bench.path("private").join(frame), walks.join("frame").join(frame)).unwrap();
     let absolute = bench.path("private").display().to_string();
     let ask = |walk: &str, more: &str| {
         let question = json!([{"question_id": "q", "question": "Where?", "answer": "there", "category": "c", "episode_history": walk}]);
         bench.file("questions.json", question.to_string());
         bench.call(&words(&flags(&mock, more)))
     };
-    let refusals = each(
-        [
-            "../private",
-            "hm3d-v0/../../private",
-            "absolute",
-            "hm3d-v0/link",
-            "hm3d-v0/frame",
-        ],
-        |walk| {
-            let walk = if *walk == "absolute" {
-                &absolute
-            } else {
-                *walk
-            };
-            ask(walk, "--out run").messages()
-        },
-    );
+    let refusals = each(["../private", "hm3d-v0/../../private", "absolute", "hm3d-v0/link", "hm3d-v0/frame"], |walk| {
+        let walk = if *walk == "absolute" { &absolute } else { *walk };
+        ask(walk, "--out run").messages()
+    });
     insta::assert_snapshot!(refusals, @r#"
     ../private
       exit code: 2
@@ -187,12 +163,7 @@ fn killed_shard_resumes_in_other_numbers() {
 fn model_is_added_to_shards() {
     let bench = Bench::new();
     let mock = MockEndpoint::start([Answer::text("B")]);
-    let flags = |models: &str, more: &str| {
-        format!(
-            "{models} --base-url {} --levels L0,L2 {more}",
-            mock.base_url()
-        )
-    };
+    let flags = |models: &str, more: &str| format!("{models} --base-url {} --levels L0,L2 {more}", mock.base_url());
     bench.complete(&words(&flags("--model a --model b", "--out whole")));
     let whole = mock.requests().len();
     bench.complete(&words(&format!("plan {}", flags("--model a", "--out run"))));
@@ -202,11 +173,7 @@ fn model_is_added_to_shards() {
             bench.complete(&words(&flags(models, &part)));
         }
     }
-    assert_eq!(
-        mock.requests().len(),
-        2 * whole,
-        "what a run has is not asked again"
-    );
+    assert_eq!(mock.requests().len(), 2 * whole, "what a run has is not asked again");
     bench.complete(&words("merge run --out merged"));
     assert_eq!(asked(&bench.path("whole")), asked(&bench.path("merged")));
     assert_same_products(&bench.path("whole"), &bench.path("merged"));

@@ -2,10 +2,7 @@
 //!
 //! Draws are fixed, so that no run of these tests differs from another.
 
-#![expect(
-    clippy::print_stdout,
-    reason = "the measured rates, for whoever asks with --nocapture"
-)]
+#![expect(clippy::print_stdout, reason = "the measured rates, for whoever asks with --nocapture")]
 
 use crate::support::made::record;
 use darkqa_base::types::{Condition, OptionProbabilities, Record};
@@ -44,19 +41,11 @@ fn noise(_: f64) -> f64 {
 fn reply(condition: &Condition, place: (usize, usize), confidence: f64, right: bool) -> Record {
     let mut record = record("m", condition, place, right);
     let detail = &mut record.detail;
-    detail.choices = (0..CHOICES)
-        .map(|index| format!("choice {index}"))
-        .collect();
+    detail.choices = (0..CHOICES).map(|index| format!("choice {index}")).collect();
     let rest = (1.0 - confidence) / (CHOICES - 1) as f64;
     let mut p = vec![rest; CHOICES];
     p[usize::from(!right)] = confidence;
-    detail.options = Some(OptionProbabilities {
-        p,
-        mass: 1.0,
-        bound: 0.0,
-        token: "A".to_owned(),
-        reasoned: false,
-    });
+    detail.options = Some(OptionProbabilities { p, mass: 1.0, bound: 0.0, token: "A".to_owned(), reasoned: false });
     record
 }
 
@@ -77,9 +66,7 @@ fn replies(random: &mut StdRng, frames: usize, size: usize, truth: Truth) -> Vec
 }
 
 fn of(records: &[Record], draws: &Resamples) -> Calibration {
-    let asked = records
-        .iter()
-        .map(|record| (&record.question, &record.detail.frame));
+    let asked = records.iter().map(|record| (&record.question, &record.detail.frame));
     let clusters = Clusters::new(asked, &FrameTies::default());
     let trials = records.iter().cloned().collect();
     let mut found = calibrations(&Grid::new(&trials, &clusters), draws);
@@ -88,26 +75,16 @@ fn of(records: &[Record], draws: &Resamples) -> Calibration {
 }
 
 /// Calibrations of `runs` simulated runs.
-fn simulated(
-    seed: u64,
-    runs: usize,
-    (frames, size): (usize, usize),
-    truth: Truth,
-) -> Vec<Calibration> {
+fn simulated(seed: u64, runs: usize, (frames, size): (usize, usize), truth: Truth) -> Vec<Calibration> {
     let mut random = StdRng::seed_from_u64(seed);
     let draws = Resamples::new(frames);
-    (0..runs)
-        .map(|_| of(&replies(&mut random, frames, size, truth), &draws))
-        .collect()
+    (0..runs).map(|_| of(&replies(&mut random, frames, size, truth), &draws)).collect()
 }
 
 /// How often an interval holds a number, in percent.
 fn held(found: &[Calibration], number: f64, of: fn(&Calibration) -> Option<Estimate>) -> f64 {
     let holds = |estimate: Estimate| (estimate.low..=estimate.high).contains(&number);
-    let times = found
-        .iter()
-        .filter_map(of)
-        .filter(|estimate| holds(*estimate));
+    let times = found.iter().filter_map(of).filter(|estimate| holds(*estimate));
     100.0 * times.count() as f64 / found.len() as f64
 }
 
@@ -115,20 +92,16 @@ fn mean(found: &[Calibration], of: fn(&Calibration) -> f64) -> f64 {
     found.iter().map(of).sum::<f64>() / found.len() as f64
 }
 
-/// The error that is still found where there is none, by number of replies. Without the correction it would be 0.10 and 0.087.
+/// The error that is still found where there is none, by number of replies. Without the correction it would be 0.10 and
+/// 0.087.
 #[test]
 fn perfect_model_is_calibrated() {
     for (frames, size, most) in [(25, 4, 0.045), (100, 4, 0.028)] {
         let found = simulated(3, 100, (frames, size), calibrated);
         let error = mean(&found, |row| row.error.unwrap().value);
-        let (zero, gap) = (
-            held(&found, 0.0, |row| row.error),
-            held(&found, 0.0, |row| Some(row.overconfidence.estimate)),
-        );
-        println!(
-            "{} replies: error {error:.4}, 0 held {zero} %, gap {gap} %",
-            frames * size
-        );
+        let (zero, gap) =
+            (held(&found, 0.0, |row| row.error), held(&found, 0.0, |row| Some(row.overconfidence.estimate)));
+        println!("{} replies: error {error:.4}, 0 held {zero} %, gap {gap} %", frames * size);
         assert!(error < most, "{error}");
         assert!(zero >= 93.0, "{zero}");
         assert!((89.0..=100.0).contains(&gap), "{gap}");
@@ -140,9 +113,7 @@ fn truth_of(number: impl Fn(f64) -> f64) -> f64 {
     let mut random = StdRng::seed_from_u64(5);
     let confidences = Beta::new(2.0, 2.0).unwrap();
     let times = 400_000;
-    let sum: f64 = (0..times)
-        .map(|_| number(0.25 + 0.75 * confidences.sample(&mut random)))
-        .sum();
+    let sum: f64 = (0..times).map(|_| number(0.25 + 0.75 * confidences.sample(&mut random))).sum();
     sum / f64::from(times)
 }
 
@@ -182,11 +153,7 @@ fn confidence_that_is_noise_tells_nothing() {
     assert!((88.0..=100.0).contains(&chance), "{chance}");
     for row in &found {
         // Leaving out the least confident replies helps nothing.
-        assert!(
-            (row.risk.at_50 - row.risk.at_100).abs() < 0.12,
-            "{:?}",
-            row.risk
-        );
+        assert!((row.risk.at_50 - row.risk.at_100).abs() < 0.12, "{:?}", row.risk);
     }
     // It is off by the spread of what it says: 0.17.
     let found_off = found.iter().filter(|row| row.error.unwrap().low > 0.0);
@@ -215,10 +182,7 @@ fn reasoning_replies_are_counted_apart() {
     }
     let draws = Resamples::new(30);
     let found = of(&records, &draws);
-    assert_eq!(
-        (found.replies, found.reasoned, found.unstated),
-        (100, 7, 13)
-    );
+    assert_eq!((found.replies, found.reasoned, found.unstated), (100, 7, 13));
     assert!(found.error.is_some());
     // One fewer, and the calibration error is not known.
     records.pop();

@@ -24,10 +24,7 @@ fn rotation_averages_position_bias() {
     let table = run(&bench, "--model script:script.jsonl --circular");
     let records = records(&bench.path("run"));
     assert_eq!(records.len(), 18);
-    let truths: Vec<u64> = records
-        .iter()
-        .map(|r| r["truth"].as_u64().unwrap())
-        .collect();
+    let truths: Vec<u64> = records.iter().map(|r| r["truth"].as_u64().unwrap()).collect();
     for truth in 0..3 {
         assert_eq!(truths.iter().filter(|t| **t == truth).count(), 6);
     }
@@ -37,18 +34,9 @@ fn rotation_averages_position_bias() {
     }
     // Always A: right in one rotation of three, never in all.
     assert!(table.contains("33.3"), "{table}");
-    assert!(
-        table.contains("right every time") && table.contains("0.0"),
-        "{table}"
-    );
+    assert!(table.contains("right every time") && table.contains("0.0"), "{table}");
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
-    assert!(
-        csv.lines()
-            .next()
-            .unwrap()
-            .ends_with("value,low,high,always,reading"),
-        "{csv}"
-    );
+    assert!(csv.lines().next().unwrap().ends_with("value,low,high,always,reading"), "{csv}");
     let text = "{\"default\":\"brown\"}";
     bench.file("script.jsonl", text);
     let by_text = args("--out by-text --model script:script.jsonl --circular");
@@ -101,12 +89,7 @@ fn shuffled_orders_are_stable() {
         )));
         let orders: BTreeSet<(String, String)> = records(&bench.path("run"))
             .iter()
-            .map(|record| {
-                (
-                    record["question"].to_string(),
-                    record["choices"].to_string(),
-                )
-            })
+            .map(|record| (record["question"].to_string(), record["choices"].to_string()))
             .collect();
         assert_eq!(orders.len(), 6, "one order a question");
         orders
@@ -126,10 +109,7 @@ fn repeats_are_trials_of_their_own() {
     run(&bench, &repeated);
     assert_eq!(mock.requests().len(), 18);
     let records = records(&bench.path("run"));
-    let repeats: Vec<u64> = records
-        .iter()
-        .map(|r| r["repeat"].as_u64().unwrap_or(0))
-        .collect();
+    let repeats: Vec<u64> = records.iter().map(|r| r["repeat"].as_u64().unwrap_or(0)).collect();
     for repeat in 0..3 {
         assert_eq!(repeats.iter().filter(|r| **r == repeat).count(), 6);
     }
@@ -146,15 +126,9 @@ fn constraint_is_sent_and_parsed() {
     run(&bench, &format!("{model} --constrain json"));
     let sent = &mock.requests()[0].json();
     let schema = &sent["response_format"]["json_schema"]["schema"];
-    assert_eq!(
-        schema["properties"]["answer"]["enum"],
-        json!(["A", "B", "C"])
-    );
+    assert_eq!(schema["properties"]["answer"]["enum"], json!(["A", "B", "C"]));
     for record in records(&bench.path("run")) {
-        assert_eq!(
-            (&record["reply"], &record["outcome"]),
-            (&"C".into(), &"right".into())
-        );
+        assert_eq!((&record["reply"], &record["outcome"]), (&"C".into(), &"right".into()));
     }
     let of = |run: &str| bench.complete(&["report", run, "--full"]);
     assert!(!of("run").contains("Constraint not followed"));
@@ -170,19 +144,13 @@ fn constraint_is_sent_and_parsed() {
     let base = mock.base_url();
     let free = args("--out free --constrain choice");
     let called = bench.call(&[free, model_args(&base, "")].concat());
-    assert_eq!(
-        mock.requests()[0].json()["structured_outputs"]["choice"],
-        json!(["A", "B", "C"])
-    );
+    assert_eq!(mock.requests()[0].json()["structured_outputs"]["choice"], json!(["A", "B", "C"]));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
      WARN m: a reply does not have the form that --request constrain=choice requests; the server may not support
         it, or the reply was truncated (--max-tokens)
     ");
-    assert_eq!(
-        called.stderr.matches("--request constrain=choice").count(),
-        1
-    );
+    assert_eq!(called.stderr.matches("--request constrain=choice").count(), 1);
     let report = of("free");
     let report = on_one_line(&report);
     let counted = records(&bench.path("free")).len();
@@ -210,16 +178,9 @@ fn stored_replies_are_reparsed_offline() {
         })
         .collect();
     fs::write(&path, &old).unwrap();
-    assert!(
-        bench
-            .complete(&["report", "run", "--full"])
-            .contains("   0.0")
-    );
+    assert!(bench.complete(&["report", "run", "--full"]).contains("   0.0"));
     let rescored = bench.complete(&["report", "run", "--rescore", "--full"]);
-    assert!(
-        rescored.starts_with("6 of 6 records now read differently\n"),
-        "{rescored}"
-    );
+    assert!(rescored.starts_with("6 of 6 records now read differently\n"), "{rescored}");
     assert!(rescored.ends_with(&table), "{rescored}");
     let again = bench.complete(&["report", "run", "--rescore", "--full"]);
     assert!(again.starts_with("0 of 6"), "{again}");
@@ -234,10 +195,8 @@ fn earlier_parsing_is_reported() {
     let bench = Bench::with_questions(6);
     bench.file("script.jsonl", "{\"default\":\"I can rule out option C.\"}");
     run(&bench, "--model script:script.jsonl");
-    let [records, manifest] =
-        ["run/records.jsonl", "run/manifest.json"].map(|name| bench.path(name));
-    let read_manifest =
-        || -> Value { serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap() };
+    let [records, manifest] = ["run/records.jsonl", "run/manifest.json"].map(|name| bench.path(name));
+    let read_manifest = || -> Value { serde_json::from_slice(&fs::read(&manifest).unwrap()).unwrap() };
     assert_eq!(read_manifest()["reply_reading"], "lenient/5");
     assert!(!bench.complete(&["report", "run"]).contains("differently"));
     // As an earlier version read them.
@@ -269,10 +228,7 @@ fn earlier_parsing_is_reported() {
         let said = on_one_line(&report);
         assert!(said.contains(&change), "{report}");
         let rescored = bench.complete(&["report", "run", "--rescore"]);
-        assert!(
-            rescored.starts_with(&format!("6 of 6 records now read differently\n{change}\n")),
-            "{rescored}"
-        );
+        assert!(rescored.starts_with(&format!("6 of 6 records now read differently\n{change}\n")), "{rescored}");
         assert_eq!(read_manifest()["reply_reading"], "lenient/5");
         assert!(!bench.complete(&["report", "run"]).contains("differently"));
     }
@@ -284,10 +240,7 @@ fn unanswered_replies_show_their_reason() {
     let thinking = json!({"content": null, "reasoning_content": "hmm"});
     let mut answers = vec![Answer::message(&thinking, "length"); 10];
     answers.push(Answer::message(&json!({"content": null}), "content_filter"));
-    answers.push(Answer::message(
-        &json!({"content": null, "refusal": "no"}),
-        "stop",
-    ));
+    answers.push(Answer::message(&json!({"content": null, "refusal": "no"}), "stop"));
     let mock = MockEndpoint::start(answers);
     let base = mock.base_url();
     let repeated = args("--out run --full --repeats 2 --concurrency 1");

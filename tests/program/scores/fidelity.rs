@@ -13,13 +13,9 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Beta, Distribution as _, Normal};
 use serde_json::Value;
 
-/// Fidelity findings of made replies: `clusters` frames with `questions` each. The right-rate of a frame is drawn with an
-/// intraclass correlation of 0.2, and the PSNR of its image follows the rate with a slope.
-fn findings(
-    random: &mut StdRng,
-    [clusters, questions]: [usize; 2],
-    slope: f64,
-) -> FidelityFindings {
+/// Fidelity findings of made replies: `clusters` frames with `questions` each. The right-rate of a frame is drawn with
+/// an intraclass correlation of 0.2, and the PSNR of its image follows the rate with a slope.
+fn findings(random: &mut StdRng, [clusters, questions]: [usize; 2], slope: f64) -> FidelityFindings {
     let condition: Condition = "L3-ev".parse().unwrap();
     let (rates, noise) = (Beta::new(2.4, 1.6).unwrap(), Normal::new(0.0, 1.0).unwrap());
     let (mut records, mut measured) = (Vec::new(), Vec::new());
@@ -109,39 +105,30 @@ fn run_reports_image_fidelity() {
     let bench = Bench::new();
     bench.rooms("frames", 8, "160x120");
     let run = |variant: &str| {
-        let line =
-            format!("--model random --data frames --out run --levels L0,L1,L5 --variant {variant}");
+        let line = format!("--model random --data frames --out run --levels L0,L1,L5 --variant {variant}");
         bench.complete(&words(&line))
     };
     run("ev");
     let lines = |name: &str| -> Vec<Value> {
         let text = fs::read_to_string(bench.path("run").join(name)).unwrap();
-        text.lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     };
     let stored = lines("fidelity.jsonl");
     let records = records(&bench.path("run"));
     let dark = records.iter().filter(|record| record["condition"] != "L0");
     for record in dark {
-        let image = stored
-            .iter()
-            .find(|line| line["image"] == record["image"]["digest"]);
+        let image = stored.iter().find(|line| line["image"] == record["image"]["digest"]);
         let image = image.unwrap_or_else(|| panic!("{record}"));
         assert_eq!(image["condition"], record["condition"]);
         assert_eq!(image["frame"], record["frame"]);
-        let lighter = stored
-            .iter()
-            .find(|other| other["frame"] == image["frame"] && other["condition"] == "L1-ev");
+        let lighter = stored.iter().find(|other| other["frame"] == image["frame"] && other["condition"] == "L1-ev");
         let psnr = |line: &Value| line["psnr"].as_f64().unwrap();
         let is_darker = record["level"] == "L5";
         assert_eq!(psnr(image) < psnr(lighter.unwrap()), is_darker, "{image}");
     }
     assert!(stored.iter().all(|line| line["condition"] != "L0"));
     let table = fs::read_to_string(bench.path("run/fidelity.csv")).unwrap();
-    assert!(
-        table.starts_with("condition,level,variant,enhancer,images,psnr,ssim,n,accuracy,psnr_auc")
-    );
+    assert!(table.starts_with("condition,level,variant,enhancer,images,psnr,ssim,n,accuracy,psnr_auc"));
     assert_eq!(table.lines().count(), 3, "{table}");
     the_page_draws_the_numbers_of_the_file(&bench, &table);
     // Images that were measured are not measured again; a new condition is added.
@@ -151,28 +138,21 @@ fn run_reports_image_fidelity() {
     assert_eq!(after[..stored.len()], stored);
 }
 
-/// The figure of the page has a point for each row of the file, with its numbers; a run without dark images has no such section.
+/// The figure of the page has a point for each row of the file, with its numbers; a run without dark images has no such
+/// section.
 fn the_page_draws_the_numbers_of_the_file(bench: &Bench, table: &str) {
     let page = |run: &str| fs::read_to_string(bench.path(run).join("report.html")).unwrap();
     let drawn = page("run");
     let (_, figure) = drawn.split_once(r#"id="figure-fidelity""#).unwrap();
-    let (_, data) = figure
-        .split_once(r#"<script type="application/json">"#)
-        .unwrap();
+    let (_, data) = figure.split_once(r#"<script type="application/json">"#).unwrap();
     let data: Value = serde_json::from_str(data.split_once("</script>").unwrap().0).unwrap();
     for (panel, column) in [("SSIM of the images", 6), ("share of right answers", 8)] {
         let panels = data["panels"].as_array().unwrap();
         let panel = panels.iter().find(|one| one["title"] == panel).unwrap();
         let points = panel["lines"][0]["points"].as_array().unwrap();
-        let drawn: Vec<f64> = points
-            .iter()
-            .map(|point| point["y"][0].as_f64().unwrap())
-            .collect();
-        let filed: Vec<f64> = table
-            .lines()
-            .skip(1)
-            .map(|row| row.split(',').nth(column).unwrap().parse().unwrap())
-            .collect();
+        let drawn: Vec<f64> = points.iter().map(|point| point["y"][0].as_f64().unwrap()).collect();
+        let filed: Vec<f64> =
+            table.lines().skip(1).map(|row| row.split(',').nth(column).unwrap().parse().unwrap()).collect();
         assert_eq!(drawn.len(), filed.len());
         for (drawn, filed) in drawn.iter().zip(&filed) {
             assert!((drawn - filed).abs() < 1e-4, "{drawn} {filed}");

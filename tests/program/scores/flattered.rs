@@ -15,9 +15,7 @@ fn bench(truth: impl Fn(usize) -> usize) -> Bench {
         let frame = item / 4;
         let name = format!("f{frame}.png");
         let grey = image::Rgb([90 + 5 * frame as u8, 120, 120]);
-        image::RgbImage::from_pixel(16, 12, grey)
-            .save(bench.path(&name))
-            .unwrap();
+        image::RgbImage::from_pixel(16, 12, grey).save(bench.path(&name)).unwrap();
         let line = json!({
             "id": format!("q{item}"), "image": name, "family": "room",
             "question": format!("Which room is {item}?"), "choices": ROOMS,
@@ -46,18 +44,8 @@ fn script(bench: &Bench, conditions: &[&str], answer: impl Fn(&str, usize) -> Op
     bench.file("m.jsonl", lines);
 }
 
-const RUN: [&str; 10] = [
-    "--model",
-    "script:m.jsonl",
-    "--data",
-    "set.jsonl",
-    "--levels",
-    "L0,L5",
-    "--variant",
-    "ev",
-    "--out",
-    "o",
-];
+const RUN: [&str; 10] =
+    ["--model", "script:m.jsonl", "--data", "set.jsonl", "--levels", "L0,L5", "--variant", "ev", "--out", "o"];
 
 fn read(bench: &Bench, name: &str) -> String {
     std::fs::read_to_string(bench.path(name)).unwrap()
@@ -69,9 +57,7 @@ fn summary(bench: &Bench) -> Value {
 
 fn texts<'s>(summary: &'s Value, list: &str, kind: &str) -> Vec<&'s str> {
     let all = summary[list].as_array().unwrap().iter();
-    all.filter(|one| one["kind"] == kind)
-        .map(|one| one["text"].as_str().unwrap())
-        .collect()
+    all.filter(|one| one["kind"] == kind).map(|one| one["text"].as_str().unwrap()).collect()
 }
 
 #[test]
@@ -79,18 +65,10 @@ fn refused_questions_are_no_sight() {
     let truth = |item: usize| item % 4;
     let bench = bench(truth);
     // In the dark half of the answers would be wrong; those questions get no reply.
-    script(
-        &bench,
-        &["L0", "L5-ev"],
-        |condition, item| match condition {
-            "L0" => Some(if item.is_multiple_of(10) {
-                (truth(item) + 1) % 4
-            } else {
-                truth(item)
-            }),
-            _ => (item / 4).is_multiple_of(2).then(|| truth(item)),
-        },
-    );
+    script(&bench, &["L0", "L5-ev"], |condition, item| match condition {
+        "L0" => Some(if item.is_multiple_of(10) { (truth(item) + 1) % 4 } else { truth(item) }),
+        _ => (item / 4).is_multiple_of(2).then(|| truth(item)),
+    });
     let called = bench.call(&[&RUN[..], &["--full"]].concat());
     let summary = summary(&bench);
     assert_eq!(
@@ -103,33 +81,18 @@ fn refused_questions_are_no_sight() {
         ["No verdict on darkness is possible at L5: 50.0 % of the questions lack a reply at L5."]
     );
     let table = read(&bench, "o/summary.csv");
-    let dark = table
-        .lines()
-        .find(|line| line.contains("L5-ev") || line.contains(",L5,"));
+    let dark = table.lines().find(|line| line.contains("L5-ev") || line.contains(",L5,"));
     assert!(dark.unwrap().contains("0.5,1"), "{table}");
-    assert!(
-        words(&called.stdout)
-            .join(" ")
-            .contains("missing wrong–right 50.0–100.0"),
-        "{}",
-        called.stdout
-    );
+    assert!(words(&called.stdout).join(" ").contains("missing wrong–right 50.0–100.0"), "{}", called.stdout);
     let thresholds = read(&bench, "o/thresholds.csv");
-    assert!(
-        thresholds.contains("by the missing replies"),
-        "{thresholds}"
-    );
+    assert!(thresholds.contains("by the missing replies"), "{thresholds}");
 }
 
 #[test]
 fn one_true_answer_is_named_and_weighted() {
     // Four of five rooms are bedrooms, and the model says so whatever it sees.
     let truth = |item: usize| {
-        if item.is_multiple_of(5) {
-            1 + item / 5 % 3
-        } else {
-            0
-        }
+        if item.is_multiple_of(5) { 1 + item / 5 % 3 } else { 0 }
     };
     let bench = bench(truth);
     script(&bench, &["L0", "L5-ev"], |condition, item| {
@@ -143,9 +106,8 @@ fn one_true_answer_is_named_and_weighted() {
     bench.call(&RUN).ended(0);
     let without_blind = alert(&bench);
     assert!(
-        without_blind.starts_with(
-            "One answer to everything scores well: “bedroom” is true of 76 of 96 questions about room."
-        )
+        without_blind
+            .starts_with("One answer to everything scores well: “bedroom” is true of 76 of 96 questions about room.")
             && without_blind.contains("Ask without images too (--blind)"),
         "{without_blind}"
     );

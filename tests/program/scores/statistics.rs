@@ -1,22 +1,18 @@
 //! The statistics, held to simulated runs whose truth is known.
 //!
 //! Clusters have a right-rate of their own (beta with intraclass correlation ρ), so that their questions stand and fall
-//! together. The bounds are those of the claim: 95 % intervals hold the truth 93 to 97.5 times in a hundred, and tests reject
-//! what is true at most 5 times. Draws are fixed, so that no run of these tests differs from another.
+//! together. The bounds are those of the claim: 95 % intervals hold the truth 93 to 97.5 times in a hundred, and tests
+//! reject what is true at most 5 times. Draws are fixed, so that no run of these tests differs from another.
 
 #![allow(clippy::float_cmp)]
-#![expect(
-    clippy::print_stdout,
-    reason = "the measured rates, for whoever asks with --nocapture"
-)]
+#![expect(clippy::print_stdout, reason = "the measured rates, for whoever asks with --nocapture")]
 
 use std::fmt::Write as _;
 
 use crate::support::made::record;
 use crate::support::table::check_rows;
 use darkqa_base::types::{
-    AxisLevel, Condition, Degradation, EnhancerName, Family, ParsedAnswer, Record, Severity,
-    Variant,
+    AxisLevel, Condition, Degradation, EnhancerName, Family, ParsedAnswer, Record, Severity, Variant,
 };
 use darkqa_eval::Kind;
 use darkqa_score::accuracies::curves;
@@ -50,9 +46,7 @@ fn rate(random: &mut StdRng, mean: f64, correlation: f64) -> f64 {
         return mean;
     }
     let scale = (1.0 - correlation) / correlation;
-    Beta::new(mean * scale, (1.0 - mean) * scale)
-        .unwrap()
-        .sample(random)
+    Beta::new(mean * scale, (1.0 - mean) * scale).unwrap().sample(random)
 }
 
 /// How often something holds, in percent.
@@ -67,17 +61,13 @@ fn at(severity: Option<Severity>) -> Condition {
 }
 
 fn clusters_of(records: &[Record]) -> Clusters {
-    let asked = records
-        .iter()
-        .map(|record| (&record.question, &record.detail.frame));
+    let asked = records.iter().map(|record| (&record.question, &record.detail.frame));
     Clusters::new(asked, &FrameTies::default())
 }
 
 /// Number of questions about each frame.
 fn sizes(random: &mut StdRng, frames: usize, least: usize, most: usize) -> Vec<usize> {
-    (0..frames)
-        .map(|_| random.random_range(least..=most))
-        .collect()
+    (0..frames).map(|_| random.random_range(least..=most)).collect()
 }
 
 #[test]
@@ -95,19 +85,13 @@ fn intervals_of_shares_hold_the_truth() {
                         .map(|replies| {
                             let rate = rate(&mut random, mean, correlation);
                             let right = (0..replies).filter(|_| random.random_bool(rate)).count();
-                            ClusterCount {
-                                right: right as u32,
-                                replies: replies as u32,
-                            }
+                            ClusterCount { right: right as u32, replies: replies as u32 }
                         })
                         .collect();
                     let estimate = Estimate::clustered(&counts).unwrap();
                     (estimate.low..=estimate.high).contains(&mean)
                 });
-                let _ = writeln!(
-                    table,
-                    "{frames} frames, p {mean}, ρ {correlation}: {held:.1} %"
-                );
+                let _ = writeln!(table, "{frames} frames, p {mean}, ρ {correlation}: {held:.1} %");
                 within &= (93.0..=97.5).contains(&held);
             }
         }
@@ -120,22 +104,12 @@ fn intervals_of_shares_hold_the_truth() {
 type Marks = ([i64; 4], [i64; 4]);
 
 fn points(marks: [i64; 4]) -> f64 {
-    marks
-        .iter()
-        .map(|mark| (mark - 1) as f64 / 4.0)
-        .sum::<f64>()
-        / 4.0
+    marks.iter().map(|mark| (mark - 1) as f64 / 4.0).sum::<f64>() / 4.0
 }
 
-/// Open answers about walks on lit and on dark frames: good with a rate of the walk's own; in the dark three in ten are bad in any
-/// case.
-fn walks(
-    random: &mut StdRng,
-    walks: usize,
-    (good, bad): Marks,
-    mean: f64,
-    rho: f64,
-) -> OpenSummary {
+/// Open answers about walks on lit and on dark frames: good with a rate of the walk's own; in the dark three in ten are
+/// bad in any case.
+fn walks(random: &mut StdRng, walks: usize, (good, bad): Marks, mean: f64, rho: f64) -> OpenSummary {
     let (mut answers, mut topics) = (Vec::new(), Vec::new());
     for walk in 0..walks {
         let rate = rate(random, mean, rho);
@@ -147,15 +121,8 @@ fn walks(
             let question = topics.len();
             let (lit, dark) = (mark(true), mark(false));
             let (is_good, kept) = (random.random_bool(rate), random.random_bool(0.7));
-            let lit = if is_good {
-                lit
-            } else {
-                bad[random.random_range(0..4)]
-            };
-            for (level, mark) in [
-                (None, lit),
-                (Some(Severity::L4), if kept { lit } else { dark }),
-            ] {
+            let lit = if is_good { lit } else { bad[random.random_range(0..4)] };
+            for (level, mark) in [(None, lit), (Some(Severity::L4), if kept { lit } else { dark })] {
                 answers.push(ScoredAnswer {
                     subject: ModelInCondition::new(MODEL, Some(&at(level))),
                     question,
@@ -163,11 +130,7 @@ fn walks(
                     cut: false,
                 });
             }
-            topics.push(QuestionGroups {
-                episode: walk.to_string(),
-                category: String::new(),
-                split: String::new(),
-            });
+            topics.push(QuestionGroups { episode: walk.to_string(), category: String::new(), split: String::new() });
         }
     }
     open_summary(&answers, &topics)
@@ -205,9 +168,7 @@ fn intervals_of_open_scores_hold_truth() {
                     "marks {name}, {count} walks, mean {mean}, ρ {rho}: score {scores:.1} %, drop {drops:.1} %"
                 );
                 // With few walks the intervals are wider, on purpose.
-                within &= [scores, drops]
-                    .iter()
-                    .all(|held| (93.0..=99.0).contains(held));
+                within &= [scores, drops].iter().all(|held| (93.0..=99.0).contains(held));
             }
         }
     });
@@ -216,13 +177,7 @@ fn intervals_of_open_scores_hold_truth() {
 }
 
 /// Two subjects on the same items, with these chances of (first alone, second alone) right in a cluster.
-fn pair(
-    random: &mut StdRng,
-    sizes: &[usize],
-    first: f64,
-    second: f64,
-    correlation: f64,
-) -> Vec<Record> {
+fn pair(random: &mut StdRng, sizes: &[usize], first: f64, second: f64, correlation: f64) -> Vec<Record> {
     let raw = at(Some(Severity::L3));
     let mut mended = raw.clone();
     mended.enhancer = Some(EnhancerName::new("e").unwrap());
@@ -251,11 +206,7 @@ fn paired(records: &[Record]) -> PairedComparison {
     let clusters = clusters_of(records);
     let trials = records.iter().cloned().collect();
     let grid = Grid::new(&trials, &clusters);
-    let raw = grid
-        .subjects
-        .iter()
-        .position(|s| s.enhancer.is_none())
-        .unwrap();
+    let raw = grid.subjects.iter().position(|s| s.enhancer.is_none()).unwrap();
     PairedComparison::new(&grid, 1 - raw, raw, None, ParsingMode::Strict).unwrap()
 }
 
@@ -272,12 +223,9 @@ fn intervals_of_differences_hold_the_truth() {
                     let made = paired(&records).difference;
                     (made.low..=made.high).contains(&(first - second))
                 });
-                let _ = writeln!(
-                    table,
-                    "{frames} frames, {first} − {second}, ρ {correlation}: {held:.1} %"
-                );
-                // Four hundred runs: give or take 2.2 %. Where the difference is 0, the interval is never without it while the exact
-                // test of few changed answers does not reject.
+                let _ = writeln!(table, "{frames} frames, {first} − {second}, ρ {correlation}: {held:.1} %");
+                // Four hundred runs: give or take 2.2 %. Where the difference is 0, the interval is never without it
+                // while the exact test of few changed answers does not reject.
                 let most = if first > second { 98.0 } else { 99.5 };
                 assert!((92.5..=most).contains(&held), "{table}");
             }
@@ -303,19 +251,11 @@ fn tests_keep_size_and_power() {
     let independent = rejected(0.1, 0.1, 0.0);
     let together = rejected(0.1, 0.1, 0.4);
     let real = rejected(0.2, 0.05, 0.0);
-    println!(
-        "of 1000, by swaps and by McNemar: independent {independent:?}, together {together:?}, real {real:?}"
-    );
+    println!("of 1000, by swaps and by McNemar: independent {independent:?}, together {together:?}, real {real:?}");
     // Give or take 1.4 %.
-    assert!(
-        independent.0 <= 64 && independent.1 <= 64,
-        "{independent:?}"
-    );
+    assert!(independent.0 <= 64 && independent.1 <= 64, "{independent:?}");
     assert!(together.0 <= 64, "{together:?}");
-    assert!(
-        together.1 > 80,
-        "McNemar's test does not hold here, or this tests nothing: {together:?}"
-    );
+    assert!(together.1 > 80, "McNemar's test does not hold here, or this tests nothing: {together:?}");
     assert!(real.0 > 900, "{real:?}");
 }
 
@@ -329,15 +269,9 @@ fn thresholds_are_recovered() {
     let mut random = StdRng::seed_from_u64(11);
     // What the estimator aims at: the curve of straight lines between the levels.
     let levels = Severity::LADDER.map(|severity| AxisLevel::new(Kind::Sensor, severity));
-    let drops: Vec<f64> = std::iter::once(AxisLevel::L0)
-        .chain(levels)
-        .map(AxisLevel::value)
-        .collect();
+    let drops: Vec<f64> = std::iter::once(AxisLevel::L0).chain(levels).map(AxisLevel::value).collect();
     let middle = f64::midpoint(psychometric(0.0), 1.0 / 3.0);
-    let after = drops
-        .iter()
-        .position(|drop| psychometric(*drop) < middle)
-        .unwrap();
+    let after = drops.iter().position(|drop| psychometric(*drop) < middle).unwrap();
     let (near, far) = (drops[after - 1], drops[after]);
     let (above, below) = (psychometric(near), psychometric(far));
     let truth = near + (above - middle) / (above - below) * (far - near);
@@ -362,12 +296,7 @@ fn thresholds_are_recovered() {
                 let rate = (psychometric(drop) + 0.2 * luck).clamp(0.0, 1.0);
                 for question in 0..*size {
                     let right = random.random_bool(rate);
-                    records.push(record(
-                        MODEL,
-                        &condition,
-                        (frame * 100 + question, frame),
-                        right,
-                    ));
+                    records.push(record(MODEL, &condition, (frame * 100 + question, frame), right));
                 }
             }
         }
@@ -409,57 +338,25 @@ fn made_set_gives_papers_arithmetic() {
     for chosen in [Some(0), Some(1), Some(1), Some(1), None] {
         add(Family::Presence, &["yes", "no"], 0, chosen);
     }
-    for (truth, chosen) in [
-        (0, 0),
-        (0, 0),
-        (1, 0),
-        (1, 0),
-        (2, 0),
-        (2, 0),
-        (1, 1),
-        (2, 1),
-    ] {
-        add(
-            Family::Color,
-            &["black", "red", "blue"],
-            truth,
-            Some(chosen),
-        );
+    for (truth, chosen) in [(0, 0), (0, 0), (1, 0), (1, 0), (2, 0), (2, 0), (1, 1), (2, 1)] {
+        add(Family::Color, &["black", "red", "blue"], truth, Some(chosen));
     }
-    let offers = records
-        .iter()
-        .map(|record| darkqa_score::accuracies::OfferedChoices {
-            family: record.detail.family.clone(),
-            choices: record.detail.choices.len(),
-            orders: 1,
-        });
+    let offers = records.iter().map(|record| darkqa_score::accuracies::OfferedChoices {
+        family: record.detail.family.clone(),
+        choices: record.detail.choices.len(),
+        orders: 1,
+    });
     let trials = records.iter().cloned().collect();
-    let findings = Findings::new(
-        &trials,
-        &FrameTies::default(),
-        offers.collect::<Vec<_>>(),
-        &[],
-    );
+    let findings = Findings::new(&trials, &FrameTies::default(), offers.collect::<Vec<_>>(), &[]);
     let rates = &findings.hallucinations[0];
     assert_eq!(rates.false_positive.unwrap().value, 0.25);
     assert_eq!(rates.false_negative.unwrap().value, 0.6);
-    let colours = findings
-        .confusions
-        .iter()
-        .find(|c| c.family == Family::Color)
-        .unwrap();
+    let colours = findings.confusions.iter().find(|c| c.family == Family::Color).unwrap();
     let collapse = colours.collapse.as_ref().unwrap();
-    assert_eq!(
-        (&*collapse.top, collapse.share.value, collapse.truth),
-        ("black", 0.75, 0.25)
-    );
+    assert_eq!((&*collapse.top, collapse.share.value, collapse.truth), ("black", 0.75, 0.25));
     assert!((collapse.entropy - 0.811_278_124_459_132_8).abs() < 1e-12);
     // Chance: 9 questions of two choices and 8 of three, 9/2 + 8/3 of 17, as a fraction 43/102.
-    let chance = findings
-        .summary
-        .cells
-        .iter()
-        .find(|cell| cell.subject.view.is_none() && cell.family.is_none());
+    let chance = findings.summary.cells.iter().find(|cell| cell.subject.view.is_none() && cell.family.is_none());
     assert!((chance.unwrap().accuracy.unwrap().value - 43.0 / 102.0).abs() < 1e-15);
     assert_eq!(findings.grid.subjects[0].variant, Variant::NONE);
 }

@@ -13,11 +13,7 @@ const ONE: ModelIndex = ModelIndex(0);
 fn failed(kind: FailureKind, status: Option<u16>, reach: Reach) -> AskError {
     let mut failed = AskError::new(kind, "no".to_owned());
     failed.failure.status = status;
-    AskError {
-        reach,
-        retry: Retry::AfterDelay,
-        ..failed
-    }
+    AskError { reach, retry: Retry::AfterDelay, ..failed }
 }
 
 fn refused_connection() -> AskError {
@@ -35,11 +31,7 @@ async fn requests_about_one_image_share_a_replica_within_the_load_limit() {
     for _ in 0..AFFINITY_SLACK {
         assert_eq!(choose(&all, 7), favourite);
     }
-    assert_ne!(
-        choose(&all, 7),
-        favourite,
-        "four more than the others are too many"
-    );
+    assert_ne!(choose(&all, 7), favourite, "four more than the others are too many");
     // For any images, the loads of two replicas differ by at most AFFINITY_SLACK + 1.
     let all = new_balancer(4);
     for image in 0..400_u64 {
@@ -56,19 +48,13 @@ async fn requests_about_one_image_share_a_replica_within_the_load_limit() {
         let all = new_balancer(4);
         counts[choose(&all, image)] += 1;
     }
-    assert!(
-        counts.iter().all(|count| (850..1150).contains(count)),
-        "{counts:?}"
-    );
+    assert!(counts.iter().all(|count| (850..1150).contains(count)), "{counts:?}");
 }
 
 #[tokio::test(start_paused = true)]
 async fn an_endless_stated_wait_is_no_panic() {
     let all = new_balancer(2);
-    let limited = AskError {
-        wait: Some(Duration::MAX),
-        ..failed(FailureKind::RateLimit, Some(429), Reach::Endpoint)
-    };
+    let limited = AskError { wait: Some(Duration::MAX), ..failed(FailureKind::RateLimit, Some(429), Reach::Endpoint) };
     assert_eq!(all.record_failure(ONE, 0, &limited), Failover::OtherReplica);
     for image in 0..100 {
         assert_eq!(choose(&all, image), 1);
@@ -76,10 +62,7 @@ async fn an_endless_stated_wait_is_no_panic() {
 }
 
 fn best(affinity: u64, replicas: &[usize]) -> usize {
-    *replicas
-        .iter()
-        .max_by_key(|index| rendezvous_weight(affinity, **index))
-        .unwrap()
+    *replicas.iter().max_by_key(|index| rendezvous_weight(affinity, **index)).unwrap()
 }
 
 #[test]
@@ -97,16 +80,10 @@ async fn backoff_grows_with_each_failed_probe() {
     let all = new_balancer(2);
     let mut backoffs = Vec::new();
     for _ in 0..2 {
-        assert_eq!(
-            all.record_failure(ONE, 0, &refused_connection()),
-            Failover::OtherReplica
-        );
+        assert_eq!(all.record_failure(ONE, 0, &refused_connection()), Failover::OtherReplica);
         assert!(all.accepts(ONE, 0));
     }
-    assert_eq!(
-        all.record_failure(ONE, 0, &refused_connection()),
-        Failover::OtherReplica
-    );
+    assert_eq!(all.record_failure(ONE, 0, &refused_connection()), Failover::OtherReplica);
     assert!(!all.accepts(ONE, 0));
     for _ in 0..14 {
         let start = Instant::now();
@@ -143,11 +120,7 @@ async fn server_failures_use_a_retry() {
     let server = failed(FailureKind::Server, Some(500), Reach::Trial);
     assert_eq!(all.record_failure(ONE, 0, &server), Failover::None);
     assert_eq!(all.record_failure(ONE, 0, &server), Failover::None);
-    assert_eq!(
-        all.record_failure(ONE, 0, &server),
-        Failover::OtherReplica,
-        "it backs off now"
-    );
+    assert_eq!(all.record_failure(ONE, 0, &server), Failover::OtherReplica, "it backs off now");
     // A reply in between resets the count.
     all.record_failure(ONE, 1, &server);
     all.record_failure(ONE, 1, &server);
@@ -168,10 +141,7 @@ async fn server_failures_use_a_retry() {
         (FailureKind::Server, 503, Retry::WhenAccepted),
     ] {
         for _ in 0..9 {
-            let failure = AskError {
-                retry,
-                ..failed(kind, Some(status), Reach::Trial)
-            };
+            let failure = AskError { retry, ..failed(kind, Some(status), Reach::Trial) };
             assert_eq!(all.record_failure(ONE, 1, &failure), Failover::None);
         }
         assert!(all.accepts(ONE, 1), "{status}");
@@ -195,10 +165,7 @@ async fn replicas_without_the_model_are_excluded() {
 async fn replicas_with_another_model_are_excluded() {
     let all = new_balancer(3);
     assert!(all.record_success(ONE, 0, Some("a"), Instant::now()));
-    assert!(
-        all.record_success(ONE, 1, None, Instant::now()),
-        "the reply names no model"
-    );
+    assert!(all.record_success(ONE, 1, None, Instant::now()), "the reply names no model");
     assert!(!all.record_success(ONE, 1, Some("b"), Instant::now()));
     assert!(!all.accepts(ONE, 1));
     assert!(all.record_success(ONE, 2, Some("a"), Instant::now()) && all.accepts(ONE, 2));
@@ -211,10 +178,7 @@ async fn exclusion_concerns_a_single_model() {
     for (model, name) in [(ONE, "a"), (other, "b"), (ONE, "a")] {
         for index in 0..2 {
             let is_expected = all.record_success(model, index, Some(name), Instant::now());
-            assert!(
-                is_expected && all.accepts(model, index),
-                "{name} at {index}"
-            );
+            assert!(is_expected && all.accepts(model, index), "{name} at {index}");
         }
     }
     let missing = failed(FailureKind::Request, Some(404), Reach::Endpoint);
@@ -248,11 +212,7 @@ async fn without_a_healthy_replica_all_are_tried() {
     for index in [0, 0, 0, 1, 1] {
         all.record_failure(ONE, index, &refused_connection());
     }
-    assert_eq!(
-        all.record_failure(ONE, 1, &refused_connection()),
-        Failover::None,
-        "no other is left"
-    );
+    assert_eq!(all.record_failure(ONE, 1, &refused_connection()), Failover::None, "no other is left");
     assert!(!all.accepts(ONE, 0) && !all.accepts(ONE, 1));
     assert!(all.choose(ONE, 0, &[], |_| true).is_some());
 }

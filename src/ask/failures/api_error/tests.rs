@@ -3,51 +3,19 @@ use super::*;
 #[test]
 fn errors_of_every_shape_are_parsed() {
     for (body, message, code) in [
-        (
-            r#"{"error":{"message":"m","type":"t","code":"c"}}"#,
-            "m",
-            Some("c"),
-        ),
+        (r#"{"error":{"message":"m","type":"t","code":"c"}}"#, "m", Some("c")),
         (r#"{"error":{"message":"m","code":502}}"#, "m", Some("502")),
         (r#"{"error":"m"}"#, "m", None),
-        (
-            r#"{"object":"error","message":"m","code":400}"#,
-            "m",
-            Some("400"),
-        ),
+        (r#"{"object":"error","message":"m","code":400}"#, "m", Some("400")),
         (r#"{"detail":"m"}"#, "m", None),
-        (
-            r#"{"detail":[{"loc":["body"],"msg":"m"},{"msg":"n"}]}"#,
-            "m; n",
-            None,
-        ),
-        (
-            r#"{"type":"error","error":{"type":"overloaded_error","message":"m"}}"#,
-            "m",
-            None,
-        ),
-        (
-            r#"{"type":"about:blank","title":"m","status":422}"#,
-            "m",
-            Some("422"),
-        ),
-        (
-            r#"{"error":{"message":"m","metadata":{"raw":"r"}}}"#,
-            "m: r",
-            None,
-        ),
+        (r#"{"detail":[{"loc":["body"],"msg":"m"},{"msg":"n"}]}"#, "m; n", None),
+        (r#"{"type":"error","error":{"type":"overloaded_error","message":"m"}}"#, "m", None),
+        (r#"{"type":"about:blank","title":"m","status":422}"#, "m", Some("422")),
+        (r#"{"error":{"message":"m","metadata":{"raw":"r"}}}"#, "m: r", None),
         (r#"{"error":{"odd":1}}"#, r#"{"odd":1}"#, None),
-        (
-            "<html><head><TITLE> 413 Too Large </TITLE>é",
-            "an HTML page titled \"413 Too Large\"",
-            None,
-        ),
+        ("<html><head><TITLE> 413 Too Large </TITLE>é", "an HTML page titled \"413 Too Large\"", None),
         ("\n<!DOCTYPE html><p>", "an HTML page without a title", None),
-        (
-            r#"{"error_code":336503,"error_msg":"m"}"#,
-            "m",
-            Some("336503"),
-        ),
+        (r#"{"error_code":336503,"error_msg":"m"}"#, "m", Some("336503")),
         (r#"{"statusCode":403,"message":"m"}"#, "m", Some("403")),
         (" upstream\n", "upstream", None),
         ("", "", None),
@@ -61,12 +29,7 @@ fn errors_of_every_shape_are_parsed() {
 #[test]
 fn nested_errors_are_parsed() {
     for (body, message, code, param) in [
-        (
-            r#"[{"error":{"message":"m","code":429}}]"#,
-            "m",
-            Some("429"),
-            None,
-        ),
+        (r#"[{"error":{"message":"m","code":429}}]"#, "m", Some("429"), None),
         (
             r#"{"object":"error","message":{"detail":[{"type":"extra_forbidden","loc":["body","max_completion_tokens"],"msg":"Extra inputs are not permitted"}]}}"#,
             "max_completion_tokens: Extra inputs are not permitted",
@@ -79,12 +42,7 @@ fn nested_errors_are_parsed() {
             Some("400"),
             Some("temperature"),
         ),
-        (
-            r#"{"detail":[{"loc":["body","logprobs"],"msg":"m"}]}"#,
-            "logprobs: m",
-            None,
-            Some("logprobs"),
-        ),
+        (r#"{"detail":[{"loc":["body","logprobs"],"msg":"m"}]}"#, "logprobs: m", None, Some("logprobs")),
         // Five levels: the fourth remains JSON text.
         (
             r#"{"error":{"message":{"message":{"message":{"message":{"message":"x"}}}}}}"#,
@@ -93,12 +51,7 @@ fn nested_errors_are_parsed() {
             None,
         ),
         // A JSON object that is not an error remains part of the message.
-        (
-            r#"{"error":{"message":"use {\"a\": 1}"}}"#,
-            r#"use {"a": 1}"#,
-            None,
-            None,
-        ),
+        (r#"{"error":{"message":"use {\"a\": 1}"}}"#, r#"use {"a": 1}"#, None, None),
     ] {
         let api_error = ApiError::from_body(body);
         assert_eq!(api_error.message, message, "{body}");
@@ -141,26 +94,14 @@ fn waits_and_daily_limits_are_parsed() {
 #[test]
 fn limits_of_zero_are_found() {
     for (body, is_zero) in [
-        (
-            r#"{"error":{"message":"Quota exceeded for metric: x, limit: 0, model: m"}}"#,
-            true,
-        ),
+        (r#"{"error":{"message":"Quota exceeded for metric: x, limit: 0, model: m"}}"#, true),
         (r#"{"error":{"message":"You have a quota of 0."}}"#, true),
-        (
-            r#"{"error":{"message":"Limit 0, Used 0, Requested 900"}}"#,
-            true,
-        ),
-        (
-            r#"{"error":{"message":"x","details":[{"violations":[{"quotaId":"a","quotaValue":"0"}]}]}}"#,
-            true,
-        ),
+        (r#"{"error":{"message":"Limit 0, Used 0, Requested 900"}}"#, true),
+        (r#"{"error":{"message":"x","details":[{"violations":[{"quotaId":"a","quotaValue":"0"}]}]}}"#, true),
         (r#"{"error":{"message":"limit: 0.5"}}"#, false),
         (r#"{"error":{"message":"limit: 05"}}"#, false),
         (r#"{"error":{"message":"limit: 250"}}"#, false),
-        (
-            r#"{"error":{"message":"x","details":[{"violations":[{"quotaValue":"50"}]}]}}"#,
-            false,
-        ),
+        (r#"{"error":{"message":"x","details":[{"violations":[{"quotaValue":"50"}]}]}}"#, false),
     ] {
         assert_eq!(ApiError::from_body(body).has_zero_limit, is_zero, "{body}");
     }
@@ -168,17 +109,9 @@ fn limits_of_zero_are_found() {
 
 #[test]
 fn a_body_without_an_error_has_none() {
-    for body in [
-        r#"{"choices":[],"error":null}"#,
-        r#"{"choices":[],"error":""}"#,
-        r#"{"error":{},"message":""}"#,
-        r"{}",
-        r"[]",
-    ] {
-        assert_eq!(
-            ApiError::from_json(&serde_json::from_str(body).unwrap()),
-            None,
-            "{body}"
-        );
+    for body in
+        [r#"{"choices":[],"error":null}"#, r#"{"choices":[],"error":""}"#, r#"{"error":{},"message":""}"#, r"{}", r"[]"]
+    {
+        assert_eq!(ApiError::from_json(&serde_json::from_str(body).unwrap()), None, "{body}");
     }
 }

@@ -2,10 +2,7 @@ use super::*;
 use crate::ask::requests::{Parameters, RequestFields, TokenField};
 
 fn parameters() -> Parameters {
-    Parameters {
-        reasoning_effort: Some("minimal".into()),
-        ..Parameters::new("m".into())
-    }
+    Parameters { reasoning_effort: Some("minimal".into()), ..Parameters::new("m".into()) }
 }
 
 fn classify(status: u16, body: &str) -> AskError {
@@ -34,11 +31,7 @@ fn statuses_are_classified() {
             403 | 404 | 410 => Reach::ByStatus,
             _ => Reach::Endpoint,
         };
-        assert_eq!(
-            (class.reach, class.retry),
-            (reach, Retry::Never),
-            "{status}"
-        );
+        assert_eq!((class.reach, class.retry), (reach, Retry::Never), "{status}");
         assert!(!class.failure.message.is_empty(), "{status}");
     }
     for (status, kind) in [
@@ -53,20 +46,12 @@ fn statuses_are_classified() {
         (599, FailureKind::Server),
     ] {
         let class = classify(status, "");
-        assert_eq!(
-            (class.reach, class.retry),
-            (Reach::Trial, Retry::AfterDelay),
-            "{status}"
-        );
+        assert_eq!((class.reach, class.retry), (Reach::Trial, Retry::AfterDelay), "{status}");
         assert_eq!(class.failure.kind, kind);
     }
     for status in [400, 413, 415, 422] {
         let class = classify(status, "");
-        assert_eq!(
-            (class.reach, class.retry),
-            (Reach::Trial, Retry::Never),
-            "{status}"
-        );
+        assert_eq!((class.reach, class.retry), (Reach::Trial, Retry::Never), "{status}");
     }
 }
 
@@ -77,53 +62,31 @@ fn codes_and_messages_override_the_status() {
             429,
             r#"{"error":{"type":"insufficient_quota","code":"insufficient_quota","message":"You exceeded your current quota"}}"#,
         ),
-        (
-            400,
-            r#"{"error":{"type":"invalid_request_error","message":"Your credit balance is too low"}}"#,
-        ),
+        (400, r#"{"error":{"type":"invalid_request_error","message":"Your credit balance is too low"}}"#),
         (400, r#"{"error":{"code":"model_not_found","message":"x"}}"#),
-        (
-            400,
-            r#"{"error":{"message":"No connected db.","code":"400"}}"#,
-        ),
-        (
-            500,
-            r#"{"error":{"code":500,"message":"image input is not supported - hint: mmproj"}}"#,
-        ),
-        (
-            400,
-            r#"{"object":"error","message":"X is not a multimodal model None","code":400}"#,
-        ),
+        (400, r#"{"error":{"message":"No connected db.","code":"400"}}"#),
+        (500, r#"{"error":{"code":500,"message":"image input is not supported - hint: mmproj"}}"#),
+        (400, r#"{"object":"error","message":"X is not a multimodal model None","code":400}"#),
     ] {
         let class = classify(status, body);
-        assert_eq!(
-            (class.reach, class.retry),
-            (Reach::Endpoint, Retry::Never),
-            "{body}"
-        );
+        assert_eq!((class.reach, class.retry), (Reach::Endpoint, Retry::Never), "{body}");
     }
     // Gemini's limit per minute also mentions a quota, but waiting helps.
     let minute = r#"{"error":{"code":429,"status":"RESOURCE_EXHAUSTED","message":"You exceeded your current quota, please check your plan"}}"#;
     assert_eq!(classify(429, minute).retry, Retry::AfterDelay);
     let moderated = r#"{"error":{"code":403,"message":"x","metadata":{"reasons":["violence"]}}}"#;
-    let filtered = r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
+    let filtered =
+        r#"{"error":{"code":"content_filter","message":"x","innererror":{"code":"ResponsibleAIPolicyViolation"}}}"#;
     for (status, body) in [(403, moderated), (400, filtered)] {
         let class = classify(status, body);
-        assert_eq!(
-            (class.reach, class.retry, class.failure.kind),
-            (Reach::Trial, Retry::Never, FailureKind::Filtered)
-        );
+        assert_eq!((class.reach, class.retry, class.failure.kind), (Reach::Trial, Retry::Never, FailureKind::Filtered));
     }
 }
 
 #[test]
 fn the_message_names_the_helpful_flag() {
     for (body, reach, flag) in [
-        (
-            r#"{"error":{"param":"temperature","message":"x"}}"#,
-            Reach::Endpoint,
-            "--temperature default",
-        ),
+        (r#"{"error":{"param":"temperature","message":"x"}}"#, Reach::Endpoint, "--temperature default"),
         (
             r#"{"error":{"param":"max_tokens","message":"Use 'max_completion_tokens' instead."}}"#,
             Reach::Endpoint,
@@ -145,16 +108,8 @@ fn the_message_names_the_helpful_flag() {
             "--temperature default",
         ),
         // The message may concern this request alone.
-        (
-            r#"{"error":{"message":"max_tokens is too large for this prompt: 1024"}}"#,
-            Reach::Trial,
-            "--max-tokens",
-        ),
-        (
-            r#"{"error":{"param":"reasoning_effort","message":"x"}}"#,
-            Reach::Endpoint,
-            "--reasoning-effort",
-        ),
+        (r#"{"error":{"message":"max_tokens is too large for this prompt: 1024"}}"#, Reach::Trial, "--max-tokens"),
+        (r#"{"error":{"param":"reasoning_effort","message":"x"}}"#, Reach::Endpoint, "--reasoning-effort"),
     ] {
         let class = classify(400, body);
         assert_eq!(class.reach, reach, "{body}");
@@ -184,14 +139,8 @@ fn unsupported_fields_differ_from_wrong_values() {
             r#"{"error":{"param":"temperature","code":"unsupported_value","message":"only 1"}}"#,
             Some(AdaptableField::Temperature { least: None }),
         ),
-        (
-            r#"{"error":{"param":"max_tokens","message":"max_tokens is too large: 1024"}}"#,
-            None,
-        ),
-        (
-            r#"{"error":{"param":"reasoning_effort","code":"unsupported_value","message":"x"}}"#,
-            None,
-        ),
+        (r#"{"error":{"param":"max_tokens","message":"max_tokens is too large: 1024"}}"#, None),
+        (r#"{"error":{"param":"reasoning_effort","code":"unsupported_value","message":"x"}}"#, None),
     ] {
         assert_eq!(classify(400, body).refused_field, refused_field, "{body}");
     }
@@ -200,16 +149,15 @@ fn unsupported_fields_differ_from_wrong_values() {
 /// What a message must have, or nothing at all after the server's words.
 const NO_REMEDY: &str = "";
 
-/// Bodies of servers, with the status, the words of the remedy, and the kind. Rows without a remedy are causes that no flag changes, or
-/// that nobody understands.
+/// Bodies of servers, with the status, the words of the remedy, and the kind. Rows without a remedy are causes that no
+/// flag changes, or that nobody understands.
 #[test]
 fn remedies_come_from_the_body() {
     use FailureKind::{Filtered, RateLimit, Request};
     const WAF: &str = "<html>\r\n<head><title>403 Forbidden</title></head>\r\n<body>\r\n<center><h1>403 Forbidden</h1></center>\r\n</body>\r\n</html>";
     const CLOUDFLARE: &str = "<!DOCTYPE html><html><head><title>Attention Required! | Cloudflare</title></head><body><h1>Sorry, you have been blocked</h1></body></html>";
     let words = |message: &str| serde_json::json!({"error": {"message": message}}).to_string();
-    let flat =
-        |message: &str| serde_json::json!({"statusCode": 403, "message": message}).to_string();
+    let flat = |message: &str| serde_json::json!({"statusCode": 403, "message": message}).to_string();
     let gemini = |limit: &str| {
         serde_json::json!([{"error": {"code": 429, "status": "RESOURCE_EXHAUSTED",
             "message": format!("You exceeded your current quota. * Quota exceeded for metric: free_tier_requests, limit: {limit}, model: m\nPlease retry in 33s."),
@@ -308,10 +256,7 @@ fn remedies_come_from_the_body() {
 fn optional_fields_are_named() {
     let mut parameters = parameters();
     parameters.probabilities = true;
-    parameters.extra.body = serde_json::json!({"provider": {"require_parameters": true}})
-        .as_object()
-        .unwrap()
-        .clone();
+    parameters.extra.body = serde_json::json!({"provider": {"require_parameters": true}}).as_object().unwrap().clone();
     let fields = RequestFields {
         wire: Wire::Chat,
         token_field: TokenField::MaxTokens,
@@ -321,14 +266,8 @@ fn optional_fields_are_named() {
         top_logprobs: Some(20),
         thinking: None,
     };
-    let sent = SentFields {
-        parameters: &parameters,
-        fields,
-        has_image: true,
-        has_key: true,
-    };
-    let body =
-        r#"{"error":{"message":"No endpoints found that can handle the requested parameters."}}"#;
+    let sent = SentFields { parameters: &parameters, fields, has_image: true, has_key: true };
+    let body = r#"{"error":{"message":"No endpoints found that can handle the requested parameters."}}"#;
     let failed = AskError::refused(404, &ApiError::from_body(body), Wire::Chat, sent);
     let flags = "leave out one of --request probabilities, --reasoning-effort, --extra-body (provider), the token limit (--request \
                  token-field=none), or choose another --model";
@@ -338,41 +277,17 @@ fn optional_fields_are_named() {
 #[test]
 fn temperatures_are_refused_in_many_words() {
     for (status, body, least) in [
-        (
-            400,
-            r#"{"error":{"message":"invalid temperature: only 1 is allowed for this model"}}"#,
-            None,
-        ),
-        (
-            400,
-            r#"{"error":{"message":"invalid temperature: only 0.6 is allowed for this model"}}"#,
-            None,
-        ),
+        (400, r#"{"error":{"message":"invalid temperature: only 1 is allowed for this model"}}"#, None),
+        (400, r#"{"error":{"message":"invalid temperature: only 0.6 is allowed for this model"}}"#, None),
         (
             422,
             r#"{"error":"Input validation error: `temperature` must be strictly positive","error_type":"validation"}"#,
             Some(1),
         ),
-        (
-            400,
-            r#"{"error":{"message":"invalid params, temperature should be in (0, 1] (2013)"}}"#,
-            Some(1),
-        ),
-        (
-            400,
-            r#"{"error":{"message":"temperature 参数非法，取值范围 [0.01, 2]"}}"#,
-            Some(1),
-        ),
-        (
-            400,
-            r#"{"error":{"param":"temperature","message":"nope"}}"#,
-            None,
-        ),
-        (
-            422,
-            r#"{"detail":[{"loc":["body","temperature"],"msg":"Input should be greater than 0.1"}]}"#,
-            Some(11),
-        ),
+        (400, r#"{"error":{"message":"invalid params, temperature should be in (0, 1] (2013)"}}"#, Some(1)),
+        (400, r#"{"error":{"message":"temperature 参数非法，取值范围 [0.01, 2]"}}"#, Some(1)),
+        (400, r#"{"error":{"param":"temperature","message":"nope"}}"#, None),
+        (422, r#"{"detail":[{"loc":["body","temperature"],"msg":"Input should be greater than 0.1"}]}"#, Some(11)),
     ] {
         let failed = classify(status, body);
         let refused = Some(AdaptableField::Temperature { least });
@@ -408,22 +323,10 @@ fn a_judge_is_named_by_its_own_flags() {
         has_key: true,
     };
     for (body, flag) in [
-        (
-            r#"{"error":{"param":"temperature","message":"x"}}"#,
-            "--judge-temperature default",
-        ),
-        (
-            r#"{"error":{"message":"you can only afford 9 tokens"}}"#,
-            "--judge-max-tokens 9",
-        ),
-        (
-            r#"{"error":{"message":"Model Not Exist"}}"#,
-            "check --judge and --judge-base-url",
-        ),
-        (
-            r#"{"detail":[{"loc":["body","seed"],"msg":"Extra inputs are not permitted"}]}"#,
-            "--sampling-seed none",
-        ),
+        (r#"{"error":{"param":"temperature","message":"x"}}"#, "--judge-temperature default"),
+        (r#"{"error":{"message":"you can only afford 9 tokens"}}"#, "--judge-max-tokens 9"),
+        (r#"{"error":{"message":"Model Not Exist"}}"#, "check --judge and --judge-base-url"),
+        (r#"{"detail":[{"loc":["body","seed"],"msg":"Extra inputs are not permitted"}]}"#, "--sampling-seed none"),
     ] {
         let failed = AskError::refused(400, &ApiError::from_body(body), Wire::Chat, sent);
         assert!(failed.failure.message.contains(flag), "{body}: {failed}");

@@ -11,10 +11,7 @@ fn unlimited() -> Gate {
 }
 
 fn per_minute(requests: Option<u32>, tokens: Option<u32>) -> Quota {
-    Quota {
-        requests: requests.and_then(NonZeroU32::new),
-        tokens: tokens.and_then(NonZeroU32::new),
-    }
+    Quota { requests: requests.and_then(NonZeroU32::new), tokens: tokens.and_then(NonZeroU32::new) }
 }
 
 fn succeed(gate: &Gate, sent: Instant) {
@@ -69,20 +66,16 @@ async fn a_quota_applies_from_the_first_request_on() {
     for _ in 0..21 {
         gate.pass().await;
     }
-    assert!(
-        idle.elapsed() >= Duration::from_secs(1),
-        "an idle minute does not allow a burst"
-    );
+    assert!(idle.elapsed() >= Duration::from_secs(1), "an idle minute does not allow a burst");
 }
 
 #[tokio::test(start_paused = true)]
 async fn implausible_numbers_do_not_stop_the_run() {
     let gate = Gate::new(per_minute(None, Some(u32::MAX)));
     let mut headers = reqwest::header::HeaderMap::new();
-    for (name, value) in [
-        ("x-ratelimit-remaining-requests", "0"),
-        ("x-ratelimit-reset-requests", "18446744073709551615"),
-    ] {
+    for (name, value) in
+        [("x-ratelimit-remaining-requests", "0"), ("x-ratelimit-reset-requests", "18446744073709551615")]
+    {
         headers.insert(name, value.parse().unwrap());
     }
     let limits = RateLimits::read(&headers, std::time::SystemTime::now());
@@ -103,41 +96,13 @@ fn bucket(rate: f64, store: f64) -> Limit {
 async fn unknown_limits_are_learned() {
     // Ideal time in seconds, maximum ratio to it, and maximum number of refusals.
     for (limit, wait, items, ideal, max_ratio, max_refused) in [
-        (
-            bucket(20.0, 20.0),
-            StatedWait::Seconds(1.0),
-            300,
-            14.0,
-            1.15,
-            30,
-        ),
+        (bucket(20.0, 20.0), StatedWait::Seconds(1.0), 300, 14.0, 1.15, 30),
         (bucket(20.0, 20.0), StatedWait::Exact, 300, 14.0, 1.2, 30),
         (bucket(20.0, 20.0), StatedWait::None, 300, 14.0, 1.15, 40),
         (bucket(20.0, 1.0), StatedWait::None, 300, 15.0, 1.4, 60),
-        (
-            bucket(20.0, 1.0),
-            StatedWait::Seconds(1.0),
-            300,
-            15.0,
-            1.6,
-            40,
-        ),
-        (
-            bucket(2.0, 2.0),
-            StatedWait::Seconds(1.0),
-            100,
-            49.0,
-            1.3,
-            60,
-        ),
-        (
-            bucket(100.0, 100.0),
-            StatedWait::Seconds(1.0),
-            3000,
-            29.0,
-            1.25,
-            150,
-        ),
+        (bucket(20.0, 1.0), StatedWait::Seconds(1.0), 300, 15.0, 1.6, 40),
+        (bucket(2.0, 2.0), StatedWait::Seconds(1.0), 100, 49.0, 1.3, 60),
+        (bucket(100.0, 100.0), StatedWait::Seconds(1.0), 3000, 29.0, 1.25, 150),
         (Limit::Sliding(15), StatedWait::Exact, 40, 120.0, 1.4, 40),
         (Limit::Fixed(15), StatedWait::None, 40, 120.0, 1.5, 60),
         (Limit::Fixed(500), StatedWait::Exact, 1500, 120.0, 1.3, 60),
@@ -187,10 +152,7 @@ async fn no_minute_has_more_requests_than_the_quota() {
                 let items = 4 * max as usize;
                 let result = simulate(limit, wait, items.min(900), quota, seed).await;
                 let found = result.max_per_minute();
-                assert!(
-                    found <= max as usize,
-                    "{limit:?} {wait:?}: {found} of {max}"
-                );
+                assert!(found <= max as usize, "{limit:?} {wait:?}: {found} of {max}");
                 let is_unlimited = match limit {
                     Limit::Random(share) => share < 0.1,
                     Limit::Broken(_) => true,
@@ -235,11 +197,7 @@ async fn no_minute_has_more_tokens_than_the_quota() {
     let start = Instant::now();
     while asking.join_next().await.is_some() {}
     let used = used.lock().unwrap().clone();
-    let max = used
-        .iter()
-        .map(|(sent, _)| tokens_in_minute(&used, *sent))
-        .max()
-        .unwrap();
+    let max = used.iter().map(|(sent, _)| tokens_in_minute(&used, *sent)).max().unwrap();
     assert!((50_000..=60_000).contains(&max), "{max}");
     // 200 requests of 1000 tokens take 3.3 minutes; the quota of the first minute may be used at once.
     let minutes = start.elapsed().as_secs_f64() / 60.0;

@@ -18,14 +18,10 @@ pub const UNKNOWN: &str = "misc";
 type NameTable = BTreeMap<&'static str, &'static str>;
 
 fn parse_table(text: &'static str) -> NameTable {
-    text.lines()
-        .filter(|line| !line.starts_with('#'))
-        .filter_map(|line| line.split_once('\t'))
-        .collect()
+    text.lines().filter(|line| !line.starts_with('#')).filter_map(|line| line.split_once('\t')).collect()
 }
 
-static TABLES: LazyLock<[NameTable; 3]> =
-    LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(parse_table));
+static TABLES: LazyLock<[NameTable; 3]> = LazyLock::new(|| [OVERRIDES, HM3D, THOR].map(parse_table));
 
 /// Meaning of a word of a data set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,20 +40,16 @@ fn normalized(word: &str) -> String {
     lower.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-/// The meaning of a word of a data set. The suffixes `/otherroom` and `/outside` are ignored, because they give the place only.
+/// The meaning of a word of a data set. The suffixes `/otherroom` and `/outside` are ignored, because they give the
+/// place only.
 pub fn meaning(word: &str) -> Meaning {
     let word = normalized(word);
-    let bare = OTHER_PLACES
-        .iter()
-        .find_map(|suffix| word.strip_suffix(suffix))
-        .map_or(word.as_str(), str::trim_end);
+    let bare = OTHER_PLACES.iter().find_map(|suffix| word.strip_suffix(suffix)).map_or(word.as_str(), str::trim_end);
     if bare.is_empty() {
         return Meaning::Nothing;
     }
     let [overrides, hm3d, _] = &*TABLES;
-    let found = [&word[..], bare]
-        .into_iter()
-        .find_map(|word| overrides.get(word).or_else(|| hm3d.get(word)));
+    let found = [&word[..], bare].into_iter().find_map(|word| overrides.get(word).or_else(|| hm3d.get(word)));
     match found {
         Some(class) => Meaning::Class(class),
         None if bare.starts_with("unknown") || bare == "unlabeled" => Meaning::Nothing,
@@ -65,8 +57,8 @@ pub fn meaning(word: &str) -> Meaning {
     }
 }
 
-/// The class of a word of a data set; `None` if the word is empty or means unknown. A word that is in no table has the class
-/// [`UNKNOWN`], and `count` is added to its entry `original` in `unlisted`.
+/// The class of a word of a data set; `None` if the word is empty or means unknown. A word that is in no table has the
+/// class [`UNKNOWN`], and `count` is added to its entry `original` in `unlisted`.
 pub fn class_of(
     word: &str,
     original: &str,
@@ -99,13 +91,10 @@ pub fn thor(kind: &str) -> (String, &'static str) {
         words.extend(letter.to_lowercase());
         before = letter;
     }
-    let class = TABLES[2]
-        .get(kind)
-        .copied()
-        .unwrap_or_else(|| match meaning(&words) {
-            Meaning::Class(class) => class,
-            Meaning::Nothing | Meaning::Unlisted => "objects",
-        });
+    let class = TABLES[2].get(kind).copied().unwrap_or_else(|| match meaning(&words) {
+        Meaning::Class(class) => class,
+        Meaning::Nothing | Meaning::Unlisted => "objects",
+    });
     (words, class)
 }
 
@@ -142,14 +131,7 @@ mod tests {
         ] {
             assert_eq!(meaning(word), Meaning::Class(class), "{word}");
         }
-        for word in [
-            "",
-            "  ",
-            "/otherroom",
-            "unknown",
-            "unknown/ probably nothing",
-            "unlabeled",
-        ] {
+        for word in ["", "  ", "/otherroom", "unknown", "unknown/ probably nothing", "unlabeled"] {
             assert_eq!(meaning(word), Meaning::Nothing, "{word}");
         }
         assert_eq!(meaning("flux capacitor"), Meaning::Unlisted);

@@ -10,8 +10,8 @@ use super::severity::{Axis, Severity};
 use super::treatment::Treatment;
 use crate::types::text::words::written_as_text;
 
-/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds on one axis share its points, which are ordered by
-/// severity. The darkness of pairs is on no axis, because it differs by frame; it is ordered last.
+/// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds on one axis share its points,
+/// which are ordered by severity. The darkness of pairs is on no axis, because it differs by frame; it is ordered last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AxisLevel(Point);
 
@@ -96,11 +96,12 @@ impl fmt::Display for AxisLevel {
     }
 }
 
-/// A kind of degradation in one noise profile, at any severity: the levels of one curve share it. The darkness of pairs is a variant
-/// without a kind, because it is on no curve.
+/// A kind of degradation in one noise profile, at any severity: the levels of one curve share it. The darkness of pairs
+/// is a variant without a kind, because it is on no curve.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash, Default)]
 pub struct Variant {
-    /// The darkness of pairs; `None` for untouched frames and degradations. It is the first field, so that pairs follow all others.
+    /// The darkness of pairs; `None` for untouched frames and degradations. It is the first field, so that pairs follow
+    /// all others.
     pub pair: Option<PairDark>,
     /// The kind; `None` for untouched frames and pairs.
     pub kind: Option<Kind>,
@@ -112,12 +113,7 @@ pub struct Variant {
 
 impl Variant {
     /// The variant of untouched frames: no kind and no noise profile.
-    pub const NONE: Self = Self {
-        kind: None,
-        reading: None,
-        pair: None,
-        group: None,
-    };
+    pub const NONE: Self = Self { kind: None, reading: None, pair: None, group: None };
 
     /// True for untouched frames, of any group of runs.
     #[must_use]
@@ -146,7 +142,8 @@ impl Variant {
         self.pair.as_ref().and_then(PairDark::photograph)
     }
 
-    /// The kind of degradation, or of the synthesis that matches a photograph; `None` for images that are not synthetic.
+    /// The kind of degradation, or of the synthesis that matches a photograph; `None` for images that are not
+    /// synthetic.
     #[must_use]
     pub fn synthetic_kind(&self) -> Option<Kind> {
         match &self.pair {
@@ -156,19 +153,19 @@ impl Variant {
         }
     }
 
-    /// The name in captions, as `with noise`; with the noise profile if it is not the paper's, without the group of runs.
+    /// The name in captions, as `with noise`; with the noise profile if it is not the paper's, without the group of
+    /// runs.
     #[must_use]
     pub fn title(&self) -> String {
         if let Some(pair) = &self.pair {
             return pair.title();
         }
         let kind = self.kind.map_or("untouched", Kind::title);
-        self.unusual_profile()
-            .map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
+        self.unusual_profile().map_or(kind.to_owned(), |reading| format!("{kind} @{reading}"))
     }
 
-    /// The kind's word, or the name of a pair's darkness, with the noise profile if it is not the paper's, as `noise@eld`; without the
-    /// group of runs.
+    /// The kind's word, or the name of a pair's darkness, with the noise profile if it is not the paper's, as
+    /// `noise@eld`; without the group of runs.
     #[must_use]
     pub fn kind_and_profile(&self) -> String {
         match self.unusual_profile() {
@@ -180,16 +177,12 @@ impl Variant {
     /// The suffix of names for the group of runs, ` @RUN`; empty without a group.
     #[must_use]
     pub fn group_suffix(&self) -> String {
-        self.group
-            .as_ref()
-            .map_or_else(String::new, ToString::to_string)
+        self.group.as_ref().map_or_else(String::new, ToString::to_string)
     }
 
     /// The noise profile, unless it is the paper's.
     fn unusual_profile(&self) -> Option<&ProfileName> {
-        self.reading
-            .as_ref()
-            .filter(|name| **name != ProfileName::PAPER)
+        self.reading.as_ref().filter(|name| **name != ProfileName::PAPER)
     }
 }
 
@@ -205,10 +198,7 @@ impl From<Option<&Degradation>> for Variant {
 
 impl From<&Treatment> for Variant {
     fn from(treatment: &Treatment) -> Self {
-        Self {
-            pair: treatment.pair().cloned(),
-            ..treatment.degradation().into()
-        }
+        Self { pair: treatment.pair().cloned(), ..treatment.degradation().into() }
     }
 }
 

@@ -23,11 +23,7 @@ impl EnhancerName {
     /// # Errors
     /// If it is empty or has other characters than letters, digits, `_`, `-` and `.`.
     pub fn new(name: &str) -> Result<Self, Error> {
-        if name.is_empty()
-            || !name
-                .chars()
-                .all(|c: char| c.is_ascii_alphanumeric() || "_-.".contains(c))
-        {
+        if name.is_empty() || !name.chars().all(|c: char| c.is_ascii_alphanumeric() || "_-.".contains(c)) {
             return Err(Error::usage(
                 "--llie",
                 format_args!(
@@ -53,9 +49,9 @@ impl fmt::Display for EnhancerName {
 
 /// A treatment with or without an enhancer: the state in which a frame is shown.
 ///
-/// It is written `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`; a photograph in the dark is `NAME[+ENHANCER]`, and a synthetic image
-/// that is as dark as it is `match-KIND[@READING][+ENHANCER]`. READING is a noise profile. `&` is reserved for several degradations in
-/// sequence.
+/// It is written `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`; a photograph in the dark is `NAME[+ENHANCER]`,
+/// and a synthetic image that is as dark as it is `match-KIND[@READING][+ENHANCER]`. READING is a noise profile. `&` is
+/// reserved for several degradations in sequence.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
     /// Treatment of the frame before it is enhanced.
@@ -68,20 +64,12 @@ pub struct Condition {
 
 impl Condition {
     /// The untouched frame without an enhancer.
-    pub const L0: Self = Self {
-        treatment: Treatment::Untouched,
-        enhancer: None,
-        group: None,
-    };
+    pub const L0: Self = Self { treatment: Treatment::Untouched, enhancer: None, group: None };
 
     /// The condition without an enhancer.
     #[must_use]
     pub fn raw(treatment: impl Into<Treatment>) -> Self {
-        Self {
-            treatment: treatment.into(),
-            enhancer: None,
-            group: None,
-        }
+        Self { treatment: treatment.into(), enhancer: None, group: None }
     }
 
     /// The degradation of the frame; `None` for L0 and for pairs.
@@ -108,13 +96,11 @@ impl Condition {
         (&self.treatment).into()
     }
 
-    /// The value of the column `variant`: the kind with its noise profile, or the darkness of a pair; and its group of runs.
+    /// The value of the column `variant`: the kind with its noise profile, or the darkness of a pair; and its group of
+    /// runs.
     #[must_use]
     pub fn variant(&self) -> Variant {
-        Variant {
-            group: self.group.clone(),
-            ..(&self.treatment).into()
-        }
+        Variant { group: self.group.clone(), ..(&self.treatment).into() }
     }
 }
 
@@ -139,11 +125,7 @@ impl FromStr for Condition {
             None => (text, None),
             Some((treatment, name)) => (treatment, Some(EnhancerName::new(name)?)),
         };
-        Ok(Self {
-            treatment: treatment.parse()?,
-            enhancer,
-            group: None,
-        })
+        Ok(Self { treatment: treatment.parse()?, enhancer, group: None })
     }
 }
 
@@ -213,27 +195,8 @@ mod tests {
 
     #[test]
     fn conditions_are_ordered_by_severity() {
-        let mut names = [
-            "dark",
-            "L3-ev",
-            "match-ev",
-            "L0",
-            "E5-noise@eld",
-            "E5-noise",
-            "L2-noise",
-        ];
+        let mut names = ["dark", "L3-ev", "match-ev", "L0", "E5-noise@eld", "E5-noise", "L2-noise"];
         names.sort_by_key(|name| name.parse::<Condition>().unwrap());
-        assert_eq!(
-            names,
-            [
-                "L0",
-                "L2-noise",
-                "E5-noise",
-                "E5-noise@eld",
-                "L3-ev",
-                "match-ev",
-                "dark"
-            ]
-        );
+        assert_eq!(names, ["L0", "L2-noise", "E5-noise", "E5-noise@eld", "L3-ev", "match-ev", "dark"]);
     }
 }

@@ -41,17 +41,13 @@ impl<'a> ConditionColumns<'a> {
             level,
             variant: match condition.and_then(Condition::pair) {
                 Some(pair) => pair.to_string(),
-                None => degradation
-                    .map_or("none", |how| how.kind().word())
-                    .to_owned(),
+                None => degradation.map_or("none", |how| how.kind().word()).to_owned(),
             },
             ev: light.map(AxisLevel::value),
             severity: severity.filter(|_| light.is_none()),
-            reading: degradation.and_then(Degradation::reading).or_else(|| {
-                condition
-                    .and_then(Condition::pair)
-                    .and_then(PairDark::reading)
-            }),
+            reading: degradation
+                .and_then(Degradation::reading)
+                .or_else(|| condition.and_then(Condition::pair).and_then(PairDark::reading)),
             enhancer: condition.and_then(|condition| condition.enhancer.as_ref()),
         }
     }

@@ -26,11 +26,7 @@ impl Degradation {
     ///
     /// # Errors
     /// If the severity is above the maximum of the kind, or a noise profile is named for a kind without noise profiles.
-    pub fn new(
-        kind: Kind,
-        severity: Severity,
-        reading: Option<ProfileName>,
-    ) -> Result<Self, Error> {
+    pub fn new(kind: Kind, severity: Severity, reading: Option<ProfileName>) -> Result<Self, Error> {
         if severity > kind.max_severity() {
             let problem = format_args!(
                 "{} {} is more than a {} takes; the largest is {}",
@@ -50,11 +46,7 @@ impl Degradation {
             return Err(Error::usage("condition", problem));
         }
         let reading = reading.or_else(|| kind.has_profiles().then_some(ProfileName::PAPER));
-        Ok(Self {
-            severity,
-            kind,
-            reading,
-        })
+        Ok(Self { severity, kind, reading })
     }
 
     /// The kind of degradation, as exposure drop or noise.
@@ -85,14 +77,7 @@ impl Degradation {
 impl Ord for Degradation {
     /// Compares axis, severity, kind and noise profile.
     fn cmp(&self, other: &Self) -> Ordering {
-        let [one, two] = [self, other].map(|how| {
-            (
-                how.kind.first_of_axis(),
-                how.severity,
-                how.kind,
-                &how.reading,
-            )
-        });
+        let [one, two] = [self, other].map(|how| (how.kind.first_of_axis(), how.severity, how.kind, &how.reading));
         one.cmp(&two)
     }
 }
@@ -121,15 +106,9 @@ impl FromStr for Degradation {
             None => (text, None),
             Some((plain, reading)) => (plain, Some(ProfileName::new(reading)?)),
         };
-        let (label, word) = plain
-            .split_once('-')
-            .ok_or_else(|| syntax_error(text, "not of that form"))?;
-        let kind = Kind::from_word(word).ok_or_else(|| {
-            syntax_error(
-                text,
-                format_args!("no kind of degradation is named {word:?}"),
-            )
-        })?;
+        let (label, word) = plain.split_once('-').ok_or_else(|| syntax_error(text, "not of that form"))?;
+        let kind = Kind::from_word(word)
+            .ok_or_else(|| syntax_error(text, format_args!("no kind of degradation is named {word:?}")))?;
         if reading == Some(ProfileName::PAPER) {
             let problem = "the reading paper is written without its name";
             return Err(syntax_error(text, problem));
@@ -144,8 +123,8 @@ fn syntax_error(text: &str, problem: impl fmt::Display) -> Error {
     Error::usage("condition", format_args!("{text:?}: {problem}; {form}"))
 }
 
-/// A kind of degradation. To add one, describe it in this `impl` and implement it in the crate `darkqa-light`; the kinds are listed
-/// nowhere else.
+/// A kind of degradation. To add one, describe it in this `impl` and implement it in the crate `darkqa-light`; the
+/// kinds are listed nowhere else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// Less light, without noise.
@@ -196,10 +175,7 @@ impl Kind {
     /// The first kind on the same axis, which represents the axis.
     #[must_use]
     pub(super) fn first_of_axis(self) -> Self {
-        Self::ALL
-            .into_iter()
-            .find(|other| other.axis() == self.axis())
-            .unwrap_or(self)
+        Self::ALL.into_iter().find(|other| other.axis() == self.axis()).unwrap_or(self)
     }
 
     /// The default severities: those of the paper, or chosen ones for a kind that the paper does not have.
@@ -258,8 +234,8 @@ impl Kind {
         self.base().unwrap_or(self)
     }
 
-    /// Gain in EV that brightens a small copy of a degraded image for display. It is 0 for kinds that do not reduce the light, and for
-    /// kinds whose darkness depends on the camera's settings.
+    /// Gain in EV that brightens a small copy of a degraded image for display. It is 0 for kinds that do not reduce the
+    /// light, and for kinds whose darkness depends on the camera's settings.
     #[must_use]
     pub fn display_gain(self, severity: Severity) -> f32 {
         match self {
@@ -277,13 +253,11 @@ impl Kind {
         }
     }
 
-    /// The label of a severity: `L1` to `L5` for the exposure drops of the paper, `E3.3` for others, `T33.33` for exposure times.
+    /// The label of a severity: `L1` to `L5` for the exposure drops of the paper, `E3.3` for others, `T33.33` for
+    /// exposure times.
     #[must_use]
     pub fn label(self, severity: Severity) -> String {
-        let index = self
-            .named_severities()
-            .iter()
-            .position(|named| *named == severity);
+        let index = self.named_severities().iter().position(|named| *named == severity);
         match index {
             Some(index) => format!("L{}", index + 1),
             None => format!("{}{severity}", self.letter()),
@@ -304,10 +278,7 @@ impl Kind {
     /// If no severity has the label, or if the label is not the canonical one: `E6` must be written `L3`.
     pub fn severity(self, label: &str) -> Result<Severity, Error> {
         let upper = label.to_ascii_uppercase();
-        let named = self
-            .named_severities()
-            .iter()
-            .find(|severity| self.label(**severity) == upper);
+        let named = self.named_severities().iter().find(|severity| self.label(**severity) == upper);
         if let Some(severity) = named {
             return Ok(*severity);
         }
@@ -318,27 +289,17 @@ impl Kind {
                 }
                 Self::Motion => "L0 and not an exposure time in milliseconds such as T33.33",
             };
-            return Err(Error::usage(
-                "level",
-                format_args!("{label:?} is not {expected}"),
-            ));
+            return Err(Error::usage("level", format_args!("{label:?} is not {expected}")));
         };
         let severity = number.parse::<Severity>()?;
         if self.label(severity) != upper {
             let expected = self.label(severity);
-            return Err(Error::usage(
-                "level",
-                format_args!("{label:?} is written {expected}"),
-            ));
+            return Err(Error::usage("level", format_args!("{label:?} is written {expected}")));
         }
         if severity > self.max_severity() {
             return Err(Error::usage(
                 "level",
-                format_args!(
-                    "{label:?} is above {}{}",
-                    self.letter(),
-                    self.max_severity()
-                ),
+                format_args!("{label:?} is above {}{}", self.letter(), self.max_severity()),
             ));
         }
         Ok(severity)
@@ -374,22 +335,14 @@ impl ProfileName {
     /// # Errors
     /// If it is empty or has other characters.
     pub fn new(name: &str) -> Result<Self, Error> {
-        if name.is_empty()
-            || !name
-                .chars()
-                .all(|c: char| c.is_ascii_alphanumeric() || "_.-".contains(c))
-        {
+        if name.is_empty() || !name.chars().all(|c: char| c.is_ascii_alphanumeric() || "_.-".contains(c)) {
             let problem = format_args!(
                 "{name:?} is not a valid name of a noise profile: only letters, digits, '_', '.' and '-' are allowed"
             );
             return Err(Error::usage("reading", problem));
         }
         // Most records use the paper's noise profile, so its name is not allocated.
-        Ok(if name == Self::PAPER.as_str() {
-            Self::PAPER
-        } else {
-            Self(Cow::Owned(name.to_owned()))
-        })
+        Ok(if name == Self::PAPER.as_str() { Self::PAPER } else { Self(Cow::Owned(name.to_owned())) })
     }
 
     /// A valid name, which is not checked.

@@ -29,8 +29,8 @@ pub struct ExposureFacts {
 }
 
 impl ExposureFacts {
-    /// The settings of a walk: blur length and angle only if they are equal in all frames, the others from the first frame. `None` if a
-    /// frame has no settings.
+    /// The settings of a walk: blur length and angle only if they are equal in all frames, the others from the first
+    /// frame. `None` if a frame has no settings.
     #[must_use]
     pub fn shared(mut all: impl Iterator<Item = Option<Self>>) -> Option<Self> {
         let first = all.next()??;
@@ -38,9 +38,7 @@ impl ExposureFacts {
             let other = other?;
             Some(Self {
                 blur_px: shared.blur_px.filter(|px| other.blur_px == Some(*px)),
-                blur_angle: shared
-                    .blur_angle
-                    .filter(|angle| other.blur_angle == Some(*angle)),
+                blur_angle: shared.blur_angle.filter(|angle| other.blur_angle == Some(*angle)),
                 ..shared
             })
         })

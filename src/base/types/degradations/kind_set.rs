@@ -30,9 +30,7 @@ impl KindSet {
 
     /// The kinds, in the order of tables.
     pub fn kinds(self) -> impl Iterator<Item = Kind> {
-        Kind::ALL
-            .into_iter()
-            .filter(move |kind| self.includes(*kind))
+        Kind::ALL.into_iter().filter(move |kind| self.includes(*kind))
     }
 }
 
@@ -90,10 +88,7 @@ mod tests {
             assert_eq!(text.parse::<KindSet>().unwrap().to_string(), written);
         }
         let wrong = "raw".parse::<KindSet>().unwrap_err();
-        assert!(
-            wrong.contains("one of ev, noise, auto, motion, both, all"),
-            "{wrong}"
-        );
+        assert!(wrong.contains("one of ev, noise, auto, motion, both, all"), "{wrong}");
         assert!("".parse::<KindSet>().is_err() && "ev,".parse::<KindSet>().is_err());
     }
 }

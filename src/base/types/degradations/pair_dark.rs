@@ -1,4 +1,5 @@
-//! The darkness of a pair, a frame and a photograph of its scene in the dark: [`PairDark`], and the photograph's name: [`PhotoName`].
+//! The darkness of a pair, a frame and a photograph of its scene in the dark: [`PairDark`], and the photograph's name:
+//! [`PhotoName`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -29,13 +30,11 @@ impl PhotoName {
     /// Checks a name. It is used as the name of a condition, so it must differ from all other conditions.
     ///
     /// # Errors
-    /// If it does not begin with a lower-case letter, has other characters than lower-case letters, digits, `_`, `-` and `.`, is longer
-    /// than 40 characters, or is the name of another condition.
+    /// If it does not begin with a lower-case letter, has other characters than lower-case letters, digits, `_`, `-`
+    /// and `.`, is longer than 40 characters, or is the name of another condition.
     pub fn new(name: &str) -> Result<Self, Error> {
         if !name.starts_with(|c: char| c.is_ascii_lowercase())
-            || !name
-                .chars()
-                .all(|c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_-.".contains(c))
+            || !name.chars().all(|c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_-.".contains(c))
         {
             return name_error(
                 name,
@@ -46,8 +45,8 @@ impl PhotoName {
             return name_error(name, "it has more than 40 characters");
         }
         let mut letters = name.chars();
-        let has_label = "let".contains(letters.next().unwrap_or_default())
-            && letters.next().is_some_and(|c| c.is_ascii_digit());
+        let has_label =
+            "let".contains(letters.next().unwrap_or_default()) && letters.next().is_some_and(|c| c.is_ascii_digit());
         let is_taken = ["none", "blind", "chance", "guessing", MATCH].contains(&name)
             || name.starts_with("match-")
             || Kind::from_word(name).is_some();
@@ -84,7 +83,8 @@ impl<'de> Deserialize<'de> for PhotoName {
 /// The dark image of a pair: a photograph, or a synthetic image with the same darkness. The darkness differs by frame.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum PairDark {
-    /// A synthetic image of the frame with the exposure drop of its photograph: the kind, and the noise profile if the kind has several.
+    /// A synthetic image of the frame with the exposure drop of its photograph: the kind, and the noise profile if the
+    /// kind has several.
     Match(Kind, Option<ProfileName>),
     /// A photograph of the same scene in the dark, without synthesis.
     Photograph(PhotoName),
@@ -118,7 +118,8 @@ impl PairDark {
         }
     }
 
-    /// Drops the noise profile: photographs of one name, or synthetic images of one kind, are compared across noise profiles.
+    /// Drops the noise profile: photographs of one name, or synthetic images of one kind, are compared across noise
+    /// profiles.
     #[must_use]
     pub fn without_profile(&self) -> Self {
         match self {
@@ -174,17 +175,12 @@ impl FromStr for PairDark {
         };
         let kind = Kind::from_word(word)
             .filter(|kind| kind.can_match())
-            .ok_or_else(|| {
-                match_error(text, "the forms are match-ev, match-noise and match-auto")
-            })?;
+            .ok_or_else(|| match_error(text, "the forms are match-ev, match-noise and match-auto"))?;
         if reading.is_some() && !kind.has_profiles() {
             return Err(match_error(text, "this kind has no noise profiles"));
         }
         if reading == Some(ProfileName::PAPER) {
-            return Err(match_error(
-                text,
-                "the reading paper is written without its name",
-            ));
+            return Err(match_error(text, "the reading paper is written without its name"));
         }
         let reading = reading.or_else(|| kind.has_profiles().then_some(ProfileName::PAPER));
         Ok(Self::Match(kind, reading))
@@ -201,17 +197,14 @@ mod tests {
 
     #[test]
     fn photograph_names_differ_from_other_conditions() {
-        for name in [
-            "dark", "dark-2", "lamp", "low_1.5s", "evening", "tungsten", "match",
-        ] {
+        for name in ["dark", "dark-2", "lamp", "low_1.5s", "evening", "tungsten", "match"] {
             assert_eq!(PhotoName::new(name).is_ok(), name != "match", "{name}");
         }
         assert_eq!(PhotoName::numbered(0).as_str(), "dark");
         assert_eq!(PhotoName::numbered(1).as_str(), "dark-2");
-        for name in [
-            "", "Dark", "2lux", "l3-ev", "e3", "t5", "ev", "noise", "match-ev", "none", "blind",
-            "a b", "a+b", "ä",
-        ] {
+        for name in
+            ["", "Dark", "2lux", "l3-ev", "e3", "t5", "ev", "noise", "match-ev", "none", "blind", "a b", "a+b", "ä"]
+        {
             assert!(PhotoName::new(name).is_err(), "{name}");
         }
         assert!(PhotoName::new(&"a".repeat(41)).is_err());
@@ -219,23 +212,10 @@ mod tests {
 
     #[test]
     fn dark_images_of_pairs_read_back() {
-        for text in [
-            "dark",
-            "dark-2",
-            "match-ev",
-            "match-noise",
-            "match-noise@eld",
-            "match-auto",
-        ] {
+        for text in ["dark", "dark-2", "match-ev", "match-noise", "match-noise@eld", "match-auto"] {
             assert_eq!(text.parse::<PairDark>().unwrap().to_string(), text);
         }
-        for text in [
-            "match-",
-            "match-motion",
-            "match-ev@eld",
-            "match-noise@paper",
-            "match",
-        ] {
+        for text in ["match-", "match-motion", "match-ev@eld", "match-noise@paper", "match"] {
             assert!(text.parse::<PairDark>().is_err(), "{text}");
         }
     }

@@ -15,15 +15,15 @@ pub struct PairFacts {
     /// Median over the pixels of log₂ of the luminance ratio, in EV; `None` if too many pixels are black.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub median: Option<f64>,
-    /// The drop in EV with which synthesis makes the frame as dark as the photograph. It differs from `mean`, because synthesis computes
-    /// light as codes to the power of 2.2.
+    /// The drop in EV with which synthesis makes the frame as dark as the photograph. It differs from `mean`, because
+    /// synthesis computes light as codes to the power of 2.2.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub synthesis: Option<f64>,
 }
 
 impl PairFacts {
-    /// The largest drop in EV that can be measured. Above it, noise clipped at black hides a part of the drop: on a dim frame with a noise
-    /// deviation of 0.002 in linear light, 6 EV are measured as 5.9, 7.5 EV as 6.8 and 9 EV as 7.3.
+    /// The largest drop in EV that can be measured. Above it, noise clipped at black hides a part of the drop: on a dim
+    /// frame with a noise deviation of 0.002 in linear light, 6 EV are measured as 5.9, 7.5 EV as 6.8 and 9 EV as 7.3.
     pub const MEASURABLE: f64 = 6.0;
 
     /// The stated drop in EV, otherwise the measured one; `None` if neither is known.

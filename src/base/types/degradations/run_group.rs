@@ -3,7 +3,8 @@
 use std::fmt;
 use std::sync::Arc;
 
-/// The runs in a report whose images of a condition are equal, if other runs in the report have other images under the same condition.
+/// The runs in a report whose images of a condition are equal, if other runs in the report have other images under the
+/// same condition.
 ///
 /// It is never stored: only a report on several runs sets it.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -18,10 +19,7 @@ impl RunGroup {
     /// The group of these runs; the tables show `name`.
     #[must_use]
     pub fn new(name: &str, runs: &[usize]) -> Self {
-        Self {
-            name: name.into(),
-            runs: runs.into(),
-        }
+        Self { name: name.into(), runs: runs.into() }
     }
 
     /// The name that the tables show.
@@ -33,8 +31,7 @@ impl RunGroup {
     /// True if two groups have a run in common; `None` means all runs.
     #[must_use]
     pub fn overlap(one: Option<&Self>, other: Option<&Self>) -> bool {
-        one.zip(other)
-            .is_none_or(|(one, other)| one.runs.iter().any(|run| other.runs.contains(run)))
+        one.zip(other).is_none_or(|(one, other)| one.runs.iter().any(|run| other.runs.contains(run)))
     }
 }
 

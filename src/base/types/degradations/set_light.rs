@@ -4,9 +4,7 @@ use serde::{Deserialize, Serialize};
 
 /// The light in which the photographs of a set were taken.
 #[cfg_attr(feature = "program", derive(clap::ValueEnum))]
-#[derive(
-    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
-)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SetLight {
     /// Well lit: L0 is the frame in the light

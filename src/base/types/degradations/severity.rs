@@ -23,36 +23,21 @@ pub struct Axis {
 
 impl Axis {
     /// The exposure drop in exposure values; one EV is a factor of two in light.
-    pub const LIGHT: Self = Self {
-        title: "exposure drop",
-        unit: "EV",
-        cause: "darkness",
-        place: "in the dark",
-    };
+    pub const LIGHT: Self = Self { title: "exposure drop", unit: "EV", cause: "darkness", place: "in the dark" };
 
     /// The exposure time of a moving camera, in milliseconds.
-    pub const MOTION: Self = Self {
-        title: "exposure time",
-        unit: "ms",
-        cause: "motion blur",
-        place: "with motion blur",
-    };
+    pub const MOTION: Self =
+        Self { title: "exposure time", unit: "ms", cause: "motion blur", place: "with motion blur" };
 
     /// All axes, in the order of tables.
     pub const ALL: [Self; 2] = [Self::LIGHT, Self::MOTION];
 
-    /// The axes that `is_present` accepts, in the order of tables; [`Self::LIGHT`] if it accepts none, as for a run with clean frames only.
+    /// The axes that `is_present` accepts, in the order of tables; [`Self::LIGHT`] if it accepts none, as for a run
+    /// with clean frames only.
     #[must_use]
     pub fn present(is_present: impl Fn(Self) -> bool) -> Vec<Self> {
-        let axes: Vec<Self> = Self::ALL
-            .into_iter()
-            .filter(|axis| is_present(*axis))
-            .collect();
-        if axes.is_empty() {
-            vec![Self::LIGHT]
-        } else {
-            axes
-        }
+        let axes: Vec<Self> = Self::ALL.into_iter().filter(|axis| is_present(*axis)).collect();
+        if axes.is_empty() { vec![Self::LIGHT] } else { axes }
     }
 }
 
@@ -73,7 +58,8 @@ impl Severity {
     pub const L5: Self = Self::from_hundredths(900);
     /// The exposure drops of the paper (DarkQA, section III), smallest first.
     pub const LADDER: [Self; 5] = [Self::L1, Self::L2, Self::L3, Self::L4, Self::L5];
-    /// Exposure times in milliseconds: 1/120 s (half the frame interval of 60 fps video) and its doubles up to 2/15 s; chosen.
+    /// Exposure times in milliseconds: 1/120 s (half the frame interval of 60 fps video) and its doubles up to 2/15 s;
+    /// chosen.
     pub const TIMES: [Self; 5] = [
         Self::from_hundredths(833),
         Self::from_hundredths(1667),
@@ -123,9 +109,8 @@ impl FromStr for Severity {
     /// Parses a decimal number above 0 with at most two decimals.
     fn from_str(text: &str) -> Result<Self, Error> {
         let (whole, part) = text.split_once('.').unwrap_or((text, "0"));
-        let is_decimal = [whole, part]
-            .iter()
-            .all(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()));
+        let is_decimal =
+            [whole, part].iter().all(|digits| !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit()));
         if !is_decimal {
             let problem = format_args!("{text:?} is not a decimal number like 3.3");
             return Err(Error::usage("level", problem));

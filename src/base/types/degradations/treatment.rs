@@ -9,9 +9,10 @@ use crate::error::Error;
 
 /// Processing of a frame before it is enhanced.
 ///
-/// A photograph in the dark is not a degradation: it has a name instead of a kind and a severity, so synthesis, curves, thresholds and
-/// means over levels, which all take a [`Degradation`], exclude it by type. A synthetic image that matches a photograph is handled in the
-/// same way, because its exposure drop differs by frame; it becomes a degradation once its frame is known.
+/// A photograph in the dark is not a degradation: it has a name instead of a kind and a severity, so synthesis, curves,
+/// thresholds and means over levels, which all take a [`Degradation`], exclude it by type. A synthetic image that
+/// matches a photograph is handled in the same way, because its exposure drop differs by frame; it becomes a
+/// degradation once its frame is known.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Treatment {
     /// The frame as it is, L0.
@@ -65,7 +66,8 @@ impl FromStr for Treatment {
         if text == "L0" {
             return Ok(Self::Untouched);
         }
-        // Levels are in upper case, so a lower-case word is parsed as a pair. If that fails, the error about levels lists all forms.
+        // Levels are in upper case, so a lower-case word is parsed as a pair. If that fails, the error about levels
+        // lists all forms.
         if text.starts_with(|c: char| c.is_ascii_lowercase()) {
             match text.parse::<PairDark>() {
                 Ok(dark) => return Ok(Self::Paired(dark)),

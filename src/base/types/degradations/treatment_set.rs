@@ -101,11 +101,7 @@ impl TreatmentSet {
             _ => {
                 let kind = Kind::from_word(word).map(|kind| Self::only(Some(kind)));
                 let words = Kind::ALL.map(Kind::word).join(", ");
-                kind.ok_or_else(|| {
-                    format!(
-                        "{word:?} is not one of {UNTOUCHED}, {words}, both, {PHOTOGRAPHS}, {ALL}"
-                    )
-                })
+                kind.ok_or_else(|| format!("{word:?} is not one of {UNTOUCHED}, {words}, both, {PHOTOGRAPHS}, {ALL}"))
             }
         }
     }
@@ -113,10 +109,7 @@ impl TreatmentSet {
 
 impl From<KindSet> for TreatmentSet {
     fn from(kinds: KindSet) -> Self {
-        kinds
-            .kinds()
-            .map(|kind| Self::only(Some(kind)))
-            .fold(Self::NONE, Self::union)
+        kinds.kinds().map(|kind| Self::only(Some(kind))).fold(Self::NONE, Self::union)
     }
 }
 
@@ -136,10 +129,7 @@ impl FromStr for TreatmentSet {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        text.split(',').try_fold(
-            Self::NONE,
-            |set, word| Ok(set.union(Self::from_word(word)?)),
-        )
+        text.split(',').try_fold(Self::NONE, |set, word| Ok(set.union(Self::from_word(word)?)))
     }
 }
 
@@ -172,10 +162,7 @@ mod tests {
         }
         for wrong in ["L0", "raw", "", "l0,", "l0,raw"] {
             let error = wrong.parse::<TreatmentSet>().unwrap_err();
-            assert!(
-                error.contains("one of l0, ev, noise, auto, motion, both, dark, all"),
-                "{error}"
-            );
+            assert!(error.contains("one of l0, ev, noise, auto, motion, both, dark, all"), "{error}");
         }
     }
 

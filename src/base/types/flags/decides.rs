@@ -3,9 +3,10 @@
 use clap::Arg;
 use clap::builder::ArgExt;
 
-/// The part of a run that a flag decides. Each flag states its class in its definition: `#[arg(long, add = Decides::Pixels)]`.
-/// The help, the manual and the list of all flags show the class. `tests/program/runs/identity.rs` checks it: a flag that decides something
-/// changes the keys of trials, the columns or the identity of a run; a flag that decides nothing changes none of them.
+/// The part of a run that a flag decides. Each flag states its class in its definition: `#[arg(long, add =
+/// Decides::Pixels)]`. The help, the manual and the list of all flags show the class. `tests/program/runs/identity.rs`
+/// checks it: a flag that decides something changes the keys of trials, the columns or the identity of a run; a flag
+/// that decides nothing changes none of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Decides {
     /// The set of trials: questions, models, conditions.

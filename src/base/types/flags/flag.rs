@@ -51,9 +51,7 @@ pub fn threads(text: &str) -> Result<NonZeroUsize, String> {
 
 /// Writes an enum's value as its word on the command line.
 pub fn write_word(value: &impl ValueEnum, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-    value
-        .to_possible_value()
-        .map_or(Ok(()), |value| f.pad(value.get_name()))
+    value.to_possible_value().map_or(Ok(()), |value| f.pad(value.get_name()))
 }
 
 /// Reads an enum's value from its word, as a manifest stores it.

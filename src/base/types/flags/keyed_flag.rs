@@ -13,7 +13,8 @@ pub struct KeyedFlag {
     pub heading: &'static str,
     /// The help text; empty if the flag has a value without a key, whose own help text is used.
     pub about: &'static str,
-    /// The value of a key that is written without a value; `None` if such a key is a switch or has only one possible value.
+    /// The value of a key that is written without a value; `None` if such a key is a switch or has only one possible
+    /// value.
     pub alone: Option<&'static str>,
     /// Each key with the name of the hidden flag for the same setting. The empty key is for a value without a key.
     pub keys: &'static [(&'static str, &'static str)],
@@ -63,24 +64,14 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
         heading: "Ready-made sets",
         about: "Rows of a ready-made set to leave out, with a count, instead of stopping; default: none",
         alone: Some("skip"),
-        keys: &[
-            ("no-image", "no-image"),
-            ("open", "open"),
-            ("several", "several"),
-            ("bad", "bad"),
-        ],
+        keys: &[("no-image", "no-image"), ("open", "open"), ("several", "several"), ("bad", "bad")],
     },
     KeyedFlag {
         name: "decode",
         heading: "Data",
         about: "How image files are decoded; default: to sRGB, without scaling",
         alone: None,
-        keys: &[
-            ("colour", "colour"),
-            ("transfer", "transfer"),
-            ("exposure", "exposure"),
-            ("max-pixels", "max-pixels"),
-        ],
+        keys: &[("colour", "colour"), ("transfer", "transfer"), ("exposure", "exposure"), ("max-pixels", "max-pixels")],
     },
     KeyedFlag {
         name: "choice-order",
@@ -141,23 +132,14 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
         heading: "Sending",
         about: "",
         alone: None,
-        keys: &[
-            ("", "retries"),
-            ("paid", "paid-retries"),
-            ("max-wait", "max-wait"),
-            ("patience", "patience"),
-        ],
+        keys: &[("", "retries"), ("paid", "paid-retries"), ("max-wait", "max-wait"), ("patience", "patience")],
     },
     KeyedFlag {
         name: "stop",
         heading: "Sending",
         about: "Early stop of a run; default: when no model can be asked any more",
         alone: None,
-        keys: &[
-            ("failures", "max-failures"),
-            ("first-model", "fail-fast"),
-            ("grace", "grace"),
-        ],
+        keys: &[("failures", "max-failures"), ("first-model", "fail-fast"), ("grace", "grace")],
     },
     KeyedFlag {
         name: "image",
@@ -177,11 +159,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
         heading: "Scale",
         about: "",
         alone: None,
-        keys: &[
-            ("", "images-cache"),
-            ("what", "images-cache-what"),
-            ("size", "images-cache-size"),
-        ],
+        keys: &[("", "images-cache"), ("what", "images-cache-what"), ("size", "images-cache-size")],
     },
     KeyedFlag {
         name: "shard",
@@ -196,10 +174,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
 #[must_use]
 pub fn keyed_form(flag: &str) -> Option<(&'static KeyedFlag, &'static str)> {
     KEYED_FLAGS.iter().find_map(|keyed| {
-        let (key, _) = keyed
-            .keys
-            .iter()
-            .find(|(key, own)| *own == flag && !key.is_empty())?;
+        let (key, _) = keyed.keys.iter().find(|(key, own)| *own == flag && !key.is_empty())?;
         Some((keyed, *key))
     })
 }
@@ -220,9 +195,7 @@ pub fn setting_spelling(setting: &str) -> String {
     let (mut spelling, mut last) = (String::new(), "");
     for word in setting.split_inclusive(' ') {
         let name = word.strip_prefix("--").unwrap_or_default();
-        let end = name
-            .find(|c: char| c != '-' && !c.is_ascii_alphanumeric())
-            .unwrap_or(name.len());
+        let end = name.find(|c: char| c != '-' && !c.is_ascii_alphanumeric()).unwrap_or(name.len());
         let (flag, rest) = name.split_at(end);
         match keyed_form(flag) {
             Some((keyed, key)) if keyed.name == last => spelling.extend([key, rest]),
@@ -255,23 +228,13 @@ impl KeyedFlag {
     ///
     /// # Errors
     /// If a key does not exist or a part is empty.
-    pub fn settings(
-        &self,
-        text: &str,
-        has: impl Fn(&str) -> bool,
-    ) -> Result<Vec<KeyedSetting>, String> {
-        let (plain, known): (Vec<_>, Vec<_>) = self
-            .keys
-            .iter()
-            .filter(|(_, flag)| has(flag))
-            .partition(|(key, _)| key.is_empty());
+    pub fn settings(&self, text: &str, has: impl Fn(&str) -> bool) -> Result<Vec<KeyedSetting>, String> {
+        let (plain, known): (Vec<_>, Vec<_>) =
+            self.keys.iter().filter(|(_, flag)| has(flag)).partition(|(key, _)| key.is_empty());
         let parts: Vec<&str> = text.split(',').collect();
         let names: Vec<&str> = known.iter().map(|(key, _)| *key).collect();
         // A part after the first that is nearly a key is a mistyped key.
-        let is_mistyped = parts
-            .iter()
-            .skip(1)
-            .any(|part| names.iter().any(|key| is_nearly(key_of(part), key)));
+        let is_mistyped = parts.iter().skip(1).any(|part| names.iter().any(|key| is_nearly(key_of(part), key)));
         if let [(_, flag)] = plain[..]
             && !is_mistyped
             && parts.iter().all(|part| !names.contains(&key_of(part)))
@@ -314,11 +277,7 @@ mod tests {
 
     fn settings(flag: &str, text: &str) -> Result<Vec<(&'static str, Option<String>)>, String> {
         let keyed = KeyedFlag::from_name(flag).unwrap();
-        Ok(keyed
-            .settings(text, |_| true)?
-            .into_iter()
-            .map(|one| (one.flag, one.value))
-            .collect())
+        Ok(keyed.settings(text, |_| true)?.into_iter().map(|one| (one.flag, one.value)).collect())
     }
 
     fn with(flag: &'static str, value: &str) -> (&'static str, Option<String>) {
@@ -329,11 +288,7 @@ mod tests {
     fn keys_may_have_no_value() {
         assert_eq!(
             settings("noise", "gain=3, fixed,camera=a=b.toml"),
-            Ok(vec![
-                with("gain", "3"),
-                ("fixed", None),
-                with("camera", "a=b.toml")
-            ])
+            Ok(vec![with("gain", "3"), ("fixed", None), with("camera", "a=b.toml")])
         );
     }
 
@@ -341,24 +296,14 @@ mod tests {
     fn plain_value_may_come_first() {
         assert_eq!(
             settings("image", "jpeg:90,max-side=512,first"),
-            Ok(vec![
-                with("image", "jpeg:90"),
-                with("max-side", "512"),
-                ("image-first", None)
-            ])
+            Ok(vec![with("image", "jpeg:90"), with("max-side", "512"), ("image-first", None)])
         );
-        assert_eq!(
-            settings("image", "max-side=512"),
-            Ok(vec![with("max-side", "512")])
-        );
+        assert_eq!(settings("image", "max-side=512"), Ok(vec![with("max-side", "512")]));
     }
 
     #[test]
     fn a_plain_value_without_keys_may_have_commas() {
-        assert_eq!(
-            settings("images-cache", "a,b=c"),
-            Ok(vec![with("images-cache", "a,b=c")])
-        );
+        assert_eq!(settings("images-cache", "a,b=c"), Ok(vec![with("images-cache", "a,b=c")]));
     }
 
     #[test]
@@ -366,10 +311,7 @@ mod tests {
         let problem = settings("noise", "gian=3").unwrap_err();
         assert_eq!(problem, "unknown key \"gian\"; did you mean gain?");
         let problem = settings("stop", "").unwrap_err();
-        assert_eq!(
-            problem,
-            "unknown key \"\"; keys: failures, first-model, grace"
-        );
+        assert_eq!(problem, "unknown key \"\"; keys: failures, first-model, grace");
         let problem = settings("image", "png,maxside=9").unwrap_err();
         assert_eq!(problem, "unknown key \"maxside\"; did you mean max-side?");
         let problem = settings("image", "png,max-side=9,zoom").unwrap_err();
@@ -380,11 +322,7 @@ mod tests {
     fn a_key_of_another_command_is_unknown() {
         let keyed = KeyedFlag::from_name("request").unwrap();
         let problem = keyed.settings("constrain=json", |flag| flag != "constrain");
-        assert!(
-            problem
-                .unwrap_err()
-                .starts_with("unknown key \"constrain\"")
-        );
+        assert!(problem.unwrap_err().starts_with("unknown key \"constrain\""));
     }
 
     #[test]
@@ -397,10 +335,7 @@ mod tests {
     #[test]
     fn settings_of_manifests_are_spelled_as_keys() {
         for (setting, spelling) in [
-            (
-                "--camera, --gain or --fixed",
-                "--noise camera, gain or fixed",
-            ),
+            ("--camera, --gain or --fixed", "--noise camera, gain or fixed"),
             ("--camera (name) of paper", "--noise camera (name) of paper"),
             ("--model", "--model"),
             ("--levels of the run --", "--levels of the run --"),

@@ -11,6 +11,4 @@ mod keyed_flag;
 pub use decides::Decides;
 #[cfg(feature = "program")]
 pub use flag::{flag_words, positive, read_word, seconds, threads, write_word};
-pub use keyed_flag::{
-    KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling, keyed_form, setting_spelling,
-};
+pub use keyed_flag::{KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling, keyed_form, setting_spelling};

@@ -1,32 +1,27 @@
-//! Conversion of 16-bit codes and linear light to the 8-bit codes of the undarkened image: [`from_rgb16`], [`from_linear`].
+//! Conversion of 16-bit codes and linear light to the 8-bit codes of the undarkened image: [`from_rgb16`],
+//! [`from_linear`].
 
 use std::sync::LazyLock;
 
 use super::image::{Light, Rgb, Rgb16Image};
 
-/// Exponent between codes and light, as in the exposure drop (DarkQA, eqs. 1 and 3): the undarkened image equals a drop of 0 EV.
+/// Exponent between codes and light, as in the exposure drop (DarkQA, eqs. 1 and 3): the undarkened image equals a drop
+/// of 0 EV.
 const GAMMA: f64 = 2.2;
 
 /// Rounds 16-bit codes to the nearest 8-bit codes.
 pub(super) fn from_rgb16(codes: &Rgb16Image) -> Rgb {
-    let nearest = codes
-        .samples()
-        .iter()
-        .map(|code| ((u32::from(*code) + 128) / 257) as u8);
+    let nearest = codes.samples().iter().map(|code| ((u32::from(*code) + 128) / 257) as u8);
     new_image(codes.height(), codes.width(), nearest)
 }
 
 /// The codes floor(255 · min(1, L)^(1/2.2) + ½) of light L.
 pub(super) fn from_linear(light: &Light) -> Rgb {
     /// Lower bound of the light of each code from 1 to 255.
-    static STEPS: LazyLock<[f64; 255]> = LazyLock::new(|| {
-        std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, GAMMA))
-    });
+    static STEPS: LazyLock<[f64; 255]> =
+        LazyLock::new(|| std::array::from_fn(|below| libm::pow((below as f64 + 0.5) / 255.0, GAMMA)));
     let steps = &*STEPS;
-    let codes = light
-        .samples()
-        .iter()
-        .map(|light| steps.partition_point(|step| *step <= f64::from(*light)) as u8);
+    let codes = light.samples().iter().map(|light| steps.partition_point(|step| *step <= f64::from(*light)) as u8);
     new_image(light.height(), light.width(), codes)
 }
 

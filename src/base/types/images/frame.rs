@@ -24,11 +24,7 @@ impl FrameId {
     #[must_use]
     pub fn bare(&self) -> &str {
         match self.0.rsplit_once('.') {
-            Some((bare, ending))
-                if is_image_ending(ending) && !bare.is_empty() && !bare.ends_with('/') =>
-            {
-                bare
-            }
+            Some((bare, ending)) if is_image_ending(ending) && !bare.is_empty() && !bare.ends_with('/') => bare,
             _ => &self.0,
         }
     }
@@ -45,9 +41,7 @@ const IMAGE_ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "tif", "tiff", "
 
 /// True if the extension, in any case, is that of a supported image format.
 pub fn is_image_ending(ending: &str) -> bool {
-    IMAGE_ENDINGS
-        .iter()
-        .any(|known| ending.eq_ignore_ascii_case(known))
+    IMAGE_ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
 /// One view of a scene: an image and, if the data set has them, its maps of the same height and width.

@@ -20,7 +20,8 @@ pub type Rgb16Image = Image<u16>;
 
 /// Linear light of an image, with the primaries of sRGB; black is 0, white is 1.
 ///
-/// Either the light of a scene, or the light that a display emits for codes: their gamma is undone, the tone curve of the camera is not.
+/// Either the light of a scene, or the light that a display emits for codes: their gamma is undone, the tone curve of
+/// the camera is not.
 pub type Light = Image<f32>;
 
 /// A sample of an [`Image`].
@@ -59,41 +60,29 @@ impl<T: Sample> Image<T> {
     /// An image from height × width × 3 samples, row by row, red first.
     ///
     /// # Errors
-    /// If the number of samples is not `height * width * 3`, or is zero, or a sample of light is not a finite number of at least 0.
+    /// If the number of samples is not `height * width * 3`, or is zero, or a sample of light is not a finite number of
+    /// at least 0.
     pub fn new(height: usize, width: usize, samples: Vec<T>) -> Result<Self, Error> {
         let found = samples.len();
         let expected = height.checked_mul(width).and_then(|n| n.checked_mul(3));
         if found == 0 || expected != Some(found) {
             let image = T::IMAGE;
-            return Err(Error::data(
-                "image",
-                format_args!("{found} samples do not make a {height} × {width} {image}"),
-            ));
+            return Err(Error::data("image", format_args!("{found} samples do not make a {height} × {width} {image}")));
         }
         if let Some(sample) = samples.iter().find(|sample| !sample.is_valid()) {
             return Err(Error::data(
                 "image",
-                format_args!(
-                    "{sample} is not an amount of light; expected a finite number of at least 0"
-                ),
+                format_args!("{sample} is not an amount of light; expected a finite number of at least 0"),
             ));
         }
-        Ok(Self {
-            height,
-            width,
-            samples,
-        })
+        Ok(Self { height, width, samples })
     }
 
     /// A black image of at least one pixel.
     #[must_use]
     pub fn black(height: usize, width: usize) -> Self {
         let (height, width) = (height.max(1), width.max(1));
-        Self {
-            height,
-            width,
-            samples: vec![T::default(); height * width * 3],
-        }
+        Self { height, width, samples: vec![T::default(); height * width * 3] }
     }
 
     /// The height in pixels.

@@ -6,8 +6,8 @@
 
 /// A computation that is compiled separately for each [`Isa`].
 pub trait Kernel {
-    /// Runs the computation. This method and all functions that it calls must be `#[inline(always)]`: only inlined code is compiled for the
-    /// caller's instruction set.
+    /// Runs the computation. This method and all functions that it calls must be `#[inline(always)]`: only inlined code
+    /// is compiled for the caller's instruction set.
     fn run(self);
 }
 
@@ -53,10 +53,7 @@ impl Isa {
     }
 
     /// Runs a kernel with this instruction set, or with the baseline if the machine does not have it.
-    #[expect(
-        unsafe_code,
-        reason = "the match guards check the CPU feature before each call"
-    )]
+    #[expect(unsafe_code, reason = "the match guards check the CPU feature before each call")]
     pub fn run(self, kernel: impl Kernel) {
         match self {
             // SAFETY: the machine has the instructions that the function is compiled for.

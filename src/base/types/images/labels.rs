@@ -6,14 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::types::values::Digest;
 
-/// Suffixes in HM3D-Sem's names of objects seen through a door or window. They name the place of the object, not its class.
-pub const OTHER_PLACES: [&str; 5] = [
-    "/otherroom",
-    "/ otherroom",
-    "/other room",
-    "/outside",
-    "/ outside",
-];
+/// Suffixes in HM3D-Sem's names of objects seen through a door or window. They name the place of the object, not its
+/// class.
+pub const OTHER_PLACES: [&str; 5] = ["/otherroom", "/ otherroom", "/other room", "/outside", "/ outside"];
 
 /// The class of one number in a semantic map.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -33,8 +28,9 @@ pub struct Labels {
     pub void: BTreeSet<u16>,
     /// The class of each number.
     pub labels: BTreeMap<u16, Label>,
-    /// The canonical classes with a label of their own: if the map does not contain one, neither does the image. A class that is not in
-    /// this set may be present under a more general label, as sinks are labelled `objects` in NYU13.
+    /// The canonical classes with a label of their own: if the map does not contain one, neither does the image. A
+    /// class that is not in this set may be present under a more general label, as sinks are labelled `objects` in
+    /// NYU13.
     pub expressible: BTreeSet<String>,
 }
 
@@ -43,10 +39,8 @@ impl Labels {
     #[must_use]
     pub fn digest(&self) -> Digest {
         let numbers = self.void.iter().map(|id| vec![id.to_string()]);
-        let labels = self
-            .labels
-            .iter()
-            .map(|(id, label)| vec![id.to_string(), label.name.clone(), label.canonical.clone()]);
+        let labels =
+            self.labels.iter().map(|(id, label)| vec![id.to_string(), label.name.clone(), label.canonical.clone()]);
         let expressible = self.expressible.iter().map(|name| vec![name.clone()]);
         let words: Vec<String> = numbers
             .chain([vec![";".to_owned()]])

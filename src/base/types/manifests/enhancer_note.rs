@@ -83,7 +83,8 @@ pub struct ProbeNote {
 pub enum ProbeOutcome {
     /// The images are plausible as enhanced images.
     Plausible,
-    /// The images are unusual. They are accepted, because some models produce such images and the user stated the conventions.
+    /// The images are unusual. They are accepted, because some models produce such images and the user stated the
+    /// conventions.
     Doubtful,
     /// The images are implausible; the run continued because the user overruled the probe.
     Overruled,
@@ -123,11 +124,7 @@ impl EnhancerNote {
 
     /// Counts a burnt-out image of a frame and condition, with its percentage of white pixels.
     pub fn count_burnt_out(&mut self, frame: String, condition: String, white: u8) {
-        let found = BurntOutImages {
-            images: 1,
-            percents: white.into(),
-            example: frame,
-        };
+        let found = BurntOutImages { images: 1, percents: white.into(), example: frame };
         self.burnt_out.entry(condition).or_default().add(&found);
     }
 
@@ -209,11 +206,7 @@ mod tests {
     use super::*;
 
     fn image(frame: &str) -> FlawedImage {
-        FlawedImage {
-            frame: frame.to_owned(),
-            condition: "L3+noise+m".to_owned(),
-            flaw: Flaw::Flat,
-        }
+        FlawedImage { frame: frame.to_owned(), condition: "L3+noise+m".to_owned(), flaw: Flaw::Flat }
     }
 
     #[test]
@@ -225,25 +218,13 @@ mod tests {
         let empty = EnhancerNote::default();
         assert_eq!(empty.with_earlier(Some(note(9, 0))), note(9, 0));
         // A manifest of an earlier version has the words alone.
-        let words = EnhancerNote {
-            sizes: "9 images: as they are".to_owned(),
-            ..EnhancerNote::default()
-        };
+        let words = EnhancerNote { sizes: "9 images: as they are".to_owned(), ..EnhancerNote::default() };
         assert_eq!(note(31, 0).with_earlier(Some(words)), note(31, 0));
     }
 
     fn note(whole: usize, reduced: usize) -> EnhancerNote {
-        let counts = SizeLog {
-            images: whole + reduced,
-            whole,
-            reduced,
-            ..SizeLog::default()
-        };
-        EnhancerNote {
-            sizes: counts.summary(),
-            size_counts: counts,
-            ..EnhancerNote::default()
-        }
+        let counts = SizeLog { images: whole + reduced, whole, reduced, ..SizeLog::default() };
+        EnhancerNote { sizes: counts.summary(), size_counts: counts, ..EnhancerNote::default() }
     }
 
     #[test]
@@ -256,10 +237,7 @@ mod tests {
             note
         };
         let both = note(&[("c", 97), ("b", 60)]).with_earlier(Some(note(&[("a", 80)])));
-        assert_eq!(
-            both.burnt_out,
-            note(&[("a", 80), ("b", 60), ("c", 97)]).burnt_out
-        );
+        assert_eq!(both.burnt_out, note(&[("a", 80), ("b", 60), ("c", 97)]).burnt_out);
         assert_eq!(both.burnt_out["L1+ev+m"].example, "a");
         let plain = serde_json::to_value(EnhancerNote::default()).unwrap();
         assert_eq!(plain.get("burnt_out"), None);
@@ -272,19 +250,14 @@ mod tests {
         for name in &names {
             one.count(Some(image(name)));
         }
-        names
-            .iter()
-            .rev()
-            .for_each(|name| other.count(Some(image(name))));
+        names.iter().rev().for_each(|name| other.count(Some(image(name))));
         assert_eq!(one, other);
         assert_eq!((one.flaws(), one.examples.len()), (9, 6));
         let mut parts = JudgedImages::default();
         parts.count(None);
         parts.count(Some(image("f0")));
         let mut rest = JudgedImages::default();
-        names[1..]
-            .iter()
-            .for_each(|name| rest.count(Some(image(name))));
+        names[1..].iter().for_each(|name| rest.count(Some(image(name))));
         parts.add(&rest);
         assert_eq!((parts.images, &parts.examples), (10, &one.examples));
     }

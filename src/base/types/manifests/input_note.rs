@@ -1,4 +1,5 @@
-//! Changes made to images when their files were read: of one image ([`InputNote`]), and of all images of a run ([`InputSummary`]).
+//! Changes made to images when their files were read: of one image ([`InputNote`]), and of all images of a run
+//! ([`InputSummary`]).
 
 use std::collections::BTreeMap;
 
@@ -74,25 +75,20 @@ pub enum ColourHandling {
 }
 
 impl InputNote {
-    /// Description of every change of the pixels, as one text for digests; `None` if the pixels are the codes of the file.
+    /// Description of every change of the pixels, as one text for digests; `None` if the pixels are the codes of the
+    /// file.
     #[must_use]
     pub fn rule(&self) -> Option<String> {
         let orientation = self.orientation.map(|turn| format!("orientation {turn}"));
-        let colour = self
-            .colour
-            .as_ref()
-            .and_then(|colour| match colour.handling {
-                ColourHandling::Converted => Some(format!("colour {COLOUR_VERSION}")),
-                ColourHandling::Video => Some(format!("video colour {COLOUR_VERSION}")),
-                ColourHandling::Clipped => Some(format!("clipped colour {COLOUR_VERSION}")),
-                ColourHandling::Ignored => None,
-            });
+        let colour = self.colour.as_ref().and_then(|colour| match colour.handling {
+            ColourHandling::Converted => Some(format!("colour {COLOUR_VERSION}")),
+            ColourHandling::Video => Some(format!("video colour {COLOUR_VERSION}")),
+            ColourHandling::Clipped => Some(format!("clipped colour {COLOUR_VERSION}")),
+            ColourHandling::Ignored => None,
+        });
         let depth = self.depth.map(|depth| depth.words().to_owned());
         let exposure = self.exposure_ev.map(|ev| format!("exposure {ev}"));
-        let parts: Vec<String> = [orientation, colour, depth, exposure]
-            .into_iter()
-            .flatten()
-            .collect();
+        let parts: Vec<String> = [orientation, colour, depth, exposure].into_iter().flatten().collect();
         (!parts.is_empty()).then(|| parts.join("; "))
     }
 
@@ -175,18 +171,12 @@ impl Remark {
             }
             Self::FirstOfSeveral => "the first picture of a file with several",
             Self::Converted => "converted to sRGB",
-            Self::ConvertedVideo => {
-                "converted to the primaries of sRGB, with codes of video taken as displayed"
-            }
-            Self::Clipped => {
-                "converted to sRGB by --decode colour=clip, where light above 203 cd/m² becomes white"
-            }
+            Self::ConvertedVideo => "converted to the primaries of sRGB, with codes of video taken as displayed",
+            Self::Clipped => "converted to sRGB by --decode colour=clip, where light above 203 cd/m² becomes white",
             Self::NotConverted => {
                 "taken as sRGB, because of --decode colour=ignore, although the file states other colours"
             }
-            Self::Deep => {
-                "of more than 8 bits, which are rounded to 8 only after the light is reduced"
-            }
+            Self::Deep => "of more than 8 bits, which are rounded to 8 only after the light is reduced",
             Self::Scaled => "scaled by --decode exposure",
             Self::NoLight => "not linear light, so that a flag does not apply",
         }
@@ -239,17 +229,9 @@ impl InputSummary {
         self.0.iter().map(|(remark, count)| {
             let found: usize = count.images.values().sum();
             let verb = if found == 1 { " is" } else { "s are" };
-            let details: Vec<String> = count
-                .images
-                .iter()
-                .map(|(detail, images)| format!("{detail}: {images}"))
-                .collect();
-            format!(
-                "{found} image{verb} {} ({}; for example {})",
-                remark.words(),
-                details.join(", "),
-                count.example
-            )
+            let details: Vec<String> =
+                count.images.iter().map(|(detail, images)| format!("{detail}: {images}")).collect();
+            format!("{found} image{verb} {} ({}; for example {})", remark.words(), details.join(", "), count.example)
         })
     }
 }
@@ -268,10 +250,7 @@ mod tests {
     use super::*;
 
     fn turned(orientation: u8) -> InputNote {
-        InputNote {
-            orientation: Some(orientation),
-            ..InputNote::default()
-        }
+        InputNote { orientation: Some(orientation), ..InputNote::default() }
     }
 
     #[test]

@@ -49,8 +49,8 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Counts the outcomes of the stored trials. `trials` is the number of planned trials; `failed` has an entry for each stored trial,
-    /// true if the trial failed.
+    /// Counts the outcomes of the stored trials. `trials` is the number of planned trials; `failed` has an entry for
+    /// each stored trial, true if the trial failed.
     #[must_use]
     pub fn new(trials: usize, failed: impl IntoIterator<Item = bool>) -> Self {
         let (mut stored, mut failures) = (0, 0);
@@ -58,11 +58,7 @@ impl Counts {
             stored += 1;
             failures += usize::from(has_failed);
         }
-        Self {
-            trials,
-            answered: stored - failures,
-            failed: failures,
-        }
+        Self { trials, answered: stored - failures, failed: failures }
     }
 }
 
@@ -73,11 +69,8 @@ pub fn differences<'a>(
 ) -> impl Iterator<Item = (&'a str, String, String)> {
     let fields: BTreeSet<&String> = one.keys().chain(other.keys()).collect();
     fields.into_iter().filter_map(move |field| {
-        let [first, second] = [one, other].map(|settings| {
-            settings
-                .get(field)
-                .map_or("unset".to_owned(), ToString::to_string)
-        });
+        let [first, second] =
+            [one, other].map(|settings| settings.get(field).map_or("unset".to_owned(), ToString::to_string));
         (first != second).then_some((field.as_str(), first, second))
     })
 }
@@ -109,11 +102,7 @@ impl RunManifest {
     /// Sets the counts and the resulting status: complete if all trials have a reply, else incomplete.
     pub fn set_counts(&mut self, counts: Counts) {
         self.counts = counts;
-        self.status = if counts.answered == counts.trials {
-            Status::Complete
-        } else {
-            Status::Incomplete
-        };
+        self.status = if counts.answered == counts.trials { Status::Complete } else { Status::Incomplete };
     }
 
     /// True if a model is built into this program; false if it runs at an endpoint or is unknown to the run.
@@ -131,22 +120,17 @@ impl RunManifest {
         let mut found = Vec::new();
         for (column, values) in &self.columns {
             for (value, first) in values {
-                let second = other
-                    .columns
-                    .get(column)
-                    .and_then(|values| values.get(value));
+                let second = other.columns.get(column).and_then(|values| values.get(value));
                 let Some(second) = second else {
                     continue;
                 };
                 let [first, second] = [first, second].map(fields);
-                found.extend(differences(&first, &second).map(|(field, first, second)| {
-                    ColumnDifference {
-                        column,
-                        value,
-                        field: field.to_owned(),
-                        first,
-                        second,
-                    }
+                found.extend(differences(&first, &second).map(|(field, first, second)| ColumnDifference {
+                    column,
+                    value,
+                    field: field.to_owned(),
+                    first,
+                    second,
                 }));
             }
         }
@@ -165,8 +149,8 @@ fn fields(object: &Value) -> BTreeMap<String, Value> {
         .collect()
 }
 
-/// The range of sources (frames or walks) that a shard evaluates. The sources of the run are numbered in the order of their first
-/// questions.
+/// The range of sources (frames or walks) that a shard evaluates. The sources of the run are numbered in the order of
+/// their first questions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PartPlace {
     /// Index of the shard's first source, from 0.
@@ -213,7 +197,8 @@ pub struct RunManifest {
     pub platform: BTreeMap<String, String>,
     /// The settings that apply to all trials, by flag. A run can only be resumed with the same identity.
     pub identity: Identity,
-    /// The definitions of models, enhancers and noise profiles, by column and value. A resumed run may add values, but not redefine one.
+    /// The definitions of models, enhancers and noise profiles, by column and value. A resumed run may add values, but
+    /// not redefine one.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub columns: Columns,
     /// The models in the order of the models file; empty without a file.
@@ -238,7 +223,8 @@ pub struct RunManifest {
     pub images: BTreeMap<String, Value>,
     /// The version of the lenient reply parser that produced the records, such as `lenient/5`.
     ///
-    /// `None` in runs of open-ended questions, and in runs of earlier versions of this program, which used [`FIRST_REPLY_READING`].
+    /// `None` in runs of open-ended questions, and in runs of earlier versions of this program, which used
+    /// [`FIRST_REPLY_READING`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reply_reading: Option<String>,
     /// The trial counts.

@@ -10,14 +10,13 @@ mod size_log;
 mod stored_views;
 
 pub use enhancer_note::{
-    ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage, JudgedImages, ProbeNote, ProbeOutcome,
-    TRAINED_ON,
+    ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage, JudgedImages, ProbeNote, ProbeOutcome, TRAINED_ON,
 };
 pub use flaw::Flaw;
 pub use input_note::{ColourHandling, ColourNote, DepthNote, InputNote, InputSummary};
 pub use manifest::{
-    ColumnDifference, Columns, Counts, FIRST_REPLY_READING, Identity, JUDGES, PartPlace,
-    RunManifest, RunPart, Status, differences, judge_flag,
+    ColumnDifference, Columns, Counts, FIRST_REPLY_READING, Identity, JUDGES, PartPlace, RunManifest, RunPart, Status,
+    differences, judge_flag,
 };
 pub use model_listing::{ListedModel, ModelColumn, ModelListing};
 pub use recorded_names::RecordedNames;

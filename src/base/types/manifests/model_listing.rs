@@ -14,8 +14,8 @@ pub struct ListedModel {
     pub group: Option<String>,
 }
 
-/// The models of a report. Their order in tables is: listed models without a group, unlisted models by name, then each group; listed models
-/// keep the order of the list. Without a list the order is by name.
+/// The models of a report. Their order in tables is: listed models without a group, unlisted models by name, then each
+/// group; listed models keep the order of the list. Without a list the order is by name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ModelListing {
     listed: Vec<ListedModel>,
@@ -91,15 +91,14 @@ impl ModelListing {
         order
     }
 
-    /// The sort key of a model. A name followed by a run or a time in brackets, as `gpt-4o (one)`, has the place of the bare name.
+    /// The sort key of a model. A name followed by a run or a time in brackets, as `gpt-4o (one)`, has the place of the
+    /// bare name.
     pub fn place(&self, model: &str) -> ModelPlace {
         let Some(place) = self.index(model) else {
             return (0, self.listed.len());
         };
-        let group = self.listed[place]
-            .group
-            .as_ref()
-            .and_then(|group| self.groups.iter().position(|known| known == group));
+        let group =
+            self.listed[place].group.as_ref().and_then(|group| self.groups.iter().position(|known| known == group));
         (group.map_or(0, |group| group + 1), place)
     }
 
@@ -137,9 +136,7 @@ impl ModelListing {
 
     /// The enhancers with known training data, each with `trained on DATA`.
     pub fn trainings(&self) -> impl Iterator<Item = (&str, String)> {
-        self.training
-            .iter()
-            .map(|(enhancer, data)| (&**enhancer, trained_on(data)))
+        self.training.iter().map(|(enhancer, data)| (&**enhancer, trained_on(data)))
     }
 
     /// `trained on DATA` of an enhancer; `None` if its training data are unknown.
@@ -159,8 +156,7 @@ impl ModelListing {
 
     /// Removes people from these models; if all of them are people, returns them all.
     pub fn without_people<'m>(&self, models: impl IntoIterator<Item = &'m str>) -> Vec<&'m str> {
-        let (people, models): (Vec<&str>, Vec<&str>) =
-            models.into_iter().partition(|model| self.is_people(model));
+        let (people, models): (Vec<&str>, Vec<&str>) = models.into_iter().partition(|model| self.is_people(model));
         if models.is_empty() { people } else { models }
     }
 
@@ -185,18 +181,12 @@ impl ModelListing {
 
     /// The cell of an extra column for a model; empty if unknown.
     pub fn cell(&self, column: ModelColumn, model: &str) -> &str {
-        self.cells
-            .get(&(column, model.to_owned()))
-            .map_or("", String::as_str)
+        self.cells.get(&(column, model.to_owned())).map_or("", String::as_str)
     }
 
     /// The name of a model in tables, with a mark if its requests were changed.
     pub fn label(&self, model: &str) -> String {
-        if self.adapted.contains_key(model) {
-            format!("{model} {MARK}")
-        } else {
-            model.to_owned()
-        }
+        if self.adapted.contains_key(model) { format!("{model} {MARK}") } else { model.to_owned() }
     }
 
     /// Footnote that explains the mark, if one of these models has it.
@@ -212,25 +202,19 @@ impl ModelListing {
             }
         }
         (!notes.is_empty()).then(|| {
-            format!(
-                "{MARK} requests were changed because the server refused what was set ({})",
-                notes.join("; ")
-            )
+            format!("{MARK} requests were changed because the server refused what was set ({})", notes.join("; "))
         })
     }
 
-    /// The index of a model in the list. Without the name itself, the longest name that it begins with before ` (` counts.
+    /// The index of a model in the list. Without the name itself, the longest name that it begins with before ` (`
+    /// counts.
     fn index(&self, model: &str) -> Option<usize> {
         let exact = self.listed.iter().position(|known| known.name == model);
         exact.or_else(|| {
             self.listed
                 .iter()
                 .enumerate()
-                .filter(|(_, known)| {
-                    model
-                        .strip_prefix(&*known.name)
-                        .is_some_and(|rest| rest.starts_with(" ("))
-                })
+                .filter(|(_, known)| model.strip_prefix(&*known.name).is_some_and(|rest| rest.starts_with(" (")))
                 .max_by_key(|(_, known)| known.name.len())
                 .map(|(index, _)| index)
         })
@@ -246,10 +230,7 @@ mod tests {
     use super::*;
 
     fn listed(name: &str, group: Option<&str>) -> ListedModel {
-        ListedModel {
-            name: name.to_owned(),
-            group: group.map(str::to_owned),
-        }
+        ListedModel { name: name.to_owned(), group: group.map(str::to_owned) }
     }
 
     fn sorted<'a>(listing: &ModelListing, mut models: Vec<&'a str>) -> Vec<&'a str> {
@@ -266,10 +247,7 @@ mod tests {
             listed("a", Some("large")),
             listed("a", Some("small")),
         ]);
-        assert_eq!(
-            sorted(&listing, vec!["a", "b", "m", "y", "z"]),
-            ["m", "b", "z", "a", "y"]
-        );
+        assert_eq!(sorted(&listing, vec!["a", "b", "m", "y", "z"]), ["m", "b", "z", "a", "y"]);
         assert_eq!(listing.group("a"), Some("large"));
         assert_eq!((listing.group("m"), listing.group("b")), (None, None));
         assert!(listing.has_groups());
@@ -305,11 +283,7 @@ mod tests {
 
     #[test]
     fn names_with_a_run_have_the_place_of_the_model() {
-        let listing = ModelListing::new([
-            listed("b", None),
-            listed("a (fp8)", None),
-            listed("a", Some("g")),
-        ]);
+        let listing = ModelListing::new([listed("b", None), listed("a (fp8)", None), listed("a", Some("g"))]);
         assert_eq!(
             sorted(&listing, vec!["a (one)", "a (fp8) (one)", "ab", "b (two)"]),
             ["b (two)", "a (fp8) (one)", "ab", "a (one)"]

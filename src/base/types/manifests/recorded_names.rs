@@ -11,18 +11,15 @@ const RENAMED: &str = "renamed models";
 
 /// A map from model names in records to names in tables, for the names that differ.
 ///
-/// Records are never changed. A name in records always refers to one model with one set of settings that decide its replies. If a model is
-/// renamed, or another model takes its name, it keeps its records.
+/// Records are never changed. A name in records always refers to one model with one set of settings that decide its
+/// replies. If a model is renamed, or another model takes its name, it keeps its records.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct RecordedNames(BTreeMap<String, String>);
 
 impl RecordedNames {
     /// Reads the names from a manifest.
     pub fn from_manifest(manifest: &RunManifest) -> Self {
-        let names = manifest
-            .settings
-            .get(RENAMED)
-            .and_then(|names| serde_json::from_value(names.clone()).ok());
+        let names = manifest.settings.get(RENAMED).and_then(|names| serde_json::from_value(names.clone()).ok());
         Self(names.unwrap_or_default())
     }
 
@@ -70,10 +67,7 @@ impl RecordedNames {
 
     /// A different name in records that is shown under this name in tables.
     fn other_record_name(&self, name: &str) -> Option<&str> {
-        self.0
-            .iter()
-            .find(|(_, shown)| *shown == name)
-            .map(|(recorded, _)| recorded.as_str())
+        self.0.iter().find(|(_, shown)| *shown == name).map(|(recorded, _)| recorded.as_str())
     }
 }
 
@@ -82,9 +76,7 @@ mod tests {
     use super::*;
 
     fn moved(names: &mut RecordedNames, moves: &[(&str, &str)]) {
-        let moves = moves
-            .iter()
-            .map(|(old, new)| ((*old).to_owned(), (*new).to_owned()));
+        let moves = moves.iter().map(|(old, new)| ((*old).to_owned(), (*new).to_owned()));
         names.rename(&moves.collect());
     }
 
@@ -93,10 +85,7 @@ mod tests {
         let mut names = RecordedNames::default();
         moved(&mut names, &[("m", "m (before)")]);
         names.ensure("m", || "m [1]".to_owned());
-        assert_eq!(
-            (names.table_name("m"), names.record_name("m")),
-            ("m (before)", "m [1]")
-        );
+        assert_eq!((names.table_name("m"), names.record_name("m")), ("m (before)", "m [1]"));
         assert_eq!(names.table_name("m [1]"), "m");
         // Rename back and forth again.
         moved(&mut names, &[("m (before)", "m"), ("m", "m (before)")]);
@@ -105,10 +94,7 @@ mod tests {
         assert_eq!(names.record_name("m (before)"), "m [1]");
         moved(&mut names, &[("m (before)", "m"), ("m", "m (before)")]);
         names.ensure("m", || unreachable!());
-        assert_eq!(
-            (names.table_name("m"), names.record_name("m")),
-            ("m (before)", "m [1]")
-        );
+        assert_eq!((names.table_name("m"), names.record_name("m")), ("m (before)", "m [1]"));
     }
 
     #[test]
@@ -116,14 +102,7 @@ mod tests {
         let mut names = RecordedNames::default();
         moved(&mut names, &[("a", "b")]);
         moved(&mut names, &[("b", "c")]);
-        assert_eq!(
-            (
-                names.table_name("a"),
-                names.table_name("b"),
-                names.table_name("c")
-            ),
-            ("c", "c", "c")
-        );
+        assert_eq!((names.table_name("a"), names.table_name("b"), names.table_name("c")), ("c", "c", "c"));
         assert_eq!(names.record_name("c"), "c");
         moved(&mut names, &[("c", "a")]);
         assert_eq!((names.table_name("a"), names.table_name("b")), ("a", "a"));

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::types::text::counted;
 
-/// Counts of the ways in which image sizes were adapted to an enhancer, with their parameters. An image can be both padded and tiled.
+/// Counts of the ways in which image sizes were adapted to an enhancer, with their parameters. An image can be both
+/// padded and tiled.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SizeLog {
     /// Images that were enhanced.
@@ -54,10 +55,7 @@ pub struct SeamCounts {
 }
 
 /// Whether a count is 0.
-#[expect(
-    clippy::trivially_copy_pass_by_ref,
-    reason = "serde passes a reference"
-)]
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(count: &usize) -> bool {
     *count == 0
 }
@@ -131,24 +129,12 @@ impl SizeLog {
             (self.whole, "as they are".to_owned()),
             (self.padded, format!("filled ({pad}) and cropped")),
             (self.tiled, self.tiles()),
-            (
-                self.resized,
-                format!("resized to {} and back", self.fixed()),
-            ),
-            (
-                self.reduced,
-                "reduced by --llie-options max-side and enlarged".to_owned(),
-            ),
+            (self.resized, format!("resized to {} and back", self.fixed())),
+            (self.reduced, "reduced by --llie-options max-side and enlarged".to_owned()),
         ]
         .into_iter()
         .filter(|(count, _)| *count > 0)
-        .map(|(count, words)| {
-            if count == self.images {
-                words
-            } else {
-                format!("{count} {words}")
-            }
-        })
+        .map(|(count, words)| if count == self.images { words } else { format!("{count} {words}") })
         .collect();
         let mut text = counted(self.images, "image");
         if !parts.is_empty() {
@@ -164,26 +150,16 @@ impl SizeLog {
     /// The tiles with their context and seams.
     fn tiles(&self) -> String {
         let [width, height] = self.tile.unwrap_or_default();
-        let seam = if self.seam.black > 0
-            && self.seam.differing == 0
-            && self.seam.black * 10 >= self.seam.compared * 9
+        let seam = if self.seam.black > 0 && self.seam.differing == 0 && self.seam.black * 10 >= self.seam.compared * 9
         {
             "seams could not be checked, because the images are nearly black there".to_owned()
         } else if self.seam.differing == 0 {
             "no difference at seams".to_owned()
         } else {
-            let SeamCounts {
-                compared,
-                differing,
-                most,
-                ..
-            } = self.seam;
+            let SeamCounts { compared, differing, most, .. } = self.seam;
             format!("{differing} of {compared} samples at seams differ, by up to {most}")
         };
-        format!(
-            "in tiles of {width} × {height} with {} px context ({seam})",
-            self.context.unwrap_or(0)
-        )
+        format!("in tiles of {width} × {height} with {} px context ({seam})", self.context.unwrap_or(0))
     }
 
     /// The fixed input size of the model, as `96 × any`.
@@ -216,17 +192,8 @@ mod tests {
             log.summary(),
             "12 images: 8 as they are, 1 filled (reflect) and cropped, 4 in tiles of 512 × 384 with 8 px context (no difference at seams)"
         );
-        let log = SizeLog {
-            images: 1,
-            resized: 1,
-            fixed: Some([Some(96), None]),
-            too_long: 2,
-            ..SizeLog::default()
-        };
-        assert_eq!(
-            log.summary(),
-            "1 image: resized to 96 × any and back; 2 took too long"
-        );
+        let log = SizeLog { images: 1, resized: 1, fixed: Some([Some(96), None]), too_long: 2, ..SizeLog::default() };
+        assert_eq!(log.summary(), "1 image: resized to 96 × any and back; 2 took too long");
         assert_eq!(SizeLog::default().summary(), "0 images");
         let json = serde_json::to_value(&log).unwrap();
         assert_eq!(json["fixed"], serde_json::json!([96, null]));

@@ -45,15 +45,10 @@ struct ManifestModel {
 impl StoredViews {
     /// Reads the views that a manifest records.
     pub fn from_manifest(manifest: &RunManifest) -> Self {
-        if let Some(known) = manifest
-            .settings
-            .get(VIEWS)
-            .and_then(|value| serde_json::from_value::<Views>(value.clone()).ok())
+        if let Some(known) =
+            manifest.settings.get(VIEWS).and_then(|value| serde_json::from_value::<Views>(value.clone()).ok())
         {
-            return Self {
-                known,
-                is_complete: true,
-            };
+            return Self { known, is_complete: true };
         }
         // Older manifests contain only the models in the models file of the last command.
         let known = manifest
@@ -64,10 +59,7 @@ impl StoredViews {
             .flatten()
             .map(|model| (model.name, model.view))
             .collect();
-        Self {
-            known,
-            is_complete: false,
-        }
+        Self { known, is_complete: false }
     }
 
     /// True if the manifest records the views of all models.
@@ -85,7 +77,8 @@ impl StoredViews {
         }
     }
 
-    /// Writes the views to a manifest: those of the stored models, each under its new name, and those of the command's models.
+    /// Writes the views to a manifest: those of the stored models, each under its new name, and those of the command's
+    /// models.
     pub fn write_to<'a>(
         &self,
         manifest: &mut RunManifest,
@@ -94,10 +87,7 @@ impl StoredViews {
     ) {
         let mut views = Views::new();
         for (name, new) in stored {
-            views
-                .entry(new)
-                .or_default()
-                .extend(self.views(name).into_iter().flatten());
+            views.entry(new).or_default().extend(self.views(name).into_iter().flatten());
         }
         for (name, shown) in now {
             views.entry(name.clone()).or_default().extend(shown);
@@ -111,9 +101,6 @@ impl StoredViews {
     }
 
     fn views(&self, name: &str) -> Option<BTreeSet<View>> {
-        self.known
-            .get(name)
-            .cloned()
-            .or_else(|| self.is_complete.then(|| BTreeSet::from([View::Image])))
+        self.known.get(name).cloned().or_else(|| self.is_complete.then(|| BTreeSet::from([View::Image])))
     }
 }

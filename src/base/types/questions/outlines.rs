@@ -9,15 +9,11 @@ use super::run_question::RunQuestion;
 pub type PixelBox = [u32; 4];
 
 impl RunQuestion {
-    /// Bounding boxes of the objects in the question's evidence: all segments with the word asked about, or all candidates for the closest
-    /// object. Empty for questions about the whole room or without evidence.
+    /// Bounding boxes of the objects in the question's evidence: all segments with the word asked about, or all
+    /// candidates for the closest object. Empty for questions about the whole room or without evidence.
     #[must_use]
     pub fn outlines(&self) -> Vec<PixelBox> {
-        let about = self
-            .evidence
-            .get("about")
-            .and_then(Value::as_str)
-            .filter(|about| !about.is_empty());
+        let about = self.evidence.get("about").and_then(Value::as_str).filter(|about| !about.is_empty());
         self.evidence
             .get("segments")
             .and_then(Value::as_array)
@@ -25,9 +21,7 @@ impl RunQuestion {
             .flatten()
             .filter(|segment| match (&self.family, about) {
                 (Family::Closest, _) => true,
-                (_, about) => {
-                    about.is_some() && segment.get("word").and_then(Value::as_str) == about
-                }
+                (_, about) => about.is_some() && segment.get("word").and_then(Value::as_str) == about,
             })
             .filter_map(|segment| pixel_box(segment.get("bbox")?))
             .collect()
@@ -37,23 +31,15 @@ impl RunQuestion {
     #[must_use]
     pub fn object(&self) -> Option<PixelBox> {
         self.outlines().into_iter().reduce(|one, other| {
-            [
-                one[0].min(other[0]),
-                one[1].min(other[1]),
-                one[2].max(other[2]),
-                one[3].max(other[3]),
-            ]
+            [one[0].min(other[0]), one[1].min(other[1]), one[2].max(other[2]), one[3].max(other[3])]
         })
     }
 }
 
 /// Parses a box of evidence; `None` if the value is not a box.
 fn pixel_box(value: &Value) -> Option<PixelBox> {
-    let numbers: Option<Vec<u32>> = value
-        .as_array()?
-        .iter()
-        .map(|number| u32::try_from(number.as_u64()?).ok())
-        .collect();
+    let numbers: Option<Vec<u32>> =
+        value.as_array()?.iter().map(|number| u32::try_from(number.as_u64()?).ok()).collect();
     let pixels: PixelBox = numbers?.try_into().ok()?;
     (pixels[0] < pixels[2] && pixels[1] < pixels[3]).then_some(pixels)
 }
@@ -65,12 +51,9 @@ mod tests {
     use super::*;
 
     fn question(family: Family, evidence: Value) -> RunQuestion {
-        let line = json!({"id": "q", "frame": "f", "family": "other", "question": "?", "choices": ["a", "b"], "answer": "a"});
-        RunQuestion {
-            family,
-            evidence,
-            ..serde_json::from_value(line).unwrap()
-        }
+        let line =
+            json!({"id": "q", "frame": "f", "family": "other", "question": "?", "choices": ["a", "b"], "answer": "a"});
+        RunQuestion { family, evidence, ..serde_json::from_value(line).unwrap() }
     }
 
     #[test]
@@ -82,19 +65,14 @@ mod tests {
             {"word": "sink", "bbox": [9, 9, 9, 12]},
             {"word": "sink", "bbox": "everywhere"},
         ]);
-        let sink = question(
-            Family::Presence,
-            json!({"about": "sink", "segments": segments}),
-        );
+        let sink = question(Family::Presence, json!({"about": "sink", "segments": segments}));
         assert_eq!(sink.outlines(), [[10, 20, 30, 40], [50, 10, 60, 30]]);
         assert_eq!(sink.object(), Some([10, 10, 60, 40]));
         let closest = question(Family::Closest, json!({"about": "", "segments": segments}));
         assert_eq!(closest.object(), Some([0, 0, 60, 40]));
-        for whole in [
-            json!({"about": "", "segments": segments}),
-            json!({"about": "lamp", "segments": segments}),
-            Value::Null,
-        ] {
+        for whole in
+            [json!({"about": "", "segments": segments}), json!({"about": "lamp", "segments": segments}), Value::Null]
+        {
             assert_eq!(question(Family::RoomType, whole).object(), None);
         }
     }

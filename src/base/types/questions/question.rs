@@ -42,15 +42,10 @@ impl Family {
     pub const TOTAL: &str = "all";
 
     /// The paper's five families.
-    pub const PAPER: [Self; 5] = [
-        Self::RoomType,
-        Self::Affordance,
-        Self::Presence,
-        Self::Color,
-        Self::Closest,
-    ];
+    pub const PAPER: [Self; 5] = [Self::RoomType, Self::Affordance, Self::Presence, Self::Color, Self::Closest];
 
-    /// The name in files and tables: `room_type`, `affordance`, `presence`, `color`, `closest`, or a ready-made set's name.
+    /// The name in files and tables: `room_type`, `affordance`, `presence`, `color`, `closest`, or a ready-made set's
+    /// name.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
@@ -66,10 +61,7 @@ impl Family {
 
 impl From<&str> for Family {
     fn from(name: &str) -> Self {
-        Self::PAPER
-            .into_iter()
-            .find(|family| family.name() == name)
-            .unwrap_or_else(|| Self::Other(name.to_owned()))
+        Self::PAPER.into_iter().find(|family| family.name() == name).unwrap_or_else(|| Self::Other(name.to_owned()))
     }
 }
 
@@ -102,8 +94,8 @@ impl Choices {
     /// The maximum number of choices: one letter each.
     pub const MOST: usize = 26;
 
-    /// Checks a list of choices: there are 2 to 26, none is empty, no two are equal (without regard to letter case and outer
-    /// spaces), and `truth` is the index of one of them.
+    /// Checks a list of choices: there are 2 to 26, none is empty, no two are equal (without regard to letter case and
+    /// outer spaces), and `truth` is the index of one of them.
     ///
     /// # Errors
     /// [`Error::Data`] at the place `choices`.
@@ -125,34 +117,18 @@ impl Choices {
     /// [`Error::Data`] at the place `choices`.
     pub fn with_truth(texts: Arc<[String]>, truth: Option<usize>) -> Result<Self, Error> {
         if !(2..=Self::MOST).contains(&texts.len()) {
-            return choices_error(format!(
-                "{}: a question needs 2 to {}",
-                counted(texts.len(), "choice"),
-                Self::MOST
-            ));
+            return choices_error(format!("{}: a question needs 2 to {}", counted(texts.len(), "choice"), Self::MOST));
         }
         if let Some(truth) = truth.filter(|truth| *truth >= texts.len()) {
-            return choices_error(format!(
-                "the answer is choice {} of {}",
-                truth + 1,
-                texts.len()
-            ));
+            return choices_error(format!("the answer is choice {} of {}", truth + 1, texts.len()));
         }
-        let folded: Vec<String> = texts
-            .iter()
-            .map(|text| text.trim().to_lowercase())
-            .collect();
+        let folded: Vec<String> = texts.iter().map(|text| text.trim().to_lowercase()).collect();
         for (i, text) in folded.iter().enumerate() {
             if text.is_empty() {
                 return choices_error(format!("choice {} is empty", letter(i)));
             }
             if let Some(j) = folded[..i].iter().position(|earlier| earlier == text) {
-                return choices_error(format!(
-                    "choices {} and {} are both {:?}",
-                    letter(j),
-                    letter(i),
-                    texts[i]
-                ));
+                return choices_error(format!("choices {} and {} are both {:?}", letter(j), letter(i), texts[i]));
             }
         }
         Ok(Self { texts, truth })
@@ -178,7 +154,8 @@ impl Choices {
     }
 }
 
-/// The text of the choice "not enough is visible". A choice with these words, in any letter case, is not a wrong answer but an abstention.
+/// The text of the choice "not enough is visible". A choice with these words, in any letter case, is not a wrong answer
+/// but an abstention.
 pub const CANNOT_TELL: &str = "cannot tell";
 
 /// Whether the true answers to the questions of a run are known: of all of its questions, or of none.
@@ -291,19 +268,13 @@ mod tests {
             (vec!["yes", ""], 0),
             (vec!["x"; 27], 0),
         ] {
-            assert!(
-                Choices::new(texts(&list), truth).is_err(),
-                "{list:?} {truth}"
-            );
+            assert!(Choices::new(texts(&list), truth).is_err(), "{list:?} {truth}");
         }
     }
 
     #[test]
     fn families_read_back() {
-        for family in Family::PAPER
-            .into_iter()
-            .chain([Family::Other("OCR".into())])
-        {
+        for family in Family::PAPER.into_iter().chain([Family::Other("OCR".into())]) {
             assert_eq!(Family::from(family.name()), family);
         }
     }

@@ -9,10 +9,12 @@ use crate::error::Error;
 use crate::types::images::FrameId;
 use crate::types::values::Digest;
 
-/// The key in [`RunQuestion::evidence`] with the name of a question that is asked about every image ([`RunQuestion::bank_id`]).
+/// The key in [`RunQuestion::evidence`] with the name of a question that is asked about every image
+/// ([`RunQuestion::bank_id`]).
 pub const BANK_ID: &str = "bank_id";
 
-/// One line of a run's `questions.jsonl`: a question with the scene of its frame. The file can also be used as `--questions`.
+/// One line of a run's `questions.jsonl`: a question with the scene of its frame. The file can also be used as
+/// `--questions`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RunQuestion {
     /// The name of the question, unique in its data set.
@@ -46,7 +48,8 @@ pub struct RunQuestion {
     /// The frames of a question that shows several, in order; not in the file otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub images: Vec<FrameId>,
-    /// The group of questions that are scored together, written as `group` and `group_size`; not in the file if the data set has no groups.
+    /// The group of questions that are scored together, written as `group` and `group_size`; not in the file if the
+    /// data set has no groups.
     #[serde(default, flatten, skip_serializing_if = "Option::is_none")]
     pub group: Option<StrictGroup>,
 }
@@ -90,7 +93,8 @@ impl QuestionPart {
 }
 
 impl RunQuestion {
-    /// True if two questions are equal, ignoring evidence and place. Images and groups are compared only if both are known.
+    /// True if two questions are equal, ignoring evidence and place. Images and groups are compared only if both are
+    /// known.
     #[must_use]
     pub fn is_same(&self, other: &Self) -> bool {
         self.id == other.id && self.difference(other).is_none()
@@ -104,32 +108,18 @@ impl RunQuestion {
         let parts = [
             (QuestionPart::Text, self.text != other.text),
             (QuestionPart::Choices, self.choices != other.choices),
-            (
-                QuestionPart::Answer,
-                (&self.answer, &self.extra_answers) != (&other.answer, &other.extra_answers),
-            ),
-            (
-                QuestionPart::Frame,
-                (&self.frame, &self.images) != (&other.frame, &other.images),
-            ),
-            (
-                QuestionPart::Image,
-                images.is_some_and(|(image, other)| image != other),
-            ),
+            (QuestionPart::Answer, (&self.answer, &self.extra_answers) != (&other.answer, &other.extra_answers)),
+            (QuestionPart::Frame, (&self.frame, &self.images) != (&other.frame, &other.images)),
+            (QuestionPart::Image, images.is_some_and(|(image, other)| image != other)),
             (QuestionPart::Family, self.family != other.family),
             (QuestionPart::Scene, self.scene != other.scene),
-            (
-                QuestionPart::Group,
-                groups.is_some_and(|(group, other)| group != other),
-            ),
+            (QuestionPart::Group, groups.is_some_and(|(group, other)| group != other)),
         ];
-        parts
-            .into_iter()
-            .find(|(_, differs)| *differs)
-            .map(|(part, _)| part)
+        parts.into_iter().find(|(_, differs)| *differs).map(|(part, _)| part)
     }
 
-    /// Removes the evidence, which may be ten times as large as the rest, except the name in [`bank_id`](Self::bank_id).
+    /// Removes the evidence, which may be ten times as large as the rest, except the name in
+    /// [`bank_id`](Self::bank_id).
     #[must_use]
     pub fn without_evidence(mut self) -> Self {
         let bank_id = self.evidence.get_mut(BANK_ID).map(Value::take);
@@ -137,8 +127,8 @@ impl RunQuestion {
         self
     }
 
-    /// Digest of the question as a judge sees it: its words and its right answers. If two questions have equal digests, the same answer to
-    /// both is marked once.
+    /// Digest of the question as a judge sees it: its words and its right answers. If two questions have equal digests,
+    /// the same answer to both is marked once.
     #[must_use]
     pub fn judge_digest(&self) -> Digest {
         let answer = self.answer.as_deref().unwrap_or_default();
@@ -150,16 +140,15 @@ impl RunQuestion {
         Digest::from_parts(words.chain(further))
     }
 
-    /// The name of a question that is asked about every image, the same for all images; for other questions their own name.
+    /// The name of a question that is asked about every image, the same for all images; for other questions their own
+    /// name.
     #[must_use]
     pub fn bank_id(&self) -> &str {
-        self.evidence
-            .get(BANK_ID)
-            .and_then(Value::as_str)
-            .unwrap_or(&self.id.0)
+        self.evidence.get(BANK_ID).and_then(Value::as_str).unwrap_or(&self.id.0)
     }
 
-    /// The stored form of a question; `place` is its index among all questions of the data, `scene` the scene of its frame.
+    /// The stored form of a question; `place` is its index among all questions of the data, `scene` the scene of its
+    /// frame.
     #[must_use]
     pub fn new(question: &Question, place: usize, scene: &str) -> Self {
         let choices = question.choices.texts();
@@ -231,10 +220,7 @@ mod tests {
             (change(|q| q.choices.swap(0, 1)), QuestionPart::Choices),
             (change(|q| q.answer = None), QuestionPart::Answer),
             (change(|q| q.frame.0.push('2')), QuestionPart::Frame),
-            (
-                change(|q| q.image = Some(Digest::from_bytes(b"two"))),
-                QuestionPart::Image,
-            ),
+            (change(|q| q.image = Some(Digest::from_bytes(b"two"))), QuestionPart::Image),
             (change(|q| q.scene.push('s')), QuestionPart::Scene),
         ] {
             assert_eq!(found, Some(part));

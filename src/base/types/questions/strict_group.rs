@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-/// The group of a question in the strict score of its benchmark: a group is correct if all its questions are answered correctly, as MME
-/// scores the two questions about an image (Fu et al. 2023, arXiv:2306.13394, section 2.2, "accuracy+").
+/// The group of a question in the strict score of its benchmark: a group is correct if all its questions are answered
+/// correctly, as MME scores the two questions about an image (Fu et al. 2023, arXiv:2306.13394, section 2.2,
+/// "accuracy+").
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct StrictGroup {
     /// The name of the group, unique in its data set.

@@ -10,8 +10,8 @@ use crate::types::questions::{Answer, Family, QuestionId, UnreadReason};
 use crate::types::replies::{Finish, LostAttempts, Observed, OptionProbabilities, Usage};
 use crate::types::values::Digest;
 
-/// Declares a detail, and the type of a record line that contains it. serde's `flatten` would take a quarter more time to read a line,
-/// because it buffers every field (best of seven times 200,000 lines: 4.1 µs a line instead of 3.2).
+/// Declares a detail, and the type of a record line that contains it. serde's `flatten` would take a quarter more time
+/// to read a line, because it buffers every field (best of seven times 200,000 lines: 4.1 µs a line instead of 3.2).
 macro_rules! details {
     ($(#[$about:meta])* $name:ident, $line:ident { $($(#[$meta:meta])* $field:ident: $type:ty,)+ }) => {
         $(#[$about])*
@@ -102,14 +102,15 @@ details! {
         /// The other images of a question that shows several, in order; not in the file otherwise.
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         more_images: Vec<ImageFacts>,
-        /// The frame whose image was shown, if it is not the frame of the question: a control of the observer. Not in the file
-        /// otherwise.
+        /// The frame whose image was shown, if it is not the frame of the question: a control of the observer. Not in
+        /// the file otherwise.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         shown_frame: Option<FrameId>,
         /// The observer's view of the frame; absent in the file for other models and without an image.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         observed: Option<Observed>,
-        /// The model's probability of each choice; absent in the file if it was not requested, or not reported by the server.
+        /// The model's probability of each choice; absent in the file if it was not requested, or not reported by the
+        /// server.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         options: Option<OptionProbabilities>,
     }
@@ -153,7 +154,8 @@ details! {
         person: Option<String>,
         /// The answer that the judge was shown; `None` in records of answers.
         judged: Option<String>,
-        /// The mark that the program of OpenEQA parses from the reply; `None` in records of answers, and if it finds no mark.
+        /// The mark that the program of OpenEQA parses from the reply; `None` in records of answers, and if it finds no
+        /// mark.
         upstream: Option<i64>,
         /// The mark that the tolerant protocol parses from the reply; `None` as for `upstream`.
         tolerant: Option<i64>,
@@ -220,14 +222,8 @@ pub struct ParsedAnswer {
 impl From<Answer> for ParsedAnswer {
     fn from(answer: Answer) -> Self {
         match answer {
-            Answer::Chosen(index) => Self {
-                chosen: Some(index),
-                why: None,
-            },
-            Answer::Unparsed(why) => Self {
-                chosen: None,
-                why: Some(why),
-            },
+            Answer::Chosen(index) => Self { chosen: Some(index), why: None },
+            Answer::Unparsed(why) => Self { chosen: None, why: Some(why) },
         }
     }
 }
@@ -245,13 +241,15 @@ pub struct ImageFacts {
     pub height: usize,
     /// The file format: `png` or `jpeg`.
     pub format: String,
-    /// The EXIF orientation, 2 to 8, by which the frame was rotated or mirrored on loading; not in the file without one.
+    /// The EXIF orientation, 2 to 8, by which the frame was rotated or mirrored on loading; not in the file without
+    /// one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub orientation: Option<u8>,
     /// Camera settings for this image; absent in the file for kinds that do not state them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exposure: Option<ExposureFacts>,
-    /// How dark the photograph of the frame is; in the file only for images of a pair, which are as dark as the photograph.
+    /// How dark the photograph of the frame is; in the file only for images of a pair, which are as dark as the
+    /// photograph.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pair: Option<PairFacts>,
 }

@@ -1,5 +1,5 @@
-//! Facts about images that were sent, stored next to the records of a run for its report: small copies ([`Thumbnail`]) and the
-//! similarity to the clean frame ([`ImageFidelity`]).
+//! Facts about images that were sent, stored next to the records of a run for its report: small copies ([`Thumbnail`])
+//! and the similarity to the clean frame ([`ImageFidelity`]).
 
 use serde::{Deserialize, Serialize};
 
@@ -26,7 +26,8 @@ pub struct Thumbnail {
     /// The width and height of the frame in pixels, the unit of boxes in evidence; not in the file for several frames.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub size: Option<[u32; 2]>,
-    /// Crops of the objects that questions are about, at full resolution and brightened as `crop` is; not in the file if empty.
+    /// Crops of the objects that questions are about, at full resolution and brightened as `crop` is; not in the file
+    /// if empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub objects: Vec<ObjectCrop>,
 }
@@ -40,7 +41,8 @@ pub struct ObjectCrop {
     pub crop: String,
 }
 
-/// One line of a run's `fidelity.jsonl`: how similar an image is to its clean frame, both in the size sent, before any JPEG.
+/// One line of a run's `fidelity.jsonl`: how similar an image is to its clean frame, both in the size sent, before any
+/// JPEG.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ImageFidelity {
     /// The name of the frame.

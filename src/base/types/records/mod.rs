@@ -8,14 +8,11 @@ mod small_number;
 mod trial_key;
 mod trials;
 
-pub use detail::{
-    ChoiceDetail, ImageFacts, OpenDetail, ParsedAnswer, Step, TrialOutcome, WalkFacts,
-};
+pub use detail::{ChoiceDetail, ImageFacts, OpenDetail, ParsedAnswer, Step, TrialOutcome, WalkFacts};
 pub use image_notes::{ImageFidelity, ObjectCrop, Thumbnail};
 pub use record::{Failure, FailureKind, Record, StoredDetail, Via, View};
 pub use small_number::{SmallNumber, Tokens};
 pub use trial_key::TrialKey;
 pub use trials::{
-    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, KeptTrial, SentImages, TextPlace, TrialRef,
-    Trials,
+    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, KeptTrial, SentImages, TextPlace, TrialRef, Trials,
 };

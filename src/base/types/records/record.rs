@@ -23,7 +23,8 @@ pub struct Record<D> {
     pub model: String,
     /// Whether the model was shown the images.
     pub view: View,
-    /// The condition of the images; `None` if the model was shown none. Written to the file as several columns ([`ConditionColumns`]).
+    /// The condition of the images; `None` if the model was shown none. Written to the file as several columns
+    /// ([`ConditionColumns`]).
     #[serde(flatten, serialize_with = "condition_columns")]
     pub condition: Option<Condition>,
     /// The text of the reply; `None` if no reply came.
@@ -47,7 +48,8 @@ pub struct Record<D> {
     /// The provider that a router passed the request on to; not in the file if the server names none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub provider: Option<String>,
-    /// The replica of the endpoint that replied, by its place among the addresses; not in the file if there is one address.
+    /// The replica of the endpoint that replied, by its place among the addresses; not in the file if there is one
+    /// address.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub endpoint: Option<usize>,
     /// The duration of the last try, in milliseconds.
@@ -121,13 +123,7 @@ impl<'de, D: StoredDetail> Deserialize<'de> for Record<D> {
 impl<D> Record<D> {
     /// The record of a trial without a result yet. Without a condition the model is shown no image.
     #[must_use]
-    pub fn blank(
-        key: TrialKey,
-        question: QuestionId,
-        model: &str,
-        condition: Option<Condition>,
-        detail: D,
-    ) -> Self {
+    pub fn blank(key: TrialKey, question: QuestionId, model: &str, condition: Option<Condition>, detail: D) -> Self {
         Self {
             key,
             question,
@@ -170,20 +166,13 @@ impl<D> Record<D> {
     /// The record with a failure after this number of requests.
     #[must_use]
     pub fn with_failure(self, failure: Failure, attempts: u32) -> Self {
-        Self {
-            failure: Some(failure),
-            attempts,
-            ..self
-        }
+        Self { failure: Some(failure), attempts, ..self }
     }
 
     /// The record, marked as asked in a batch.
     #[must_use]
     pub fn in_batch(self) -> Self {
-        Self {
-            via: Via::Batch,
-            ..self
-        }
+        Self { via: Via::Batch, ..self }
     }
 }
 

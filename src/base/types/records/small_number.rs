@@ -109,17 +109,11 @@ mod tests {
         };
         assert_eq!(Tokens::from(Some(usage)).usage(), Some(usage));
         assert_eq!(Tokens::from(None).usage(), None);
-        let large = Usage {
-            prompt_tokens: Some(u64::MAX),
-            ..usage
-        };
+        let large = Usage { prompt_tokens: Some(u64::MAX), ..usage };
         let capped = Tokens::from(Some(large)).usage().unwrap();
         assert_eq!(capped.prompt_tokens, Some(u64::from(u32::MAX) - 1));
         let parsed: Tokens = serde_json::from_str(r#"{"prompt_tokens":3}"#).unwrap();
-        assert_eq!(
-            parsed.usage().and_then(|usage| usage.prompt_tokens),
-            Some(3)
-        );
+        assert_eq!(parsed.usage().and_then(|usage| usage.prompt_tokens), Some(3));
         let parsed: Tokens = serde_json::from_str("null").unwrap();
         assert_eq!(parsed.usage(), None);
     }

@@ -11,7 +11,8 @@ pub const OBSERVER: &str = "observer";
 pub enum Control {
     /// The unchanged image of a frame from another scene in the same condition; the plan of the run chooses it.
     OtherRoom,
-    /// Each square of 12 pixels filled with its mean. The score may stay above chance, because large things are still visible.
+    /// Each square of 12 pixels filled with its mean. The score may stay above chance, because large things are still
+    /// visible.
     Mosaic12,
     /// Each square of 40 pixels filled with its mean.
     Mosaic40,
@@ -70,17 +71,15 @@ impl Control {
         !matches!(self, Self::Shift4 | Self::Mosaic12)
     }
 
-    /// Controls that a run with the observer asks by default: the first that is possible, which is `other-room`, or `tiles` if all frames
-    /// are from one scene.
+    /// Controls that a run with the observer asks by default: the first that is possible, which is `other-room`, or
+    /// `tiles` if all frames are from one scene.
     pub const DEFAULTS: [Self; 2] = [Self::OtherRoom, Self::Tiles];
 
-    /// The control in a model name such as `observer:tiles`, or `observer:tiles (night)` with the name of a run; `None` for other models.
+    /// The control in a model name such as `observer:tiles`, or `observer:tiles (night)` with the name of a run; `None`
+    /// for other models.
     pub fn from_model_name(model: &str) -> Option<Self> {
         let name = model.strip_prefix(OBSERVER)?.strip_prefix(':')?;
-        name.split_once(" (")
-            .map_or(name, |(name, _)| name)
-            .parse()
-            .ok()
+        name.split_once(" (").map_or(name, |(name, _)| name).parse().ok()
     }
 
     /// The name as a model, `observer:NAME`.
@@ -122,12 +121,9 @@ impl FromStr for Control {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        Self::ALL
-            .into_iter()
-            .find(|control| control.name() == text)
-            .ok_or_else(|| {
-                let names = Self::ALL.map(Self::name).join(", ");
-                format!("observer:{text} is not a control; there are: {names}")
-            })
+        Self::ALL.into_iter().find(|control| control.name() == text).ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("observer:{text} is not a control; there are: {names}")
+        })
     }
 }

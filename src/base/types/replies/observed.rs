@@ -17,7 +17,8 @@ pub struct Observed {
     pub detected: usize,
     /// The share of the image's variance that the untouched frame explains (R²), in millionths.
     pub explained_ppm: u32,
-    /// The confirmed share of each thing's outline, in percent, rounded down, by the thing's number. A thing is seen from 50 on.
+    /// The confirmed share of each thing's outline, in percent, rounded down, by the thing's number. A thing is seen
+    /// from 50 on.
     pub outlines: BTreeMap<u32, u8>,
 }
 

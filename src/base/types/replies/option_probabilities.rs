@@ -16,12 +16,13 @@ pub struct TokenChances {
 pub struct TokenPosition {
     /// The token that the model chose.
     pub token: String,
-    /// The likeliest tokens with the natural logarithms of their probabilities; each token once, the chosen one among them.
+    /// The likeliest tokens with the natural logarithms of their probabilities; each token once, the chosen one among
+    /// them.
     pub likeliest: Vec<(String, f64)>,
 }
 
-/// Whether reasoning came before the answer of a reply. If so, the reasoning decided the answer, and the probability of its letter is
-/// not the model's confidence.
+/// Whether reasoning came before the answer of a reply. If so, the reasoning decided the answer, and the probability of
+/// its letter is not the model's confidence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Thought {
     /// The model reasoned first.

@@ -16,7 +16,8 @@ pub enum Finish {
     Length,
     /// A content filter stopped the reply.
     Filter,
-    /// Another reason, in the server's words: of a complete reply if [`Finish::is_whole`], else of one that the server ended early.
+    /// Another reason, in the server's words: of a complete reply if [`Finish::is_whole`], else of one that the server
+    /// ended early.
     Other(String),
     /// Not reported by the server.
     Unknown,
@@ -26,11 +27,12 @@ impl Finish {
     /// Maximum length of a reason in a server's words, in characters; chosen.
     const MAX_REASON_CHARS: usize = 40;
 
-    /// Words of replies that are complete and end in a way of their own: calls of tools (OpenAI, Anthropic), guesses of built-in models.
+    /// Words of replies that are complete and end in a way of their own: calls of tools (OpenAI, Anthropic), guesses of
+    /// built-in models.
     const WHOLE: [&str; 4] = ["tool_calls", "function_call", "tool_use", "guess"];
 
-    /// True if the reply is complete, so that an answer is looked for in a sentence, too. Of a reply that a filter, a limit or the server
-    /// ended early, only a text that is an answer and nothing else counts.
+    /// True if the reply is complete, so that an answer is looked for in a sentence, too. Of a reply that a filter, a
+    /// limit or the server ended early, only a text that is an answer and nothing else counts.
     #[must_use]
     pub fn is_whole(&self) -> bool {
         match self {
@@ -51,11 +53,7 @@ impl Finish {
     pub fn shorten(self) -> Self {
         match self {
             Self::Other(reason) => {
-                let reason = reason
-                    .chars()
-                    .filter(|c| !c.is_control())
-                    .take(Self::MAX_REASON_CHARS)
-                    .collect();
+                let reason = reason.chars().filter(|c| !c.is_control()).take(Self::MAX_REASON_CHARS).collect();
                 Self::Other(reason)
             }
             named => named,
@@ -89,8 +87,7 @@ impl Usage {
     #[must_use]
     pub fn total(&self) -> Option<u64> {
         let (prompt, completion) = (self.prompt_tokens, self.completion_tokens);
-        (prompt.is_some() || completion.is_some())
-            .then(|| prompt.unwrap_or(0).saturating_add(completion.unwrap_or(0)))
+        (prompt.is_some() || completion.is_some()).then(|| prompt.unwrap_or(0).saturating_add(completion.unwrap_or(0)))
     }
 
     /// True if the server stated that it charges for the request: tokens, or a cost.
@@ -100,8 +97,8 @@ impl Usage {
         is_cost || self.total().is_some_and(|tokens| tokens > 0)
     }
 
-    /// Adds two usages; a number is unknown if it is unknown in both. If only one has a cost, the tokens of the other one count at its
-    /// cost per token.
+    /// Adds two usages; a number is unknown if it is unknown in both. If only one has a cost, the tokens of the other
+    /// one count at its cost per token.
     #[must_use]
     pub fn plus(self, more: Self) -> Self {
         Self {
@@ -123,11 +120,7 @@ impl Usage {
 /// Cost of the requests of two usages, of which only `priced` has a cost: the same cost per token for both.
 fn extend(cost: StatedCost, priced: Usage, other: Usage) -> StatedCost {
     let [known, added] = [priced, other].map(|usage| usage.total().unwrap_or(0) as f64);
-    if known > 0.0 {
-        cost.times((known + added) / known)
-    } else {
-        cost
-    }
+    if known > 0.0 { cost.times((known + added) / known) } else { cost }
 }
 
 /// Adds two numbers of which each may be unknown.
@@ -145,8 +138,8 @@ pub struct LostAttempts {
     pub attempts: u32,
     /// The tokens of all attempts.
     pub usage: Usage,
-    /// Requests that may have been charged although the server stated no tokens, the request of the reply included. Absent in the file if
-    /// there are none.
+    /// Requests that may have been charged although the server stated no tokens, the request of the reply included.
+    /// Absent in the file if there are none.
     #[serde(default, skip_serializing_if = "Unstated::is_none")]
     pub unstated: Unstated,
 }
@@ -201,9 +194,7 @@ impl Unstated {
         Self {
             requests: self.requests.saturating_add(more.requests),
             prompt_tokens: self.prompt_tokens.saturating_add(more.prompt_tokens),
-            completion_tokens: self
-                .completion_tokens
-                .saturating_add(more.completion_tokens),
+            completion_tokens: self.completion_tokens.saturating_add(more.completion_tokens),
         }
     }
 }
@@ -235,8 +226,8 @@ pub struct Reply {
     pub observed: Option<Observed>,
     /// The likeliest tokens; `None` if they were not requested or the server stated none.
     pub chances: Option<TokenChances>,
-    /// True if another try may end in another way: the server's word for the end is not known, or the model thought and gave no answer.
-    /// Not stored.
+    /// True if another try may end in another way: the server's word for the end is not known, or the model thought and
+    /// gave no answer. Not stored.
     pub may_heal: bool,
     /// The field with the only text of a reply without content; `None` for every other reply.
     pub other_field: Option<OtherField>,
@@ -276,10 +267,6 @@ impl Reply {
     /// A reply without text that ended at the token limit, from a server that sent none of the text.
     #[must_use]
     pub fn empty_truncated(usage: Option<Usage>) -> Self {
-        Self {
-            finish: Finish::Length,
-            usage,
-            ..Self::local(String::new())
-        }
+        Self { finish: Finish::Length, usage, ..Self::local(String::new()) }
     }
 }

@@ -2,24 +2,24 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-/// Units per US dollar: xAI's ticks, the finest unit in which a vendor states charges (docs.x.ai/developers/cost-tracking).
+/// Units per US dollar: xAI's ticks, the finest unit in which a vendor states charges
+/// (docs.x.ai/developers/cost-tracking).
 const PER_DOLLAR: f64 = 1e10;
 
-/// A charge that a server states for a request, 0 or more, in units of 10⁻¹⁰ US dollars. A number of US dollars in a file.
+/// A charge that a server states for a request, 0 or more, in units of 10⁻¹⁰ US dollars. A number of US dollars in a
+/// file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct StatedCost(u64);
 
 impl StatedCost {
-    /// Maximum plausible charge for one request, in US dollars; chosen: ten times the dearest known request, a million tokens of reply at
-    /// 10 dollars per million.
+    /// Maximum plausible charge for one request, in US dollars; chosen: ten times the dearest known request, a million
+    /// tokens of reply at 10 dollars per million.
     pub const MAX: f64 = 100.0;
 
     /// A charge in US dollars; `None` for a negative number, one above [`Self::MAX`], or none at all.
     #[must_use]
     pub fn from_dollars(dollars: f64) -> Option<Self> {
-        (0.0..=Self::MAX)
-            .contains(&dollars)
-            .then(|| Self((dollars * PER_DOLLAR).round() as u64))
+        (0.0..=Self::MAX).contains(&dollars).then(|| Self((dollars * PER_DOLLAR).round() as u64))
     }
 
     /// The charge in US dollars.
@@ -119,10 +119,7 @@ mod tests {
             assert_eq!(parsed, cost, "{text}");
             assert!((parsed.dollars() - dollars).abs() < 1e-10, "{text}");
         }
-        assert_eq!(
-            serde_json::to_string(&StatedCost::from_dollars(0.13)).unwrap(),
-            "0.13"
-        );
+        assert_eq!(serde_json::to_string(&StatedCost::from_dollars(0.13)).unwrap(), "0.13");
     }
 
     #[test]

@@ -3,11 +3,7 @@
 /// Formats an amount in dollars with two decimals, or four below one dollar.
 #[must_use]
 pub fn money(dollars: f64) -> String {
-    if dollars > 0.0 && dollars < 0.995 {
-        format!("${dollars:.4}")
-    } else {
-        format!("${dollars:.2}")
-    }
+    if dollars > 0.0 && dollars < 0.995 { format!("${dollars:.4}") } else { format!("${dollars:.2}") }
 }
 
 /// Formats a time, as in `2.0 h`, `6 min` or `40 s`.

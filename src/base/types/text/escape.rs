@@ -1,23 +1,17 @@
 //! Escaping of hidden characters in untrusted text: [`escape_hidden`].
 //!
-//! A name in a data set, a run or a reply of an endpoint may contain characters that move the cursor of a terminal, reverse the direction
-//! of a line, or are invisible. Control characters also make an SVG file invalid XML.
+//! A name in a data set, a run or a reply of an endpoint may contain characters that move the cursor of a terminal,
+//! reverse the direction of a line, or are invisible. Control characters also make an SVG file invalid XML.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// The terminal styles that this program prints: bold, red, green, yellow, and reset.
-const STYLES: [&str; 5] = [
-    "\u{1b}[1m",
-    "\u{1b}[31m",
-    "\u{1b}[32m",
-    "\u{1b}[33m",
-    "\u{1b}[0m",
-];
+const STYLES: [&str; 5] = ["\u{1b}[1m", "\u{1b}[31m", "\u{1b}[32m", "\u{1b}[33m", "\u{1b}[0m"];
 
-/// True for a character that is invisible or changes the text around it: control characters except line feed and tab, line separators,
-/// annotation marks, and Unicode's default-ignorable characters (direction marks, invisible letters, tags) except the two variation
-/// selectors of emoji.
+/// True for a character that is invisible or changes the text around it: control characters except line feed and tab,
+/// line separators, annotation marks, and Unicode's default-ignorable characters (direction marks, invisible letters,
+/// tags) except the two variation selectors of emoji.
 #[must_use]
 pub fn is_hidden(c: char) -> bool {
     matches!(

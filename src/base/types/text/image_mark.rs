@@ -19,8 +19,7 @@ pub fn mark(index: usize) -> String {
 }
 
 /// Matches a [`mark`] whose number has no leading zeros.
-static MARK: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new("<image ([1-9][0-9]{0,3})>").ok());
+static MARK: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new("<image ([1-9][0-9]{0,3})>").ok());
 
 /// Splits a text at its marks. A mark stays part of the words if `is_place` returns false for the index of its image.
 pub fn pieces(text: &str, mut is_place: impl FnMut(usize) -> bool) -> Vec<MarkedPiece<'_>> {
@@ -51,17 +50,8 @@ mod tests {
     fn a_text_is_cut_at_its_marks() {
         use MarkedPiece::{Image, Words};
         let text = format!("{}Is it like {}?", mark(1), mark(0));
-        assert_eq!(
-            pieces(&text, |_| true),
-            [Image(1), Words("Is it like "), Image(0), Words("?")]
-        );
-        for other in [
-            "<image>",
-            "<image 0>",
-            "<image 01>",
-            "<image 12345>",
-            "< image 1>",
-        ] {
+        assert_eq!(pieces(&text, |_| true), [Image(1), Words("Is it like "), Image(0), Words("?")]);
+        for other in ["<image>", "<image 0>", "<image 01>", "<image 12345>", "< image 1>"] {
             assert_eq!(pieces(other, |_| true), [Words(other)]);
         }
         assert_eq!(pieces("", |_| true), []);

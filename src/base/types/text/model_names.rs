@@ -7,13 +7,12 @@ const SMALL: [&str; 6] = ["mini", "nano", "lite", "tiny", "small", "micro"];
 
 /// Words of many models, which do not show that two names are related.
 const COMMON: [&str; 14] = [
-    "instruct", "chat", "vision", "vl", "it", "preview", "latest", "model", "base", "turbo", "fp",
-    "awq", "gguf", "exp",
+    "instruct", "chat", "vision", "vl", "it", "preview", "latest", "model", "base", "turbo", "fp", "awq", "gguf", "exp",
 ];
 
-/// True if the name in the replies is evidently that of another model than the one asked: they have no word in common, or they name
-/// different sizes. Servers complete names (`gpt-4o` becomes `gpt-4o-2024-11-20`, `llava` becomes a path), so that other differences mean
-/// nothing; and names without a digit, such as `default`, are not judged.
+/// True if the name in the replies is evidently that of another model than the one asked: they have no word in common,
+/// or they name different sizes. Servers complete names (`gpt-4o` becomes `gpt-4o-2024-11-20`, `llava` becomes a path),
+/// so that other differences mean nothing; and names without a digit, such as `default`, are not judged.
 #[must_use]
 pub fn is_other_model(asked: &str, served: &str) -> bool {
     let (asked, served) = (words(asked), words(served));
@@ -26,12 +25,8 @@ pub fn is_other_model(asked: &str, served: &str) -> bool {
         return false;
     }
     let (asked_sizes, served_sizes) = (sizes(&asked), sizes(&served));
-    let is_other_size = !asked_sizes.is_empty()
-        && !served_sizes.is_empty()
-        && asked_sizes.is_disjoint(&served_sizes);
-    asked_families.is_disjoint(&served_families)
-        || is_other_size
-        || is_small(&asked) != is_small(&served)
+    let is_other_size = !asked_sizes.is_empty() && !served_sizes.is_empty() && asked_sizes.is_disjoint(&served_sizes);
+    asked_families.is_disjoint(&served_families) || is_other_size || is_small(&asked) != is_small(&served)
 }
 
 /// True if two names in replies differ only in case or in the path before them.
@@ -42,11 +37,7 @@ pub fn is_same_name(one: &str, other: &str) -> bool {
 
 /// The name without the folders, the organization or the address before it.
 fn last_segment(name: &str) -> &str {
-    name.trim()
-        .trim_end_matches(['/', '\\'])
-        .rsplit(['/', '\\'])
-        .next()
-        .unwrap_or(name)
+    name.trim().trim_end_matches(['/', '\\']).rsplit(['/', '\\']).next().unwrap_or(name)
 }
 
 /// The words of a name in lower case, without its path.
@@ -76,10 +67,7 @@ fn families(words: &BTreeSet<String>) -> BTreeSet<&str> {
 fn sizes(words: &BTreeSet<String>) -> BTreeSet<&str> {
     words
         .iter()
-        .filter(|word| {
-            word.strip_suffix(['b', 'm'])
-                .is_some_and(|number| number.parse::<f64>().is_ok())
-        })
+        .filter(|word| word.strip_suffix(['b', 'm']).is_some_and(|number| number.parse::<f64>().is_ok()))
         .map(String::as_str)
         .collect()
 }
@@ -114,15 +102,9 @@ mod tests {
             ("claude-3-5-sonnet-latest", "claude-3-5-sonnet-20241022"),
             ("gemini-flash-latest", "gemini-2.5-flash"),
             ("qwen2.5vl:7b", "Qwen/Qwen2.5-VL-7B-Instruct"),
-            (
-                "qwen2.5-vl-7b",
-                "/models/Qwen2.5-VL-7B-Instruct-Q4_K_M.gguf",
-            ),
+            ("qwen2.5-vl-7b", "/models/Qwen2.5-VL-7B-Instruct-Q4_K_M.gguf"),
             ("Qwen2.5-VL-7B", "C:\\models\\qwen2.5-vl-7b-q8_0.gguf"),
-            (
-                "meta-llama/Llama-3.2-11B-Vision-Instruct",
-                "llama-3.2-11b-vision",
-            ),
+            ("meta-llama/Llama-3.2-11B-Vision-Instruct", "llama-3.2-11b-vision"),
             ("google/gemini-2.5-flash", "gemini-2.5-flash"),
             ("openai/gpt-4o:free", "openai/gpt-4o"),
             ("my-deployment", "gpt-4o-2024-08-06"),

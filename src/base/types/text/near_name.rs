@@ -5,11 +5,9 @@ use strsim::{damerau_levenshtein, jaro_winkler};
 /// Minimum Jaro–Winkler similarity of two names for a suggestion; chosen.
 const MIN_SIMILARITY: f64 = 0.8;
 
-/// The most similar of the known names, ignoring case; the first of equally similar ones, and `None` if none is similar.
-pub fn nearest<'a, S: AsRef<str> + 'a>(
-    name: &str,
-    known: impl IntoIterator<Item = &'a S>,
-) -> Option<&'a str> {
+/// The most similar of the known names, ignoring case; the first of equally similar ones, and `None` if none is
+/// similar.
+pub fn nearest<'a, S: AsRef<str> + 'a>(name: &str, known: impl IntoIterator<Item = &'a S>) -> Option<&'a str> {
     let name = name.to_lowercase();
     known
         .into_iter()
@@ -31,10 +29,7 @@ pub fn is_nearly(word: &str, known: &str) -> bool {
 }
 
 /// [`did_you_mean`] for the most similar of the known names.
-pub fn suggestion<'a, S: AsRef<str> + 'a>(
-    name: &str,
-    known: impl IntoIterator<Item = &'a S>,
-) -> String {
+pub fn suggestion<'a, S: AsRef<str> + 'a>(name: &str, known: impl IntoIterator<Item = &'a S>) -> String {
     did_you_mean(nearest(name, known))
 }
 
@@ -49,14 +44,7 @@ mod tests {
 
     #[test]
     fn only_similar_names_are_suggested() {
-        let known = [
-            "lift",
-            "gray-gain",
-            "speed",
-            "angle",
-            "ruas-lol",
-            "ruas-upe",
-        ];
+        let known = ["lift", "gray-gain", "speed", "angle", "ruas-lol", "ruas-upe"];
         for (name, meant) in [
             ("lfit", "lift"),
             ("Lift", "lift"),

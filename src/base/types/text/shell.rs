@@ -4,13 +4,10 @@ use std::borrow::Cow;
 
 /// Quotes a text as one word of a POSIX shell.
 ///
-/// Single quotes are added to an empty text and to one with a character that is neither alphanumeric nor in `-_./:=,@%+`.
+/// Single quotes are added to an empty text and to one with a character that is neither alphanumeric nor in
+/// `-_./:=,@%+`.
 pub fn shell_word(text: &str) -> Cow<'_, str> {
-    if !text.is_empty()
-        && text
-            .chars()
-            .all(|c: char| c.is_alphanumeric() || "-_./:=,@%+".contains(c))
-    {
+    if !text.is_empty() && text.chars().all(|c: char| c.is_alphanumeric() || "-_./:=,@%+".contains(c)) {
         return Cow::Borrowed(text);
     }
     Cow::Owned(format!("'{}'", text.replace('\'', "'\\''")))

@@ -17,9 +17,7 @@ impl TomlFault {
         let message: Vec<&str> = error.message().lines().map(str::trim).collect();
         Self {
             line: line_at(text, error.span().map_or(0, |span| span.start)),
-            problem: message.join(", ")
-                + &suggested_key(error.message())
-                + quoting_hint(error.message()),
+            problem: message.join(", ") + &suggested_key(error.message()) + quoting_hint(error.message()),
         }
     }
 }
@@ -38,17 +36,13 @@ fn suggested_key(message: &str) -> String {
     }
 }
 
-/// Hint to quote a text that the parser tried to read as a number or a date; empty for other errors, which need no hint.
+/// Hint to quote a text that the parser tried to read as a number or a date; empty for other errors, which need no
+/// hint.
 fn quoting_hint(message: &str) -> &'static str {
-    let is_number = ["invalid fraction", "invalid float", "invalid integer"]
-        .iter()
-        .any(|problem| message.starts_with(problem));
+    let is_number =
+        ["invalid fraction", "invalid float", "invalid integer"].iter().any(|problem| message.starts_with(problem));
     let is_date = message.starts_with("invalid type: map, expected a string");
-    if is_number || is_date {
-        "; a text stands in quotes"
-    } else {
-        ""
-    }
+    if is_number || is_date { "; a text stands in quotes" } else { "" }
 }
 
 #[cfg(test)]
@@ -71,11 +65,7 @@ mod tests {
         for (text, line, part) in [
             ("\nrange = \"0..1\"", 2, "; did you mean range_in?"),
             ("range_in = 0..1", 1, "; a text stands in quotes"),
-            (
-                "multiple = 2\nrange_in = nchw",
-                2,
-                "; a text stands in quotes",
-            ),
+            ("multiple = 2\nrange_in = nchw", 2, "; a text stands in quotes"),
             ("range_in = 2024-01-01", 1, "; a text stands in quotes"),
         ] {
             let fault = TomlFault::new(text, &toml::from_str::<Known>(text).unwrap_err());

@@ -5,8 +5,8 @@ use serde::Serialize;
 use serde::ser::Error as _;
 use serde_json::{Error, Value};
 
-/// The canonical JSON of a value: keys are sorted, and fields that are `null` or absent are left out at every depth. Adding a field that is
-/// `None` therefore changes no digest.
+/// The canonical JSON of a value: keys are sorted, and fields that are `null` or absent are left out at every depth.
+/// Adding a field that is `None` therefore changes no digest.
 ///
 /// Floats have the shortest decimal form that parses to the same number, an `f32` that of the `f32`.
 ///
@@ -72,11 +72,7 @@ mod tests {
             wide: 7.5,
             narrow: 0.1,
             missing: None,
-            parts: vec![
-                Part::Alone,
-                Part::Number(3.3),
-                Part::Fields { z: None, a: 1 },
-            ],
+            parts: vec![Part::Alone, Part::Number(3.3), Part::Fields { z: None, a: 1 }],
             seed: u64::MAX,
             names: BTreeMap::from([("b", Some(true)), ("a", None)]),
         }
@@ -102,8 +98,7 @@ mod tests {
             name: &'static str,
         }
         let before = canonical(&[Before { name: "a" }]).unwrap();
-        let [none, some] =
-            [None, Some(0)].map(|added| canonical(&[After { added, name: "a" }]).unwrap());
+        let [none, some] = [None, Some(0)].map(|added| canonical(&[After { added, name: "a" }]).unwrap());
         assert_eq!(before, none);
         assert_ne!(before, some);
     }

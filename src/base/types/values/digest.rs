@@ -19,8 +19,9 @@ impl Digest {
         Self(*blake3::hash(bytes).as_bytes())
     }
 
-    /// The digest of a value as canonical JSON: keys sorted, nulls and absent fields left out at every depth. `domain` names
-    /// the kind of value and its version, as `darkqa.trial/2`, so that equal values of two kinds have different digests.
+    /// The digest of a value as canonical JSON: keys sorted, nulls and absent fields left out at every depth. `domain`
+    /// names the kind of value and its version, as `darkqa.trial/2`, so that equal values of two kinds have different
+    /// digests.
     ///
     /// # Errors
     /// If a number in the value is infinite or NaN, or a key of a map is not a string.
@@ -42,21 +43,15 @@ impl Digest {
         Ok((Self::from_text(domain, &value.to_string()), value))
     }
 
-    /// [`Digest::canonical`] in a tenth of the time, for a type that serializes to canonical JSON: its fields are declared in sorted
-    /// order, `None` is skipped, and no number is a float.
+    /// [`Digest::canonical`] in a tenth of the time, for a type that serializes to canonical JSON: its fields are
+    /// declared in sorted order, `None` is skipped, and no number is a float.
     ///
     /// # Errors
     /// If a key of a map is not a string.
     #[cfg(feature = "program")]
     pub fn presorted(domain: &'static str, value: &impl serde::Serialize) -> Result<Self, Error> {
         let text = serde_json::to_string(value).map_err(|e| Error::data(domain, e))?;
-        debug_assert_eq!(
-            canonical(value)
-                .ok()
-                .map(|value| value.to_string())
-                .as_ref(),
-            Some(&text)
-        );
+        debug_assert_eq!(canonical(value).ok().map(|value| value.to_string()).as_ref(), Some(&text));
         Ok(Self::from_text(domain, &text))
     }
 
@@ -68,13 +63,12 @@ impl Digest {
         Self(*hasher.finalize().as_bytes())
     }
 
-    /// The digest of several parts in order. The length of each part is hashed too, so that different lists never hash the same bytes.
+    /// The digest of several parts in order. The length of each part is hashed too, so that different lists never hash
+    /// the same bytes.
     pub fn from_parts<'a>(parts: impl IntoIterator<Item = &'a [u8]>) -> Self {
         let mut hasher = blake3::Hasher::new();
         for part in parts {
-            hasher
-                .update(&(part.len() as u64).to_le_bytes())
-                .update(part);
+            hasher.update(&(part.len() as u64).to_le_bytes()).update(part);
         }
         Self(*hasher.finalize().as_bytes())
     }
@@ -112,8 +106,7 @@ impl FromStr for Digest {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let hash = blake3::Hash::from_hex(text)
-            .map_err(|e| Error::data(format_args!("digest {text:?}"), e))?;
+        let hash = blake3::Hash::from_hex(text).map_err(|e| Error::data(format_args!("digest {text:?}"), e))?;
         Ok(Self(*hash.as_bytes()))
     }
 }
@@ -128,10 +121,7 @@ mod tests {
     fn canonical_digest_hashes_domain_and_json() {
         let value = std::collections::BTreeMap::from([("a", [Some(1), None])]);
         let first = Digest::canonical("darkqa.test/1", &value).unwrap();
-        assert_eq!(
-            first,
-            Digest::from_bytes(b"darkqa.test/1\0{\"a\":[1,null]}")
-        );
+        assert_eq!(first, Digest::from_bytes(b"darkqa.test/1\0{\"a\":[1,null]}"));
         assert_ne!(first, Digest::canonical("darkqa.test/2", &value).unwrap());
         assert!(Digest::canonical("darkqa.test/1", &f32::NAN).is_err());
     }

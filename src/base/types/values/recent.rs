@@ -3,10 +3,11 @@
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// A first-in, first-out cache of at most `capacity` values. If another thread is already computing a value, `get` waits for it.
+/// A first-in, first-out cache of at most `capacity` values. If another thread is already computing a value, `get`
+/// waits for it.
 ///
-/// Cache crates consider how often a value is used (quick_cache was tried): with a capacity of one or two large frames they reject a new
-/// frame, although it is needed next.
+/// Cache crates consider how often a value is used (quick_cache was tried): with a capacity of one or two large frames
+/// they reject a new frame, although it is needed next.
 #[derive(Debug)]
 pub struct Recent<K, V> {
     capacity: usize,

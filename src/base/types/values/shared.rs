@@ -102,16 +102,12 @@ mod tests {
     #[test]
     fn equal_values_share_memory() {
         let mut distinct = Distinct::default();
-        let [mut one, mut other, mut same] =
-            ["a", "b", "a"].map(|text| Shared::from(text.to_owned()));
+        let [mut one, mut other, mut same] = ["a", "b", "a"].map(|text| Shared::from(text.to_owned()));
         for value in [&mut one, &mut other, &mut same] {
             distinct.share(value);
         }
         assert!(std::sync::Arc::ptr_eq(&one.0, &same.0) && one == same);
         assert!(one != other && serde_json::to_string(&one).unwrap() == "\"a\"");
-        assert_eq!(
-            serde_json::from_str::<Shared<String>>("\"b\"").unwrap(),
-            other
-        );
+        assert_eq!(serde_json::from_str::<Shared<String>>("\"b\"").unwrap(), other);
     }
 }

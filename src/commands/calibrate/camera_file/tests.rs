@@ -5,27 +5,17 @@ use crate::commands::calibrate::{Cfa, Measured};
 use crate::types::Digest;
 
 fn measured(value: f64) -> Measured {
-    Measured {
-        value,
-        error: Some(0.001),
-    }
+    Measured { value, error: Some(0.001) }
 }
 
 fn setting(name: &str, gain: f64) -> SettingFit {
     SettingFit {
         name: name.to_owned(),
-        frames: FrameCounts {
-            bias: 10,
-            exposures: 5,
-            flat_pairs: 10,
-        },
+        frames: FrameCounts { bias: 10, exposures: 5, flat_pairs: 10 },
         gain: measured(gain),
         read_scale: measured(1.5 * gain.sqrt()),
         read_shape: measured(-0.04),
-        plot: crate::commands::calibrate::read_noise::PlotFit {
-            shape: -0.03,
-            scale: 1.6,
-        },
+        plot: crate::commands::calibrate::read_noise::PlotFit { shape: -0.03, scale: 1.6 },
         row_deviation: measured(0.4 * gain.sqrt()),
         offsets: [512.1, 511.9, 512.3, 512.0].map(measured).to_vec(),
         read_deviation: 2.7,
@@ -58,13 +48,7 @@ fn camera(settings: Vec<SettingFit>) -> CameraFit {
 
 #[test]
 fn the_file_has_the_measured_values() {
-    let camera = camera(
-        ["a", "b", "c"]
-            .iter()
-            .zip([0.1, 0.5, 2.5])
-            .map(|(n, k)| setting(n, k))
-            .collect(),
-    );
+    let camera = camera(["a", "b", "c"].iter().zip([0.1, 0.5, 2.5]).map(|(n, k)| setting(n, k)).collect());
     let text = camera_file(&camera).unwrap();
     let read = Calibration::parse(&text, "camera.toml").unwrap();
     assert_eq!(read.name, camera.name);
@@ -78,11 +62,7 @@ fn the_file_has_the_measured_values() {
     for (bias, expected) in noise.bias.iter().zip([0.1, -0.1, 0.3, 0.0]) {
         assert!((bias - expected).abs() < 1e-5, "{:?}", noise.bias);
     }
-    for part in [
-        "± 71 % of itself",
-        "# Warning: iso100: doubtful [gain]",
-        "K 0.5000 ± 0.0010",
-    ] {
+    for part in ["± 71 % of itself", "# Warning: iso100: doubtful [gain]", "K 0.5000 ± 0.0010"] {
         assert!(text.contains(part), "{part}: {text}");
     }
 }
@@ -90,30 +70,16 @@ fn the_file_has_the_measured_values() {
 /// Comments of a table.
 fn comments<'t>(text: &'t str, table: &str) -> Vec<&'t str> {
     let table = text.split_once(&format!("\n[{table}]\n")).unwrap().1;
-    table
-        .lines()
-        .take_while(|line| !line.is_empty())
-        .filter(|line| line.starts_with('#'))
-        .collect()
+    table.lines().take_while(|line| !line.is_empty()).filter(|line| line.starts_with('#')).collect()
 }
 
 /// Comments state the number of settings without visible row noise.
 #[test]
 fn lines_state_their_source() {
-    let four: Vec<SettingFit> = ["a", "b", "c", "d"]
-        .into_iter()
-        .zip([0.1, 0.5, 2.5, 5.0])
-        .map(|(name, gain)| setting(name, gain))
-        .collect();
+    let four: Vec<SettingFit> =
+        ["a", "b", "c", "d"].into_iter().zip([0.1, 0.5, 2.5, 5.0]).map(|(name, gain)| setting(name, gain)).collect();
     for (quiet, settings, row) in [
-        (
-            &[][..],
-            4,
-            &[
-                "# Fitted to 4 settings.",
-                "# The deviation is known to ± 50 % of itself.",
-            ][..],
-        ),
+        (&[][..], 4, &["# Fitted to 4 settings.", "# The deviation is known to ± 50 % of itself."][..]),
         (
             &[0],
             4,
@@ -158,17 +124,9 @@ fn lines_state_their_source() {
 fn invalid_values_are_not_written() {
     let twice = camera(vec![setting("a", 0.5), setting("b", 0.5)]);
     let error = camera_file(&twice).unwrap_err().to_string();
-    assert!(
-        error.contains("step 2, gain: 0.5 is not above 0.5"),
-        "{error}"
-    );
+    assert!(error.contains("step 2, gain: 0.5 is not above 0.5"), "{error}");
     let far = camera(vec![setting("a", 300.0)]);
-    assert!(
-        camera_file(&far)
-            .unwrap_err()
-            .to_string()
-            .contains("gain: 300")
-    );
+    assert!(camera_file(&far).unwrap_err().to_string().contains("gain: 300"));
 }
 
 #[test]

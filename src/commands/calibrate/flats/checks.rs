@@ -9,9 +9,11 @@ use crate::types::Digest;
 const MAX_AT_TOP: f64 = 1e-3;
 /// Share of white below which clipping is suspicious (chosen).
 const MIN_CLIPPING: f64 = 0.9;
-/// Minimum share of white that the maximum code of the flats should reach (chosen: users are asked for flats up to 60 %).
+/// Minimum share of white that the maximum code of the flats should reach (chosen: users are asked for flats up to 60
+/// %).
 const MIN_REACH: f64 = 0.25;
-/// Relative differences of light between the frames of a pair: a note above the first, an error above the second (chosen).
+/// Relative differences of light between the frames of a pair: a note above the first, an error above the second
+/// (chosen).
 const LIGHT: [f64; 2] = [0.01, 0.05];
 
 /// Minimum share of the tiles of an exposure in the range of light; exposures with fewer are left out (chosen).
@@ -60,14 +62,10 @@ impl PairFacts {
         [0, 1].map(|frame| (&*self.names[frame], self.digests[frame]))
     }
 
-    /// Ratio of the light of the first frame to that of the second, by plane. The ratio of a plane with little light is unreliable, so it
-    /// is limited to twice the allowed difference; without light it is 1.
+    /// Ratio of the light of the first frame to that of the second, by plane. The ratio of a plane with little light is
+    /// unreliable, so it is limited to twice the allowed difference; without light it is 1.
     pub(super) fn light_ratios(&self, offsets: &[f64]) -> Vec<f64> {
-        offsets
-            .iter()
-            .enumerate()
-            .map(|(plane, offset)| self.light_ratio(plane, *offset))
-            .collect()
+        offsets.iter().enumerate().map(|(plane, offset)| self.light_ratio(plane, *offset)).collect()
     }
 
     fn light_ratio(&self, plane: usize, offset: f64) -> f64 {
@@ -75,15 +73,9 @@ impl PairFacts {
             .tiles
             .iter()
             .filter(|tile| tile.plane == plane)
-            .fold([0.0; 3], |[count, a, b], tile| {
-                [count + tile.count, a + tile.sums[0], b + tile.sums[1]]
-            });
+            .fold([0.0; 3], |[count, a, b], tile| [count + tile.count, a + tile.sums[0], b + tile.sums[1]]);
         let [a, b] = [a, b].map(|sum| sum - count * offset);
-        if a > 0.0 && b > 0.0 {
-            (a / b).clamp(1.0 - 2.0 * LIGHT[1], 1.0 + 2.0 * LIGHT[1])
-        } else {
-            1.0
-        }
+        if a > 0.0 && b > 0.0 { (a / b).clamp(1.0 - 2.0 * LIGHT[1], 1.0 + 2.0 * LIGHT[1]) } else { 1.0 }
     }
 }
 
@@ -108,11 +100,8 @@ impl ExposureCheck<'_> {
 
     /// Checks for overexposure; `None` if the exposure is not overexposed.
     pub(super) fn find_clipping(&self) -> Option<Clipped> {
-        let (share, code) = self
-            .facts
-            .iter()
-            .map(|pair| pair.at_top)
-            .fold((0.0, 0), |max, top| if top.0 > max.0 { top } else { max });
+        let (share, code) =
+            self.facts.iter().map(|pair| pair.at_top).fold((0.0, 0), |max, top| if top.0 > max.0 { top } else { max });
         let Self { name, white, .. } = self;
         let at = if code == *white {
             format!("white, {white}")
@@ -160,19 +149,18 @@ impl ExposureCheck<'_> {
                 ));
             }
             let ratios = pair.light_ratios(self.offsets);
-            correlation(pair.neighbours.correlation(&ratios))
-                .map_err(|problem| Error::data(first, problem))?;
+            correlation(pair.neighbours.correlation(&ratios)).map_err(|problem| Error::data(first, problem))?;
         }
         Ok(notes)
     }
 
-    /// Reason for leaving out the exposure if too few tiles are in the range of light, of which `used` are; otherwise `None`.
+    /// Reason for leaving out the exposure if too few tiles are in the range of light, of which `used` are; otherwise
+    /// `None`.
     pub(super) fn out_of_range(&self, used: usize, range: [f64; 2]) -> Option<String> {
         let all: usize = self.facts.iter().map(|pair| pair.tiles.len()).sum();
         let share = used as f64 / all.max(1) as f64;
         (share < MIN_IN_RANGE).then(|| {
-            let mean = self.facts.iter().flat_map(|pair| pair.means).sum::<f64>()
-                / (2 * self.facts.len()) as f64
+            let mean = self.facts.iter().flat_map(|pair| pair.means).sum::<f64>() / (2 * self.facts.len()) as f64
                 - self.offset();
             let [low, high] = range.map(|share| 100.0 * share);
             format!(

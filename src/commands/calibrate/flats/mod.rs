@@ -1,4 +1,5 @@
-//! Measurement of the flats of a setting, pairs of evenly lit frames at several exposures, as points of photon transfer: [`Flats`].
+//! Measurement of the flats of a setting, pairs of evenly lit frames at several exposures, as points of photon
+//! transfer: [`Flats`].
 
 mod checks;
 mod transfer;
@@ -16,8 +17,9 @@ use crate::error::{Error, Result};
 use checks::{ExposureCheck, PairFacts};
 pub(super) use transfer::{Point, Transfer, gain};
 
-/// Range of light to use, as shares of white above the offset. EMVA 1288 release 4 Linear fits up to 70 % of saturation. The lower end is
-/// chosen: below it, errors of the offset matter; the corners of a frame with 2 % in its centre have 1.5 %.
+/// Range of light to use, as shares of white above the offset. EMVA 1288 release 4 Linear fits up to 70 % of
+/// saturation. The lower end is chosen: below it, errors of the offset matter; the corners of a frame with 2 % in its
+/// centre have 1.5 %.
 const RANGE: [f64; 2] = [0.015, 0.7];
 
 /// Usable exposures of a setting.
@@ -76,8 +78,8 @@ impl Flats {
     /// Measures the flats of a setting. Adds notes on omissions and warnings to `notes`.
     ///
     /// # Errors
-    /// If a frame cannot be read, is a copy or has codes above white, the frames of a pair differ in light, neighbours correlate, or too
-    /// few exposures are usable.
+    /// If a frame cannot be read, is a copy or has codes above white, the frames of a pair differ in light, neighbours
+    /// correlate, or too few exposures are usable.
     pub(super) fn measure(
         reader: &FrameReader,
         files: &SettingFiles,
@@ -93,12 +95,7 @@ impl Flats {
         for (exposure, facts) in files.exposures.iter().zip(facts) {
             let dark = dark(reader, exposure, settings.hot, inputs)?;
             let offsets = dark.as_ref().map_or(base.offsets, |dark| &dark.offsets[..]);
-            let check = ExposureCheck {
-                name: &exposure.name,
-                facts: &facts,
-                offsets,
-                white: settings.white,
-            };
+            let check = ExposureCheck { name: &exposure.name, facts: &facts, offsets, white: settings.white };
             check.check_white()?;
             if let Some(clipped) = check.find_clipping() {
                 left_out.push(clipped.reason);
@@ -109,10 +106,7 @@ impl Flats {
                 inputs.check_unique(name, digest)?;
             }
             notes.extend(check.check_pairs()?);
-            let pairs: Vec<Vec<Tile>> = facts
-                .iter()
-                .map(|pair| in_range(pair, offsets, settings.white))
-                .collect();
+            let pairs: Vec<Vec<Tile>> = facts.iter().map(|pair| in_range(pair, offsets, settings.white)).collect();
             let used: usize = pairs.iter().map(Vec::len).sum();
             if let Some(reason) = check.out_of_range(used, RANGE) {
                 left_out.push(reason);
@@ -123,11 +117,7 @@ impl Flats {
         if exposures.len() < MIN_EXPOSURES {
             return Err(too_few(files, exposures.len(), &left_out));
         }
-        notes.extend(
-            left_out
-                .into_iter()
-                .map(|reason| format!("{reason}; left out")),
-        );
+        notes.extend(left_out.into_iter().map(|reason| format!("{reason}; left out")));
         Ok(Self { exposures })
     }
 
@@ -138,17 +128,12 @@ impl Flats {
 
     /// Number of pairs of all exposures.
     pub(super) fn pairs(&self) -> usize {
-        self.exposures
-            .iter()
-            .map(|exposure| exposure.pairs.len())
-            .sum()
+        self.exposures.iter().map(|exposure| exposure.pairs.len()).sum()
     }
 
     /// True if every exposure has dark frames.
     pub(super) fn have_dark_frames(&self) -> bool {
-        self.exposures
-            .iter()
-            .all(|exposure| exposure.dark.is_some())
+        self.exposures.iter().all(|exposure| exposure.dark.is_some())
     }
 
     /// Points of photon transfer, with one weight for each pair.
@@ -237,11 +222,7 @@ fn read(
 }
 
 /// Reads a pair of frames and computes its facts and those of its files.
-fn pair_facts(
-    reader: &FrameReader,
-    pair: &[PathBuf],
-    hot: &HotPixels,
-) -> Result<(PairFacts, [FrameFacts; 2])> {
+fn pair_facts(reader: &FrameReader, pair: &[PathBuf], hot: &HotPixels) -> Result<(PairFacts, [FrameFacts; 2])> {
     let layout = reader.layout;
     let [a, b] = read_pair(reader, pair)?;
     let sums = PairSums::new(layout, [&a.samples, &b.samples], hot);
@@ -266,12 +247,7 @@ fn read_pair(reader: &FrameReader, pair: &[PathBuf]) -> Result<[Frame; 2]> {
 }
 
 /// Reads the dark frames of an exposure; `None` if it has none.
-fn dark(
-    reader: &FrameReader,
-    exposure: &ExposureFiles,
-    hot: &HotPixels,
-    inputs: &mut Inputs,
-) -> Result<Option<Dark>> {
+fn dark(reader: &FrameReader, exposure: &ExposureFiles, hot: &HotPixels, inputs: &mut Inputs) -> Result<Option<Dark>> {
     let layout = reader.layout;
     let mut planes = vec![[0_u64; 2]; layout.cfa.planes()];
     let mut noises: Vec<PairNoise> = Vec::new();
@@ -280,14 +256,9 @@ fn dark(
         &groups,
         2 * reader.bytes_of_frame(),
         |group| {
-            let frames: Vec<Frame> = group
-                .iter()
-                .map(|path| reader.read(path))
-                .collect::<Result<_>>()?;
-            let sums: Vec<Vec<[u64; 2]>> = frames
-                .iter()
-                .map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes())
-                .collect();
+            let frames: Vec<Frame> = group.iter().map(|path| reader.read(path)).collect::<Result<_>>()?;
+            let sums: Vec<Vec<[u64; 2]>> =
+                frames.iter().map(|frame| PlaneSums::new(layout, &frame.samples, hot).planes()).collect();
             let noise = match &frames[..] {
                 [a, b] => Some(PairSums::new(layout, [&a.samples, &b.samples], hot).noise()),
                 _ => None,
@@ -313,10 +284,7 @@ fn dark(
         return Ok(None);
     }
     Ok(Some(Dark {
-        offsets: planes
-            .iter()
-            .map(|[count, sum]| *sum as f64 / (*count).max(1) as f64)
-            .collect(),
+        offsets: planes.iter().map(|[count, sum]| *sum as f64 / (*count).max(1) as f64).collect(),
         within: noises.iter().map(|noise| noise.within).sum::<f64>() / noises.len() as f64,
     }))
 }

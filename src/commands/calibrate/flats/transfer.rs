@@ -1,7 +1,7 @@
 //! System gain K by photon transfer: [`Transfer`].
 //!
-//! A signal of S ADU is S / K electrons. Their number has the variance S / K, which is K · S in ADU² (Janesick, *Photon Transfer*, 2007;
-//! EMVA 1288 release 4 Linear, section 6).
+//! A signal of S ADU is S / K electrons. Their number has the variance S / K, which is K · S in ADU² (Janesick, *Photon
+//! Transfer*, 2007; EMVA 1288 release 4 Linear, section 6).
 
 /// Point of photon transfer: a tile of a pair of flats.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,22 +39,12 @@ impl Transfer {
         let gain = gain(points);
         let by_plane = (0..planes)
             .map(|plane| {
-                let plane_points: Vec<Point> = points
-                    .iter()
-                    .filter(|point| point.plane == plane)
-                    .copied()
-                    .collect();
+                let plane_points: Vec<Point> = points.iter().filter(|point| point.plane == plane).copied().collect();
                 (!plane_points.is_empty()).then(|| self::gain(&plane_points))
             })
             .collect();
         let [intercept, intercept_error] = intercept(points, gain);
-        Self {
-            gain,
-            by_plane,
-            bend: bend(points, gain),
-            intercept,
-            intercept_error,
-        }
+        Self { gain, by_plane, bend: bend(points, gain), intercept, intercept_error }
     }
 }
 
@@ -62,8 +52,8 @@ fn sum(points: &[Point], term: impl Fn(&Point) -> f64) -> f64 {
     points.iter().map(term).sum()
 }
 
-/// Gain K = Σ w S V / Σ w S² with w = n / (K S + read variance)², because a variance V has the variance 2 (K S + …)² / n. The weights
-/// depend on K; three iterations are enough for them to converge.
+/// Gain K = Σ w S V / Σ w S² with w = n / (K S + read variance)², because a variance V has the variance 2 (K S + …)² /
+/// n. The weights depend on K; three iterations are enough for them to converge.
 pub(crate) fn gain(points: &[Point]) -> f64 {
     let mut gain = sum(points, |p| p.weight * p.variance) / sum(points, |p| p.weight * p.signal);
     for _ in 0..3 {
@@ -80,27 +70,17 @@ fn weight(point: &Point, gain: f64) -> f64 {
 
 /// Slope of V / S over S, weighted by the number of sites, times the range of S and relative to K.
 fn bend(points: &[Point], gain: f64) -> f64 {
-    let [slope, _] = line(
-        points
-            .iter()
-            .map(|p| (p.weight, p.signal, p.variance / p.signal)),
-    );
+    let [slope, _] = line(points.iter().map(|p| (p.weight, p.signal, p.variance / p.signal)));
     let [low, high] = points
         .iter()
         .map(|p| p.signal)
-        .fold([f64::INFINITY, 0.0], |[low, high], s| {
-            [f64::min(low, s), f64::max(high, s)]
-        });
+        .fold([f64::INFINITY, 0.0], |[low, high], s| [f64::min(low, s), f64::max(high, s)]);
     slope * (high - low) / gain
 }
 
 /// Intercept of the weighted line, and its standard error from the variance 2 (K S + …)² / n of each point.
 fn intercept(points: &[Point], gain: f64) -> [f64; 2] {
-    let [slope, mean] = line(
-        points
-            .iter()
-            .map(|p| (weight(p, gain), p.signal, p.variance)),
-    );
+    let [slope, mean] = line(points.iter().map(|p| (weight(p, gain), p.signal, p.variance)));
     let [mut sum, mut first, mut second] = [0.0; 3];
     for point in points {
         let weight = weight(point, gain);
@@ -116,18 +96,12 @@ fn intercept(points: &[Point], gain: f64) -> [f64; 2] {
 
 /// Slope of the weighted regression of y on x, and the weighted mean of y. A point is (weight, x, y).
 fn line(points: impl Iterator<Item = (f64, f64, f64)> + Clone) -> [f64; 2] {
-    let [sum, x, y] = points
-        .clone()
-        .fold([0.0; 3], |[sum, x, y], (weight, px, py)| {
-            [sum + weight, x + weight * px, y + weight * py]
-        });
+    let [sum, x, y] =
+        points.clone().fold([0.0; 3], |[sum, x, y], (weight, px, py)| [sum + weight, x + weight * px, y + weight * py]);
     let (x, y) = (x / sum, y / sum);
     let [products, squares] = points.fold([0.0; 2], |[products, squares], (weight, px, py)| {
         let dx = px - x;
-        [
-            products + weight * dx * (py - y),
-            squares + weight * dx * dx,
-        ]
+        [products + weight * dx * (py - y), squares + weight * dx * dx]
     });
     [products / squares, y]
 }
@@ -157,11 +131,7 @@ mod tests {
     fn a_straight_line_gives_its_slope() {
         let fit = Transfer::fit(&points(|signal| 0.75 * signal), 4);
         assert!((fit.gain - 0.75).abs() < 1e-12);
-        assert!(
-            fit.by_plane
-                .iter()
-                .all(|k| (k.unwrap() - 0.75).abs() < 1e-12)
-        );
+        assert!(fit.by_plane.iter().all(|k| (k.unwrap() - 0.75).abs() < 1e-12));
         assert!(fit.bend.abs() < 1e-10 && fit.intercept.abs() < 1e-8);
     }
 
@@ -171,17 +141,10 @@ mod tests {
         // From 300 to 12 344 ADU, V / S falls from 0.821 to 0.674.
         assert!((bent.bend + 0.196).abs() < 0.01, "{}", bent.bend);
         let lifted = Transfer::fit(&points(|signal| 0.75 * signal + 12.0), 4);
-        assert!(
-            (lifted.intercept - 12.0).abs() < 1e-6,
-            "{}",
-            lifted.intercept
-        );
+        assert!((lifted.intercept - 12.0).abs() < 1e-6, "{}", lifted.intercept);
         assert!(lifted.intercept_error > 0.0 && lifted.intercept_error < 12.0);
         let mut apart = points(|signal| 0.75 * signal);
-        apart
-            .iter_mut()
-            .filter(|p| p.plane == 3)
-            .for_each(|p| p.variance *= 1.1);
+        apart.iter_mut().filter(|p| p.plane == 3).for_each(|p| p.variance *= 1.1);
         let fit = Transfer::fit(&apart, 5);
         assert!((fit.by_plane[3].unwrap() - 0.825).abs() < 1e-12);
         assert!((fit.by_plane[0].unwrap() - 0.75).abs() < 1e-12);
@@ -195,9 +158,7 @@ mod tests {
         let mut normal = || {
             // The sum of twelve uniform numbers.
             (0..12).fold(-6.0, |sum, _| {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1);
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
                 sum + (state >> 32) as f64 / 4_294_967_296.0
             })
         };
@@ -213,9 +174,6 @@ mod tests {
             squares += fit.intercept * fit.intercept / 400.0;
             error += fit.intercept_error / 400.0;
         }
-        assert!(
-            (squares.sqrt() / error - 1.0).abs() < 0.1,
-            "{squares}, {error}"
-        );
+        assert!((squares.sqrt() / error - 1.0).abs() < 0.1, "{squares}, {error}");
     }
 }

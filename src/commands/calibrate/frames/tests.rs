@@ -15,11 +15,7 @@ fn pgm(folder: &Path, name: &str, [width, height]: [usize; 2], maximum: u16) -> 
 }
 
 fn options(crop: Option<&str>) -> ReadOptions {
-    ReadOptions {
-        cfa: Cfa::Rggb,
-        crop: crop.map(|crop| crop.parse().unwrap()),
-        most_pixels: 1_000_000,
-    }
+    ReadOptions { cfa: Cfa::Rggb, crop: crop.map(|crop| crop.parse().unwrap()), most_pixels: 1_000_000 }
 }
 
 #[test]
@@ -34,16 +30,12 @@ fn frames_are_cropped_and_must_match_the_first() {
     assert_eq!(frame.samples.len(), 300 * 300);
     // The second row starts at site 301.
     assert_eq!(frame.samples[300], 301 % 256);
-    for (size, maximum, part) in [
-        ([300, 300], 4095, "300 × 300 sites, but"),
-        ([301, 300], 1023, "a PGM with the maximum 1023, but"),
-    ] {
+    for (size, maximum, part) in
+        [([300, 300], 4095, "300 × 300 sites, but"), ([301, 300], 1023, "a PGM with the maximum 1023, but")]
+    {
         let other = pgm(folder.path(), "other.pgm", size, maximum);
         let error = reader.read(&other).unwrap_err().to_string();
-        assert!(
-            error.contains("other.pgm") && error.contains("first.pgm"),
-            "{error}"
-        );
+        assert!(error.contains("other.pgm") && error.contains("first.pgm"), "{error}");
         assert!(error.contains(part), "{error}");
     }
 }
@@ -59,24 +51,13 @@ fn crops_must_keep_the_pattern_and_fit() {
     assert_eq!(frame.samples[0], (6 * 300 + 4) % 256);
     assert_eq!(frame.samples[256], (7 * 300 + 4) % 256);
     for (crop, part) in [
-        (
-            "4,6,300,260",
-            "--crop reaches beyond the frame of 300 × 310",
-        ),
-        (
-            "5,6,256,260",
-            "--crop X,Y,WIDTH,HEIGHT: all four must be even",
-        ),
+        ("4,6,300,260", "--crop reaches beyond the frame of 300 × 310"),
+        ("5,6,256,260", "--crop X,Y,WIDTH,HEIGHT: all four must be even"),
         ("0,0,256,254", "256 × 254 sites are too few for row noise"),
         ("18446744073709551615,0,256,256", "--crop reaches beyond"),
     ] {
-        let error = FrameReader::open(&first, options(Some(crop)))
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.contains("first.pgm") && error.contains(part),
-            "{crop}: {error}"
-        );
+        let error = FrameReader::open(&first, options(Some(crop))).unwrap_err().to_string();
+        assert!(error.contains("first.pgm") && error.contains(part), "{crop}: {error}");
     }
     for wrong in ["1,2,3", "1,2,3,-4", "a", "1,2,3,4,5"] {
         assert!(wrong.parse::<Crop>().is_err(), "{wrong}");
@@ -86,22 +67,19 @@ fn crops_must_keep_the_pattern_and_fit() {
 #[test]
 fn frames_of_another_camera_are_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let [first, same, none, other] = [
-        ("first.tif", Some("A 1")),
-        ("same.tif", Some("A 1")),
-        ("none.tif", None),
-        ("other.tif", Some("B 2")),
-    ]
-    .map(|(name, model)| {
-        let path = folder.path().join(name);
-        let mut encoder = TiffEncoder::new(fs::File::create(&path).unwrap()).unwrap();
-        let mut image = encoder.new_image::<Gray16>(256, 256).unwrap();
-        if let Some(model) = model {
-            image.encoder().write_tag(Tag::Model, model).unwrap();
-        }
-        image.write_data(&vec![512; 256 * 256]).unwrap();
-        path
-    });
+    let [first, same, none, other] =
+        [("first.tif", Some("A 1")), ("same.tif", Some("A 1")), ("none.tif", None), ("other.tif", Some("B 2"))].map(
+            |(name, model)| {
+                let path = folder.path().join(name);
+                let mut encoder = TiffEncoder::new(fs::File::create(&path).unwrap()).unwrap();
+                let mut image = encoder.new_image::<Gray16>(256, 256).unwrap();
+                if let Some(model) = model {
+                    image.encoder().write_tag(Tag::Model, model).unwrap();
+                }
+                image.write_data(&vec![512; 256 * 256]).unwrap();
+                path
+            },
+        );
     let reader = FrameReader::open(&first, options(None)).unwrap();
     assert_eq!(reader.camera(), Some("A 1"));
     reader.read(&same).unwrap();

@@ -18,9 +18,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
     let most_bytes = usize::try_from(most_pixels.saturating_mul(2)).unwrap_or(usize::MAX);
     limits.decoding_buffer_size = most_bytes;
     limits.intermediate_buffer_size = most_bytes;
-    let mut decoder = Decoder::new(Cursor::new(bytes))
-        .map_err(|e| not_readable(&e))?
-        .with_limits(limits);
+    let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(|e| not_readable(&e))?.with_limits(limits);
     let mut tag = |tag: Tag| decoder.find_tag(tag).ok().flatten();
     if tag(DNG_VERSION).is_some() {
         return Err(makers::message("DNG"));
@@ -53,19 +51,10 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         return Err("a TIFF of several images; one mosaic alone expected".to_owned());
     }
     let camera = match (maker, model) {
-        (Some(maker), Some(model)) if !model.starts_with(&maker) => {
-            Some(format!("{maker} {model}"))
-        }
+        (Some(maker), Some(model)) if !model.starts_with(&maker) => Some(format!("{maker} {model}")),
         (maker, model) => model.or(maker),
     };
-    Ok(Decoded {
-        height,
-        width,
-        samples,
-        form: MosaicForm::Tiff,
-        camera,
-        taken,
-    })
+    Ok(Decoded { height, width, samples, form: MosaicForm::Tiff, camera, taken })
 }
 
 fn not_readable(error: &TiffError) -> String {

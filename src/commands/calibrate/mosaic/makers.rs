@@ -4,20 +4,16 @@ use std::path::Path;
 
 use super::decoded::EXPORT;
 
-/// Extensions of RAW files, by maker: Adobe, Canon, Nikon, Sony, Olympus, Panasonic, Fujifilm, Pentax, Samsung, Leica, Hasselblad,
-/// Phase One, Sigma, Kodak, Minolta, Epson.
+/// Extensions of RAW files, by maker: Adobe, Canon, Nikon, Sony, Olympus, Panasonic, Fujifilm, Pentax, Samsung, Leica,
+/// Hasselblad, Phase One, Sigma, Kodak, Minolta, Epson.
 const EXTENSIONS: [&str; 24] = [
-    "dng", "cr2", "cr3", "crw", "nef", "nrw", "arw", "srf", "sr2", "orf", "rw2", "raw", "raf",
-    "pef", "srw", "rwl", "3fr", "fff", "iiq", "x3f", "dcr", "kdc", "mrw", "erf",
+    "dng", "cr2", "cr3", "crw", "nef", "nrw", "arw", "srf", "sr2", "orf", "rw2", "raw", "raf", "pef", "srw", "rwl",
+    "3fr", "fff", "iiq", "x3f", "dcr", "kdc", "mrw", "erf",
 ];
 
 /// Error for a RAW file of a maker, with advice on exporting its mosaic; `None` for other files.
 pub(super) fn problem(path: &Path, bytes: &[u8]) -> Option<String> {
-    let extension = path
-        .extension()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_ascii_lowercase();
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase();
     let by_content = match bytes {
         [b'I', b'I', 42, 0, _, _, _, _, b'C', b'R', ..] => Some("cr2"),
         [_, _, _, _, b'f', b't', b'y', b'p', b'c', b'r', b'x', ..] => Some("cr3"),

@@ -1,4 +1,5 @@
-//! Undeveloped frame of a sensor: [`Mosaic`], read from a 16-bit PNG, a TIFF or a binary PGM. The values are ADU, unchanged from the file.
+//! Undeveloped frame of a sensor: [`Mosaic`], read from a 16-bit PNG, a TIFF or a binary PGM. The values are ADU,
+//! unchanged from the file.
 
 mod decoded;
 mod grey_tiff;
@@ -39,12 +40,11 @@ impl Mosaic {
     /// Reads a file of at most `most_pixels` samples. The content decides the form, not the name.
     ///
     /// # Errors
-    /// If the file cannot be read, is incomplete, or is not a mosaic: a RAW file of a maker, or an image with several channels, 8 bits, or
-    /// a palette.
+    /// If the file cannot be read, is incomplete, or is not a mosaic: a RAW file of a maker, or an image with several
+    /// channels, 8 bits, or a palette.
     pub(super) fn read(path: &Path, most_pixels: u64) -> Result<Self> {
         let bytes = reading::bytes(path)?;
-        let decoded = decode(path, &bytes, most_pixels)
-            .map_err(|problem| Error::data(path.display(), problem))?;
+        let decoded = decode(path, &bytes, most_pixels).map_err(|problem| Error::data(path.display(), problem))?;
         Ok(Self {
             height: decoded.height,
             width: decoded.width,
@@ -69,35 +69,21 @@ fn decode(path: &Path, bytes: &[u8], most_pixels: u64) -> Result<Decoded, String
     match bytes {
         [0x89, b'P', b'N', b'G', ..] => png(bytes, most_pixels),
         [b'P', b'1'..=b'7', ..] => pgm::decode(bytes, most_pixels),
-        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => {
-            grey_tiff::decode(bytes, most_pixels)
-        }
+        [b'I', b'I', 42 | 43, 0, ..] | [b'M', b'M', 0, 42 | 43, ..] => grey_tiff::decode(bytes, most_pixels),
         [0xFF, 0xD8, ..] => Err(developed("a JPEG file")),
-        _ => Err(format!(
-            "not a mosaic: a 16-bit PNG, a TIFF or a binary PGM expected; {EXPORT}"
-        )),
+        _ => Err(format!("not a mosaic: a 16-bit PNG, a TIFF or a binary PGM expected; {EXPORT}")),
     }
 }
 
 fn png(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> {
-    let png =
-        RawPng::open(bytes, &[SampleForm::Grey16], most_pixels).map_err(|error| match error {
-            RawPngError::Broken(problem) => format!("{problem}; copy or export it again"),
-            RawPngError::TooLarge(problem) => format!("{problem}; raise --decode max-pixels"),
-            RawPngError::OtherForm(problem) => developed(&problem),
-        })?;
+    let png = RawPng::open(bytes, &[SampleForm::Grey16], most_pixels).map_err(|error| match error {
+        RawPngError::Broken(problem) => format!("{problem}; copy or export it again"),
+        RawPngError::TooLarge(problem) => format!("{problem}; raise --decode max-pixels"),
+        RawPngError::OtherForm(problem) => developed(&problem),
+    })?;
     let (height, width) = png.size;
-    let samples = png
-        .samples(|sample| sample)
-        .map_err(|problem| format!("{problem}; copy or export it again"))?;
-    Ok(Decoded {
-        height,
-        width,
-        samples,
-        form: MosaicForm::Png,
-        camera: None,
-        taken: None,
-    })
+    let samples = png.samples(|sample| sample).map_err(|problem| format!("{problem}; copy or export it again"))?;
+    Ok(Decoded { height, width, samples, form: MosaicForm::Png, camera: None, taken: None })
 }
 
 #[cfg(test)]

@@ -14,11 +14,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         return Err(problem);
     }
     let mut header = Header { bytes, at: 2 };
-    let [width, height, maximum] = [
-        header.number("width")?,
-        header.number("height")?,
-        header.number("maximum")?,
-    ];
+    let [width, height, maximum] = [header.number("width")?, header.number("height")?, header.number("maximum")?];
     if width == 0 || height == 0 {
         return Err(format!("{width} × {height} pixels are not an image"));
     }
@@ -29,9 +25,7 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         return Err(developed(&format!("a PGM of 8 bits (maximum {maximum})")));
     }
     let Ok(maximum) = u16::try_from(maximum) else {
-        return Err(format!(
-            "the maximum {maximum} is above 65535, the largest of the format"
-        ));
+        return Err(format!("the maximum {maximum} is above 65535, the largest of the format"));
     };
     // A single white-space character ends the header.
     let rest = bytes.get(header.at + 1..).unwrap_or_default();
@@ -42,31 +36,16 @@ pub(super) fn decode(bytes: &[u8], most_pixels: u64) -> Result<Decoded, String> 
         } else {
             "more than one image, or no PGM of 16 bits"
         };
-        return Err(format!(
-            "{problem}: {} bytes of samples, {expected} expected",
-            rest.len()
-        ));
+        return Err(format!("{problem}: {} bytes of samples, {expected} expected", rest.len()));
     }
-    let samples: Vec<u16> = rest
-        .as_chunks::<2>()
-        .0
-        .iter()
-        .map(|pair| u16::from_be_bytes(*pair))
-        .collect();
+    let samples: Vec<u16> = rest.as_chunks::<2>().0.iter().map(|pair| u16::from_be_bytes(*pair)).collect();
     let largest = samples.iter().copied().max().unwrap_or(0);
     if largest > maximum {
         return Err(format!(
             "a sample of {largest} is above the maximum {maximum} of the header; samples are big-endian"
         ));
     }
-    Ok(Decoded {
-        height,
-        width,
-        samples,
-        form: MosaicForm::Pgm(maximum),
-        camera: None,
-        taken: None,
-    })
+    Ok(Decoded { height, width, samples, form: MosaicForm::Pgm(maximum), camera: None, taken: None })
 }
 
 /// Parser of the header of a file.
@@ -93,14 +72,8 @@ impl Header<'_> {
         }
         let rest = &self.bytes[self.at..];
         // Ten digits are enough for any supported image.
-        let length = rest
-            .iter()
-            .take(10)
-            .take_while(|byte| byte.is_ascii_digit())
-            .count();
-        let number = std::str::from_utf8(&rest[..length])
-            .ok()
-            .and_then(|digits| digits.parse().ok());
+        let length = rest.iter().take(10).take_while(|byte| byte.is_ascii_digit()).count();
+        let number = std::str::from_utf8(&rest[..length]).ok().and_then(|digits| digits.parse().ok());
         self.at += length;
         let ends = self.bytes.get(self.at).is_some_and(u8::is_ascii_whitespace);
         number.filter(|_| ends).ok_or_else(missing)

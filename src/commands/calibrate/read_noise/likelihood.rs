@@ -6,14 +6,15 @@ use super::super::sums::{Residuals, STEPS};
 use super::simplex::{self, Start};
 use super::tukey::TukeyTable;
 
-/// Minimum probability of a residual (chosen). It is far below the probability of any residual of the distribution, and limits the effect
-/// of outliers such as cosmic rays.
+/// Minimum probability of a residual (chosen). It is far below the probability of any residual of the distribution, and
+/// limits the effect of outliers such as cosmic rays.
 const MIN_PROBABILITY: f64 = 1e-12;
 
 /// Search range of λ. Below −½ the variance is infinite; 1 is the uniform distribution.
 const SHAPES: [f64; 2] = [-0.49, 1.0];
 
-/// Step of the numerical derivatives in λ and in ln σ_TL (chosen larger than the spacing of the table, which is interpolated linearly).
+/// Step of the numerical derivatives in λ and in ln σ_TL (chosen larger than the spacing of the table, which is
+/// interpolated linearly).
 const DERIVATIVE_STEP: f64 = 2e-3;
 
 /// Absolute residuals in ADU, in ascending order, with their counts: the distribution is symmetric around 0.
@@ -23,11 +24,8 @@ pub(super) struct Folded(Vec<(f64, f64)>);
 impl Folded {
     pub(super) fn new(residuals: &Residuals) -> Self {
         let mut folded: Vec<(i64, u64)> = Vec::new();
-        let mut all: Vec<(i64, u64)> = residuals
-            .counts()
-            .into_iter()
-            .map(|(steps, count)| (steps.abs(), count))
-            .collect();
+        let mut all: Vec<(i64, u64)> =
+            residuals.counts().into_iter().map(|(steps, count)| (steps.abs(), count)).collect();
         all.sort_unstable();
         for (steps, count) in all {
             match folded.last_mut() {
@@ -35,12 +33,7 @@ impl Folded {
                 _ => folded.push((steps, count)),
             }
         }
-        Self(
-            folded
-                .into_iter()
-                .map(|(steps, count)| (steps as f64 / STEPS as f64, count as f64))
-                .collect(),
-        )
+        Self(folded.into_iter().map(|(steps, count)| (steps as f64 / STEPS as f64, count as f64)).collect())
     }
 }
 
@@ -65,12 +58,7 @@ impl Likelihood {
     /// # Errors
     /// If all residuals are 0, or the search ends at a limit of the range of λ.
     pub(super) fn maximize(&self) -> Result<[f64; 2], String> {
-        let squares: f64 = self
-            .residuals
-            .0
-            .iter()
-            .map(|(size, n)| n * size * size)
-            .sum();
+        let squares: f64 = self.residuals.0.iter().map(|(size, n)| n * size * size).sum();
         let deviation = (squares / self.count.max(1.0)).sqrt();
         if deviation <= 0.0 || self.count <= 0.0 {
             return Err("bias frames without any noise".to_owned());
@@ -78,10 +66,7 @@ impl Likelihood {
         // The standard deviation of the distribution with scale 1 is 1.8 at λ = 0.
         let log_scale = libm::log(deviation / 1.8);
         let [first, second] = [-0.1, 0.1].map(|shape| {
-            let start = Start {
-                at: [shape, log_scale],
-                step: [0.05, 0.1],
-            };
+            let start = Start { at: [shape, log_scale], step: [0.05, 0.1] };
             simplex::minimize(start, &|at: [f64; 2]| {
                 if !(SHAPES[0]..=SHAPES[1]).contains(&at[0]) {
                     return f64::INFINITY;
@@ -89,11 +74,7 @@ impl Likelihood {
                 -self.log_likelihood(&self.residuals, at) / self.count
             })
         });
-        let best = if first.1 <= second.1 {
-            first.0
-        } else {
-            second.0
-        };
+        let best = if first.1 <= second.1 { first.0 } else { second.0 };
         let margin = 2.0 * DERIVATIVE_STEP;
         if best[0] < SHAPES[0] + margin || best[0] > SHAPES[1] - margin {
             return Err(format!(
@@ -145,11 +126,7 @@ impl Likelihood {
             .0
             .iter()
             .map(|(size, count)| {
-                let above = if *size < 0.5 {
-                    mirrored.next().unwrap_or(0.5)
-                } else {
-                    inner.at((0.5 - size) / scale)
-                };
+                let above = if *size < 0.5 { mirrored.next().unwrap_or(0.5) } else { inner.at((0.5 - size) / scale) };
                 let probability = above - outer.at((-0.5 - size) / scale);
                 count * libm::log(probability.max(MIN_PROBABILITY))
             })

@@ -1,7 +1,7 @@
 //! Fit of the shape λ and the scale σ_TL of read noise to the residuals of bias frames: [`ReadNoise`].
 //!
-//! The fit maximizes the likelihood of the integer codes, so that rounding does not count as noise. [`plot_fit`] is the fit by the
-//! probability plot (Wei et al. 2021), which the published calibrations use.
+//! The fit maximizes the likelihood of the integer codes, so that rounding does not count as noise. [`plot_fit`] is the
+//! fit by the probability plot (Wei et al. 2021), which the published calibrations use.
 
 mod likelihood;
 mod plot;
@@ -39,18 +39,9 @@ impl ReadNoise {
         let likelihood = Likelihood::new(Folded::new(&all));
         let [shape, log_scale] = likelihood.maximize()?;
         let curvature = likelihood.curvature([shape, log_scale]);
-        let inverse = inverse(curvature)
-            .ok_or("the shape and the scale of the read noise cannot be separated")?;
-        let scores = groups
-            .iter()
-            .map(|group| likelihood.score(&Folded::new(group), [shape, log_scale]))
-            .collect();
-        Ok(Self {
-            shape,
-            log_scale,
-            scores,
-            inverse,
-        })
+        let inverse = inverse(curvature).ok_or("the shape and the scale of the read noise cannot be separated")?;
+        let scores = groups.iter().map(|group| likelihood.score(&Folded::new(group), [shape, log_scale])).collect();
+        Ok(Self { shape, log_scale, scores, inverse })
     }
 
     /// λ and ln σ_TL with one weight for each group, by one step of Newton's method from the fit.
@@ -59,26 +50,16 @@ impl ReadNoise {
             .scores
             .iter()
             .zip(weights)
-            .fold([0.0; 2], |[a, b], (score, weight)| {
-                [a + weight * score[0], b + weight * score[1]]
-            });
+            .fold([0.0; 2], |[a, b], (score, weight)| [a + weight * score[0], b + weight * score[1]]);
         let [first, second] = self.inverse;
-        [
-            self.shape - (first[0] * a + first[1] * b),
-            self.log_scale - (second[0] * a + second[1] * b),
-        ]
+        [self.shape - (first[0] * a + first[1] * b), self.log_scale - (second[0] * a + second[1] * b)]
     }
 }
 
 /// Inverse of a negative definite matrix; `None` if the matrix is not negative definite.
 fn inverse([[a, b], [c, d]]: [[f64; 2]; 2]) -> Option<[[f64; 2]; 2]> {
     let determinant = a * d - b * c;
-    (a < 0.0 && determinant > 0.0).then(|| {
-        [
-            [d / determinant, -b / determinant],
-            [-c / determinant, a / determinant],
-        ]
-    })
+    (a < 0.0 && determinant > 0.0).then(|| [[d / determinant, -b / determinant], [-c / determinant, a / determinant]])
 }
 
 #[cfg(test)]

@@ -16,17 +16,14 @@ pub(crate) struct PlotFit {
     pub scale: f64,
 }
 
-/// Fits the shape whose quantiles correlate best with the sorted residuals; the slope of the plot is the scale (Wei et al. 2021, section
-/// 3.2; Filliben 1975). The rounding of codes counts as noise.
+/// Fits the shape whose quantiles correlate best with the sorted residuals; the slope of the plot is the scale (Wei et
+/// al. 2021, section 3.2; Filliben 1975). The rounding of codes counts as noise.
 ///
 /// Equal residuals fill an interval of probability; each is plotted at the mean quantile of that interval.
 pub(crate) fn plot_fit(residuals: &Residuals) -> PlotFit {
     let counts = residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();
-    let centre = counts
-        .iter()
-        .map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64))
-        .sum::<f64>()
+    let centre = counts.iter().map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64)).sum::<f64>()
         / total.max(1.0);
     // Mean of the product of quantile and residual.
     let product = |shape: f64| {
@@ -41,10 +38,7 @@ pub(crate) fn plot_fit(residuals: &Residuals) -> PlotFit {
         sum
     };
     let shape = golden_section(SHAPES, &|shape| product(shape) / variance(shape).sqrt());
-    PlotFit {
-        shape,
-        scale: product(shape) / variance(shape),
-    }
+    PlotFit { shape, scale: product(shape) / variance(shape) }
 }
 
 /// Integral of the quantile function Q from 0 to u: Σ ±(u^(λ+1)) / (λ(λ + 1)) up to a constant.
@@ -54,11 +48,7 @@ fn integral(u: f64, shape: f64) -> f64 {
             return 0.0;
         }
         let log = libm::log(u);
-        if shape == 0.0 {
-            u * log
-        } else {
-            u * libm::expm1(shape * log) / shape
-        }
+        if shape == 0.0 { u * log } else { u * libm::expm1(shape * log) / shape }
     });
     (lower + upper) / (shape + 1.0)
 }

@@ -6,11 +6,7 @@ use darkqa_light::draws::tukey_lambda;
 
 /// Residuals of a frame of 512 × 512 sites whose noise has these quantiles, in pseudorandom order.
 fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
-    let layout = Layout {
-        cfa: Cfa::Mono,
-        height: 512,
-        width: 512,
-    };
+    let layout = Layout { cfa: Cfa::Mono, height: 512, width: 512 };
     let sites = layout.height * layout.width;
     let samples: Vec<u16> = (0..sites)
         .map(|site| {
@@ -29,13 +25,7 @@ fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
 
 #[test]
 fn shape_and_scale_are_recovered_despite_rounding() {
-    for (shape, scale) in [
-        (0.1143, 0.59),
-        (0.0, 1.2),
-        (-0.043, 1.55),
-        (-0.114, 4.0),
-        (-0.143, 8.0),
-    ] {
+    for (shape, scale) in [(0.1143, 0.59), (0.0, 1.2), (-0.043, 1.55), (-0.114, 4.0), (-0.143, 8.0)] {
         let fit = ReadNoise::fit(&[residuals(shape, scale, 1)]).unwrap();
         assert!((fit.shape - shape).abs() < 0.004, "{shape}: {}", fit.shape);
         let error = fit.log_scale.exp() / scale - 1.0;
@@ -61,11 +51,7 @@ fn a_resample_matches_a_fit_of_its_groups() {
     let both = ReadNoise::fit(&groups).unwrap();
     let first = ReadNoise::fit(&groups[..1]).unwrap();
     let [shape, log_scale] = both.resampled(&[2.0, 0.0]);
-    assert!(
-        (shape - first.shape).abs() < 2e-3,
-        "{shape}, {}",
-        first.shape
-    );
+    assert!((shape - first.shape).abs() < 2e-3, "{shape}, {}", first.shape);
     assert!((log_scale - first.log_scale).abs() < 4e-3, "{log_scale}");
     // Equal weights give the fit itself.
     let [shape, log_scale] = both.resampled(&[1.0, 1.0]);
@@ -90,11 +76,7 @@ fn outliers_have_little_effect() {
 
 #[test]
 fn frames_without_noise_are_refused() {
-    let layout = Layout {
-        cfa: Cfa::Mono,
-        height: 256,
-        width: 256,
-    };
+    let layout = Layout { cfa: Cfa::Mono, height: 256, width: 256 };
     let hot = HotPixels::none(layout.plane_rows());
     let samples = vec![512; 256 * 256];
     let sums = PlaneSums::new(layout, &samples, &hot);

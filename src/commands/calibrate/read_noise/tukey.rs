@@ -1,6 +1,8 @@
-//! Cumulative distribution function of Tukey's λ distribution, by a table: [`TukeyTable`]. Only its inverse has a closed form.
+//! Cumulative distribution function of Tukey's λ distribution, by a table: [`TukeyTable`]. Only its inverse has a
+//! closed form.
 
-/// Number of points of the table from the smallest probability to ½ (chosen with the range for relative errors below 10⁻⁵).
+/// Number of points of the table from the smallest probability to ½ (chosen with the range for relative errors below
+/// 10⁻⁵).
 const POINTS: usize = 3001;
 
 /// Logit of the smallest probability of the table, 2.8 · 10⁻¹⁰.
@@ -43,10 +45,7 @@ impl TukeyTable {
 
     /// Reader of the distribution function with scale 1 at descending arguments.
     pub(super) fn falling(&self) -> Falling<'_> {
-        Falling {
-            table: self,
-            above: POINTS - 1,
-        }
+        Falling { table: self, above: POINTS - 1 }
     }
 }
 
@@ -58,13 +57,10 @@ pub(super) struct Falling<'a> {
 }
 
 impl Falling<'_> {
-    /// Probability of values below `x`, which must be at most 0 and at most the previous argument. It is 0 below the table.
+    /// Probability of values below `x`, which must be at most 0 and at most the previous argument. It is 0 below the
+    /// table.
     pub(super) fn at(&mut self, x: f64) -> f64 {
-        let TukeyTable {
-            quantiles,
-            probabilities,
-            ..
-        } = self.table;
+        let TukeyTable { quantiles, probabilities, .. } = self.table;
         while self.above > 0 && quantiles[self.above - 1] > x {
             self.above -= 1;
         }
@@ -73,11 +69,7 @@ impl Falling<'_> {
         }
         let [low, high] = [self.above - 1, self.above];
         let width = quantiles[high] - quantiles[low];
-        let share = if width > 0.0 {
-            ((x - quantiles[low]) / width).min(1.0)
-        } else {
-            0.0
-        };
+        let share = if width > 0.0 { ((x - quantiles[low]) / width).min(1.0) } else { 0.0 };
         probabilities[low] + share * (probabilities[high] - probabilities[low])
     }
 }

@@ -50,12 +50,8 @@ impl SettingFiles {
         let end = self.name.rfind(|c: char| c.is_ascii_digit())? + 1;
         let start = self.name[..end].rfind(|c: char| !c.is_ascii_digit() && c != '.');
         // The character before the number may have several bytes.
-        let before =
-            start.and_then(|start| Some(start + self.name[start..].chars().next()?.len_utf8()));
-        self.name[before.unwrap_or(0)..end]
-            .trim_start_matches('.')
-            .parse()
-            .ok()
+        let before = start.and_then(|start| Some(start + self.name[start..].chars().next()?.len_utf8()));
+        self.name[before.unwrap_or(0)..end].trim_start_matches('.').parse().ok()
     }
 
     /// Exposure of this name; adds it if it is new.
@@ -63,10 +59,7 @@ impl SettingFiles {
         let known = self.exposures.iter().position(|known| known.name == name);
         let index = known.unwrap_or(self.exposures.len());
         if known.is_none() {
-            self.exposures.push(ExposureFiles {
-                name: name.to_owned(),
-                ..ExposureFiles::default()
-            });
+            self.exposures.push(ExposureFiles { name: name.to_owned(), ..ExposureFiles::default() });
         }
         &mut self.exposures[index]
     }
@@ -81,16 +74,11 @@ impl SettingFiles {
             if exposure.flats.len() % 2 == 1
                 && let Some(odd) = exposure.flats.pop()
             {
-                notes.push(format!(
-                    "{}: without a partner in its pair, left out",
-                    odd.display()
-                ));
+                notes.push(format!("{}: without a partner in its pair, left out", odd.display()));
             }
             if exposure.dark.len() == 1 {
                 let one = exposure.dark[0].display();
-                notes.push(format!(
-                    "{one}: at least 2 dark frames are needed, left out"
-                ));
+                notes.push(format!("{one}: at least 2 dark frames are needed, left out"));
                 exposure.dark.clear();
             }
             if exposure.flats.is_empty() && !exposure.dark.is_empty() {

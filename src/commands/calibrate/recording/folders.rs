@@ -1,5 +1,5 @@
-//! Recording in folders: one folder for each setting, with the subfolders `bias`, `flat-NAME` for each exposure, and optionally `dark-NAME`
-//! for the same exposures and `white`.
+//! Recording in folders: one folder for each setting, with the subfolders `bias`, `flat-NAME` for each exposure, and
+//! optionally `dark-NAME` for the same exposures and `white`.
 
 use std::path::{Path, PathBuf};
 
@@ -9,21 +9,15 @@ use crate::error::{Error, Result};
 use crate::files::reading::entries;
 
 /// Names of the subfolders of a setting, for messages.
-const NAMES: &str =
-    "bias/, flat-NAME/ for each exposure, and if you have them dark-NAME/ and white/";
+const NAMES: &str = "bias/, flat-NAME/ for each exposure, and if you have them dark-NAME/ and white/";
 
 /// Finds the frames in a folder. Files and folders with other names are left out, with a note.
 pub(super) fn read(folder: &Path) -> Result<Recording> {
-    let mut recording = Recording {
-        settings: Vec::new(),
-        notes: Vec::new(),
-    };
+    let mut recording = Recording { settings: Vec::new(), notes: Vec::new() };
     for path in visible(folder)? {
         if !path.is_dir() {
             let problem = "no folder of a setting, left out";
-            recording
-                .notes
-                .push(format!("{}: {problem}", path.display()));
+            recording.notes.push(format!("{}: {problem}", path.display()));
             continue;
         }
         let setting = setting(&path, &mut recording.notes)?;
@@ -40,10 +34,7 @@ pub(super) fn read(folder: &Path) -> Result<Recording> {
 
 /// Finds the frames of a setting.
 fn setting(folder: &Path, notes: &mut Vec<String>) -> Result<SettingFiles> {
-    let mut setting = SettingFiles {
-        name: name(folder),
-        ..SettingFiles::default()
-    };
+    let mut setting = SettingFiles { name: name(folder), ..SettingFiles::default() };
     let mut found = 0;
     for path in visible(folder)? {
         let Some(frames) = frames_mut(&mut setting, &path) else {
@@ -85,8 +76,5 @@ fn visible(folder: &Path) -> Result<Vec<PathBuf>> {
 }
 
 fn name(path: &Path) -> String {
-    path.file_name()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .into_owned()
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }

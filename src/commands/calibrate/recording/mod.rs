@@ -20,16 +20,10 @@ impl Recording {
     /// If the folder cannot be read, or a setting has too few frames.
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let list = folder.join(TABLE);
-        let mut recording = if list.exists() {
-            table::read(folder, &list)?
-        } else {
-            folders::read(folder)?
-        };
+        let mut recording = if list.exists() { table::read(folder, &list)? } else { folders::read(folder)? };
         recording.settings.sort_by(|a, b| {
             let [number, other] = [a, b].map(|setting| setting.number().unwrap_or(f64::INFINITY));
-            number
-                .total_cmp(&other)
-                .then_with(|| by_numbers(&a.name, &b.name))
+            number.total_cmp(&other).then_with(|| by_numbers(&a.name, &b.name))
         });
         for setting in &mut recording.settings {
             setting.pair_up(folder, &mut recording.notes)?;
@@ -39,10 +33,7 @@ impl Recording {
 
     /// First bias frame of the first setting.
     pub(super) fn first(&self) -> &Path {
-        self.settings
-            .iter()
-            .find_map(|setting| setting.bias.first())
-            .map_or(Path::new(""), PathBuf::as_path)
+        self.settings.iter().find_map(|setting| setting.bias.first()).map_or(Path::new(""), PathBuf::as_path)
     }
 
     /// Number of settings.

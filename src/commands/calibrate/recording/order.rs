@@ -2,8 +2,8 @@
 
 use std::cmp::Ordering;
 
-/// Compares names in natural order: `2.tif` comes before `10.tif`. Runs of digits are compared by value, other characters as text. Names
-/// that differ only in leading zeros are compared as text.
+/// Compares names in natural order: `2.tif` comes before `10.tif`. Runs of digits are compared by value, other
+/// characters as text. Names that differ only in leading zeros are compared as text.
 pub(super) fn by_numbers(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a, b);
     while !left.is_empty() && !right.is_empty() {
@@ -28,7 +28,8 @@ fn split(name: &str) -> (&str, &str) {
     name.split_at(end.unwrap_or(name.len()))
 }
 
-/// Digits of a run without leading zeros; `None` for other characters. Their number and then their text give the order of values.
+/// Digits of a run without leading zeros; `None` for other characters. Their number and then their text give the order
+/// of values.
 fn value(run: &str) -> Option<&str> {
     let is_number = run.starts_with(|c: char| c.is_ascii_digit());
     is_number.then(|| run.trim_start_matches('0'))

@@ -56,10 +56,7 @@ pub(super) fn read(folder: &Path, list: &Path) -> Result<Recording> {
         }
         let known = settings.iter().position(|known| known.name == line.setting);
         let index = known.unwrap_or_else(|| {
-            settings.push(SettingFiles {
-                name: line.setting.clone(),
-                ..SettingFiles::default()
-            });
+            settings.push(SettingFiles { name: line.setting.clone(), ..SettingFiles::default() });
             settings.len() - 1
         });
         let setting = &mut settings[index];
@@ -73,10 +70,7 @@ pub(super) fn read(folder: &Path, list: &Path) -> Result<Recording> {
     if settings.is_empty() {
         return Err(Error::data(list.display(), "no frames in the list"));
     }
-    Ok(Recording {
-        settings,
-        notes: Vec::new(),
-    })
+    Ok(Recording { settings, notes: Vec::new() })
 }
 
 /// Message of a parse error, without the position that the parser adds.

@@ -33,15 +33,8 @@ fn settings_are_ordered_by_number() {
     let (_folder, recording) = opened(&files);
     let recording = recording.unwrap();
     let names = recording.settings.iter().map(|setting| &*setting.name);
-    assert_eq!(
-        names.collect::<Vec<_>>(),
-        ["iso100", "iso800", "iso1600", "low"]
-    );
-    let numbers: Vec<_> = recording
-        .settings
-        .iter()
-        .map(SettingFiles::number)
-        .collect();
+    assert_eq!(names.collect::<Vec<_>>(), ["iso100", "iso800", "iso1600", "low"]);
+    let numbers: Vec<_> = recording.settings.iter().map(SettingFiles::number).collect();
     assert_eq!(numbers, [Some(100.0), Some(800.0), Some(1600.0), None]);
     assert_eq!(recording.notes, [""; 0]);
     assert!(recording.first().ends_with("iso100/bias/0.png"));
@@ -59,20 +52,14 @@ fn the_last_number_of_a_name_counts() {
         ("é", None),
         ("1.2.3", None),
     ] {
-        let setting = SettingFiles {
-            name: name.to_owned(),
-            ..SettingFiles::default()
-        };
+        let setting = SettingFiles { name: name.to_owned(), ..SettingFiles::default() };
         assert_eq!(setting.number(), number, "{name}");
     }
     let files = ["a7s2-iso800", "a7s2-iso1600", "a7s2-iso100"].map(least);
     let (_folder, recording) = opened(&files.concat());
     let recording = recording.unwrap();
     let names = recording.settings.iter().map(|setting| &*setting.name);
-    assert_eq!(
-        names.collect::<Vec<_>>(),
-        ["a7s2-iso100", "a7s2-iso800", "a7s2-iso1600"]
-    );
+    assert_eq!(names.collect::<Vec<_>>(), ["a7s2-iso100", "a7s2-iso800", "a7s2-iso1600"]);
 }
 
 /// Frames are paired in the order of recording, with or without leading zeros.
@@ -85,12 +72,8 @@ fn frames_are_ordered_by_number() {
     let exposures = &recording.unwrap().settings[0].exposures;
     let names: Vec<&str> = exposures.iter().map(|exposure| &*exposure.name).collect();
     assert_eq!(names, ["1", "2", "3", "10"]);
-    let frames: Vec<_> = exposures[1]
-        .flats
-        .iter()
-        .map(|path| path.file_stem())
-        .map(|stem| stem.unwrap().to_str().unwrap())
-        .collect();
+    let frames: Vec<_> =
+        exposures[1].flats.iter().map(|path| path.file_stem()).map(|stem| stem.unwrap().to_str().unwrap()).collect();
     let taken: Vec<String> = (0..12).map(|frame| frame.to_string()).collect();
     assert_eq!(frames, taken);
 }
@@ -122,10 +105,7 @@ fn odd_flats_and_unknown_names_are_noted() {
         "dark-1/0.png: at least 2 dark frames",
         "dark frames of 9, an exposure without flats",
     ] {
-        assert!(
-            recording.notes.iter().any(|note| note.contains(part)),
-            "{part}"
-        );
+        assert!(recording.notes.iter().any(|note| note.contains(part)), "{part}");
     }
     assert_eq!(recording.notes.len(), 6, "{:?}", recording.notes);
     let exposures = &recording.settings[0].exposures;
@@ -172,9 +152,7 @@ w0,100,white,
 
 #[test]
 fn frames_can_be_listed() {
-    let folder = folder(&[
-        "b0", "b1", "f0", "f1", "f2", "f3", "f4", "f5", "d0", "d1", "w0",
-    ]);
+    let folder = folder(&["b0", "b1", "f0", "f1", "f2", "f3", "f4", "f5", "d0", "d1", "w0"]);
     let list = folder.path().join("frames.csv");
     fs::write(&list, LIST).unwrap();
     let recording = Recording::open(folder.path()).unwrap();
@@ -187,24 +165,13 @@ fn frames_can_be_listed() {
     for (from, to, part) in [
         ("b1,100,bias", "b9,100,bias", "line 3: "),
         ("b1,100,bias", "b1,100,biass", "line 3: "),
-        (
-            "b1,100,bias",
-            "b1,100,biass",
-            "kind (bias, flat, dark or white)",
-        ),
-        (
-            "f1,100,flat,short",
-            "f1,100,flat,",
-            "line 5: a flat or dark frame needs",
-        ),
+        ("b1,100,bias", "b1,100,biass", "kind (bias, flat, dark or white)"),
+        ("f1,100,flat,short", "f1,100,flat,", "line 5: a flat or dark frame needs"),
         ("file,", "files,", "columns file, setting, kind"),
         (LIST, "", "no frames in the list"),
     ] {
         fs::write(&list, LIST.replacen(from, to, 1)).unwrap();
         let error = Recording::open(folder.path()).unwrap_err().to_string();
-        assert!(
-            error.contains("frames.csv") && error.contains(part),
-            "{error}"
-        );
+        assert!(error.contains("frames.csv") && error.contains(part), "{error}");
     }
 }

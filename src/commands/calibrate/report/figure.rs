@@ -6,7 +6,8 @@ use crate::report::charts::chart::LineStyle;
 use crate::report::charts::chart::points::{PointPanel, PointSeries};
 use crate::report::charts::paper::point_figure;
 
-/// Draws three panels: photon transfer, probability plots of the read noise, and the deviations of read and row noise over the gain K.
+/// Draws three panels: photon transfer, probability plots of the read noise, and the deviations of read and row noise
+/// over the gain K.
 ///
 /// # Errors
 /// If the figure cannot be drawn.
@@ -15,16 +16,8 @@ pub(crate) fn figure(camera: &CameraFit) -> Result<String> {
 }
 
 /// One series for each camera setting.
-fn setting_series(
-    camera: &CameraFit,
-    series: impl Fn(&SettingFit, LineStyle) -> PointSeries,
-) -> Vec<PointSeries> {
-    camera
-        .settings
-        .iter()
-        .enumerate()
-        .map(|(style, fit)| series(fit, LineStyle(style)))
-        .collect()
+fn setting_series(camera: &CameraFit, series: impl Fn(&SettingFit, LineStyle) -> PointSeries) -> Vec<PointSeries> {
+    camera.settings.iter().enumerate().map(|(style, fit)| series(fit, LineStyle(style))).collect()
 }
 
 /// Panel of variance over signal for each exposure and colour plane on logarithmic axes, with the fitted line of K.
@@ -39,17 +32,8 @@ fn transfer(camera: &CameraFit) -> PointPanel {
             .collect();
         let signals = points.iter().map(|[signal, _]| *signal);
         let ends = [signals.clone().reduce(f64::min), signals.reduce(f64::max)];
-        let line = ends
-            .into_iter()
-            .flatten()
-            .map(|signal| [signal, signal + libm::log10(fit.gain.value)])
-            .collect();
-        PointSeries {
-            name: format!("{}: K {:.4}", fit.name, fit.gain.value),
-            style,
-            lines: vec![line],
-            points,
-        }
+        let line = ends.into_iter().flatten().map(|signal| [signal, signal + libm::log10(fit.gain.value)]).collect();
+        PointSeries { name: format!("{}: K {:.4}", fit.name, fit.gain.value), style, lines: vec![line], points }
     });
     PointPanel {
         title: "photon transfer".to_owned(),
@@ -58,7 +42,8 @@ fn transfer(camera: &CameraFit) -> PointPanel {
     }
 }
 
-/// Panel of scaled residuals over the quantiles of the fitted distribution; the points are on a straight line if the fit is good.
+/// Panel of scaled residuals over the quantiles of the fitted distribution; the points are on a straight line if the
+/// fit is good.
 fn probability(camera: &CameraFit) -> PointPanel {
     let series = setting_series(camera, |fit, style| {
         let points = &fit.figure.plot;
@@ -85,26 +70,14 @@ fn deviations(camera: &CameraFit) -> PointPanel {
         title: "noise over gain".to_owned(),
         axes: ["ln K", "ln σ"],
         series: vec![
-            PointSeries {
-                name: "σ_TL".to_owned(),
-                style: LineStyle(0),
-                ..read
-            },
-            PointSeries {
-                name: "σ_row".to_owned(),
-                style: LineStyle(1),
-                ..row
-            },
+            PointSeries { name: "σ_TL".to_owned(), style: LineStyle(0), ..read },
+            PointSeries { name: "σ_row".to_owned(), style: LineStyle(1), ..row },
         ],
     }
 }
 
 /// Unnamed series of ln σ over ln K with its fitted line. Settings without noise are left out.
-fn deviation_series(
-    camera: &CameraFit,
-    sigma: fn(&SettingFit) -> f64,
-    line: &NoiseLine,
-) -> PointSeries {
+fn deviation_series(camera: &CameraFit, sigma: fn(&SettingFit) -> f64, line: &NoiseLine) -> PointSeries {
     let points: Vec<[f64; 2]> = camera
         .settings
         .iter()
@@ -115,12 +88,7 @@ fn deviation_series(
     PointSeries {
         name: String::new(),
         style: LineStyle(0),
-        lines: vec![
-            points
-                .iter()
-                .map(|[x, _]| [*x, libm::log(line.at(libm::exp(*x)))])
-                .collect(),
-        ],
+        lines: vec![points.iter().map(|[x, _]| [*x, libm::log(line.at(libm::exp(*x)))]).collect()],
         points,
     }
 }

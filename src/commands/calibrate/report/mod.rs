@@ -41,56 +41,33 @@ pub(crate) fn table(camera: &CameraFit) -> String {
     let settings = TableBuilder::new("calibration", &camera.settings)
         .column(Text, "terminal", |fit| fit.name.clone())
         .column(Text, "terminal K ADU/e", |fit| with_error(fit.gain, 4))
-        .column(Text, "terminal σ_TL ADU", |fit| {
-            with_error(fit.read_scale, 4)
-        })
+        .column(Text, "terminal σ_TL ADU", |fit| with_error(fit.read_scale, 4))
         .column(Text, "terminal λ", |fit| with_error(fit.read_shape, 4))
-        .column(Text, "terminal λ by PPCC", |fit| {
-            decimal(fit.plot.shape, 4)
-        })
-        .column(Text, "terminal σ_row ADU", |fit| {
-            with_error(fit.row_deviation, 4)
-        })
+        .column(Text, "terminal λ by PPCC", |fit| decimal(fit.plot.shape, 4))
+        .column(Text, "terminal σ_row ADU", |fit| with_error(fit.row_deviation, 4))
         .column(Text, &*bias_head, |fit| bias_cell(camera, fit))
         .build();
     let table = terminal::table(&[settings]);
-    let noise_lines = [
-        noise_line("σ_TL", &camera.read_scale),
-        noise_line("σ_row", &camera.row_deviation),
-    ];
+    let noise_lines = [noise_line("σ_TL", &camera.read_scale), noise_line("σ_row", &camera.row_deviation)];
     let checks = if camera.warnings.is_empty() {
         "checks: nothing to report\n".to_owned()
     } else {
-        let warnings: String = camera
-            .warnings
-            .iter()
-            .map(|warning| format!("  {warning}\n"))
-            .collect();
+        let warnings: String = camera.warnings.iter().map(|warning| format!("  {warning}\n")).collect();
         format!("checks:\n{warnings}")
     };
-    let lacks_error = camera
-        .settings
-        .iter()
-        .any(|fit| fit.gain.error.is_none() || fit.read_scale.error.is_none());
+    let lacks_error = camera.settings.iter().any(|fit| fit.gain.error.is_none() || fit.read_scale.error.is_none());
     let error_note = if lacks_error {
         "no ±: a standard error needs 2 pairs of frames or more (10 bias frames are recommended)\n"
     } else {
         ""
     };
-    format!(
-        "{title}\n{table}{}{error_note}{checks}",
-        noise_lines.concat()
-    )
+    format!("{title}\n{table}{}{error_note}{checks}", noise_lines.concat())
 }
 
 /// Bias of each colour plane, with the largest standard error of the planes.
 fn bias_cell(camera: &CameraFit, fit: &SettingFit) -> String {
     let planes = camera.bias(fit);
-    let values = planes
-        .iter()
-        .map(|bias| decimal(bias.value, 3))
-        .collect::<Vec<_>>()
-        .join(" / ");
+    let values = planes.iter().map(|bias| decimal(bias.value, 3)).collect::<Vec<_>>().join(" / ");
     let largest_error = planes.iter().filter_map(|bias| bias.error).reduce(f64::max);
     match largest_error {
         Some(error) => format!("{values} ± {error:.3}"),
@@ -122,9 +99,7 @@ fn noise_line(name: &str, line: &NoiseLine) -> String {
     );
     let source = match line.slope_from {
         SlopeSource::Settings => String::new(),
-        SlopeSource::Preset => {
-            "; fewer than 3 settings count: the slope is that of sony-a7s2".to_owned()
-        }
+        SlopeSource::Preset => "; fewer than 3 settings count: the slope is that of sony-a7s2".to_owned(),
         SlopeSource::NoNoise => return format!("{name}: no setting has any\n"),
     };
     let deviation = match line.deviation_error() {

@@ -10,19 +10,15 @@ const BEND_LIMITS: [f64; 2] = [0.05, 0.15];
 const MAX_INTERCEPT: f64 = 3.0;
 /// Largest difference of K between colour planes, relative to K (chosen).
 const MAX_PLANE_DIFFERENCE: f64 = 0.03;
-/// Smallest standard deviation of the noise of bias frames, in ADU. Chosen: below it, the rounding error depends on the noise and on the
-/// fractional part of the offset.
+/// Smallest standard deviation of the noise of bias frames, in ADU. Chosen: below it, the rounding error depends on the
+/// noise and on the fractional part of the offset.
 const MIN_READ_DEVIATION: f64 = 0.35;
 
 /// Checks a fitted setting and returns warnings. `width` is the number of sites in a row.
 ///
 /// # Errors
 /// If K is out of range, or if the photon transfer line bends too much.
-pub(super) fn setting_doubts(
-    fit: &SettingFit,
-    has_dark: bool,
-    width: usize,
-) -> Result<Vec<String>, String> {
+pub(super) fn setting_doubts(fit: &SettingFit, has_dark: bool, width: usize) -> Result<Vec<String>, String> {
     let gain = fit.gain.value;
     if !(GAIN_RANGE[0]..=GAIN_RANGE[1]).contains(&gain) {
         return Err(format!(
@@ -64,11 +60,7 @@ pub(super) fn setting_doubts(
 fn intercept_doubt(fit: &SettingFit, has_dark: bool) -> Option<String> {
     let error = fit.intercept.error.unwrap_or(f64::INFINITY);
     if fit.intercept.value.abs() > MAX_INTERCEPT * error {
-        let advice = if has_dark {
-            ""
-        } else {
-            "; record dark frames of the exposures of the flats (dark-NAME/)"
-        };
+        let advice = if has_dark { "" } else { "; record dark frames of the exposures of the flats (dark-NAME/)" };
         return Some(format!(
             "photon transfer does not pass through 0: {:+.1} ± {error:.1} ADU² at no light, as if the offset of the flats were {:+.1} ADU from that of the bias frames (dark current, or a black level that moves){advice}",
             fit.intercept.value,
@@ -84,11 +76,8 @@ fn plane_doubt(fit: &SettingFit) -> Option<String> {
     let low = gains.clone().fold(f64::INFINITY, f64::min);
     let high = gains.fold(0.0, f64::max);
     if (high - low) / fit.gain.value > MAX_PLANE_DIFFERENCE {
-        let list: Vec<String> = fit
-            .gain_by_plane
-            .iter()
-            .map(|k| k.map_or("–".to_owned(), |k| format!("{k:.4}")))
-            .collect();
+        let list: Vec<String> =
+            fit.gain_by_plane.iter().map(|k| k.map_or("–".to_owned(), |k| format!("{k:.4}"))).collect();
         return Some(format!(
             "the planes differ in K by more than {:.0} % ({}), and the model has one K for all",
             100.0 * MAX_PLANE_DIFFERENCE,

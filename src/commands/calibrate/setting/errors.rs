@@ -40,17 +40,14 @@ impl Errors {
                 fit_draw(bias, flats, &weights, flat_weights)
             })
             .collect();
-        let bias_error =
-            |value: &dyn Fn(&Draw) -> f64| deviation(draws.iter().map(value), bias.pairs());
+        let bias_error = |value: &dyn Fn(&Draw) -> f64| deviation(draws.iter().map(value), bias.pairs());
         let planes = draws.first().map_or(0, |draw| draw.offsets.len());
         Self {
             gain: deviation(draws.iter().map(|draw| draw.gain), flats.pairs()),
             shape: bias_error(&|draw| draw.read[0]),
             log_scale: bias_error(&|draw| draw.read[1]),
             row: bias_error(&|draw| draw.row),
-            offsets: (0..planes)
-                .map(|plane| bias_error(&|draw| draw.offsets[plane]))
-                .collect(),
+            offsets: (0..planes).map(|plane| bias_error(&|draw| draw.offsets[plane])).collect(),
         }
     }
 }
@@ -58,10 +55,7 @@ impl Errors {
 /// Fits a draw of the bias groups and the flat pairs, given by their weights.
 fn fit_draw(bias: &BiasFit, flats: &Flats, bias_weights: &[f64], flat_weights: &[f64]) -> Draw {
     let (offsets, noise) = (bias.offsets(bias_weights), bias.noise(bias_weights));
-    let base = Base {
-        offsets: &offsets,
-        within: noise.within,
-    };
+    let base = Base { offsets: &offsets, within: noise.within };
     Draw {
         gain: gain(&flats.points(base, flat_weights)),
         row: noise.row_deviation(),

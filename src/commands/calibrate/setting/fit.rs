@@ -42,8 +42,8 @@ pub(crate) struct SettingFit {
     pub gain_by_plane: Vec<Option<f64>>,
     /// Change of variance / signal over the range of light, relative to K.
     pub bend: f64,
-    /// Intercept of the photon transfer line: its variance without light, in ADU². Its error comes from the noise of the sites, because a
-    /// few pairs of flats are too few for a bootstrap.
+    /// Intercept of the photon transfer line: its variance without light, in ADU². Its error comes from the noise of
+    /// the sites, because a few pairs of flats are too few for a bootstrap.
     pub intercept: Measured,
     /// Points for the figures.
     #[serde(skip)]

@@ -33,10 +33,7 @@ pub(super) struct MeasureContext<'a> {
 ///
 /// # Errors
 /// If a frame cannot be read, or a check fails.
-pub(super) fn measure(
-    files: &SettingFiles,
-    context: &mut MeasureContext<'_>,
-) -> Result<SettingFit> {
+pub(super) fn measure(files: &SettingFiles, context: &mut MeasureContext<'_>) -> Result<SettingFit> {
     let refused = |problem: String| Error::data(&files.name, problem);
     let mut notes = Vec::new();
     let bias = BiasFit::measure(context.reader, files, context.inputs, &mut notes)?;
@@ -49,30 +46,13 @@ pub(super) fn measure(
             context.white
         )));
     }
-    let base = Base {
-        offsets: &offsets,
-        within: noise.within,
-    };
-    let settings = FlatSettings {
-        white: context.white,
-        hot: &bias.hot,
-    };
-    let flats = Flats::measure(
-        context.reader,
-        files,
-        settings,
-        base,
-        context.inputs,
-        &mut notes,
-    )?;
+    let base = Base { offsets: &offsets, within: noise.within };
+    let settings = FlatSettings { white: context.white, hot: &bias.hot };
+    let flats = Flats::measure(context.reader, files, settings, base, context.inputs, &mut notes)?;
     let fit = fit(&files.name, &bias, &flats, base);
     let width = context.reader.layout.width;
     notes.extend(doubts::setting_doubts(&fit, flats.have_dark_frames(), width).map_err(refused)?);
-    context.warnings.extend(
-        notes
-            .into_iter()
-            .map(|note| format!("{}: {note}", files.name)),
-    );
+    context.warnings.extend(notes.into_iter().map(|note| format!("{}: {note}", files.name)));
     Ok(fit)
 }
 
@@ -85,11 +65,7 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
     let scale = bias.widened * libm::exp(bias.read.log_scale);
     SettingFit {
         name: name.to_owned(),
-        frames: FrameCounts {
-            bias: bias.frames,
-            exposures: flats.exposures(),
-            flat_pairs: flats.pairs(),
-        },
+        frames: FrameCounts { bias: bias.frames, exposures: flats.exposures(), flat_pairs: flats.pairs() },
         gain: Measured::new(transfer.gain, errors.gain),
         read_scale: Measured::new(scale, errors.log_scale.map(|error| scale * error)),
         read_shape: Measured::new(bias.read.shape, errors.shape),
@@ -106,10 +82,7 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
         gain_by_plane: transfer.by_plane,
         bend: transfer.bend,
         intercept: Measured::new(transfer.intercept, Some(transfer.intercept_error)),
-        figure: FigurePoints {
-            transfer: means_by_plane(&points),
-            plot: plot_points(bias),
-        },
+        figure: FigurePoints { transfer: means_by_plane(&points), plot: plot_points(bias) },
     }
 }
 
@@ -118,20 +91,16 @@ fn means_by_plane(points: &[Point]) -> Vec<[f64; 2]> {
     points
         .chunk_by(|a, b| (a.exposure, a.plane) == (b.exposure, b.plane))
         .map(|group| {
-            let [sum, signal, variance] =
-                group.iter().fold([0.0; 3], |[sum, signal, variance], p| {
-                    [
-                        sum + p.weight,
-                        signal + p.weight * p.signal,
-                        variance + p.weight * p.variance,
-                    ]
-                });
+            let [sum, signal, variance] = group.iter().fold([0.0; 3], |[sum, signal, variance], p| {
+                [sum + p.weight, signal + p.weight * p.signal, variance + p.weight * p.variance]
+            });
             [signal / sum, variance / sum]
         })
         .collect()
 }
 
-/// Points of the probability plot at equally spaced logits of the probability, up to one sample in a million at either end.
+/// Points of the probability plot at equally spaced logits of the probability, up to one sample in a million at either
+/// end.
 fn plot_points(bias: &BiasFit) -> Vec<[f64; 2]> {
     let counts = bias.residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();

@@ -24,9 +24,7 @@ impl PlaneSums {
                 let sum: u64 = part.iter().map(|sample| u64::from(*sample)).sum();
                 hot.columns(plane_row)
                     .map(|column| part[column])
-                    .fold([part.len() as u64, sum], |[count, sum], sample| {
-                        [count - 1, sum - u64::from(sample)]
-                    })
+                    .fold([part.len() as u64, sum], |[count, sum], sample| [count - 1, sum - u64::from(sample)])
             })
             .collect();
         Self { layout, rows }
@@ -90,11 +88,7 @@ impl TopCode {
 
     /// Maximum code of the frame.
     pub(crate) fn max(&self) -> u16 {
-        self.planes
-            .iter()
-            .map(|(_, code, _)| *code)
-            .max()
-            .unwrap_or(0)
+        self.planes.iter().map(|(_, code, _)| *code).max().unwrap_or(0)
     }
 
     /// Largest share of the samples of a plane at its maximum code, and this code.
@@ -105,12 +99,7 @@ impl TopCode {
                 let share = *with_it as f64 / (*count).max(1) as f64;
                 (share, *code)
             })
-            .fold(
-                (0.0, 0),
-                |max, plane| {
-                    if plane.0 > max.0 { plane } else { max }
-                },
-            )
+            .fold((0.0, 0), |max, plane| if plane.0 > max.0 { plane } else { max })
     }
 }
 
@@ -119,11 +108,7 @@ mod tests {
     use super::*;
     use crate::commands::calibrate::layout::Cfa;
 
-    const LAYOUT: Layout = Layout {
-        cfa: Cfa::Rggb,
-        height: 2,
-        width: 6,
-    };
+    const LAYOUT: Layout = Layout { cfa: Cfa::Rggb, height: 2, width: 6 };
     const SAMPLES: [u16; 12] = [1, 10, 2, 10, 3, 10, 5, 7, 5, 7, 9, 8];
 
     #[test]

@@ -1,4 +1,5 @@
-//! Sums over frames as integers, which are exact, so that the result does not depend on the order or the number of threads.
+//! Sums over frames as integers, which are exact, so that the result does not depend on the order or the number of
+//! threads.
 
 mod frame;
 mod pair;

@@ -1,7 +1,8 @@
 //! Sums over the difference of two frames of one exposure: [`PairSums`].
 //!
-//! A difference removes everything that is constant: fixed pattern, response of the sites, fall-off of light. The light of two flats is
-//! never exactly equal, so the sums of products of A and B are stored, which give the difference for any ratio of light.
+//! A difference removes everything that is constant: fixed pattern, response of the sites, fall-off of light. The light
+//! of two flats is never exactly equal, so the sums of products of A and B are stored, which give the difference for
+//! any ratio of light.
 
 mod neighbours;
 mod scatter;
@@ -62,8 +63,9 @@ impl TileSums {
 
     /// Variance of one frame without row noise, in ADU², if the light of A is `ratio` times the light of B.
     ///
-    /// A and B · ratio have equal light, so that their difference D has neither fall-off nor the response of the sites. If S is the light
-    /// of B, the variance of D is K · ratio · S + ratio² · K · S = 2 ratio · K · S̄, where S̄ is the mean light of both.
+    /// A and B · ratio have equal light, so that their difference D has neither fall-off nor the response of the sites.
+    /// If S is the light of B, the variance of D is K · ratio · S + ratio² · K · S = 2 ratio · K · S̄, where S̄ is the
+    /// mean light of both.
     pub(crate) fn variance(&self, ratio: f64) -> f64 {
         self.scatter.squared_difference(ratio) / self.free / (2.0 * ratio)
     }
@@ -108,9 +110,7 @@ impl PairSums {
             .rows
             .iter()
             .flat_map(|row| row.tiles)
-            .fold([0; 3], |[n, a, b], cell| {
-                [n + cell.count, a + cell.a, b + cell.b]
-            });
+            .fold([0; 3], |[n, a, b], cell| [n + cell.count, a + cell.a, b + cell.b]);
         [a, b].map(|sum| sum as f64 / n as f64)
     }
 
@@ -124,9 +124,7 @@ impl PairSums {
                 sums[plane].1 += cell.difference();
             }
         }
-        sums.into_iter()
-            .map(|(count, sum)| sum as f64 / count.max(1) as f64)
-            .collect()
+        sums.into_iter().map(|(count, sum)| sum as f64 / count.max(1) as f64).collect()
     }
 
     /// Parts of rows with their planes.
@@ -140,7 +138,8 @@ impl PairSums {
     /// Read noise and row noise of one frame, for a pair without light.
     ///
     /// D is A − B minus the means of its planes, and m is the mean of D over a sensor row. The variance within rows is
-    /// Σ(D − m)² / (2 · degrees of freedom). The row noise is var(m) / 2 minus the contribution of the sites, within / width.
+    /// Σ(D − m)² / (2 · degrees of freedom). The row noise is var(m) / 2 minus the contribution of the sites, within /
+    /// width.
     pub(crate) fn noise(&self) -> PairNoise {
         let step = self.layout.cfa.step();
         let plane_means = self.plane_means();
@@ -166,10 +165,7 @@ impl PairSums {
         let planes = (self.layout.cfa.planes() - step) as f64;
         let within = within / (count - rows - planes) / 2.0;
         let of_means = of_means / (rows - step as f64) / 2.0;
-        PairNoise {
-            within,
-            row: of_means - within * rows / count,
-        }
+        PairNoise { within, row: of_means - within * rows / count }
     }
 
     /// Sums over neighbours in the rows of each plane.
@@ -214,10 +210,7 @@ impl PairSums {
 impl Cell {
     /// Computes the sums of the sites of both frames in a tile and row.
     fn new(a: &[u16], b: &[u16]) -> Self {
-        let mut cell = Self {
-            count: a.len() as u64,
-            ..Self::default()
-        };
+        let mut cell = Self { count: a.len() as u64, ..Self::default() };
         for (a, b) in a.iter().zip(b) {
             cell.a += u64::from(*a);
             cell.b += u64::from(*b);
@@ -266,8 +259,7 @@ impl PairRow {
             for left in column.saturating_sub(1)..=column {
                 let is_new = last.is_none_or(|last| left > last);
                 if is_new && left + 1 < a.len() {
-                    row.neighbours
-                        .remove([a[left], b[left]], [a[left + 1], b[left + 1]]);
+                    row.neighbours.remove([a[left], b[left]], [a[left + 1], b[left + 1]]);
                     last = Some(left);
                 }
             }
@@ -291,9 +283,7 @@ impl PairRow {
         self.tiles
             .iter()
             .map(|cell| cell.about(mean))
-            .fold([0.0; 3], |sums, cell| {
-                std::array::from_fn(|i| sums[i] + cell[i])
-            })
+            .fold([0.0; 3], |sums, cell| std::array::from_fn(|i| sums[i] + cell[i]))
     }
 }
 

@@ -8,7 +8,8 @@ use super::super::hot_pixels::HotPixels;
 use super::super::layout::Layout;
 use super::{PlaneSums, gather};
 
-/// Number of histogram steps in an ADU (chosen). Codes are integers but centres are not: residuals are rounded to steps.
+/// Number of histogram steps in an ADU (chosen). Codes are integers but centres are not: residuals are rounded to
+/// steps.
 pub(crate) const STEPS: i64 = 32;
 
 /// Maximum residual in ADU that is counted in a list; larger ones are counted in a map (chosen far beyond read noise).
@@ -40,10 +41,7 @@ pub(crate) struct Residuals {
 
 impl Default for Residuals {
     fn default() -> Self {
-        Self {
-            near: vec![0; (2 * WINDOW * STEPS + 1) as usize],
-            far: BTreeMap::new(),
-        }
+        Self { near: vec![0; (2 * WINDOW * STEPS + 1) as usize], far: BTreeMap::new() }
     }
 }
 
@@ -57,19 +55,9 @@ impl Residuals {
         centres: Centres<'_>,
     ) -> Self {
         let rows_at_once = (SAMPLES_PER_PART / layout.width).max(1);
-        let plane_means: Vec<f64> = sums
-            .planes()
-            .into_iter()
-            .map(|[count, sum]| sum as f64 / count.max(1) as f64)
-            .collect();
-        let counter = Counter {
-            layout,
-            samples,
-            sums,
-            hot,
-            centres,
-            plane_means,
-        };
+        let plane_means: Vec<f64> =
+            sums.planes().into_iter().map(|[count, sum]| sum as f64 / count.max(1) as f64).collect();
+        let counter = Counter { layout, samples, sums, hot, centres, plane_means };
         let starts: Vec<usize> = (0..layout.height).step_by(rows_at_once).collect();
         let parts: Vec<Self> = starts
             .into_par_iter()
@@ -110,10 +98,8 @@ impl Residuals {
 
     /// All residuals in steps, in ascending order, with their counts.
     pub(crate) fn counts(&self) -> Vec<(i64, u64)> {
-        let mut all: Vec<(i64, u64)> = (-WINDOW * STEPS..)
-            .zip(self.near.iter().copied())
-            .filter(|(_, count)| *count > 0)
-            .collect();
+        let mut all: Vec<(i64, u64)> =
+            (-WINDOW * STEPS..).zip(self.near.iter().copied()).filter(|(_, count)| *count > 0).collect();
         all.extend(self.far.iter().map(|(steps, count)| (*steps, *count)));
         all.sort_unstable();
         all
@@ -136,12 +122,7 @@ impl Counter<'_> {
         match self.centres {
             Centres::RowsAndPlanes => self.count_around_planes(row, part, residuals),
             Centres::MeanFrame { sums, frames } => {
-                self.count_around_mean_frame(
-                    row,
-                    &sums[row * self.layout.width..],
-                    frames,
-                    residuals,
-                );
+                self.count_around_mean_frame(row, &sums[row * self.layout.width..], frames, residuals);
             }
         }
     }
@@ -173,13 +154,7 @@ impl Counter<'_> {
         }
     }
 
-    fn count_around_mean_frame(
-        &self,
-        row: usize,
-        sums: &[u32],
-        frames: f64,
-        residuals: &mut Residuals,
-    ) {
+    fn count_around_mean_frame(&self, row: usize, sums: &[u32], frames: f64, residuals: &mut Residuals) {
         let Layout { width, cfa, .. } = self.layout;
         let codes = &self.samples[row * width..][..width];
         let mut is_used = vec![true; width];
@@ -216,11 +191,7 @@ mod tests {
     use super::*;
     use crate::commands::calibrate::layout::Cfa;
 
-    const LAYOUT: Layout = Layout {
-        cfa: Cfa::Rggb,
-        height: 2,
-        width: 4,
-    };
+    const LAYOUT: Layout = Layout { cfa: Cfa::Rggb, height: 2, width: 4 };
 
     fn residuals(samples: &[u16], hot: &HotPixels, centres: Centres<'_>) -> Vec<(i64, u64)> {
         let sums = PlaneSums::new(LAYOUT, samples, hot);
@@ -247,22 +218,13 @@ mod tests {
         let none = HotPixels::none(4);
         let pattern = [10, 25, 17, 20, 30, 40, 33, 48];
         let sums: Vec<u32> = pattern.iter().map(|code| 16 * u32::from(*code)).collect();
-        let centres = Centres::MeanFrame {
-            sums: &sums,
-            frames: 16.0,
-        };
+        let centres = Centres::MeanFrame { sums: &sums, frames: 16.0 };
         assert_eq!(residuals(&pattern, &none, centres), [(0, 8)]);
         // A row that is brighter as a whole is row noise.
-        let brighter: Vec<u16> = pattern
-            .iter()
-            .enumerate()
-            .map(|(site, code)| code + 5 * u16::from(site < 4))
-            .collect();
+        let brighter: Vec<u16> =
+            pattern.iter().enumerate().map(|(site, code)| code + 5 * u16::from(site < 4)).collect();
         assert_eq!(residuals(&brighter, &none, centres), [(0, 8)]);
-        assert_ne!(
-            residuals(&brighter, &none, Centres::RowsAndPlanes),
-            [(0, 8)]
-        );
+        assert_ne!(residuals(&brighter, &none, Centres::RowsAndPlanes), [(0, 8)]);
     }
 
     #[test]

@@ -21,32 +21,24 @@ const MODES: [Mode; 5] = [
 
 impl Mode {
     const fn new(command: &'static str, flag: &'static str, has_value: bool) -> Self {
-        Self {
-            command,
-            flag,
-            has_value,
-        }
+        Self { command, flag, has_value }
     }
 
     /// The place of the flag in the words, and its value if it is joined to the flag.
     fn find(&self, words: &[OsString]) -> Option<(usize, Option<OsString>)> {
-        words
-            .iter()
-            .take_while(|word| *word != "--")
-            .enumerate()
-            .find_map(|(place, word)| {
-                let rest = word.to_str()?.strip_prefix("--")?.strip_prefix(self.flag)?;
-                match rest.strip_prefix('=') {
-                    Some(value) if self.has_value => Some((place, Some(value.into()))),
-                    None if rest.is_empty() => Some((place, None)),
-                    _ => None,
-                }
-            })
+        words.iter().take_while(|word| *word != "--").enumerate().find_map(|(place, word)| {
+            let rest = word.to_str()?.strip_prefix("--")?.strip_prefix(self.flag)?;
+            match rest.strip_prefix('=') {
+                Some(value) if self.has_value => Some((place, Some(value.into()))),
+                None if rest.is_empty() => Some((place, None)),
+                _ => None,
+            }
+        })
     }
 }
 
-/// The words of a call, with the flag of a mode replaced by its subcommand: `enhance m --describe` becomes `enhance describe m`. `at` is
-/// the place of the command's name.
+/// The words of a call, with the flag of a mode replaced by its subcommand: `enhance m --describe` becomes `enhance
+/// describe m`. `at` is the place of the command's name.
 pub(super) fn in_current_form(mut words: Vec<OsString>, at: usize) -> Vec<OsString> {
     let found = MODES
         .iter()
@@ -72,10 +64,7 @@ mod tests {
 
     fn current(line: &str) -> String {
         let words = line.split(' ').map(OsString::from).collect();
-        let words: Vec<String> = in_current_form(words, 1)
-            .iter()
-            .map(|word| word.to_string_lossy().into())
-            .collect();
+        let words: Vec<String> = in_current_form(words, 1).iter().map(|word| word.to_string_lossy().into()).collect();
         words.join(" ")
     }
 
@@ -83,19 +72,10 @@ mod tests {
     fn modes_become_subcommands() {
         for (earlier, now) in [
             ("d synthesize --check dir", "d synthesize check dir"),
-            (
-                "d synthesize a --out b --from=c",
-                "d synthesize from c a --out b",
-            ),
-            (
-                "d synthesize a --from c --out b",
-                "d synthesize from c a --out b",
-            ),
+            ("d synthesize a --out b --from=c", "d synthesize from c a --out b"),
+            ("d synthesize a --from c --out b", "d synthesize from c a --out b"),
             ("d enhance m --describe", "d enhance describe m"),
-            (
-                "d enhance m a --doctor --write --out b",
-                "d enhance doctor m a --write --out b",
-            ),
+            ("d enhance m a --doctor --write --out b", "d enhance doctor m a --write --out b"),
             ("d import habitat --script", "d import script habitat"),
         ] {
             assert_eq!(current(earlier), now);

@@ -21,10 +21,7 @@ impl Expansion<'_> {
     /// The keyed flag with this name, if the command has it.
     fn keyed(&self, name: &str) -> Option<&'static KeyedFlag> {
         let keyed = KeyedFlag::from_name(name)?;
-        let is_used = keyed
-            .keys
-            .iter()
-            .any(|(key, flag)| !key.is_empty() && self.flag(flag).is_some());
+        let is_used = keyed.keys.iter().any(|(key, flag)| !key.is_empty() && self.flag(flag).is_some());
         is_used.then_some(keyed)
     }
 
@@ -36,9 +33,7 @@ impl Expansion<'_> {
             let possible = arg.map(Arg::get_possible_values).unwrap_or_default();
             setting.value = match (&possible[..], keyed.alone) {
                 (_, Some(alone)) => Some(alone.to_owned()),
-                _ if arg.is_some_and(|arg| !arg.get_action().takes_values()) => {
-                    Some("true".to_owned())
-                }
+                _ if arg.is_some_and(|arg| !arg.get_action().takes_values()) => Some("true".to_owned()),
                 ([only], _) => Some(only.get_name().to_owned()),
                 _ => {
                     let spelling = flag_spelling(setting.flag);
@@ -89,9 +84,8 @@ impl Expansion<'_> {
                     break;
                 }
             };
-            let settings = self
-                .settings(keyed, &value)
-                .map_err(|problem| Error::usage(format!("--{name}"), problem))?;
+            let settings =
+                self.settings(keyed, &value).map_err(|problem| Error::usage(format!("--{name}"), problem))?;
             for setting in settings {
                 expanded.extend(self.hidden_flag(&setting, &name)?);
             }
@@ -104,9 +98,7 @@ impl Expansion<'_> {
     fn hidden_flag(&self, setting: &KeyedSetting, name: &str) -> Result<Option<OsString>> {
         let KeyedSetting { flag, value } = setting;
         let value = value.as_deref().unwrap_or_default();
-        let takes_values = self
-            .flag(flag)
-            .is_some_and(|arg| arg.get_action().takes_values());
+        let takes_values = self.flag(flag).is_some_and(|arg| arg.get_action().takes_values());
         match value {
             _ if takes_values => Ok(Some(format!("--{flag}={value}").into())),
             "true" | "yes" | "1" => Ok(Some(format!("--{flag}").into())),
@@ -124,14 +116,8 @@ impl Expansion<'_> {
     ///
     /// # Errors
     /// If a key is unknown or has no value, or the layer sets it twice.
-    pub(super) fn layer(
-        &self,
-        mut layer: BTreeMap<String, LayeredValue>,
-    ) -> Result<BTreeMap<String, LayeredValue>> {
-        for keyed in KEYED_FLAGS
-            .iter()
-            .filter_map(|keyed| self.keyed(keyed.name))
-        {
+    pub(super) fn layer(&self, mut layer: BTreeMap<String, LayeredValue>) -> Result<BTreeMap<String, LayeredValue>> {
+        for keyed in KEYED_FLAGS.iter().filter_map(|keyed| self.keyed(keyed.name)) {
             let Some(LayeredValue { origin, values }) = layer.remove(keyed.name) else {
                 continue;
             };
@@ -154,23 +140,14 @@ impl Expansion<'_> {
     }
 
     /// Adds a setting to a layer.
-    fn insert(
-        &self,
-        layer: &mut BTreeMap<String, LayeredValue>,
-        setting: KeyedSetting,
-        origin: &str,
-    ) -> Result<()> {
+    fn insert(&self, layer: &mut BTreeMap<String, LayeredValue>, setting: KeyedSetting, origin: &str) -> Result<()> {
         let value = OsString::from(setting.value.unwrap_or_default());
         let arg = self.flag(setting.flag);
         let repeats = arg.is_some_and(|arg| matches!(arg.get_action(), ArgAction::Append));
         match layer.get_mut(setting.flag) {
             Some(known) if repeats => known.values.push(value),
             Some(known) => {
-                let problem = format!(
-                    "{} is set twice, by {} too",
-                    flag_spelling(setting.flag),
-                    known.origin
-                );
+                let problem = format!("{} is set twice, by {} too", flag_spelling(setting.flag), known.origin);
                 return Err(Error::usage(origin, problem));
             }
             None => {

@@ -7,7 +7,8 @@ use super::value_text::text_of;
 use crate::engine::models::{RunDefault, run_defaults};
 use crate::error::{Error, Result};
 
-/// The flags of the run that a file of models sets, each with its place in the file and its text. `flags` are those of the command.
+/// The flags of the run that a file of models sets, each with its place in the file and its text. `flags` are those of
+/// the command.
 ///
 /// # Errors
 /// If the command has no such flag, or the value has a form that no flag has.

@@ -1,8 +1,8 @@
 //! Refuses a file of flags that sends secrets to an address of its own: [`check`].
 //!
-//! Such a file may come from a stranger, for example from the repository of a paper. It may name an address, or what is sent to one.
-//! With both it could send any file or variable of the user to its author. So a file that names an address may only send files from
-//! its own folder, and variables that belong to this address.
+//! Such a file may come from a stranger, for example from the repository of a paper. It may name an address, or what is
+//! sent to one. With both it could send any file or variable of the user to its author. So a file that names an address
+//! may only send files from its own folder, and variables that belong to this address.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -16,13 +16,8 @@ use crate::types::flags::flag_spelling;
 const ADDRESSES: [&str; 3] = ["base-url", "judge-base-url", "ca-file"];
 
 /// The flags that name an address, each with the flags that decide which key goes there.
-const KEYS: [(&str, [&str; 2]); 2] = [
-    ("base-url", ["api-key-env", "api-key-file"]),
-    (
-        "judge-base-url",
-        ["judge-api-key-env", "judge-api-key-file"],
-    ),
-];
+const KEYS: [(&str, [&str; 2]); 2] =
+    [("base-url", ["api-key-env", "api-key-file"]), ("judge-base-url", ["judge-api-key-env", "judge-api-key-file"])];
 
 /// The flags that change which key goes to which address: a table of vendors names the variable of a host's key.
 const KEY_RULES: [&str; 2] = ["key-anyway", "vendor"];
@@ -31,17 +26,11 @@ const KEY_RULES: [&str; 2] = ["key-anyway", "vendor"];
 const VARIABLES: [&str; 3] = ["api-key-env", "judge-api-key-env", "header-env"];
 
 /// The flags that name a file whose text is sent. In `extra-body`, the file stands after `@`.
-const FILES: [&str; 5] = [
-    "api-key-file",
-    "judge-api-key-file",
-    "system-file",
-    "extra-body",
-    "prompts",
-];
+const FILES: [&str; 5] = ["api-key-file", "judge-api-key-file", "system-file", "extra-body", "prompts"];
 
-/// Refuses a file of flags that sets an address and also sends a variable of another host, or a file outside its own folder.
-/// `values` are those of the file that are in effect. `flags_set` has the flags that any layer sets. `has_key` is true if there is a
-/// default key, which is sent to addresses of unknown vendors.
+/// Refuses a file of flags that sets an address and also sends a variable of another host, or a file outside its own
+/// folder. `values` are those of the file that are in effect. `flags_set` has the flags that any layer sets. `has_key`
+/// is true if there is a default key, which is sent to addresses of unknown vendors.
 ///
 /// # Errors
 /// Names the key of the file, and the flag to type instead.
@@ -58,13 +47,9 @@ pub(super) fn check(
     if let Some((flag, value)) = KEY_RULES.iter().find_map(|flag| entry(values, flag)) {
         return Err(refusal(address, flag, value, "a key of yours"));
     }
-    let unnamed = KEYS
-        .iter()
-        .filter(|(_, keys)| !keys.iter().any(|flag| flags_set.contains(*flag)));
+    let unnamed = KEYS.iter().filter(|(_, keys)| !keys.iter().any(|flag| flags_set.contains(*flag)));
     for (key_address, [key, _]) in unnamed {
-        let value = values
-            .get(*key_address)
-            .filter(|value| has_key && goes_elsewhere(value));
+        let value = values.get(*key_address).filter(|value| has_key && goes_elsewhere(value));
         if let Some(value) = value {
             let problem = format!(
                 "{OPENAI_KEY} would be sent to this address, which the table of vendors does not have; to allow that, add --{key} \
@@ -115,9 +100,7 @@ fn entry<'a>(
 }
 
 /// The variables in which the vendor of each host that the file names keeps its key.
-fn host_variables(
-    values: &BTreeMap<String, &LayeredValue>,
-) -> impl Iterator<Item = Vec<&'static str>> {
+fn host_variables(values: &BTreeMap<String, &LayeredValue>) -> impl Iterator<Item = Vec<&'static str>> {
     ["base-url", "judge-base-url"]
         .into_iter()
         .filter_map(|flag| values.get(flag))
@@ -135,8 +118,8 @@ fn goes_elsewhere(addresses: &LayeredValue) -> bool {
         .any(|url| !url.is_loopback() && vendor_variables(url.host()).is_empty())
 }
 
-/// Returns true if a file lies in the folder of the file of flags or below it, with links followed. A file that does not exist also
-/// returns true: it is refused later.
+/// Returns true if a file lies in the folder of the file of flags or below it, with links followed. A file that does
+/// not exist also returns true: it is refused later.
 fn is_beside(file: &Path, named: &Path) -> bool {
     let folder = file.canonicalize().ok();
     let folder = folder.as_deref().and_then(Path::parent);

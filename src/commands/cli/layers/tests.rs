@@ -23,24 +23,17 @@ fn parsed(words: &[&str], variables: &[(&str, &str)], file: &str) -> Result<ArgM
         words.extend(["--config".into(), path.into()]);
     }
     let variables: BTreeMap<&str, &str> = variables.iter().copied().collect();
-    parse(COMMAND.clone(), words, |name| {
-        Some(variables.get(name)?.into())
-    })
-    .map(|parsed| parsed.matches)
-    .map_err(|problem| match problem {
-        Problem::Error(error) => error.to_string(),
-        Problem::Help(help) => help.to_string(),
-    })
+    parse(COMMAND.clone(), words, |name| Some(variables.get(name)?.into())).map(|parsed| parsed.matches).map_err(
+        |problem| match problem {
+            Problem::Error(error) => error.to_string(),
+            Problem::Help(help) => help.to_string(),
+        },
+    )
 }
 
 /// The values of a flag of the command that is called.
 fn values(matches: &ArgMatches, id: &str) -> Vec<String> {
-    command_matches(matches)
-        .get_raw(id)
-        .into_iter()
-        .flatten()
-        .map(|value| value.to_string_lossy().into())
-        .collect()
+    command_matches(matches).get_raw(id).into_iter().flatten().map(|value| value.to_string_lossy().into()).collect()
 }
 
 /// All commands with the words that call them, nested ones included.
@@ -89,8 +82,8 @@ fn sample(arg: &Arg) -> String {
         _ => match arg.get_value_names() {
             Some([name])
                 if [
-                    "N", "SECONDS", "PIXELS", "MB", "DOLLARS", "EV", "K", "R", "METRES", "DEGREES",
-                    "CODE", "CODES", "HOURS",
+                    "N", "SECONDS", "PIXELS", "MB", "DOLLARS", "EV", "K", "R", "METRES", "DEGREES", "CODE", "CODES",
+                    "HOURS",
                 ]
                 .contains(&name.as_str()) =>
             {
@@ -110,8 +103,7 @@ fn required(command: &Command, without: &Arg) -> Vec<String> {
         let conflicts = hides(command, without, arg);
         // Needed unless another flag is set.
         let id = arg.get_id().as_str();
-        let unless =
-            ["inputs", "pairs", "out", "src"].contains(&id) || id == "model" && arg.is_positional();
+        let unless = ["inputs", "pairs", "out", "src"].contains(&id) || id == "model" && arg.is_positional();
         if conflicts || !arg.is_required_set() && !unless {
             continue;
         }
@@ -130,9 +122,7 @@ fn every_flag_can_be_set_by_word_variable_and_file() {
     all.build();
     let (mut wrong, mut count) = (Vec::new(), 0);
     for (path, command) in commands(&all, &[]) {
-        let has_own_flags = command
-            .get_arguments()
-            .any(|arg| !arg.is_global_set() && arg.get_id() != "help");
+        let has_own_flags = command.get_arguments().any(|arg| !arg.is_global_set() && arg.get_id() != "help");
         if !path.is_empty() && !has_own_flags {
             continue;
         }
@@ -141,11 +131,7 @@ fn every_flag_can_be_set_by_word_variable_and_file() {
             let id = arg.get_id().as_str();
             let flag = arg.get_long().unwrap();
             let switch = !arg.get_action().takes_values();
-            let value = if switch {
-                "true".to_owned()
-            } else {
-                sample(arg)
-            };
+            let value = if switch { "true".to_owned() } else { sample(arg) };
             // Other words that the flag requires.
             let mut words = [&path[..], &required(&command, arg)].concat();
             match id {
@@ -158,11 +144,7 @@ fn every_flag_can_be_set_by_word_variable_and_file() {
                 _ => {}
             }
             let words: Vec<&str> = words.iter().map(String::as_str).collect();
-            let word = if switch {
-                format!("--{flag}")
-            } else {
-                format!("--{flag}={value}")
-            };
+            let word = if switch { format!("--{flag}") } else { format!("--{flag}={value}") };
             let (variable, key) = (variable_name(&name_of(arg)), name_of(arg));
             let table = match &path[..] {
                 [] => String::new(),
@@ -172,18 +154,11 @@ fn every_flag_can_be_set_by_word_variable_and_file() {
             let set = parsed(&words, &[(&variable, &value)], "");
             let top = parsed(&words, &[], &format!("{key} = {value:?}"));
             let filed = parsed(&words, &[], &format!("{table}{key} = {value:?}"));
-            for (how, matches) in [
-                ("word", typed),
-                ("variable", set),
-                ("file", top),
-                ("table", filed),
-            ] {
+            for (how, matches) in [("word", typed), ("variable", set), ("file", top), ("table", filed)] {
                 let found = matches.map(|matches| values(&matches, id));
                 let expected = vec![value.clone()];
                 if found.as_ref() != Ok(&expected) {
-                    wrong.push(format!(
-                        "{path:?} {flag} by {how}: {found:?} for {expected:?}"
-                    ));
+                    wrong.push(format!("{path:?} {flag} by {how}: {found:?} for {expected:?}"));
                 }
             }
         }
@@ -223,20 +198,12 @@ fn a_group_without_words_has_its_default_values() {
     let rooms = format!("{:?}", crate::rooms::Rooms::default());
     assert_eq!(defaults::<crate::rooms::Rooms>(), rooms);
     let parameters = crate::ask::Parameters::new(String::new());
-    assert_eq!(
-        defaults::<crate::ask::Parameters>(),
-        format!("{parameters:?}")
-    );
+    assert_eq!(defaults::<crate::ask::Parameters>(), format!("{parameters:?}"));
 }
 
 #[test]
 fn words_override_variables_and_variables_override_the_file() {
-    let variables = [
-        ("DARKQA_SEED", "2"),
-        ("DARKQA_GAIN", "0.5"),
-        ("DARKQA_MODEL", "a,b"),
-        ("DARKQA_BLIND", "true"),
-    ];
+    let variables = [("DARKQA_SEED", "2"), ("DARKQA_GAIN", "0.5"), ("DARKQA_MODEL", "a,b"), ("DARKQA_BLIND", "true")];
     let file = "seed = 3\ngain = 1\nratio = 150\nmodel = [\"c\"]\nquiet = false\nfamilies = [\"x\", \"y\"]\n";
     let matches = parsed(&["--seed", "1"], &variables, file).unwrap();
     for (id, expected) in [
@@ -286,11 +253,7 @@ fn the_first_layer_that_sets_a_switch_decides() {
         ("", "", false),
     ] {
         let matches = parsed(&[], &[("DARKQA_ALLOW_HTTP", variable)], file).unwrap();
-        assert_eq!(
-            matches.get_flag("allow_http"),
-            expected,
-            "{variable} {file}"
-        );
+        assert_eq!(matches.get_flag("allow_http"), expected, "{variable} {file}");
     }
 }
 
@@ -308,52 +271,21 @@ fn a_flag_hides_conflicting_flags_of_lower_layers() {
 #[test]
 fn errors_name_the_source_of_a_value_and_suggest_a_correction() {
     let error = parsed(&[], &[("DARKQA_RETRIES", "many")], "").unwrap_err();
-    assert!(
-        error.starts_with("DARKQA_RETRIES: invalid value 'many'"),
-        "{error}"
-    );
+    assert!(error.starts_with("DARKQA_RETRIES: invalid value 'many'"), "{error}");
     for (words, file, part) in [
-        (
-            &[][..],
-            "sed = 1",
-            "c.toml, sed: there is no flag --sed here; did you mean --seed?",
-        ),
-        (
-            &[],
-            "retries = \"many\"",
-            "c.toml, retries: invalid value 'many'",
-        ),
+        (&[][..], "sed = 1", "c.toml, sed: there is no flag --sed here; did you mean --seed?"),
+        (&[], "retries = \"many\"", "c.toml, retries: invalid value 'many'"),
         (&[], "blind = 3", "c.toml, blind: true or false"),
-        (
-            &[],
-            "[synthesise]\nseed = 1",
-            "there is no command synthesise; did you mean synthesize?",
-        ),
-        (
-            &["synthesize", "a", "--out=b"],
-            "model = \"m\"",
-            "model: there is no flag --model here",
-        ),
+        (&[], "[synthesise]\nseed = 1", "there is no command synthesise; did you mean synthesize?"),
+        (&["synthesize", "a", "--out=b"], "model = \"m\"", "model: there is no flag --model here"),
         (
             &["synthesize", "a", "--out=b"],
             "[synthesize]\nsheet = \"nose\"",
             "c.toml, synthesize.sheet: invalid value 'nose'",
         ),
-        (
-            &["--modle", "m"],
-            "",
-            "found; tip: a similar argument exists: '--model'",
-        ),
-        (
-            &["synthesise"],
-            "",
-            "tip: a similar subcommand exists: 'synthesize'",
-        ),
-        (
-            &["--profile", "papre"],
-            "",
-            "a similar value exists: 'paper'",
-        ),
+        (&["--modle", "m"], "", "found; tip: a similar argument exists: '--model'"),
+        (&["synthesise"], "", "tip: a similar subcommand exists: 'synthesize'"),
+        (&["--profile", "papre"], "", "a similar value exists: 'paper'"),
     ] {
         let error = parsed(words, &[], file).unwrap_err();
         assert!(error.contains(part), "{part}: {error}");
@@ -404,29 +336,16 @@ fn a_file_sends_nothing_of_the_user_to_an_address_of_its_own() {
         let flag = line.split(' ').next().unwrap();
         let problem = parsed(&words, &[], &format!("{own}{line}\n")).unwrap_err();
         let named = format!("name it on the command line with {}", flag_spelling(flag));
-        assert!(
-            problem.contains(&named) && problem.contains("--base-url"),
-            "{line}: {problem}"
-        );
+        assert!(problem.contains(&named) && problem.contains("--base-url"), "{line}: {problem}");
     }
     for (words, file) in [
         // The user typed where it goes.
-        (
-            "--base-url https://mine.example/v1",
-            format!("{own}api-key-file = \"Cargo.toml\"\n"),
-        ),
+        ("--base-url https://mine.example/v1", format!("{own}api-key-file = \"Cargo.toml\"\n")),
         // The user typed what goes there.
-        (
-            "--api-key-env MINE",
-            format!("{own}api-key-env = \"OPENAI_API_KEY\"\n"),
-        ),
+        ("--api-key-env MINE", format!("{own}api-key-env = \"OPENAI_API_KEY\"\n")),
         ("", "api-key-file = \"Cargo.toml\"\n".to_owned()),
         ("", format!("{own}api-key-env = \"none\"\n")),
-        (
-            "",
-            "base-url = \"https://api.openai.com/v1\"\napi-key-env = \"OPENAI_API_KEY\"\n"
-                .to_owned(),
-        ),
+        ("", "base-url = \"https://api.openai.com/v1\"\napi-key-env = \"OPENAI_API_KEY\"\n".to_owned()),
         ("", format!("{own}extra-body = '{{\"a\": 1}}'\n")),
     ] {
         let words: Vec<&str> = words.split_whitespace().collect();

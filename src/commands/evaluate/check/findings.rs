@@ -93,11 +93,7 @@ impl Findings {
 
     /// Number of problems, including those that are not shown.
     pub(super) fn problem_count(&self) -> usize {
-        let shown = self
-            .all
-            .iter()
-            .filter(|finding| finding.mark == Mark::Problem)
-            .count();
+        let shown = self.all.iter().filter(|finding| finding.mark == Mark::Problem).count();
         let hidden: usize = self
             .kinds
             .values()
@@ -128,19 +124,13 @@ mod tests {
         let mut findings = Findings::default();
         findings.ok("files");
         for n in 0..7 {
-            findings.add_of_kind(
-                "missing images",
-                Mark::Problem,
-                format!("{n}.png is missing"),
-            );
+            findings.add_of_kind("missing images", Mark::Problem, format!("{n}.png is missing"));
         }
         findings.add_of_kind("grey images", Mark::Warning, "x.png is grey");
         assert_eq!(findings.problem_count(), 7);
         let text = lines(&findings.finish());
         assert!(
-            text.contains(
-                "problem  4.png is missing\nproblem  and 2 more: missing images\nwarning  x.png"
-            ),
+            text.contains("problem  4.png is missing\nproblem  and 2 more: missing images\nwarning  x.png"),
             "{text}"
         );
         assert!(!text.contains("5.png"), "{text}");

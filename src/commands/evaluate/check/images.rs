@@ -95,12 +95,7 @@ pub(super) fn check_images(
     }
     let usable = shown.len() - unusable;
     if usable > 0 {
-        findings.ok(format!(
-            "{}, {}, {}",
-            counted(usable, "image"),
-            megabytes(total_bytes),
-            size_list(&sizes)
-        ));
+        findings.ok(format!("{}, {}, {}", counted(usable, "image"), megabytes(total_bytes), size_list(&sizes)));
     }
     for line in notes.lines() {
         findings.warn(line);
@@ -130,22 +125,13 @@ fn inspect<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Inspection<'
             picture.decode()?;
         }
         let note = Some(picture.note()).filter(|note| *note != InputNote::default());
-        Ok(ImageFacts {
-            size,
-            digest: picture.digest(),
-            note: note.map(Box::new),
-        })
+        Ok(ImageFacts { size, digest: picture.digest(), note: note.map(Box::new) })
     });
     Inspection { id, facts, bytes }
 }
 
 /// Measures the brightness of a sample of the images, and warns if they are already dark.
-fn check_brightness(
-    dataset: &Dataset,
-    shown: &[&FrameId],
-    dark: DarkImages,
-    findings: &mut Findings,
-) {
+fn check_brightness(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut Findings) {
     let number = shown.len().min(SAMPLE_SIZE);
     let mut sample: Vec<f64> = (0..number)
         .into_par_iter()
@@ -161,16 +147,12 @@ fn check_brightness(
     };
     match advice(*median).filter(|_| dark == DarkImages::Unexpected) {
         Some(advice) => findings.warn(advice),
-        None => findings.ok(format!(
-            "median brightness {median:.0} of 255 ({})",
-            counted(number, "image")
-        )),
+        None => findings.ok(format!("median brightness {median:.0} of 255 ({})", counted(number, "image"))),
     }
 }
 
 fn size_list(sizes: &BTreeMap<(u32, u32), usize>) -> String {
-    let text =
-        |((width, height), count): (&(u32, u32), &usize)| format!("{count} of {width}×{height}");
+    let text = |((width, height), count): (&(u32, u32), &usize)| format!("{count} of {width}×{height}");
     if sizes.len() <= 4 {
         let sizes: Vec<String> = sizes.iter().map(text).collect();
         return sizes.join(", ");

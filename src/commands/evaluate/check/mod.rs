@@ -53,11 +53,7 @@ pub(crate) struct CheckArgs {
 ///
 /// # Errors
 /// If the flags contradict each other. Other problems are findings, and set the exit code to 1.
-pub(crate) fn check(
-    mut args: EvaluateArgs,
-    check: &CheckArgs,
-    progress: &Progress,
-) -> Result<Outcome> {
+pub(crate) fn check(mut args: EvaluateArgs, check: &CheckArgs, progress: &Progress) -> Result<Outcome> {
     if let Some(place) = &check.place {
         args.data.data = vec![place.clone()];
     }
@@ -69,18 +65,11 @@ pub(crate) fn check(
     check_plan(args, progress, &mut findings);
     let problems = findings.problem_count();
     let findings = findings.finish();
-    let warnings = findings
-        .iter()
-        .filter(|finding| finding.mark == Mark::Warning)
-        .count();
+    let warnings = findings.iter().filter(|finding| finding.mark == Mark::Warning).count();
     let output = if is_json {
         findings_json(&findings, asked, problems)
     } else {
-        format!(
-            "{}{}\n",
-            lines(&findings),
-            verdict(asked, problems, warnings)
-        )
+        format!("{}{}\n", lines(&findings), verdict(asked, problems, warnings))
     };
     Ok(Outcome::text(Outcome::complete_if(problems == 0), output))
 }
@@ -102,12 +91,7 @@ fn findings_json(findings: &[Finding], questions: usize, problems: usize) -> Str
 }
 
 /// Checks data, questions and images; returns the number of questions that would be asked.
-fn check_data(
-    args: &EvaluateArgs,
-    check: &CheckArgs,
-    progress: &Progress,
-    findings: &mut Findings,
-) -> Result<usize> {
+fn check_data(args: &EvaluateArgs, check: &CheckArgs, progress: &Progress, findings: &mut Findings) -> Result<usize> {
     let rule = args.decode.rule();
     let selection = &args.selection;
     let place = args.scene.place(args.data.place());
@@ -120,8 +104,7 @@ fn check_data(
         let rules = rules(selection.rules.as_deref())?;
         open_data(&place, &args.scene, set, selection, &rules, rule, progress)
     });
-    let opened = opened
-        .and_then(|dataset| Ok((dataset, args.scene.set_light(&place, &set.root.data_root)?)));
+    let opened = opened.and_then(|dataset| Ok((dataset, args.scene.set_light(&place, &set.root.data_root)?)));
     let (mut dataset, light) = match opened {
         Ok(opened) => opened,
         Err(e) => {
@@ -155,24 +138,15 @@ fn check_data(
             findings.ok(power.line());
         }
     }
-    let depth = if check.deep {
-        Depth::Pixels
-    } else {
-        Depth::Headers
-    };
+    let depth = if check.deep { Depth::Pixels } else { Depth::Headers };
     let enhancers = args.job.enhancers.clone().for_set(light);
     // Contradictory flags are a finding already.
     let dark = LightSettings::resolve(&args.job.light, light)
-        .map_or(DarkImages::Unexpected, |levels| {
-            DarkImages::new(light, &levels, &enhancers)
-        });
+        .map_or(DarkImages::Unexpected, |levels| DarkImages::new(light, &levels, &enhancers));
     images::check_images(&dataset, dark, &asked, depth, progress, findings);
     if let Some(path) = &check.save_questions {
         save_questions(path, &dataset, &asked)?;
-        findings.ok(format!(
-            "{}: the questions as they were read",
-            path.display()
-        ));
+        findings.ok(format!("{}: the questions as they were read", path.display()));
     }
     Ok(asked.len())
 }
@@ -180,9 +154,7 @@ fn check_data(
 /// Checks the models, and estimates the run. Nothing is sent, and no key is read.
 fn check_plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) {
     if args.job.models.is_empty() {
-        findings.warn(
-            "no model is named: --model NAME adds it to the check, and what a run would take",
-        );
+        findings.warn("no model is named: --model NAME adds it to the check, and what a run would take");
         return;
     }
     if findings.problem_count() > 0 {

@@ -22,10 +22,7 @@ pub(super) fn check_questions(questions: &[Question], findings: &mut Findings) {
         *sizes.entry(question.choices.len()).or_insert(0_usize) += 1;
         chance += 1.0 / question.choices.len() as f64;
     }
-    let sizes: Vec<String> = sizes
-        .iter()
-        .map(|(size, count)| format!("{count} with {size} choices"))
-        .collect();
+    let sizes: Vec<String> = sizes.iter().map(|(size, count)| format!("{count} with {size} choices")).collect();
     findings.ok(format!(
         "{}, {}; chance {:.1} %",
         counted(questions.len(), "question"),
@@ -34,14 +31,9 @@ pub(super) fn check_questions(questions: &[Question], findings: &mut Findings) {
     ));
     let mut families: Vec<(&str, usize)> = families.into_iter().collect();
     families.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
-    let families: Vec<String> = families
-        .iter()
-        .map(|(family, count)| format!("{} {count}", excerpt(family, 30)))
-        .collect();
-    findings.ok(format!(
-        "families: {}",
-        first_names(&families, MAX_FAMILIES)
-    ));
+    let families: Vec<String> =
+        families.iter().map(|(family, count)| format!("{} {count}", excerpt(family, 30))).collect();
+    findings.ok(format!("families: {}", first_names(&families, MAX_FAMILIES)));
     warn_of_common_answers(questions, findings);
     warn_of_repeats(questions, findings);
     warn_of_contained_answers(questions, findings);
@@ -49,10 +41,8 @@ pub(super) fn check_questions(questions: &[Question], findings: &mut Findings) {
 
 /// Warns of an answer or letter that is true so often that a constant reply scores well.
 fn warn_of_common_answers(questions: &[Question], findings: &mut Findings) {
-    let letters: Vec<String> = questions
-        .iter()
-        .filter_map(|question| Some(letter(question.choices.truth()?).to_string()))
-        .collect();
+    let letters: Vec<String> =
+        questions.iter().filter_map(|question| Some(letter(question.choices.truth()?).to_string())).collect();
     let texts: Vec<String> = questions
         .iter()
         .filter_map(|question| {
@@ -86,11 +76,8 @@ fn warn_of_repeats(questions: &[Question], findings: &mut Findings) {
     for question in questions {
         let content = (&question.frame, &question.text, question.choices.texts());
         if let Some(first) = seen.insert(content, &question.id) {
-            let text = format!(
-                "the questions {:?} and {:?} are the same",
-                excerpt(&first.0, 60),
-                excerpt(&question.id.0, 60)
-            );
+            let text =
+                format!("the questions {:?} and {:?} are the same", excerpt(&first.0, 60), excerpt(&question.id.0, 60));
             findings.add_of_kind("questions that occur twice", Mark::Warning, text);
         }
     }
@@ -104,9 +91,7 @@ fn warn_of_contained_answers(questions: &[Question], findings: &mut Findings) {
         let Some(truth) = question.choices.truth().map(|truth| &texts[truth]) else {
             continue;
         };
-        let is_other_contained = texts
-            .iter()
-            .any(|choice| choice != truth && contains_words(&text, choice));
+        let is_other_contained = texts.iter().any(|choice| choice != truth && contains_words(&text, choice));
         if words(truth).len() > 2 && contains_words(&text, truth) && !is_other_contained {
             let line = format!(
                 "the question {:?} holds its answer {:?}: {:?}",
@@ -126,9 +111,5 @@ fn contains_words(text: &str, choice: &str) -> bool {
 /// The words of a text in lower case, separated by single spaces.
 fn words(text: &str) -> String {
     let lower = text.to_lowercase();
-    lower
-        .split(|c: char| !c.is_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .collect::<Vec<&str>>()
-        .join(" ")
+    lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect::<Vec<&str>>().join(" ")
 }

@@ -26,20 +26,15 @@ pub(super) fn check_settings(args: &EvaluateArgs, findings: &mut Findings) {
         Err(e) => findings.problem(e.to_string()),
     }
     let rulebook = args.selection.rules.as_deref();
-    add(
-        findings,
-        rules(rulebook).map(|_| file_line("rules", rulebook)),
-    );
+    add(findings, rules(rulebook).map(|_| file_line("rules", rulebook)));
     let folder = args.choice.prompts.as_deref();
     let prompts = folder.map_or_else(Prompts::built_in, Prompts::load);
     add(findings, prompts.map(|_| file_line("prompts", folder)));
     if !args.job.models.is_empty() {
-        let models = args.job.check_models(&args.experiment()).map(|names| {
-            Some(format!(
-                "models: {}; the keys that they need are there",
-                names.join(", ")
-            ))
-        });
+        let models = args
+            .job
+            .check_models(&args.experiment())
+            .map(|names| Some(format!("models: {}; the keys that they need are there", names.join(", "))));
         add(findings, models);
     }
     add(findings, try_enhancers(args));
@@ -66,10 +61,7 @@ fn try_enhancers(args: &EvaluateArgs) -> Result<Option<String>> {
         return Ok(None);
     }
     let names: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();
-    let search = RuntimeSearch {
-        install: Install::Offline,
-        ..args.job.loading.runtime.search()
-    };
+    let search = RuntimeSearch { install: Install::Offline, ..args.job.loading.runtime.search() };
     let version = search.open()?.version().to_owned();
     let mut loading: EnhancerRunArgs = args.job.loading.clone();
     loading.runtime.offline = true;
@@ -80,8 +72,5 @@ fn try_enhancers(args: &EvaluateArgs) -> Result<Option<String>> {
     for enhancer in &mut enhancers {
         enhancer.enhance(&image)?;
     }
-    Ok(Some(format!(
-        "enhancers: {}, each tried on an image of 64×64; ONNX Runtime {version}",
-        names.join(", ")
-    )))
+    Ok(Some(format!("enhancers: {}, each tried on an image of 64×64; ONNX Runtime {version}", names.join(", "))))
 }

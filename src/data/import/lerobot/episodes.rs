@@ -60,12 +60,7 @@ pub(super) fn read_lines(path: &Path, info: &Info, cameras: usize) -> Result<Vec
                 file: u64::from(line.episode_index),
             };
             let video = VideoPart { place, from: 0.0 };
-            Episode {
-                index: line.episode_index,
-                length: line.length,
-                data: place,
-                videos: vec![Some(video); cameras],
-            }
+            Episode { index: line.episode_index, length: line.length, data: place, videos: vec![Some(video); cameras] }
         })
         .collect())
 }
@@ -73,30 +68,18 @@ pub(super) fn read_lines(path: &Path, info: &Info, cameras: usize) -> Result<Vec
 /// Adds the episodes in a file of `meta/episodes` of version 3.0, with the videos of these cameras.
 pub(super) fn add_table(path: &Path, cameras: &[&str], episodes: &mut Vec<Episode>) -> Result<()> {
     let table = ParquetColumns::open(path)?;
-    let mut columns: Vec<String> = [
-        "episode_index",
-        "length",
-        "data/chunk_index",
-        "data/file_index",
-    ]
-    .map(str::to_owned)
-    .to_vec();
+    let mut columns: Vec<String> =
+        ["episode_index", "length", "data/chunk_index", "data/file_index"].map(str::to_owned).to_vec();
     for camera in cameras {
-        columns.extend(
-            ["chunk_index", "file_index", "from_timestamp"]
-                .map(|column| format!("videos/{camera}/{column}")),
-        );
+        columns
+            .extend(["chunk_index", "file_index", "from_timestamp"].map(|column| format!("videos/{camera}/{column}")));
     }
     let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
     table.numbers(&columns, |batch| {
         for row in 0..batch.numbers[0].len() {
             let number = |column: usize| batch.numbers[column][row];
-            let place = |column: usize| {
-                Some(FilePlace {
-                    chunk: index(number(column))?,
-                    file: index(number(column + 1))?,
-                })
-            };
+            let place =
+                |column: usize| Some(FilePlace { chunk: index(number(column))?, file: index(number(column + 1))? });
             let episode = index(number(0)).and_then(|index| u32::try_from(index).ok());
             let (Some(index), Some(length)) = (episode, index(number(1))) else {
                 let problem = "an episode without index or length";
@@ -111,22 +94,14 @@ pub(super) fn add_table(path: &Path, cameras: &[&str], episodes: &mut Vec<Episod
                     let column = 4 + 3 * camera;
                     let from = number(column + 2);
                     (0.0..=1e9).contains(&from).then_some(())?;
-                    Some(VideoPart {
-                        place: place(column)?,
-                        from,
-                    })
+                    Some(VideoPart { place: place(column)?, from })
                 })
                 .collect();
             if episodes.len() == MAX_EPISODES {
                 let problem = format_args!("more than {MAX_EPISODES} episodes, which are not read");
                 return Err(Error::data(path.display(), problem));
             }
-            episodes.push(Episode {
-                index,
-                length,
-                data,
-                videos,
-            });
+            episodes.push(Episode { index, length, data, videos });
         }
         Ok(())
     })

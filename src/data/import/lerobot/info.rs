@@ -84,20 +84,16 @@ impl Info {
     /// If the version is not supported, or a required field is missing; the message has the remedy.
     pub(super) fn parse(value: &Value) -> Result<Self, String> {
         let stated = value.get("codebase_version").and_then(Value::as_str);
-        let version = stated.ok_or(
-            "no codebase_version; v2.0, v2.1 or v3.0 expected, as LeRobot writes it in this file",
-        )?;
+        let version =
+            stated.ok_or("no codebase_version; v2.0, v2.1 or v3.0 expected, as LeRobot writes it in this file")?;
         let layout = layout(version)?;
-        let fps = positive(value.get("fps"))
-            .ok_or("no fps; the frames per second expected, a number above 0")?;
+        let fps = positive(value.get("fps")).ok_or("no fps; the frames per second expected, a number above 0")?;
         let features = value
             .get("features")
             .and_then(Value::as_object)
             .ok_or("no features; an object with the columns and cameras expected")?;
-        let cameras: Vec<Camera> = features
-            .iter()
-            .filter_map(|(name, feature)| Camera::parse(name, feature, fps))
-            .collect();
+        let cameras: Vec<Camera> =
+            features.iter().filter_map(|(name, feature)| Camera::parse(name, feature, fps)).collect();
         let [data_path, video_path] = match layout {
             Layout::V2 => PATHS_V2,
             Layout::V3 => PATHS_V3,
@@ -107,11 +103,7 @@ impl Info {
             layout,
             version: version.to_owned(),
             fps,
-            chunk_size: value
-                .get("chunks_size")
-                .and_then(Value::as_u64)
-                .filter(|size| *size > 0)
-                .unwrap_or(CHUNK_SIZE),
+            chunk_size: value.get("chunks_size").and_then(Value::as_u64).filter(|size| *size > 0).unwrap_or(CHUNK_SIZE),
             data_path: text("data_path").unwrap_or(data_path).to_owned(),
             video_path: text("video_path").unwrap_or(video_path).to_owned(),
             robot: text("robot_type").map(str::to_owned),
@@ -143,9 +135,7 @@ pub(super) fn old_version(version: &str) -> String {
 }
 
 fn positive(value: Option<&Value>) -> Option<f64> {
-    value
-        .and_then(Value::as_f64)
-        .filter(|number| number.is_finite() && *number > 0.0)
+    value.and_then(Value::as_f64).filter(|number| number.is_finite() && *number > 0.0)
 }
 
 impl Camera {
@@ -158,21 +148,13 @@ impl Camera {
         };
         // Version 2.0 has `video_info` in some sets.
         let empty = Map::new();
-        let info = ["info", "video_info"]
-            .iter()
-            .find_map(|key| feature.get(key).and_then(Value::as_object))
-            .unwrap_or(&empty);
+        let info =
+            ["info", "video_info"].iter().find_map(|key| feature.get(key).and_then(Value::as_object)).unwrap_or(&empty);
         let is_depth = ["is_depth_map", "video.is_depth_map"]
             .iter()
             .any(|key| info.get(*key).and_then(Value::as_bool) == Some(true));
-        let codec = info
-            .get("video.codec")
-            .and_then(Value::as_str)
-            .filter(|_| form == ImageForm::Video);
-        let words: Vec<String> = size(feature)
-            .into_iter()
-            .chain(codec.map(str::to_owned))
-            .collect();
+        let codec = info.get("video.codec").and_then(Value::as_str).filter(|_| form == ImageForm::Video);
+        let words: Vec<String> = size(feature).into_iter().chain(codec.map(str::to_owned)).collect();
         Some(Self {
             name: name.to_owned(),
             form,
@@ -183,23 +165,15 @@ impl Camera {
     }
 }
 
-/// Width and height in the shape of a feature, which is [height, width, channels], or [channels, height, width] in older sets.
+/// Width and height in the shape of a feature, which is [height, width, channels], or [channels, height, width] in
+/// older sets.
 fn size(feature: &Value) -> Option<String> {
-    let shape: Vec<u64> = feature
-        .get("shape")?
-        .as_array()?
-        .iter()
-        .map(Value::as_u64)
-        .collect::<Option<_>>()?;
+    let shape: Vec<u64> = feature.get("shape")?.as_array()?.iter().map(Value::as_u64).collect::<Option<_>>()?;
     let [first, second, third] = shape[..] else {
         return None;
     };
     let is_channel = |count: u64| (1..=4).contains(&count);
-    let [height, width] = if is_channel(first) && !is_channel(third) {
-        [second, third]
-    } else {
-        [first, second]
-    };
+    let [height, width] = if is_channel(first) && !is_channel(third) { [second, third] } else { [first, second] };
     Some(format!("{width}×{height}"))
 }
 
@@ -229,14 +203,7 @@ mod tests {
         let facts: Vec<(&str, &str, bool, f64)> = info
             .cameras
             .iter()
-            .map(|camera| {
-                (
-                    &*camera.name,
-                    &*camera.description,
-                    camera.is_depth,
-                    camera.fps,
-                )
-            })
+            .map(|camera| (&*camera.name, &*camera.description, camera.is_depth, camera.fps))
             .collect();
         assert_eq!(
             facts,

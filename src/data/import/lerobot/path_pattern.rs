@@ -12,7 +12,8 @@ pub(super) enum FieldValue<'a> {
     Number(u64),
 }
 
-/// Replaces the fields of a pattern, in the syntax of Python's `str.format`: `{name}`, or `{name:06d}` for a number with six digits.
+/// Replaces the fields of a pattern, in the syntax of Python's `str.format`: `{name}`, or `{name:06d}` for a number
+/// with six digits.
 ///
 /// # Errors
 /// If the pattern has another field or another syntax.
@@ -20,28 +21,22 @@ pub(super) fn fill(pattern: &str, fields: &[(&str, FieldValue<'_>)]) -> Result<S
     let mut path = String::new();
     let mut rest = pattern;
     while let Some((before, after)) = rest.split_once('{') {
-        let (field, after) = after
-            .split_once('}')
-            .ok_or_else(|| format!("{pattern:?} has a {{ without a }}"))?;
+        let (field, after) = after.split_once('}').ok_or_else(|| format!("{pattern:?} has a {{ without a }}"))?;
         let (name, format) = field.split_once(':').unwrap_or((field, ""));
         let value = fields
             .iter()
             .find(|(known, _)| *known == name)
             .ok_or_else(|| {
                 let known: Vec<&str> = fields.iter().map(|(known, _)| *known).collect();
-                format!(
-                    "{pattern:?} has the field {name:?}; one of {} expected",
-                    known.join(", ")
-                )
+                format!("{pattern:?} has the field {name:?}; one of {} expected", known.join(", "))
             })?
             .1;
         path.push_str(before);
         match value {
             FieldValue::Text(text) if format.is_empty() => path.push_str(text),
             FieldValue::Number(number) => {
-                let width = width(format).ok_or_else(|| {
-                    format!("{pattern:?} has the format {format:?}; one such as 03d expected")
-                })?;
+                let width = width(format)
+                    .ok_or_else(|| format!("{pattern:?} has the format {format:?}; one such as 03d expected"))?;
                 let _ = write!(path, "{number:0width$}");
             }
             FieldValue::Text(_) => return Err(format!("{pattern:?} has a format for {name}")),
@@ -75,14 +70,8 @@ mod tests {
     #[test]
     fn fields_are_replaced() {
         for (pattern, expected) in [
-            (
-                "videos/{video_key}/chunk-{chunk_index:03d}/x.mp4",
-                "videos/observation.images.top/chunk-002/x.mp4",
-            ),
-            (
-                "{chunk_index}/{chunk_index:d}/{episode_index:06d}",
-                "2/2/1234567",
-            ),
+            ("videos/{video_key}/chunk-{chunk_index:03d}/x.mp4", "videos/observation.images.top/chunk-002/x.mp4"),
+            ("{chunk_index}/{chunk_index:d}/{episode_index:06d}", "2/2/1234567"),
             ("plain", "plain"),
         ] {
             assert_eq!(fill(pattern, &FIELDS).unwrap(), expected);

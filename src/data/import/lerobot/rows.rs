@@ -26,18 +26,15 @@ pub(crate) struct DataRow {
 /// Columns of a data file that are read, in the order of [`DataRow`].
 const COLUMNS: [&str; 4] = ["episode_index", "frame_index", "timestamp", "task_index"];
 
-/// Reads the rows of a data file in order. Rows without a number of episode, frame or time are counted, and not given to `add`.
+/// Reads the rows of a data file in order. Rows without a number of episode, frame or time are counted, and not given
+/// to `add`.
 ///
 /// # Errors
 /// If the file cannot be read or is damaged.
 pub(super) fn read(path: &Path, mut add: impl FnMut(DataRow)) -> Result<usize> {
     let table = ParquetColumns::open(path)?;
     let has_tasks = table.names().contains(&COLUMNS[3]);
-    let columns = if has_tasks {
-        &COLUMNS[..]
-    } else {
-        &COLUMNS[..3]
-    };
+    let columns = if has_tasks { &COLUMNS[..] } else { &COLUMNS[..3] };
     let mut unread = 0;
     table.numbers(columns, |batch| {
         for row in 0..batch.numbers[0].len() {

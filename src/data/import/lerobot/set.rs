@@ -45,8 +45,8 @@ struct TaskLine {
 }
 
 impl LeRobotSet {
-    /// Opens the set in a folder, or its newest snapshot if the folder is a repository in a hub's cache. Files may also be in the folders
-    /// in `further`.
+    /// Opens the set in a folder, or its newest snapshot if the folder is a repository in a hub's cache. Files may also
+    /// be in the folders in `further`.
     ///
     /// # Errors
     /// If the folder has no description of a supported version.
@@ -56,11 +56,7 @@ impl LeRobotSet {
             return Err(Error::usage("DIR", problem));
         }
         let (folder, blobs) = cached_snapshot(place)?;
-        let further: Vec<PathBuf> = further
-            .iter()
-            .cloned()
-            .chain(blobs.filter(|blobs| blobs.is_dir()))
-            .collect();
+        let further: Vec<PathBuf> = further.iter().cloned().chain(blobs.filter(|blobs| blobs.is_dir())).collect();
         let root = Root::new(&folder, &further)?;
         let path = folder.join(INFO);
         if !path.exists() && folder.join(OLD_INFO).exists() {
@@ -71,9 +67,7 @@ impl LeRobotSet {
             let problem = "no meta/info.json in this folder: not a LeRobot data set; name the folder that has meta, data and videos";
             return Err(Error::data(place.display(), problem));
         }
-        let path = root
-            .file(&folder, Path::new(INFO))
-            .map_err(|problem| Error::data(path.display(), problem))?;
+        let path = root.file(&folder, Path::new(INFO)).map_err(|problem| Error::data(path.display(), problem))?;
         refuse_lfs_pointer(&path)?;
         let bytes = at_most(&path, MAX_INFO_BYTES)?;
         let value = serde_json::from_slice(&bytes).map_err(|e| {
@@ -132,10 +126,7 @@ impl LeRobotSet {
         };
         episodes.sort_by_key(|episode| episode.index);
         let place = self.folder.join(name);
-        if let Some(pair) = episodes
-            .windows(2)
-            .find(|pair| pair[0].index == pair[1].index)
-        {
+        if let Some(pair) = episodes.windows(2).find(|pair| pair[0].index == pair[1].index) {
             let problem = format_args!("two episodes have the index {}", pair[0].index);
             return Err(Error::data(place.display(), problem));
         }
@@ -180,7 +171,8 @@ impl LeRobotSet {
                 .collect());
         }
         let table = ParquetColumns::open(&path)?;
-        // LeRobot writes the text as the index of a pandas table, whose column is called `task` or, without a name, `__index_level_0__`.
+        // LeRobot writes the text as the index of a pandas table, whose column is called `task` or, without a name,
+        // `__index_level_0__`.
         let names = table.names();
         let text = ["task", "__index_level_0__"]
             .into_iter()
@@ -242,20 +234,16 @@ impl LeRobotSet {
 
     /// Path of an existing file that the set names.
     fn file(&self, name: &str) -> Result<PathBuf> {
-        self.root
-            .file(&self.folder, Path::new(name))
-            .map_err(|problem| {
-                let path = self.folder.join(name).display().to_string();
-                let problem = problem.replace(&format!("no such file: {path}"), "no such file");
-                Error::data(path, problem)
-            })
+        self.root.file(&self.folder, Path::new(name)).map_err(|problem| {
+            let path = self.folder.join(name).display().to_string();
+            let problem = problem.replace(&format!("no such file: {path}"), "no such file");
+            Error::data(path, problem)
+        })
     }
 
     /// Checks that a path in the folder does not lead outside.
     fn inside(&self, path: &Path) -> Result<PathBuf> {
         let name = path.strip_prefix(&self.folder).unwrap_or(path);
-        self.root
-            .path(&self.folder, name)
-            .map_err(|problem| Error::data(path.display(), problem))
+        self.root.path(&self.folder, name).map_err(|problem| Error::data(path.display(), problem))
     }
 }

@@ -34,10 +34,7 @@ pub(crate) enum ChannelContent {
 impl Channel {
     /// The channel of a topic. `definition` is the text of the message definition.
     pub(super) fn new(topic: String, schema: &str, serialization: &str, definition: &[u8]) -> Self {
-        let schema = schema
-            .replace("/msg/", "/")
-            .replace("::msg::", "/")
-            .replace("::", ".");
+        let schema = schema.replace("/msg/", "/").replace("::msg::", "/").replace("::", ".");
         let encoding = Encoding::from_name(serialization);
         let content = match (&*schema, encoding) {
             (
@@ -50,17 +47,13 @@ impl Channel {
                 Some(encoding),
             ) => ChannelContent::Image(encoding),
             (
-                "sensor_msgs/CameraInfo"
-                | "foxglove.CameraCalibration"
-                | "foxglove_msgs/CameraCalibration",
+                "sensor_msgs/CameraInfo" | "foxglove.CameraCalibration" | "foxglove_msgs/CameraCalibration",
                 Some(encoding),
             ) => ChannelContent::Camera(encoding),
             (schema, None) if schema.ends_with("Image") => ChannelContent::Unsupported(format!(
                 "serialization {serialization:?}; cdr, ros1, protobuf or json expected"
             )),
-            (schema, encoding)
-                if schema.ends_with("CompressedVideo") || schema.ends_with("FFMPEGPacket") =>
-            {
+            (schema, encoding) if schema.ends_with("CompressedVideo") || schema.ends_with("FFMPEGPacket") => {
                 match encoding {
                     Some(encoding) => ChannelContent::Video(encoding),
                     None => ChannelContent::Unsupported(format!(
@@ -74,23 +67,14 @@ impl Channel {
             },
             _ => ChannelContent::Other,
         };
-        Self {
-            topic,
-            schema,
-            content,
-        }
+        Self { topic, schema, content }
     }
 }
 
-/// Common prefix of the topics of one camera: `/front` for `/front/image_raw`, `/front/image_raw/compressed` and `/front/camera_info`.
+/// Common prefix of the topics of one camera: `/front` for `/front/image_raw`, `/front/image_raw/compressed` and
+/// `/front/camera_info`.
 pub(crate) fn camera_name(topic: &str) -> &str {
-    let transports = [
-        "/compressed",
-        "/compressedDepth",
-        "/theora",
-        "/zstd",
-        "/raw",
-    ];
+    let transports = ["/compressed", "/compressedDepth", "/theora", "/zstd", "/raw"];
     let base = transports
         .iter()
         .find_map(|transport| topic.strip_suffix(transport))
@@ -99,14 +83,11 @@ pub(crate) fn camera_name(topic: &str) -> &str {
     &base[..parent_length(base)]
 }
 
-/// Names under which the intrinsics of an image topic may be found: first its camera, then each folder from the topic's own up to the one
-/// beside `image` or `image_…`, such as `…/Color_0` for RealSense's `…/Color_0/image/data/compressed`.
+/// Names under which the intrinsics of an image topic may be found: first its camera, then each folder from the topic's
+/// own up to the one beside `image` or `image_…`, such as `…/Color_0` for RealSense's
+/// `…/Color_0/image/data/compressed`.
 pub(crate) fn intrinsics_names(topic: &str) -> Vec<&str> {
-    let folders = || {
-        successors(Some(parent(topic)), |folder| {
-            (!folder.is_empty()).then(|| parent(folder))
-        })
-    };
+    let folders = || successors(Some(parent(topic)), |folder| (!folder.is_empty()).then(|| parent(folder)));
     let is_image = |folder: &str| {
         let name = folder[parent_length(folder)..].trim_start_matches('/');
         name == "image" || name.starts_with("image_")
@@ -142,12 +123,9 @@ mod tests {
 
     #[test]
     fn topics_of_a_camera_have_one_name() {
-        for topic in [
-            "/a/front/image_raw",
-            "/a/front/image_raw/compressed",
-            "/a/front/camera_info",
-            "/a/front/compressed",
-        ] {
+        for topic in
+            ["/a/front/image_raw", "/a/front/image_raw/compressed", "/a/front/camera_info", "/a/front/compressed"]
+        {
             assert_eq!(camera_name(topic), "/a/front", "{topic}");
         }
         assert_eq!(camera_name("/image"), "");
@@ -160,21 +138,11 @@ mod tests {
         let colour = "/device_0/sensor_1/Color_0";
         assert_eq!(
             names("/device_0/sensor_1/Color_0/image/data/compressed"),
-            [
-                "/device_0/sensor_1/Color_0/image/data",
-                "/device_0/sensor_1/Color_0/image",
-                colour
-            ]
+            ["/device_0/sensor_1/Color_0/image/data", "/device_0/sensor_1/Color_0/image", colour]
         );
         assert!(names("/device_0/sensor_1/Color_0/image/data").contains(&colour));
-        assert_eq!(
-            camera_of_info("/device_0/sensor_1/Color_0/info/camera_info"),
-            colour
-        );
-        assert_eq!(
-            names("/front/image_raw/compressed"),
-            ["/front", "/front/image_raw"]
-        );
+        assert_eq!(camera_of_info("/device_0/sensor_1/Color_0/info/camera_info"), colour);
+        assert_eq!(names("/front/image_raw/compressed"), ["/front", "/front/image_raw"]);
         // Controls: no camera above the image's own.
         assert_eq!(names("/stereo/left/image_raw"), ["/stereo/left"]);
         assert_eq!(names("/images/front/raw"), ["/images/front"]);
@@ -190,32 +158,12 @@ mod tests {
 
     #[test]
     fn all_spellings_of_type_names_are_known() {
-        for schema in [
-            "sensor_msgs/msg/Image",
-            "sensor_msgs/Image",
-            "sensor_msgs::msg::Image",
-            "foxglove::RawImage",
-        ] {
-            assert!(
-                matches!(content(schema, "cdr"), ChannelContent::Image(Encoding::Cdr)),
-                "{schema}"
-            );
+        for schema in ["sensor_msgs/msg/Image", "sensor_msgs/Image", "sensor_msgs::msg::Image", "foxglove::RawImage"] {
+            assert!(matches!(content(schema, "cdr"), ChannelContent::Image(Encoding::Cdr)), "{schema}");
         }
-        assert!(matches!(
-            content("foxglove.RawImage", "flatbuffer"),
-            ChannelContent::Unsupported(_)
-        ));
-        assert!(matches!(
-            content("foxglove.CompressedVideo", "protobuf"),
-            ChannelContent::Video(Encoding::Protobuf)
-        ));
-        assert!(matches!(
-            content("foxglove.CompressedVideo", "flatbuffer"),
-            ChannelContent::Unsupported(_)
-        ));
-        assert!(matches!(
-            content("std_msgs/msg/String", "cdr"),
-            ChannelContent::Other
-        ));
+        assert!(matches!(content("foxglove.RawImage", "flatbuffer"), ChannelContent::Unsupported(_)));
+        assert!(matches!(content("foxglove.CompressedVideo", "protobuf"), ChannelContent::Video(Encoding::Protobuf)));
+        assert!(matches!(content("foxglove.CompressedVideo", "flatbuffer"), ChannelContent::Unsupported(_)));
+        assert!(matches!(content("std_msgs/msg/String", "cdr"), ChannelContent::Other));
     }
 }

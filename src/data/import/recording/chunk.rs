@@ -5,8 +5,8 @@ use std::io::{self, BufReader, Read, Seek, Take};
 use lz4_flex::frame::FrameDecoder;
 use zstd::stream::read::Decoder;
 
-/// Maximum compression ratio of a chunk, not counting the first [`ALWAYS_ALLOWED`] bytes (chosen). Repeated black raw images reach ratios
-/// of some thousands.
+/// Maximum compression ratio of a chunk, not counting the first [`ALWAYS_ALLOWED`] bytes (chosen). Repeated black raw
+/// images reach ratios of some thousands.
 const MAX_RATIO: u64 = 10_000;
 
 /// Decompressed size in bytes that is allowed at any compression ratio (chosen).
@@ -50,20 +50,13 @@ impl<R: Read> Chunk<R> {
     /// Opens the chunk whose records begin at the position of `file`.
     ///
     /// # Errors
-    /// If the compression is unknown, its decoder cannot be created, or the ratio exceeds [`MAX_RATIO`]. The error contains `file`.
-    pub(super) fn open(
-        header: &ChunkHeader,
-        file: BufReader<R>,
-    ) -> Result<Self, (BufReader<R>, String)> {
-        let allowed = header
-            .stored_length
-            .saturating_mul(MAX_RATIO)
-            .saturating_add(ALWAYS_ALLOWED);
+    /// If the compression is unknown, its decoder cannot be created, or the ratio exceeds [`MAX_RATIO`]. The error
+    /// contains `file`.
+    pub(super) fn open(header: &ChunkHeader, file: BufReader<R>) -> Result<Self, (BufReader<R>, String)> {
+        let allowed = header.stored_length.saturating_mul(MAX_RATIO).saturating_add(ALWAYS_ALLOWED);
         if header.length > allowed {
-            let problem = format!(
-                "{} bytes from {} compressed ones are not believable",
-                header.length, header.stored_length
-            );
+            let problem =
+                format!("{} bytes from {} compressed ones are not believable", header.length, header.stored_length);
             return Err((file, problem));
         }
         let stored = file.take(header.stored_length);
@@ -114,9 +107,7 @@ impl<R: Read + Seek> Chunk<R> {
 
 impl<R: Read> Read for Chunk<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
-        let length = usize::try_from(self.remaining)
-            .unwrap_or(usize::MAX)
-            .min(bytes.len());
+        let length = usize::try_from(self.remaining).unwrap_or(usize::MAX).min(bytes.len());
         let bytes = &mut bytes[..length];
         let count = match &mut self.content {
             Content::Plain(stored) => stored.read(bytes),

@@ -1,7 +1,8 @@
 //! Exposure times and gains in messages of any type: [`Exposure`].
 //!
-//! Camera drivers have no common message for exposure. Two kinds of ROS messages are therefore read: flat messages that begin with a
-//! header and have a field with “exposure” or “gain” in its name, and messages with JSON in a field `json_data`, as of RealSense cameras.
+//! Camera drivers have no common message for exposure. Two kinds of ROS messages are therefore read: flat messages that
+//! begin with a header and have a field with “exposure” or “gain” in its name, and messages with JSON in a field
+//! `json_data`, as of RealSense cameras.
 
 use serde_json::{Map, Value, json};
 
@@ -47,11 +48,7 @@ pub(super) fn relevant_definition(definition: &[u8]) -> Vec<u8> {
         && [&b"exposure"[..], b"gain", b"json_data"]
             .iter()
             .any(|word| text.windows(word.len()).any(|part| part == *word));
-    if is_relevant {
-        definition.to_vec()
-    } else {
-        Vec::new()
-    }
+    if is_relevant { definition.to_vec() } else { Vec::new() }
 }
 
 impl ExposureFields {
@@ -79,9 +76,7 @@ impl ExposureFields {
                 Some((Primitive::from_name(kind)?, name.to_owned()))
             })
             .collect();
-        let has_exposure = fields
-            .iter()
-            .any(|(_, name)| is_about_exposure(name) || name == "json_data");
+        let has_exposure = fields.iter().any(|(_, name)| is_about_exposure(name) || name == "json_data");
         has_exposure.then_some(Self { encoding, fields })
     }
 
@@ -104,13 +99,8 @@ impl ExposureFields {
             let value = kind.read(&mut reader)?;
             match value {
                 Value::String(text) if name == "json_data" => {
-                    let object: Map<String, Value> =
-                        serde_json::from_str(&text).unwrap_or_default();
-                    values.extend(
-                        object
-                            .into_iter()
-                            .filter(|(name, _)| is_about_exposure(name)),
-                    );
+                    let object: Map<String, Value> = serde_json::from_str(&text).unwrap_or_default();
+                    values.extend(object.into_iter().filter(|(name, _)| is_about_exposure(name)));
                 }
                 value if is_about_exposure(name) => {
                     values.insert(name.clone(), value);
@@ -156,11 +146,7 @@ impl Primitive {
             Self::Signed(4) => json!(reader.u32()?.cast_signed()),
             Self::Signed(_) => json!(reader.u64()?.cast_signed()),
             // Through the shortest decimal, so that 2.1 does not become 2.0999999046325684.
-            Self::Float(4) => reader
-                .f32()?
-                .to_string()
-                .parse::<f64>()
-                .map_or(Value::Null, |number| json!(number)),
+            Self::Float(4) => reader.f32()?.to_string().parse::<f64>().map_or(Value::Null, |number| json!(number)),
             Self::Float(_) => json!(reader.f64()?),
             Self::Text => json!(reader.text()?),
         })
@@ -175,23 +161,15 @@ mod tests {
 
     #[test]
     fn exposure_fields_are_found_by_definition() {
-        let definition = b"std_msgs/Header header\nuint64 camera_time # ns\nuint32 exposure_time\nfloat32 gain\n===\nMSG: x";
+        let definition =
+            b"std_msgs/Header header\nuint64 camera_time # ns\nuint32 exposure_time\nfloat32 gain\n===\nMSG: x";
         let fields = ExposureFields::from_definition(definition, Encoding::Cdr).unwrap();
         // The 8-byte number is aligned to 16 after the CDR header.
-        let message = [
-            &HEADER[..],
-            &[0; 3],
-            &9_u64.to_le_bytes(),
-            &20_000_u32.to_le_bytes(),
-            &2.1_f32.to_le_bytes(),
-        ]
-        .concat();
+        let message =
+            [&HEADER[..], &[0; 3], &9_u64.to_le_bytes(), &20_000_u32.to_le_bytes(), &2.1_f32.to_le_bytes()].concat();
         let exposure = fields.parse(&message).unwrap().unwrap();
         assert_eq!(exposure.stamp, 5_000_000_007);
-        assert_eq!(
-            Value::Object(exposure.values),
-            json!({"exposure_time": 20_000, "gain": 2.1})
-        );
+        assert_eq!(Value::Object(exposure.values), json!({"exposure_time": 20_000, "gain": 2.1}));
         assert!(fields.parse(&message[..30]).is_err());
     }
 
@@ -200,27 +178,16 @@ mod tests {
         let definition = b"std_msgs/Header header\nstring json_data";
         let fields = ExposureFields::from_definition(definition, Encoding::Cdr).unwrap();
         let text = b"{\"actual_exposure\":156,\"temperature\":40}\0";
-        let message = [
-            &HEADER[..],
-            &[0; 3],
-            &(text.len() as u32).to_le_bytes(),
-            &text[..],
-        ]
-        .concat();
+        let message = [&HEADER[..], &[0; 3], &(text.len() as u32).to_le_bytes(), &text[..]].concat();
         let exposure = fields.parse(&message).unwrap().unwrap();
-        assert_eq!(
-            Value::Object(exposure.values),
-            json!({"actual_exposure": 156})
-        );
+        assert_eq!(Value::Object(exposure.values), json!({"actual_exposure": 156}));
     }
 
     #[test]
     fn other_messages_have_no_exposure() {
-        for definition in [
-            "float32 gain",
-            "std_msgs/Header header\nfloat32 speed",
-            "std_msgs/Header header\nCovariance gain",
-        ] {
+        for definition in
+            ["float32 gain", "std_msgs/Header header\nfloat32 speed", "std_msgs/Header header\nCovariance gain"]
+        {
             let fields = ExposureFields::from_definition(definition.as_bytes(), Encoding::Cdr);
             assert!(fields.is_none(), "{definition}");
         }

@@ -59,25 +59,12 @@ const TRANSFERS: [(&str, u8); 20] = [
 ];
 
 /// Matrices that the scaler of ffmpeg undoes (`sws_getCoefficients`). It takes any other as BT.601.
-const MATRICES: [&str; 9] = [
-    "gbr",
-    "rgb",
-    "bt709",
-    "unknown",
-    "fcc",
-    "bt470bg",
-    "smpte170m",
-    "smpte240m",
-    "bt2020nc",
-];
+const MATRICES: [&str; 9] = ["gbr", "rgb", "bt709", "unknown", "fcc", "bt470bg", "smpte170m", "smpte240m", "bt2020nc"];
 
 impl FrameColours {
     /// Parses the line of the filter `showinfo` about the colours of a frame.
     pub(super) fn parse(line: &str) -> Option<Self> {
-        let (_, fields) = line
-            .split_once("showinfo")?
-            .1
-            .split_once("] color_range:")?;
+        let (_, fields) = line.split_once("showinfo")?.1.split_once("] color_range:")?;
         let field = |name: &str| {
             let (_, rest) = fields.split_once(name)?;
             rest.split_whitespace().next().map(str::to_owned)
@@ -107,24 +94,17 @@ impl FrameColours {
             ));
         }
         let number = |names: &[(&str, u8)], name: &str| {
-            names
-                .iter()
-                .find(|(known, _)| *known == name)
-                .map(|(_, number)| *number)
+            names.iter().find(|(known, _)| *known == name).map(|(_, number)| *number)
         };
-        let (Some(primaries), Some(transfer)) = (
-            number(&PRIMARIES, &self.primaries),
-            number(&TRANSFERS, &self.transfer),
-        ) else {
+        let (Some(primaries), Some(transfer)) =
+            (number(&PRIMARIES, &self.primaries), number(&TRANSFERS, &self.transfer))
+        else {
             return Err(format!(
                 "the frames have colours that are not known here (primaries {}, transfer {}); convert the video to BT.709 first",
                 self.primaries, self.transfer
             ));
         };
-        let stated = StatedColours {
-            primaries,
-            transfer,
-        };
+        let stated = StatedColours { primaries, transfer };
         stated.conversion().map_err(|problem| match transfer {
             UNSPECIFIED => format!(
                 "{problem}; state it, arib-std-b67 for HLG, smpte2084 for PQ, bt709 for others: {}",
@@ -134,36 +114,24 @@ impl FrameColours {
             8..=10 => {
                 // The filter converts only from colours that are stated.
                 let mut filter = "zscale=transfer=709:primaries=709:matrix=709".to_owned();
-                for (stated, key) in [(&self.primaries, "primariesin"), (&self.matrix, "matrixin")]
-                {
+                for (stated, key) in [(&self.primaries, "primariesin"), (&self.matrix, "matrixin")] {
                     if stated == "unknown" {
                         filter.extend([":", key, "=709"]);
                     }
                 }
-                format!(
-                    "{problem}; convert the video first, by an ffmpeg with zscale: {}",
-                    filtered(&filter)
-                )
+                format!("{problem}; convert the video first, by an ffmpeg with zscale: {}", filtered(&filter))
             }
             _ => format!("{problem}; convert the video to BT.709 first"),
         })
     }
 }
 
-/// True if the description of a stream names colours that are not taken as sRGB. Needed for versions of ffmpeg that do not state the colours
-/// of frames.
+/// True if the description of a stream names colours that are not taken as sRGB. Needed for versions of ffmpeg that do
+/// not state the colours of frames.
 pub(super) fn needs_colours(stream: &str) -> bool {
-    [
-        "bt2020",
-        "smpte2084",
-        "arib-std-b67",
-        "smpte43",
-        "linear",
-        "log100",
-        "log316",
-    ]
-    .iter()
-    .any(|name| stream.contains(name))
+    ["bt2020", "smpte2084", "arib-std-b67", "smpte43", "linear", "log100", "log316"]
+        .iter()
+        .any(|name| stream.contains(name))
 }
 
 #[cfg(test)]
@@ -203,14 +171,7 @@ mod tests {
     #[test]
     fn codes_of_ordinary_video_are_kept() {
         for matrix in MATRICES {
-            for primaries in [
-                "bt709",
-                "unknown",
-                "bt470bg",
-                "smpte170m",
-                "smpte240m",
-                "ebu3213",
-            ] {
+            for primaries in ["bt709", "unknown", "bt470bg", "smpte170m", "smpte240m", "ebu3213"] {
                 for transfer in [
                     "bt709",
                     "unknown",
@@ -246,28 +207,13 @@ mod tests {
     #[test]
     fn colours_that_are_not_converted_have_a_remedy() {
         for (matrix, primaries, transfer, expected) in [
-            (
-                "ycgco",
-                "bt709",
-                "bt709",
-                "-i 'my video.mp4' -vf zscale=matrix=709 ",
-            ),
+            ("ycgco", "bt709", "bt709", "-i 'my video.mp4' -vf zscale=matrix=709 "),
             ("ictcp", "bt2020", "smpte2084", "matrix ictcp"),
-            (
-                "bt709",
-                "bt2020",
-                "unknown",
-                "setparams=color_trc=arib-std-b67",
-            ),
+            ("bt709", "bt2020", "unknown", "setparams=color_trc=arib-std-b67"),
             ("bt709", "bt709", "log100", "zscale=transfer=709"),
             ("gbr", "bt709", "linear", "linear light in 8 bits"),
             ("bt709", "bt709", "vlog", "transfer vlog"),
-            (
-                "bt709",
-                "bt709",
-                "smpte428",
-                "digital cinema (SMPTE ST 428); convert",
-            ),
+            ("bt709", "bt709", "smpte428", "digital cinema (SMPTE ST 428); convert"),
             ("bt709", "reserved", "bt709", "primaries reserved"),
         ] {
             let problem = converted(matrix, primaries, transfer).unwrap_err();

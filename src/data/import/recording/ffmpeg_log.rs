@@ -31,12 +31,9 @@ pub(super) struct FfmpegLog {
     pub(super) lacks_decoder: bool,
 }
 
-/// Words in ffmpeg's lines about a codec that it cannot decode, in lower case. Its own decoder of AV1 needs a graphics card.
-const NO_DECODER_WORDS: [&str; 3] = [
-    "no decoder found",
-    "hardware accelerated av1 decoding",
-    "decoder (codec",
-];
+/// Words in ffmpeg's lines about a codec that it cannot decode, in lower case. Its own decoder of AV1 needs a graphics
+/// card.
+const NO_DECODER_WORDS: [&str; 3] = ["no decoder found", "hardware accelerated av1 decoding", "decoder (codec"];
 
 /// Words in ffmpeg's lines about damage, in lower case.
 const DAMAGE_WORDS: [&str; 4] = ["error", "invalid", "corrupt", "truncating"];
@@ -46,10 +43,8 @@ impl FfmpegLog {
         let words = line.to_lowercase();
         self.lacks_decoder |= NO_DECODER_WORDS.iter().any(|word| words.contains(word));
         // Names of files and their indented metadata may contain these words.
-        let is_about_file = line.starts_with([' ', '\t'])
-            || ["Input #", "Output #"]
-                .iter()
-                .any(|start| line.starts_with(start));
+        let is_about_file =
+            line.starts_with([' ', '\t']) || ["Input #", "Output #"].iter().any(|start| line.starts_with(start));
         if !is_about_file && DAMAGE_WORDS.iter().any(|word| words.contains(word)) {
             self.damage_lines += 1;
             self.first_damage.get_or_insert_with(|| line.to_owned());
@@ -72,20 +67,14 @@ pub(super) fn read_log(log: ChildStderr, facts: &Sender<FrameFacts>) -> FfmpegLo
     let mut lines = BufReader::new(log);
     let mut line = Vec::new();
     // Lines are read as bytes, because names in a file need not be UTF-8.
-    while lines
-        .read_until(b'\n', &mut line)
-        .is_ok_and(|count| count > 0)
-    {
+    while lines.read_until(b'\n', &mut line).is_ok_and(|count| count > 0) {
         let text = String::from_utf8_lossy(&line);
         base = parse_time_base(&text).or(base);
         if let Some(time) = base.and_then(|base| parse_frame_time(&text, base)) {
             let colours = None;
             send(waiting.replace(FrameFacts { time, colours }));
         } else if let Some(colours) = FrameColours::parse(&text) {
-            send(waiting.take().map(|found| FrameFacts {
-                colours: Some(colours),
-                ..found
-            }));
+            send(waiting.take().map(|found| FrameFacts { colours: Some(colours), ..found }));
         } else if !text.contains("showinfo") {
             kept.add(text.trim_end());
         }
@@ -95,15 +84,12 @@ pub(super) fn read_log(log: ChildStderr, facts: &Sender<FrameFacts>) -> FfmpegLo
     kept
 }
 
-/// True if this version of ffmpeg supports `-fps_mode` (5.1 or later), from the first line of its log. Builds without a number are recent.
+/// True if this version of ffmpeg supports `-fps_mode` (5.1 or later), from the first line of its log. Builds without a
+/// number are recent.
 pub(super) fn supports_fps_mode(log: &str) -> bool {
-    let version = log
-        .split_once("ffmpeg version ")
-        .map_or("", |(_, rest)| rest);
+    let version = log.split_once("ffmpeg version ").map_or("", |(_, rest)| rest);
     let version = version.trim_start_matches('n');
-    let mut numbers = version
-        .split(|c: char| !c.is_ascii_digit())
-        .map(str::parse::<u32>);
+    let mut numbers = version.split(|c: char| !c.is_ascii_digit()).map(str::parse::<u32>);
     match (numbers.next(), numbers.next()) {
         (Some(Ok(major)), Some(Ok(minor))) => (major, minor) >= (5, 1),
         (Some(Ok(major)), _) => major >= 6,
@@ -128,7 +114,8 @@ fn parse_time_base(line: &str) -> Option<[i64; 2]> {
     base.iter().all(|number| *number > 0).then_some(base)
 }
 
-/// Parses the time in a line of `showinfo` about a frame. Its `pts_time` is not used, because six digits are too few for long videos.
+/// Parses the time in a line of `showinfo` about a frame. Its `pts_time` is not used, because six digits are too few
+/// for long videos.
 fn parse_frame_time(line: &str, [numerator, denominator]: [i64; 2]) -> Option<Nanoseconds> {
     let (_, rest) = line.split_once(" pts:")?;
     let units: i64 = rest.split_whitespace().next()?.parse().ok()?;
@@ -157,16 +144,11 @@ mod tests {
 
     #[test]
     fn log_of_ffmpeg_is_parsed() {
-        let base = parse_time_base(
-            "[Parsed_showinfo_1 @ 0x55] config in time_base: 1/30000, frame_rate: 30/1",
-        );
+        let base = parse_time_base("[Parsed_showinfo_1 @ 0x55] config in time_base: 1/30000, frame_rate: 30/1");
         assert_eq!(base, Some([1, 30_000]));
         let line = "[Parsed_showinfo_1 @ 0x55] n:   3 pts:  45045 pts_time:1.5015  duration:  1";
         assert_eq!(parse_frame_time(line, [1, 30_000]), Some(1_501_500_000));
-        assert_eq!(
-            parse_frame_time("[Parsed_showinfo_1 @ 0x55] color_range:tv", [1, 1]),
-            None
-        );
+        assert_eq!(parse_frame_time("[Parsed_showinfo_1 @ 0x55] color_range:tv", [1, 1]), None);
         assert_eq!(parse_duration(" 00:01:02.50"), Some(62.5));
         assert_eq!(parse_duration("N/A"), None);
         for (version, expected) in [
@@ -177,11 +159,7 @@ mod tests {
             ("8", true),
             ("N-119", true),
         ] {
-            assert_eq!(
-                supports_fps_mode(&format!("ffmpeg version {version} Copyright")),
-                expected,
-                "{version}"
-            );
+            assert_eq!(supports_fps_mode(&format!("ffmpeg version {version} Copyright")), expected, "{version}");
         }
     }
 }

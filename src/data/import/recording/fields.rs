@@ -1,7 +1,7 @@
 //! Reader of the fields of a serialized message, in the order of its definition: [`FieldReader`].
 //!
-//! CDR follows OMG DDSI-RTPS 2.3, section 10, with the alignment of XCDR1 or XCDR2 (DDS-XTypes 1.3, section 7.4.3). ROS 1 and the records
-//! of MCAP are little-endian and have no alignment.
+//! CDR follows OMG DDSI-RTPS 2.3, section 10, with the alignment of XCDR1 or XCDR2 (DDS-XTypes 1.3, section 7.4.3). ROS
+//! 1 and the records of MCAP are little-endian and have no alignment.
 
 use super::Nanoseconds;
 
@@ -30,11 +30,7 @@ impl<'a> FieldReader<'a> {
         Self {
             bytes,
             offset: 0,
-            rules: SerializationRules {
-                is_big_endian: false,
-                max_alignment: 1,
-                has_terminator: false,
-            },
+            rules: SerializationRules { is_big_endian: false, max_alignment: 1, has_terminator: false },
         }
     }
 
@@ -57,33 +53,20 @@ impl<'a> FieldReader<'a> {
                 ));
             }
         };
-        Ok(Self {
-            bytes,
-            offset: 0,
-            rules: SerializationRules {
-                is_big_endian,
-                max_alignment,
-                has_terminator: true,
-            },
-        })
+        Ok(Self { bytes, offset: 0, rules: SerializationRules { is_big_endian, max_alignment, has_terminator: true } })
     }
 
     /// Reads this number of bytes.
     pub(super) fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
-        let taken = self
-            .offset
-            .checked_add(count)
-            .and_then(|end| self.bytes.get(self.offset..end))
-            .ok_or_else(ends_early)?;
+        let taken =
+            self.offset.checked_add(count).and_then(|end| self.bytes.get(self.offset..end)).ok_or_else(ends_early)?;
         self.offset += count;
         Ok(taken)
     }
 
     /// Skips the padding before a number of this size.
     fn align(&mut self, size: usize) {
-        self.offset = self
-            .offset
-            .next_multiple_of(size.min(self.rules.max_alignment));
+        self.offset = self.offset.next_multiple_of(size.min(self.rules.max_alignment));
     }
 
     /// Reads the bytes of a number as little-endian.
@@ -142,7 +125,8 @@ impl<'a> FieldReader<'a> {
         (0..count).map(|_| self.f64()).collect()
     }
 
-    /// Reads a time in seconds and nanoseconds. Seconds are signed in ROS 2 and unsigned in ROS 1; the two differ only after 2038.
+    /// Reads a time in seconds and nanoseconds. Seconds are signed in ROS 2 and unsigned in ROS 1; the two differ only
+    /// after 2038.
     pub(super) fn time(&mut self) -> Result<Nanoseconds, String> {
         let (seconds, rest) = (self.u32()?, self.u32()?);
         Ok(i64::from(seconds.cast_signed()) * 1_000_000_000 + i64::from(rest))
@@ -187,11 +171,7 @@ mod tests {
             assert!(FieldReader::unaligned(&bytes).doubles().is_err());
         }
         assert!(FieldReader::cdr(&[0, 1]).is_err());
-        assert!(
-            FieldReader::cdr(&[0, 3, 0, 0])
-                .unwrap_err()
-                .contains("plain CDR")
-        );
+        assert!(FieldReader::cdr(&[0, 3, 0, 0]).unwrap_err().contains("plain CDR"));
     }
 
     fn time(seconds: i32, rest: u32) -> i64 {

@@ -34,8 +34,8 @@ pub(crate) enum ForeignData {
 }
 
 impl ForeignData {
-    /// Detects the kind by the first bytes, or else by the format that the message states. `ending` is the file ending of an image format
-    /// that is known but not read; empty if there is none.
+    /// Detects the kind by the first bytes, or else by the format that the message states. `ending` is the file ending
+    /// of an image format that is known but not read; empty if there is none.
     pub(crate) fn detect(format: &str, bytes: &[u8], ending: &'static str) -> Self {
         if bytes.is_empty() {
             return Self::Empty;
@@ -45,17 +45,15 @@ impl ForeignData {
         }
         let stated = stated_codec(format);
         match bytes {
-            [0, 0, 0, 1, unit, ..] | [0, 0, 1, unit, ..] => {
-                Self::Video(stated.unwrap_or_else(|| codec_of_unit(*unit)))
-            }
+            [0, 0, 0, 1, unit, ..] | [0, 0, 1, unit, ..] => Self::Video(stated.unwrap_or_else(|| codec_of_unit(*unit))),
             [_, _, _, _, b'f', b't', b'y', b'p', brand @ ..] => match brand {
                 [b'a', b'v', b'i', ..] => Self::Other("AVIF"),
                 [b'h', b'e', ..] | [b'm', b'i', b'f', ..] => Self::Other("HEIF"),
                 _ => stated.map_or(Self::Unknown, Self::Video),
             },
-            [0x28, 0xb5, 0x2f, 0xfd, ..] => Self::Other(
-                "raw samples compressed with zstd, as RealSense's recorder writes YUYV and Y16",
-            ),
+            [0x28, 0xb5, 0x2f, 0xfd, ..] => {
+                Self::Other("raw samples compressed with zstd, as RealSense's recorder writes YUYV and Y16")
+            }
             [0xff, 0x0a, ..] | [0, 0, 0, 12, b'J', b'X', b'L', b' ', ..] => Self::Other("JPEG XL"),
             _ => stated.map_or(Self::Unknown, Self::Video),
         }
@@ -81,10 +79,7 @@ impl ForeignData {
 /// The video codec that a format names, such as `h264` or `hevc; yuv420p`.
 fn stated_codec(format: &str) -> Option<&'static str> {
     let format = format.to_ascii_lowercase().replace(['.', '-', '_'], "");
-    CODECS
-        .iter()
-        .find(|(name, _)| format.contains(name))
-        .map(|(_, codec)| *codec)
+    CODECS.iter().find(|(name, _)| format.contains(name)).map(|(_, codec)| *codec)
 }
 
 /// The codec of a stream in Annex B format, by the type of its first unit: parameter sets or a delimiter.
@@ -124,39 +119,16 @@ mod tests {
         for (format, bytes, ending, expected) in [
             ("h264", &b""[..], "", "an empty image (format \"h264\")"),
             ("", b"", "", "an empty image (no format stated)"),
-            (
-                "avif",
-                b"\0\0\0 ftypavif",
-                "",
-                "AVIF (format \"avif\"); JPEG, PNG or WebP expected",
-            ),
-            (
-                "",
-                b"\0\0\0 ftypheic",
-                "",
-                "HEIF (no format stated); JPEG, PNG or WebP expected",
-            ),
-            (
-                "tiff",
-                b"II*\0",
-                "tif",
-                "tif (format \"tiff\"); JPEG, PNG or WebP expected",
-            ),
-            (
-                "jpeg",
-                b"xyz",
-                "",
-                "data of an unknown kind (format \"jpeg\"); JPEG, PNG or WebP expected",
-            ),
+            ("avif", b"\0\0\0 ftypavif", "", "AVIF (format \"avif\"); JPEG, PNG or WebP expected"),
+            ("", b"\0\0\0 ftypheic", "", "HEIF (no format stated); JPEG, PNG or WebP expected"),
+            ("tiff", b"II*\0", "tif", "tif (format \"tiff\"); JPEG, PNG or WebP expected"),
+            ("jpeg", b"xyz", "", "data of an unknown kind (format \"jpeg\"); JPEG, PNG or WebP expected"),
         ] {
             let found = ForeignData::detect(format, bytes, ending);
             assert!(!matches!(found, ForeignData::Video(_)), "{format}");
             assert_eq!(found.words(format), expected);
         }
         let zstd = ForeignData::detect("YUYV; zstd; 16", &[0x28, 0xb5, 0x2f, 0xfd, 0], "");
-        assert!(
-            zstd.words("YUYV; zstd; 16").contains("RealSense"),
-            "{zstd:?}"
-        );
+        assert!(zstd.words("YUYV; zstd; 16").contains("RealSense"), "{zstd:?}");
     }
 }

@@ -52,11 +52,11 @@ const MAX_EMPTY_BYTES: usize = 4096;
 /// True if the image of a message has no pixels.
 pub(crate) fn is_without_image(schema: &str, encoding: Encoding, bytes: &[u8]) -> bool {
     bytes.len() <= MAX_EMPTY_BYTES
-        && ImageMessage::parse(schema, encoding, bytes)
-            .is_ok_and(|message| message.image.is_empty())
+        && ImageMessage::parse(schema, encoding, bytes).is_ok_and(|message| message.image.is_empty())
 }
 
-/// True if a message has an image of an encoding or format that is never read, such as depth. All images of its topic are then alike.
+/// True if a message has an image of an encoding or format that is never read, such as depth. All images of its topic
+/// are then alike.
 pub(super) fn has_unread_kind(schema: &str, encoding: Encoding, bytes: &[u8]) -> bool {
     let Ok(message) = ImageMessage::parse_any(schema, encoding, bytes) else {
         return false;
@@ -91,11 +91,7 @@ impl<'a> ImageMessage<'a> {
         }
     }
 
-    fn from_fields(
-        schema: &str,
-        encoding: Encoding,
-        mut reader: FieldReader<'a>,
-    ) -> Result<Self, String> {
+    fn from_fields(schema: &str, encoding: Encoding, mut reader: FieldReader<'a>) -> Result<Self, String> {
         skip_sequence_number(schema, encoding, &mut reader)?;
         let (stamp, frame_id) = (reader.time()?, reader.text()?);
         let image = match schema {
@@ -110,10 +106,9 @@ impl<'a> ImageMessage<'a> {
                     data: reader.bytes()?.into(),
                 })
             }
-            "sensor_msgs/CompressedImage" => MessageImage::File {
-                format: reader.text()?,
-                bytes: reader.bytes()?.into(),
-            },
+            "sensor_msgs/CompressedImage" => {
+                MessageImage::File { format: reader.text()?, bytes: reader.bytes()?.into() }
+            }
             _ if schema.ends_with("RawImage") => {
                 let [width, height] = [reader.u32()?, reader.u32()?].map(|side| side as usize);
                 MessageImage::Raw(RawImage {
@@ -131,14 +126,11 @@ impl<'a> ImageMessage<'a> {
                 MessageImage::File { format, bytes }
             }
         };
-        Ok(Self {
-            stamp: (stamp != 0).then_some(stamp),
-            frame_id,
-            image,
-        })
+        Ok(Self { stamp: (stamp != 0).then_some(stamp), frame_id, image })
     }
 
-    /// Parses a protobuf message, with the field numbers of `foxglove/RawImage.proto` and `foxglove/CompressedImage.proto`.
+    /// Parses a protobuf message, with the field numbers of `foxglove/RawImage.proto` and
+    /// `foxglove/CompressedImage.proto`.
     fn from_protobuf(schema: &str, bytes: &'a [u8]) -> Result<Self, String> {
         let is_raw = schema.ends_with("RawImage");
         let (mut stamp, mut frame_id, mut format) = (0, String::new(), String::new());
@@ -168,25 +160,15 @@ impl<'a> ImageMessage<'a> {
                 data: data.into(),
             })
         } else {
-            MessageImage::File {
-                format,
-                bytes: data.into(),
-            }
+            MessageImage::File { format, bytes: data.into() }
         };
-        Ok(Self {
-            stamp: (stamp != 0).then_some(stamp),
-            frame_id,
-            image,
-        })
+        Ok(Self { stamp: (stamp != 0).then_some(stamp), frame_id, image })
     }
 
     fn from_json(schema: &str, bytes: &[u8]) -> Result<Self, String> {
-        let message: JsonImage<'_> =
-            serde_json::from_slice(bytes).map_err(|e| format!("not a {schema}: {e}"))?;
+        let message: JsonImage<'_> = serde_json::from_slice(bytes).map_err(|e| format!("not a {schema}: {e}"))?;
         let data = match message.data {
-            JsonData::Text(text) => STANDARD
-                .decode(&*text)
-                .map_err(|e| format!("data in base64 expected: {e}"))?,
+            JsonData::Text(text) => STANDARD.decode(&*text).map_err(|e| format!("data in base64 expected: {e}"))?,
             JsonData::Numbers(numbers) => numbers,
         };
         let image = if is_raw(schema) {
@@ -199,22 +181,12 @@ impl<'a> ImageMessage<'a> {
                 data: data.into(),
             })
         } else {
-            MessageImage::File {
-                format: message.format,
-                bytes: data.into(),
-            }
+            MessageImage::File { format: message.format, bytes: data.into() }
         };
-        let JsonHeader {
-            stamp: header_stamp,
-            frame_id: header_frame_id,
-        } = message.header;
+        let JsonHeader { stamp: header_stamp, frame_id: header_frame_id } = message.header;
         let JsonTime { sec, nsec } = message.timestamp.unwrap_or(header_stamp);
         let stamp = sec.saturating_mul(1_000_000_000).saturating_add(nsec);
-        Ok(Self {
-            stamp: (stamp != 0).then_some(stamp),
-            frame_id: message.frame_id.unwrap_or(header_frame_id),
-            image,
-        })
+        Ok(Self { stamp: (stamp != 0).then_some(stamp), frame_id: message.frame_id.unwrap_or(header_frame_id), image })
     }
 }
 
@@ -223,26 +195,19 @@ fn is_raw(schema: &str) -> bool {
     schema.ends_with("RawImage") || schema == "sensor_msgs/Image"
 }
 
-/// Refuses a format without colour samples: `compressed_image_transport` writes `bayer_rggb8; png compressed ` for a mosaic that it did not
-/// convert, and `16UC1; png compressed ` for depth.
+/// Refuses a format without colour samples: `compressed_image_transport` writes `bayer_rggb8; png compressed ` for a
+/// mosaic that it did not convert, and `16UC1; png compressed ` for depth.
 fn check_format(format: &str) -> Result<(), String> {
     let (source, target) = format.split_once(';').unwrap_or((format, ""));
     let kind = match source.trim() {
         _ if format.contains("compressedDepth") => "depth",
         source if source.starts_with("16UC1") || source.starts_with("32FC1") => "depth",
-        source
-            if source.starts_with("bayer")
-                && !target.contains("bgr")
-                && !target.contains("rgb") =>
-        {
+        source if source.starts_with("bayer") && !target.contains("bgr") && !target.contains("rgb") => {
             "a mosaic in an image file; take its topic that is not compressed"
         }
         _ => return Ok(()),
     };
-    Err(format!(
-        "format {:?} is {kind}, not an image",
-        excerpt(format, 60)
-    ))
+    Err(format!("format {:?} is {kind}, not an image", excerpt(format, 60)))
 }
 
 /// A message with an image in JSON. Messages of Foxglove have `timestamp` and `frame_id`, those of ROS a `header`.

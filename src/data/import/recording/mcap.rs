@@ -1,7 +1,8 @@
 //! Reader of MCAP files: [`McapReader`].
 //!
-//! A file is read from start to end, record by record (<https://mcap.dev/spec>), because it has no index if its recorder was killed.
-//! Message bodies are read on demand and one at a time, so memory does not depend on the size of files and chunks.
+//! A file is read from start to end, record by record (<https://mcap.dev/spec>), because it has no index if its
+//! recorder was killed. Message bodies are read on demand and one at a time, so memory does not depend on the size of
+//! files and chunks.
 
 use std::collections::HashMap;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom};
@@ -139,20 +140,15 @@ impl<R: Read + Seek> McapReader<R> {
     /// # Errors
     /// If it is not an MCAP file.
     pub(crate) fn open(mut file: R) -> Result<Self, String> {
-        let length = file
-            .seek(SeekFrom::End(0))
-            .and_then(|length| file.rewind().map(|()| length))
-            .map_err(|e| e.to_string())?;
+        let length =
+            file.seek(SeekFrom::End(0)).and_then(|length| file.rewind().map(|()| length)).map_err(|e| e.to_string())?;
         let mut file = BufReader::with_capacity(BUFFER_BYTES, file);
         if length == 0 {
             return Err("the file is empty, as a recorder leaves it that is killed".to_owned());
         }
         let mut magic = [0; MAGIC.len()];
         if file.read_exact(&mut magic).is_err() || magic != MAGIC {
-            return Err(
-                "not an MCAP file; a recording of ROS 2 or Foxglove that ends in .mcap expected"
-                    .to_owned(),
-            );
+            return Err("not an MCAP file; a recording of ROS 2 or Foxglove that ends in .mcap expected".to_owned());
         }
         Ok(Self {
             source: Source::File(file),
@@ -186,8 +182,8 @@ impl<R: Read + Seek> McapReader<R> {
         self.next_record.min(self.length)
     }
 
-    /// Reads the body of the message of the last event, and decompresses it if the recorder compressed each message. `None` if it cannot be
-    /// read; the next event then has the reason.
+    /// Reads the body of the message of the last event, and decompresses it if the recorder compressed each message.
+    /// `None` if it cannot be read; the next event then has the reason.
     pub(crate) fn body(&mut self) -> Option<&[u8]> {
         self.read_body(self.unread)?;
         if self.body.starts_with(&ZSTD_MAGIC)
@@ -198,8 +194,8 @@ impl<R: Read + Seek> McapReader<R> {
         Some(&self.body)
     }
 
-    /// Reads the start of the body, at least `min` bytes if the body is that long; `None` as for [`Self::body`], which may still be called
-    /// for the whole body.
+    /// Reads the start of the body, at least `min` bytes if the body is that long; `None` as for [`Self::body`], which
+    /// may still be called for the whole body.
     pub(crate) fn start_of_body(&mut self, min: u64) -> Option<&[u8]> {
         self.read_body(self.unread.min(min))?;
         if self.body.starts_with(&ZSTD_MAGIC) {
@@ -215,12 +211,7 @@ impl<R: Read + Seek> McapReader<R> {
 
     /// Appends bytes of the current record to the body, and returns the body.
     fn read_body(&mut self, count: u64) -> Option<&[u8]> {
-        let Self {
-            source,
-            body,
-            unread,
-            ..
-        } = self;
+        let Self { source, body, unread, .. } = self;
         body.reserve_exact(count.min(MAX_MESSAGE_BYTES) as usize);
         let read = match source {
             Source::File(file) => file.take(count).read_to_end(body),
@@ -281,9 +272,7 @@ impl<R: Read + Seek> McapReader<R> {
                 let times = chunk.times;
                 (chunk.into_file().ok(), times, problem)
             }
-            (Source::File(file), Fault::UnreadableChunk { times, problem }) => {
-                (Some(file), times, problem)
-            }
+            (Source::File(file), Fault::UnreadableChunk { times, problem }) => (Some(file), times, problem),
             (_, Fault::Broken(problem) | Fault::UnreadableChunk { problem, .. }) => {
                 return Event::Cut(problem);
             }
@@ -325,16 +314,11 @@ impl<R: Read + Seek> McapReader<R> {
         let length = u64::from_le_bytes(length);
         match &self.source {
             Source::Chunk(chunk) if length > chunk.remaining => {
-                return Err(
-                    format!("a record of {length} bytes runs past the end of the chunk").into(),
-                );
+                return Err(format!("a record of {length} bytes runs past the end of the chunk").into());
             }
             Source::Chunk(_) | Source::Ended => {}
             Source::File(_) => {
-                self.next_record = self
-                    .next_record
-                    .saturating_add(RECORD_HEAD)
-                    .saturating_add(length);
+                self.next_record = self.next_record.saturating_add(RECORD_HEAD).saturating_add(length);
             }
         }
         Ok((opcode, length))
@@ -420,9 +404,7 @@ impl<R: Read + Seek> McapReader<R> {
         let mut name_length = [0; 4];
         self.read_exact(&mut name_length)?;
         let name_length = u64::from(u32::from_le_bytes(name_length));
-        let stored_length = length
-            .checked_sub(CHUNK_HEAD + 4 + name_length + 8)
-            .ok_or_else(too_short)?;
+        let stored_length = length.checked_sub(CHUNK_HEAD + 4 + name_length + 8).ok_or_else(too_short)?;
         self.unread = name_length.min(MAX_NAME_BYTES as u64);
         let name = self.read_body(self.unread).ok_or_else(ends_too_early)?;
         let compression = String::from_utf8_lossy(name).into_owned();
@@ -433,13 +415,7 @@ impl<R: Read + Seek> McapReader<R> {
             let problem = "its length and that of its records differ".to_owned();
             return Err(Fault::UnreadableChunk { times, problem });
         }
-        let header = ChunkHeader {
-            times,
-            length: content,
-            crc,
-            compression,
-            stored_length,
-        };
+        let header = ChunkHeader { times, length: content, crc, compression, stored_length };
         if let Source::File(file) = mem::replace(&mut self.source, Source::Ended) {
             match Chunk::open(&header, file) {
                 Ok(chunk) => self.source = Source::Chunk(chunk),
@@ -459,10 +435,7 @@ impl<R: Read + Seek> McapReader<R> {
         Ok(Some(if is_intact {
             Event::ChunkRead
         } else {
-            Event::ChunkDamaged {
-                times: times.map(u64::cast_signed),
-                problem: "its checksum differs".to_owned(),
-            }
+            Event::ChunkDamaged { times: times.map(u64::cast_signed), problem: "its checksum differs".to_owned() }
         }))
     }
 }
@@ -471,10 +444,7 @@ impl<R: Read + Seek> McapReader<R> {
 fn decompress_message(message: &[u8]) -> Option<Vec<u8>> {
     let mut body = Vec::new();
     let decoder = zstd::stream::read::Decoder::with_buffer(message).ok()?;
-    let read = decoder
-        .take(MAX_MESSAGE_BYTES + 1)
-        .read_to_end(&mut body)
-        .ok()?;
+    let read = decoder.take(MAX_MESSAGE_BYTES + 1).read_to_end(&mut body).ok()?;
     (read as u64 <= MAX_MESSAGE_BYTES).then_some(body)
 }
 

@@ -34,9 +34,11 @@ pub(crate) struct TopicOverview {
     pub(crate) count: usize,
     /// First and last log time of its messages.
     pub(crate) times: [Nanoseconds; 2],
-    /// Size and encoding of the first image that can be read, or why the first message cannot be read; empty for topics without images.
+    /// Size and encoding of the first image that can be read, or why the first message cannot be read; empty for topics
+    /// without images.
     pub(crate) image_format: String,
-    /// True if no further message needs a look: an image was read, or all images of the topic are of a kind that is not read.
+    /// True if no further message needs a look: an image was read, or all images of the topic are of a kind that is not
+    /// read.
     is_settled: bool,
     /// Number of messages before the first image that can be read.
     pub(crate) broken: usize,
@@ -71,7 +73,8 @@ impl TopicOverview {
         }
     }
 
-    /// Looks for an image in a message. As the first messages may be broken, each one is tried until the topic is settled.
+    /// Looks for an image in a message. As the first messages may be broken, each one is tried until the topic is
+    /// settled.
     fn look<R: Read + Seek>(
         &mut self,
         reader: &mut McapReader<R>,
@@ -112,7 +115,8 @@ impl TopicOverview {
         }
     }
 
-    /// Size and encoding of the image in a message; `None` if the recording is damaged there, which the next event reports.
+    /// Size and encoding of the image in a message; `None` if the recording is damaged there, which the next event
+    /// reports.
     ///
     /// # Errors
     /// If it cannot be read.
@@ -136,9 +140,7 @@ impl TopicOverview {
                 Ok(Some(format!("{width}×{height} {}", image.encoding)))
             }
             MessageImage::File { format, bytes } => match image(&format, &bytes) {
-                FileImage::Readable([width, height]) => {
-                    Ok(Some(format!("{width}×{height} {format}")))
-                }
+                FileImage::Readable([width, height]) => Ok(Some(format!("{width}×{height} {format}"))),
                 FileImage::Unread(problem) => Err(problem),
                 FileImage::Video(problem) => {
                     self.is_settled = true;
@@ -167,7 +169,8 @@ impl TopicOverview {
 }
 
 impl Overview {
-    /// Adds the messages of a file called `place`. `image` reads an image file, from the format that its message states and its bytes.
+    /// Adds the messages of a file called `place`. `image` reads an image file, from the format that its message states
+    /// and its bytes.
     pub(crate) fn add<R: Read + Seek>(
         &mut self,
         place: &str,
@@ -186,15 +189,10 @@ impl Overview {
                 Event::ChunkRead => {}
                 Event::ChunkDamaged { times, problem } => {
                     let [from, to] = times.map(|time| self.since_start(time));
-                    self.problems.push(format!(
-                        "{place}: a damaged chunk, {from:.3} s to {to:.3} s: {problem}"
-                    ));
+                    self.problems.push(format!("{place}: a damaged chunk, {from:.3} s to {to:.3} s: {problem}"));
                 }
                 Event::Cut(problem) => {
-                    self.problems.push(format!(
-                        "{place}: the recording is cut off{}: {problem}",
-                        self.last_message()
-                    ));
+                    self.problems.push(format!("{place}: the recording is cut off{}: {problem}", self.last_message()));
                 }
             }
         }
@@ -207,12 +205,9 @@ impl Overview {
 
     /// Topic and time of the latest message, to continue an error message.
     fn last_message(&self) -> String {
-        self.topics
-            .iter()
-            .max_by_key(|(_, topic)| topic.times[1])
-            .map_or(String::new(), |(name, topic)| {
-                format!(" after {name} at {:.3} s", self.since_start(topic.times[1]))
-            })
+        self.topics.iter().max_by_key(|(_, topic)| topic.times[1]).map_or(String::new(), |(name, topic)| {
+            format!(" after {name} at {:.3} s", self.since_start(topic.times[1]))
+        })
     }
 
     /// Counts a message, and returns its topic.
@@ -232,10 +227,6 @@ impl Overview {
 
     /// Names of the topics with images.
     pub(crate) fn image_topics(&self) -> Vec<&str> {
-        self.topics
-            .iter()
-            .filter(|(_, topic)| topic.has_images())
-            .map(|(name, _)| &**name)
-            .collect()
+        self.topics.iter().filter(|(_, topic)| topic.has_images()).map(|(name, _)| &**name).collect()
     }
 }

@@ -39,12 +39,7 @@ impl<'a> Value<'a> {
     pub(super) fn doubles(self) -> Vec<f64> {
         match self {
             Self::Fixed64(bytes) => vec![f64::from_le_bytes(bytes)],
-            Self::Bytes(bytes) => bytes
-                .as_chunks::<8>()
-                .0
-                .iter()
-                .map(|number| f64::from_le_bytes(*number))
-                .collect(),
+            Self::Bytes(bytes) => bytes.as_chunks::<8>().0.iter().map(|number| f64::from_le_bytes(*number)).collect(),
             _ => Vec::new(),
         }
     }

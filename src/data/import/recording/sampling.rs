@@ -26,8 +26,8 @@ pub(crate) struct SamplingArgs {
     /// At most N frames of each topic, evenly spread over its duration; default: no limit
     #[arg(long, value_name = "N", add = Decides::Trials)]
     pub max_frames: Option<NonZeroUsize>,
-    /// Of the frames chosen otherwise, those that differ from the last one taken by more than this many 8-bit codes: the mean absolute
-    /// difference of the grey means of 16 × 16 blocks; default: all of them
+    /// Of the frames chosen otherwise, those that differ from the last one taken by more than this many 8-bit codes:
+    /// the mean absolute difference of the grey means of 16 × 16 blocks; default: all of them
     #[arg(long, value_name = "CODES", value_parser = positive, add = Decides::Trials)]
     pub changed: Option<f64>,
 }
@@ -44,23 +44,15 @@ fn interval(text: &str) -> Result<f64, String> {
 impl SamplingArgs {
     /// Interval between two frames in seconds: `--every`, or its default.
     pub(crate) fn interval(&self) -> f64 {
-        let has_other_flag =
-            !self.at.is_empty() || self.max_frames.is_some() || self.changed.is_some();
-        self.every
-            .unwrap_or(if has_other_flag { 0.0 } else { INTERVAL })
+        let has_other_flag = !self.at.is_empty() || self.max_frames.is_some() || self.changed.is_some();
+        self.every.unwrap_or(if has_other_flag { 0.0 } else { INTERVAL })
     }
 
     /// Sampler for a topic of this duration, in seconds.
     pub(crate) fn sampler(&self, duration: f64) -> Sampler {
         // For a duration D and N frames, frames are due at 0, D/N, 2D/N, ….
-        let spread = self
-            .max_frames
-            .map_or(0.0, |limit| duration / limit.get() as f64);
-        let mut at: Vec<Nanoseconds> = self
-            .at
-            .iter()
-            .map(|seconds| nanoseconds(*seconds))
-            .collect();
+        let spread = self.max_frames.map_or(0.0, |limit| duration / limit.get() as f64);
+        let mut at: Vec<Nanoseconds> = self.at.iter().map(|seconds| nanoseconds(*seconds)).collect();
         at.sort_unstable();
         at.dedup();
         Sampler {
@@ -165,10 +157,7 @@ impl Sampler {
     /// Chooses a due frame if it differs enough from the last chosen frame.
     pub(crate) fn has_changed(&mut self, thumbnail: Thumbnail) -> bool {
         let min_change = self.min_change.unwrap_or(0.0);
-        let has_changed = self
-            .last_taken
-            .as_ref()
-            .is_none_or(|last| last.difference(&thumbnail) > min_change);
+        let has_changed = self.last_taken.as_ref().is_none_or(|last| last.difference(&thumbnail) > min_change);
         if has_changed {
             self.last_taken = Some(thumbnail);
         } else {
@@ -179,11 +168,7 @@ impl Sampler {
 
     /// Times given with `--at`, in seconds, after the last frame.
     pub(crate) fn missed(&self) -> Vec<f64> {
-        self.at
-            .iter()
-            .skip(self.progress.passed)
-            .map(|time| seconds(*time))
-            .collect()
+        self.at.iter().skip(self.progress.passed).map(|time| seconds(*time)).collect()
     }
 }
 
@@ -210,25 +195,15 @@ mod tests {
     fn one_frame_is_chosen_per_interval() {
         let times = [100.0, 100.5, 101.9, 102.0, 102.1, 107.0, 107.5, 108.0];
         assert_eq!(chosen(&SamplingArgs::default(), &times), [0, 3, 5, 7]);
-        let every = SamplingArgs {
-            every: Some(0.0),
-            ..SamplingArgs::default()
-        };
+        let every = SamplingArgs { every: Some(0.0), ..SamplingArgs::default() };
         assert_eq!(chosen(&every, &times).len(), times.len());
     }
 
     #[test]
     fn broken_frame_gives_its_place_to_the_next() {
-        let args = SamplingArgs {
-            max_frames: NonZeroUsize::new(1),
-            ..SamplingArgs::default()
-        };
+        let args = SamplingArgs { max_frames: NonZeroUsize::new(1), ..SamplingArgs::default() };
         let mut sampler = args.sampler(10.0);
-        let place = |since| Place {
-            time: since,
-            since,
-            stretch: 0,
-        };
+        let place = |since| Place { time: since, since, stretch: 0 };
         let before = sampler.progress();
         assert!(sampler.is_due(place(0)));
         sampler.reset(before);
@@ -239,21 +214,12 @@ mod tests {
 
     #[test]
     fn first_frame_at_each_time_is_chosen() {
-        let at = SamplingArgs {
-            at: vec![5.0, 0.0, 1.95, 1.96, 99.0],
-            ..SamplingArgs::default()
-        };
-        assert_eq!(
-            chosen(&at, &[10.0, 11.0, 11.9, 12.0, 14.9, 15.1]),
-            [0, 3, 5]
-        );
+        let at = SamplingArgs { at: vec![5.0, 0.0, 1.95, 1.96, 99.0], ..SamplingArgs::default() };
+        assert_eq!(chosen(&at, &[10.0, 11.0, 11.9, 12.0, 14.9, 15.1]), [0, 3, 5]);
     }
 
     fn most(n: usize) -> SamplingArgs {
-        SamplingArgs {
-            max_frames: NonZeroUsize::new(n),
-            ..SamplingArgs::default()
-        }
+        SamplingArgs { max_frames: NonZeroUsize::new(n), ..SamplingArgs::default() }
     }
 
     #[test]
@@ -266,20 +232,12 @@ mod tests {
 
     #[test]
     fn unchanged_frames_do_not_count() {
-        let args = SamplingArgs {
-            changed: Some(5.0),
-            max_frames: NonZeroUsize::new(2),
-            ..SamplingArgs::default()
-        };
+        let args = SamplingArgs { changed: Some(5.0), max_frames: NonZeroUsize::new(2), ..SamplingArgs::default() };
         let mut sampler = args.sampler(0.0);
         let found: Vec<bool> = (0..)
             .zip([10, 14, 15, 16, 200])
             .map(|(i, code)| {
-                let place = Place {
-                    time: i,
-                    since: i,
-                    stretch: 0,
-                };
+                let place = Place { time: i, since: i, stretch: 0 };
                 let grey = crate::types::Rgb::new(1, 1, vec![code; 3]).unwrap();
                 sampler.is_due(place) && sampler.has_changed(Thumbnail::new(&grey))
             })

@@ -2,12 +2,12 @@
 
 use super::Nanoseconds;
 
-/// Maximum time that a message arrives out of order (chosen). A frame that goes further back starts a new clock, as in a recording that is
-/// played again.
+/// Maximum time that a message arrives out of order (chosen). A frame that goes further back starts a new clock, as in
+/// a recording that is played again.
 const MAX_REORDERING: Nanoseconds = 5_000_000_000;
 
-/// Maximum difference between the delays of two topics to the recorder (chosen). If the first frames of two topics differ more than this,
-/// the topics have different clocks.
+/// Maximum difference between the delays of two topics to the recorder (chosen). If the first frames of two topics
+/// differ more than this, the topics have different clocks.
 const MAX_DELAY_DIFFERENCE: Nanoseconds = 1_000_000_000;
 
 /// Position of a frame in a drive.
@@ -46,8 +46,9 @@ impl ClockRun {
     }
 }
 
-/// Stretches of equal duration, counted from the first frame of the drive, whether or not it is chosen. The topics may have different
-/// clocks; the log time relates them, also after a clock jumped back. If the log time jumped back, too, the next stretch starts.
+/// Stretches of equal duration, counted from the first frame of the drive, whether or not it is chosen. The topics may
+/// have different clocks; the log time relates them, also after a clock jumped back. If the log time jumped back, too,
+/// the next stretch starts.
 #[derive(Debug)]
 pub(crate) struct Stretches {
     /// Duration of a stretch.
@@ -65,10 +66,7 @@ struct DriveStart {
 impl Stretches {
     /// Stretches of this duration.
     pub(crate) fn new(seconds: f64) -> Self {
-        Self {
-            length: ((seconds * 1e9) as Nanoseconds).max(1),
-            start: None,
-        }
+        Self { length: ((seconds * 1e9) as Nanoseconds).max(1), start: None }
     }
 
     /// Log time of the first frame.
@@ -77,12 +75,7 @@ impl Stretches {
     }
 
     /// Position of the next frame of a topic, from its time on the clock of its topic and its log time.
-    pub(crate) fn place(
-        &mut self,
-        clock: &mut TopicClock,
-        time: Nanoseconds,
-        log_time: Nanoseconds,
-    ) -> Place {
+    pub(crate) fn place(&mut self, clock: &mut TopicClock, time: Nanoseconds, log_time: Nanoseconds) -> Place {
         let start = *self.start.get_or_insert(DriveStart { time, log_time });
         let mut run = match clock.0 {
             Some(run) if run.latest.saturating_sub(time) <= MAX_REORDERING => run,
@@ -97,15 +90,12 @@ impl Stretches {
         run.log_time = log_time;
         clock.0 = Some(run);
         let since = run.since(time);
-        Place {
-            time,
-            since,
-            stretch: (since / self.length).unsigned_abs(),
-        }
+        Place { time, since, stretch: (since / self.length).unsigned_abs() }
     }
 
-    /// Time from the first frame of the drive to the first frame of a clock run: by the clock if it is the same as the clock of the drive's
-    /// first frame, else by the log time. If both jumped back, the run starts with the next stretch.
+    /// Time from the first frame of the drive to the first frame of a clock run: by the clock if it is the same as the
+    /// clock of the drive's first frame, else by the log time. If both jumped back, the run starts with the next
+    /// stretch.
     fn start_of_run(
         &self,
         start: DriveStart,
@@ -116,13 +106,8 @@ impl Stretches {
         let by_log = log_time.saturating_sub(start.log_time);
         let Some(previous) = previous else {
             let by_clock = time.saturating_sub(start.time);
-            let is_same_clock =
-                by_clock.saturating_sub(by_log).saturating_abs() <= MAX_DELAY_DIFFERENCE;
-            return if is_same_clock {
-                by_clock
-            } else {
-                by_log.max(0)
-            };
+            let is_same_clock = by_clock.saturating_sub(by_log).saturating_abs() <= MAX_DELAY_DIFFERENCE;
+            return if is_same_clock { by_clock } else { by_log.max(0) };
         };
         if log_time > previous.log_time {
             return by_log.max(0);
@@ -173,10 +158,8 @@ mod tests {
             for second in 0..40 {
                 let time = second * 1_000_000_000;
                 let log_time = time + 20_000_000;
-                let places = [
-                    stretches.place(&mut front, time, log_time),
-                    stretches.place(&mut rear, time + offset, log_time),
-                ];
+                let places =
+                    [stretches.place(&mut front, time, log_time), stretches.place(&mut rear, time + offset, log_time)];
                 let [front, rear] = places.map(|place| place.since);
                 let difference = rear.saturating_sub(front);
                 let expected = if milliseconds.abs() < 1000 { offset } else { 0 };

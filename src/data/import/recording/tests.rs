@@ -1,11 +1,6 @@
 //! Recordings in every format, and thousands of damaged ones, read from memory.
 
-#[allow(
-    dead_code,
-    missing_docs,
-    unreachable_pub,
-    reason = "the unit tests use a part of what is shared"
-)]
+#[allow(dead_code, missing_docs, unreachable_pub, reason = "the unit tests use a part of what is shared")]
 #[path = "../../../../tests/support/recording.rs"]
 mod recording;
 
@@ -50,19 +45,16 @@ fn read(file: &[u8]) -> ReadBack {
                 match &message.channel.content {
                     ChannelContent::Image(encoding) => {
                         let parsed = ImageMessage::parse(schema, *encoding, body);
-                        found.images +=
-                            usize::from(parsed.is_ok_and(|message| match message.image {
-                                MessageImage::Raw(image) => image.decode().is_ok(),
-                                MessageImage::File { bytes, .. } => !bytes.is_empty(),
-                            }));
+                        found.images += usize::from(parsed.is_ok_and(|message| match message.image {
+                            MessageImage::Raw(image) => image.decode().is_ok(),
+                            MessageImage::File { bytes, .. } => !bytes.is_empty(),
+                        }));
                     }
                     ChannelContent::Camera(encoding) => {
                         drop(CameraInfo::parse(schema, *encoding, body));
                     }
                     ChannelContent::Exposure(fields) => drop(fields.parse(body)),
-                    ChannelContent::Unsupported(_)
-                    | ChannelContent::Video(_)
-                    | ChannelContent::Other => {}
+                    ChannelContent::Unsupported(_) | ChannelContent::Video(_) | ChannelContent::Other => {}
                 }
             }
             Event::Message(_) => {}
@@ -78,12 +70,7 @@ fn read(file: &[u8]) -> ReadBack {
 fn chunks_of_each_compression_are_read() {
     for compression in Compression::ALL {
         let found = read(&drive(3, compression));
-        let expected = ReadBack {
-            messages: 22,
-            images: 9,
-            intact_chunks: 3,
-            ..ReadBack::default()
-        };
+        let expected = ReadBack { messages: 22, images: 9, intact_chunks: 3, ..ReadBack::default() };
         assert_eq!(found, expected, "{compression:?}");
     }
 }
@@ -105,10 +92,7 @@ fn a_file_cut_anywhere_keeps_what_is_whole() {
         let mut last = 0;
         for length in (8..file.len() - 60).step_by(37) {
             let found = read(&file[..length]);
-            assert!(
-                found.is_cut && found.damaged_chunks == 0,
-                "{compression:?} {length}: {found:?}"
-            );
+            assert!(found.is_cut && found.damaged_chunks == 0, "{compression:?} {length}: {found:?}");
             assert!((last..=whole.messages).contains(&found.messages));
             last = found.messages;
         }
@@ -123,11 +107,7 @@ fn a_changed_byte_damages_its_chunk_alone() {
         let middle = file.len() / 2;
         file[middle] ^= 1;
         let found = read(&file);
-        assert_eq!(
-            (found.intact_chunks, found.damaged_chunks, found.is_cut),
-            (2, 1, false),
-            "{compression:?}"
-        );
+        assert_eq!((found.intact_chunks, found.damaged_chunks, found.is_cut), (2, 1, false), "{compression:?}");
     }
 }
 
@@ -137,13 +117,8 @@ fn unknown_compressions_are_named() {
     let at = file.windows(3).position(|part| part == b"lz4").unwrap();
     file[at..at + 3].copy_from_slice(b"lzx");
     let mut reader = McapReader::open(Cursor::new(file)).unwrap();
-    let Some(Event::ChunkDamaged { problem, .. }) = reader.next() else {
-        panic!("a damaged chunk expected")
-    };
-    assert!(
-        problem.contains("\"lzx\"; zstd, lz4 or none expected"),
-        "{problem}"
-    );
+    let Some(Event::ChunkDamaged { problem, .. }) = reader.next() else { panic!("a damaged chunk expected") };
+    assert!(problem.contains("\"lzx\"; zstd, lz4 or none expected"), "{problem}");
 }
 
 #[test]
@@ -151,18 +126,8 @@ fn a_small_chunk_does_not_become_endless() {
     let mut records = Records::default();
     // A petabyte from a few bytes of a frame that repeats a byte.
     let stored = zstd::encode_all(&[0; 1000][..], 1).unwrap();
-    let head = [
-        &[0; 16][..],
-        &(1_u64 << 50).to_le_bytes(),
-        &[0; 4],
-        &4_u32.to_le_bytes(),
-        b"zstd",
-    ]
-    .concat();
-    records.record(
-        6,
-        &[&head[..], &(stored.len() as u64).to_le_bytes(), &stored].concat(),
-    );
+    let head = [&[0; 16][..], &(1_u64 << 50).to_le_bytes(), &[0; 4], &4_u32.to_le_bytes(), b"zstd"].concat();
+    records.record(6, &[&head[..], &(stored.len() as u64).to_le_bytes(), &stored].concat());
     assert_eq!(read(&records.file()).damaged_chunks, 1);
 }
 
@@ -225,8 +190,8 @@ fn damaged_messages_of_every_serialization_are_parsed_or_refused() {
     let raw = image(0.0, "bayer_rggb8", [4, 2], &[7; 8], 3);
     let json = br#"{"timestamp":{"sec":1,"nsec":2},"frame_id":"a","width":1,"height":1,"encoding":"mono8","step":1,"data":"AA=="}"#;
     let protobuf = [
-        0x0a, 4, 8, 5, 16, 6, 0x15, 1, 0, 0, 0, 0x1d, 1, 0, 0, 0, 0x22, 5, b'm', b'o', b'n', b'o',
-        b'8', 0x2d, 1, 0, 0, 0, 0x32, 1, 9, 0x3a, 1, b'c',
+        0x0a, 4, 8, 5, 16, 6, 0x15, 1, 0, 0, 0, 0x1d, 1, 0, 0, 0, 0x22, 5, b'm', b'o', b'n', b'o', b'8', 0x2d, 1, 0, 0,
+        0, 0x32, 1, 9, 0x3a, 1, b'c',
     ];
     let cases = [
         ("sensor_msgs/Image", Encoding::Cdr, &raw[..]),
@@ -234,18 +199,10 @@ fn damaged_messages_of_every_serialization_are_parsed_or_refused() {
         ("sensor_msgs/CompressedImage", Encoding::Cdr, &raw[..]),
         ("foxglove.RawImage", Encoding::Json, &json[..]),
         ("foxglove.RawImage", Encoding::Protobuf, &protobuf[..]),
-        (
-            "foxglove.CompressedImage",
-            Encoding::Protobuf,
-            &protobuf[..],
-        ),
+        ("foxglove.CompressedImage", Encoding::Protobuf, &protobuf[..]),
         ("foxglove_msgs/RawImage", Encoding::Cdr, &raw[..]),
     ];
-    assert!(
-        [0, 3, 4]
-            .into_iter()
-            .all(|i| decodes(cases[i].0, cases[i].1, cases[i].2))
-    );
+    assert!([0, 3, 4].into_iter().all(|i| decodes(cases[i].0, cases[i].1, cases[i].2)));
     let mut decoded = 0;
     for i in 0..7000 {
         let (schema, encoding, bytes) = cases[i % cases.len()];
@@ -257,18 +214,12 @@ fn damaged_messages_of_every_serialization_are_parsed_or_refused() {
 #[test]
 fn messages_of_foxglove_have_their_times_and_pixels() {
     let protobuf = [
-        0x0a, 4, 8, 5, 16, 6, 0x15, 1, 0, 0, 0, 0x1d, 1, 0, 0, 0, 0x22, 5, b'm', b'o', b'n', b'o',
-        b'8', 0x2d, 1, 0, 0, 0, 0x32, 1, 9, 0x3a, 1, b'c',
+        0x0a, 4, 8, 5, 16, 6, 0x15, 1, 0, 0, 0, 0x1d, 1, 0, 0, 0, 0x22, 5, b'm', b'o', b'n', b'o', b'8', 0x2d, 1, 0, 0,
+        0, 0x32, 1, 9, 0x3a, 1, b'c',
     ];
     let message = ImageMessage::parse("foxglove.RawImage", Encoding::Protobuf, &protobuf).unwrap();
-    assert_eq!(
-        (message.stamp, &*message.frame_id),
-        (Some(5_000_000_006), "c")
-    );
-    assert_eq!(
-        stamp("foxglove.RawImage", Encoding::Protobuf, &protobuf),
-        message.stamp
-    );
+    assert_eq!((message.stamp, &*message.frame_id), (Some(5_000_000_006), "c"));
+    assert_eq!(stamp("foxglove.RawImage", Encoding::Protobuf, &protobuf), message.stamp);
     let json = br#"{"timestamp":{"sec":5,"nsec":6},"frame_id":"c","format":"png","data":"AQI="}"#;
     let message = ImageMessage::parse("foxglove.CompressedImage", Encoding::Json, json).unwrap();
     assert_eq!(message.stamp, Some(5_000_000_006));

@@ -22,25 +22,14 @@ impl Thumbnail {
             }
         }
         // An image smaller than the grid has empty blocks, the same ones in every frame.
-        Self(
-            blocks
-                .into_iter()
-                .filter(|(_, count)| *count > 0)
-                .map(|(sum, count)| sum as f64 / count as f64)
-                .collect(),
-        )
+        Self(blocks.into_iter().filter(|(_, count)| *count > 0).map(|(sum, count)| sum as f64 / count as f64).collect())
     }
 
-    /// Mean absolute difference of the blocks, in 8-bit codes. Frames of other sizes may have fewer blocks; only the blocks that both have
-    /// are compared.
+    /// Mean absolute difference of the blocks, in 8-bit codes. Frames of other sizes may have fewer blocks; only the
+    /// blocks that both have are compared.
     pub(crate) fn difference(&self, other: &Self) -> f64 {
         let count = self.0.len().min(other.0.len()).max(1);
-        self.0
-            .iter()
-            .zip(&other.0)
-            .map(|(a, b)| (a - b).abs())
-            .sum::<f64>()
-            / count as f64
+        self.0.iter().zip(&other.0).map(|(a, b)| (a - b).abs()).sum::<f64>() / count as f64
     }
 }
 

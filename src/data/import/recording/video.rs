@@ -9,17 +9,15 @@ use std::thread::{self, JoinHandle};
 
 use super::Nanoseconds;
 use super::ffmpeg_colours::{FrameColours, needs_colours};
-use super::ffmpeg_log::{
-    FfmpegLog, FrameFacts, last_lines, parse_duration, read_log, supports_fps_mode,
-};
+use super::ffmpeg_log::{FfmpegLog, FrameFacts, last_lines, parse_duration, read_log, supports_fps_mode};
 use crate::error::{Error, Result};
 use crate::pictures::FrameConversion;
 use crate::pictures::decode_rule::MAX_PIXELS;
 use crate::types::Rgb;
 use crate::types::text::excerpt;
 
-/// Maximum length of an expression that selects frames, in bytes: a command line of Windows has at most 32,767 characters. Without the
-/// expression, all frames are decoded.
+/// Maximum length of an expression that selects frames, in bytes: a command line of Windows has at most 32,767
+/// characters. Without the expression, all frames are decoded.
 const MAX_SELECT: usize = 30_000;
 
 /// Video file with metadata from ffmpeg.
@@ -87,7 +85,8 @@ impl Video {
         Self::open_as(path, None)
     }
 
-    /// Reads the metadata of an MP4 file of a data set. A playlist in its place, which could name files elsewhere, is not read.
+    /// Reads the metadata of an MP4 file of a data set. A playlist in its place, which could name files elsewhere, is
+    /// not read.
     ///
     /// # Errors
     /// As [`Self::open`].
@@ -97,37 +96,27 @@ impl Video {
 
     fn open_as(path: &Path, format: Option<&'static str>) -> Result<Self> {
         crate::files::reading::refuse_pipes(path).map_err(|e| Error::file(path, "read", e))?;
-        let output = ffmpeg(path, format)
-            .stdin(Stdio::null())
-            .output()
-            .map_err(|e| start_error(&e))?;
+        let output = ffmpeg(path, format).stdin(Stdio::null()).output().map_err(|e| start_error(&e))?;
         let log = String::from_utf8_lossy(&output.stderr).into_owned();
         let Some((_, stream)) = log.split_once(" Video: ") else {
             let lines: Vec<String> = log.lines().map(str::to_owned).collect();
             let problem = format!("ffmpeg finds no video in it: {}", last_lines(&lines));
             return Err(Error::data(path.display(), problem));
         };
-        let duration = log
-            .split_once("Duration: ")
-            .and_then(|(_, rest)| parse_duration(rest.split(',').next()?));
+        let duration = log.split_once("Duration: ").and_then(|(_, rest)| parse_duration(rest.split(',').next()?));
         Ok(Self {
             path: path.to_owned(),
             format,
             duration,
             stream: stream.lines().next().unwrap_or_default().trim().to_owned(),
-            passthrough: if supports_fps_mode(&log) {
-                ["-fps_mode", "passthrough"]
-            } else {
-                ["-vsync", "passthrough"]
-            },
-            is_dolby_vision: log
-                .lines()
-                .any(|line| line.contains("DOVI") && line.contains("compatibility id: 0")),
+            passthrough: if supports_fps_mode(&log) { ["-fps_mode", "passthrough"] } else { ["-vsync", "passthrough"] },
+            is_dolby_vision: log.lines().any(|line| line.contains("DOVI") && line.contains("compatibility id: 0")),
         })
     }
 
-    /// Decodes one frame every `interval` seconds from the first one, or every frame if it is 0. Frames are converted to sRGB as the video
-    /// states its colours: codes of BT.709 and similar ones are kept, wide primaries and HDR are converted.
+    /// Decodes one frame every `interval` seconds from the first one, or every frame if it is 0. Frames are converted
+    /// to sRGB as the video states its colours: codes of BT.709 and similar ones are kept, wide primaries and HDR are
+    /// converted.
     ///
     /// # Errors
     /// If ffmpeg cannot be started, or the colours of the video are not converted.
@@ -136,20 +125,17 @@ impl Video {
             return self.converted(None);
         }
         // The small addend is for frames at a multiple of the interval, whose quotient may be rounded down.
-        let [this, last] =
-            ["t", "prev_selected_t"].map(|time| format!("floor(({time}-start_t)/{interval}+1e-7)"));
+        let [this, last] = ["t", "prev_selected_t"].map(|time| format!("floor(({time}-start_t)/{interval}+1e-7)"));
         self.converted(Some(&format!("isnan(prev_selected_t)+gt({this},{last})")))
     }
 
-    /// Decodes at least the frames in these spans of time, each from its first second to its last, and converts them like [`Self::frames`].
+    /// Decodes at least the frames in these spans of time, each from its first second to its last, and converts them
+    /// like [`Self::frames`].
     ///
     /// # Errors
     /// As [`Self::frames`].
     pub(crate) fn frames_within(&self, spans: &[[f64; 2]]) -> Result<VideoFrames> {
-        let spans: Vec<String> = spans
-            .iter()
-            .map(|[from, to]| format!("between(t,{from:.6},{to:.6})"))
-            .collect();
+        let spans: Vec<String> = spans.iter().map(|[from, to]| format!("between(t,{from:.6},{to:.6})")).collect();
         let select = spans.join("+");
         self.converted(Some(&*select).filter(|select| select.len() <= MAX_SELECT))
     }
@@ -180,11 +166,7 @@ impl Video {
     }
 
     /// Starts ffmpeg. Frames that are converted are decoded to 16 bits.
-    fn decode(
-        &self,
-        select: Option<&str>,
-        conversion: Option<FrameConversion>,
-    ) -> Result<VideoFrames> {
+    fn decode(&self, select: Option<&str>, conversion: Option<FrameConversion>) -> Result<VideoFrames> {
         let filter = match select {
             Some(select) => format!("select='{select}',showinfo"),
             None => "showinfo".to_owned(),
@@ -193,14 +175,7 @@ impl Video {
         command
             .args(["-map", "0:v:0", "-vf", &filter])
             .args(self.passthrough)
-            .args([
-                "-pix_fmt",
-                if conversion.is_some() {
-                    "rgb48be"
-                } else {
-                    "rgb24"
-                },
-            ])
+            .args(["-pix_fmt", if conversion.is_some() { "rgb48be" } else { "rgb24" }])
             .args(["-c:v", "ppm", "-f", "image2pipe", "-"])
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
@@ -230,11 +205,7 @@ impl Video {
 
 impl Conversion {
     fn new(conversion: FrameConversion) -> Self {
-        Self {
-            rule: conversion,
-            pixels: 0,
-            clipped: 0,
-        }
+        Self { rule: conversion, pixels: 0, clipped: 0 }
     }
 
     fn convert(&mut self, samples: &[u16]) -> Vec<u8> {
@@ -279,10 +250,7 @@ impl VideoFrames {
         }
         match self.read_image() {
             Ok(Some(image)) => {
-                let facts = self
-                    .facts
-                    .recv()
-                    .map_err(|_| self.failure("it states no time of a frame"))?;
+                let facts = self.facts.recv().map_err(|_| self.failure("it states no time of a frame"))?;
                 self.check_colours(&facts)?;
                 self.colours = facts.colours;
                 self.count += 1;
@@ -312,11 +280,8 @@ impl VideoFrames {
         if before == found {
             return Ok(());
         }
-        let name = |conversion: Option<&FrameConversion>| {
-            conversion
-                .map_or("sRGB codes", FrameConversion::name)
-                .to_owned()
-        };
+        let name =
+            |conversion: Option<&FrameConversion>| conversion.map_or("sRGB codes", FrameConversion::name).to_owned();
         let expected = name(self.conversion.as_ref().map(|known| &known.rule));
         let found = match found.conversion(&self.path) {
             Ok(conversion) => name(conversion.as_ref()),
@@ -338,10 +303,7 @@ impl VideoFrames {
     /// Share of the pixels so far whose light is above white and was clipped; `None` if the video is not HDR.
     pub(crate) fn clipped_share(&self) -> Option<f64> {
         let found = self.conversion.as_ref()?;
-        found
-            .rule
-            .is_hdr()
-            .then(|| found.clipped as f64 / found.pixels.max(1) as f64)
+        found.rule.is_hdr().then(|| found.clipped as f64 / found.pixels.max(1) as f64)
     }
 
     /// Reads the next image, in the format PPM.
@@ -349,45 +311,30 @@ impl VideoFrames {
         let Some(magic) = self.read_word()? else {
             return Ok(None);
         };
-        let (width, height, max_value) = (
-            self.read_number()?,
-            self.read_number()?,
-            self.read_number()?,
-        );
-        let expected = if self.conversion.is_some() {
-            65_535
-        } else {
-            255
-        };
+        let (width, height, max_value) = (self.read_number()?, self.read_number()?, self.read_number()?);
+        let expected = if self.conversion.is_some() { 65_535 } else { 255 };
         let pixels = width.saturating_mul(height);
         if magic != "P6" || max_value != expected || pixels == 0 || pixels as u64 > MAX_PIXELS {
             return Err(format!("an image {magic} of {width} × {height} pixels"));
         }
         let samples = if let Some(conversion) = &mut self.conversion {
             let mut bytes = vec![0; pixels * 6];
-            self.output
-                .read_exact(&mut bytes)
-                .map_err(|e| e.to_string())?;
+            self.output.read_exact(&mut bytes).map_err(|e| e.to_string())?;
             let pairs = bytes.as_chunks::<2>().0.iter();
             let samples: Vec<u16> = pairs.map(|pair| u16::from_be_bytes(*pair)).collect();
             conversion.convert(&samples)
         } else {
             let mut samples = vec![0; pixels * 3];
-            self.output
-                .read_exact(&mut samples)
-                .map_err(|e| e.to_string())?;
+            self.output.read_exact(&mut samples).map_err(|e| e.to_string())?;
             samples
         };
-        Rgb::new(height, width, samples)
-            .map(Some)
-            .map_err(|e| e.to_string())
+        Rgb::new(height, width, samples).map(Some).map_err(|e| e.to_string())
     }
 
     /// Reads a number in the head of an image.
     fn read_number(&mut self) -> Result<usize, String> {
         let word = self.read_word()?.unwrap_or_default();
-        word.parse::<usize>()
-            .map_err(|_| format!("{word:?} in the head of an image"))
+        word.parse::<usize>().map_err(|_| format!("{word:?} in the head of an image"))
     }
 
     /// Reads the next word of the header of an image and the space after it; `None` at the end.

@@ -16,7 +16,8 @@ use crate::types::text::excerpt;
 /// `vlmeval/dataset/image_base.py`).
 pub(crate) const MAX_NAME_LENGTH: usize = 64;
 
-/// Maximum length of a base64 text that is kept in memory, in bytes (chosen). A longer one is read from its file again when needed.
+/// Maximum length of a base64 text that is kept in memory, in bytes (chosen). A longer one is read from its file again
+/// when needed.
 const MAX_KEPT_BASE64: usize = 1024;
 
 /// Minimum length of a line of wrapped base64 (PEM has 64 characters, MIME 76). Shorter words belong to a sentence.
@@ -66,10 +67,7 @@ pub(crate) struct FileFacts {
 
 impl FileFacts {
     pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
-        Self {
-            digest: Digest::from_bytes(bytes),
-            format: FileFormat::detect(bytes).ok(),
-        }
+        Self { digest: Digest::from_bytes(bytes), format: FileFormat::detect(bytes).ok() }
     }
 }
 
@@ -83,10 +81,7 @@ impl Cell {
             Self::Bytes(bytes) => bytes.len(),
             Self::File(_) => size_of::<FileFacts>(),
             Self::List(cells) => cells.iter().map(Self::memory_size).sum(),
-            Self::Fields(fields) => fields
-                .iter()
-                .map(|(_, cell)| size_of::<Arc<str>>() + cell.memory_size())
-                .sum(),
+            Self::Fields(fields) => fields.iter().map(|(_, cell)| size_of::<Arc<str>>() + cell.memory_size()).sum(),
         };
         size_of::<Self>() + inner
     }
@@ -95,35 +90,23 @@ impl Cell {
     pub(super) fn without_files(self, names: &mut FieldNames) -> Self {
         match self {
             Self::Bytes(bytes) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
-            Self::Text(text) if text.len() > MAX_KEPT_BASE64 => {
-                match (decode_base64(&text), parse_list(&text)) {
-                    (Some(bytes), _) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
-                    (None, Some(items)) => Self::List(
-                        items
-                            .into_iter()
-                            .map(|item| Self::Text(item).without_files(names))
-                            .collect(),
-                    ),
-                    (None, None) => Self::Text(text),
+            Self::Text(text) if text.len() > MAX_KEPT_BASE64 => match (decode_base64(&text), parse_list(&text)) {
+                (Some(bytes), _) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
+                (None, Some(items)) => {
+                    Self::List(items.into_iter().map(|item| Self::Text(item).without_files(names)).collect())
                 }
-            }
-            Self::List(cells) => Self::List(
-                cells
-                    .into_iter()
-                    .map(|cell| cell.without_files(names))
-                    .collect(),
-            ),
+                (None, None) => Self::Text(text),
+            },
+            Self::List(cells) => Self::List(cells.into_iter().map(|cell| cell.without_files(names)).collect()),
             Self::Fields(fields) => Self::Fields(
-                fields
-                    .into_iter()
-                    .map(|(name, cell)| (names.intern(name), cell.without_files(names)))
-                    .collect(),
+                fields.into_iter().map(|(name, cell)| (names.intern(name), cell.without_files(names))).collect(),
             ),
             other => other,
         }
     }
 
-    /// True if the cell has no value: null, an empty text or list, or a word for a missing value (`nan`, `N/A`, `None`, `null`).
+    /// True if the cell has no value: null, an empty text or list, or a word for a missing value (`nan`, `N/A`, `None`,
+    /// `null`).
     pub(crate) fn is_absent(&self) -> bool {
         match self {
             Self::Absent => true,
@@ -166,10 +149,7 @@ impl Cell {
         let Self::Fields(fields) = self else {
             return None;
         };
-        fields
-            .iter()
-            .find(|(field, _)| **field == *name)
-            .map(|(_, cell)| cell)
+        fields.iter().find(|(field, _)| **field == *name).map(|(_, cell)| cell)
     }
 
     /// Kind of value, for messages.
@@ -198,10 +178,8 @@ impl Cell {
                 format!("[{}]", cells.join(", "))
             }
             Self::Fields(fields) => {
-                let fields: Vec<String> = fields
-                    .iter()
-                    .map(|(name, cell)| format!("{name}: {}", cell.excerpt(max)))
-                    .collect();
+                let fields: Vec<String> =
+                    fields.iter().map(|(name, cell)| format!("{name}: {}", cell.excerpt(max))).collect();
                 format!("{{{}}}", fields.join(", "))
             }
         };
@@ -215,17 +193,12 @@ impl From<&Cell> for Value {
         match cell {
             Cell::Absent | Cell::Bytes(_) | Cell::File(_) => Self::Null,
             Cell::Bool(is_true) => Self::Bool(*is_true),
-            Cell::Number(text) => text
-                .parse()
-                .map_or_else(|_| text.as_ref().into(), Self::Number),
+            Cell::Number(text) => text.parse().map_or_else(|_| text.as_ref().into(), Self::Number),
             Cell::Text(text) => text.as_str().into(),
             Cell::List(cells) => cells.iter().map(Self::from).collect(),
-            Cell::Fields(fields) => Self::Object(
-                fields
-                    .iter()
-                    .map(|(name, cell)| (name.to_string(), Self::from(cell)))
-                    .collect(),
-            ),
+            Cell::Fields(fields) => {
+                Self::Object(fields.iter().map(|(name, cell)| (name.to_string(), Self::from(cell))).collect())
+            }
         }
     }
 }
@@ -238,12 +211,9 @@ impl From<Value> for Cell {
             Value::Number(number) => Self::Number(number.to_string().into()),
             Value::String(text) => Self::Text(text),
             Value::Array(values) => Self::List(values.into_iter().map(Self::from).collect()),
-            Value::Object(fields) => Self::Fields(
-                fields
-                    .into_iter()
-                    .map(|(name, value)| (name.into(), Self::from(value)))
-                    .collect(),
-            ),
+            Value::Object(fields) => {
+                Self::Fields(fields.into_iter().map(|(name, value)| (name.into(), Self::from(value))).collect())
+            }
         }
     }
 }
@@ -266,17 +236,11 @@ pub(crate) fn decode_base64(text: &str) -> Option<Vec<u8>> {
     if text.bytes().all(is_base64) {
         return STANDARD.decode(text).ok();
     }
-    let is_wrapped = text
-        .split_ascii_whitespace()
-        .next()
-        .is_some_and(|line| line.len() >= MIN_BASE64_LINE);
+    let is_wrapped = text.split_ascii_whitespace().next().is_some_and(|line| line.len() >= MIN_BASE64_LINE);
     if !is_wrapped || !text.bytes().all(is_base64_or_space) {
         return None;
     }
-    let unwrapped: Vec<u8> = text
-        .bytes()
-        .filter(|byte| !byte.is_ascii_whitespace())
-        .collect();
+    let unwrapped: Vec<u8> = text.bytes().filter(|byte| !byte.is_ascii_whitespace()).collect();
     STANDARD.decode(unwrapped).ok()
 }
 
@@ -298,11 +262,7 @@ mod tests {
         let file = vec![7; 90];
         let text = STANDARD.encode(&file);
         let wrapped = format!("{}\n{}", &text[..76], &text[76..]);
-        for form in [
-            text.clone(),
-            wrapped,
-            format!("data:image/png;base64,{text}"),
-        ] {
+        for form in [text.clone(), wrapped, format!("data:image/png;base64,{text}")] {
             assert_eq!(decode_base64(&form).unwrap(), file, "{form}");
         }
         let path = "a/long/path/of/an/image/that/has/more/than/sixty/four/characters/0.png";
@@ -320,15 +280,9 @@ mod tests {
     fn files_are_replaced_by_their_digest() {
         let file = vec![9; 4000];
         let text = Cell::Text(STANDARD.encode(&file)).without_files(&mut FieldNames::default());
-        assert_eq!(
-            text,
-            Cell::Bytes(file.clone().into()).without_files(&mut FieldNames::default())
-        );
+        assert_eq!(text, Cell::Bytes(file.clone().into()).without_files(&mut FieldNames::default()));
         assert_eq!(text, Cell::File(Box::new(FileFacts::from_bytes(&file))));
-        assert_ne!(
-            text,
-            Cell::File(Box::new(FileFacts::from_bytes(&file[1..])))
-        );
+        assert_ne!(text, Cell::File(Box::new(FileFacts::from_bytes(&file[1..]))));
     }
 
     #[test]
@@ -337,10 +291,7 @@ mod tests {
             assert!(Cell::Text(nothing.to_owned()).is_absent(), "{nothing:?}");
         }
         for something in ["0", "no", "none of these"] {
-            assert!(
-                !Cell::Text(something.to_owned()).is_absent(),
-                "{something:?}"
-            );
+            assert!(!Cell::Text(something.to_owned()).is_absent(), "{something:?}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Question and answer in a conversation: [`ConversationPaths`].
 //!
-//! A conversation is a list of turns. LLaVA writes a turn as `{"from": "human", "value": "…"}`, chat interfaces as `{"role": "user",
-//! "content": "…"}`, where the content may be a list of parts, `{"type": "text", "text": "…"}`.
+//! A conversation is a list of turns. LLaVA writes a turn as `{"from": "human", "value": "…"}`, chat interfaces as
+//! `{"role": "user", "content": "…"}`, where the content may be a list of parts, `{"type": "text", "text": "…"}`.
 
 use std::borrow::Cow;
 
@@ -25,11 +25,7 @@ impl ConversationPaths {
     /// Paths in the first column of conversations; `None` if there is no such column.
     pub(crate) fn find(table: &Table) -> Option<Self> {
         let row = table.rows.first()?;
-        table
-            .columns
-            .iter()
-            .enumerate()
-            .find_map(|(index, name)| Self::from_cell(name, row.cell(index)))
+        table.columns.iter().enumerate().find_map(|(index, name)| Self::from_cell(name, row.cell(index)))
     }
 
     /// Paths in a cell of a column; `None` if the cell is not a conversation.
@@ -45,17 +41,8 @@ impl ConversationPaths {
 }
 
 /// Index of the first turn from `start` that has one of the roles, and the path of its text.
-fn first_turn(
-    column: &str,
-    turns: &[Cell],
-    roles: &[&str],
-    start: usize,
-) -> Option<(usize, String)> {
-    let (index, turn) = turns
-        .iter()
-        .enumerate()
-        .skip(start)
-        .find(|(_, turn)| has_role(turn, roles))?;
+fn first_turn(column: &str, turns: &[Cell], roles: &[&str], start: usize) -> Option<(usize, String)> {
+    let (index, turn) = turns.iter().enumerate().skip(start).find(|(_, turn)| has_role(turn, roles))?;
     Some((index, format!("{column}.{index}.{}", text_path(turn)?)))
 }
 
@@ -69,18 +56,14 @@ fn has_role(turn: &Cell, roles: &[&str]) -> bool {
 
 /// Path of the text inside a turn.
 fn text_path(turn: &Cell) -> Option<String> {
-    ["value", "content", "text"]
-        .iter()
-        .find_map(|field| match turn.field(field)? {
-            Cell::Text(_) => Some((*field).to_owned()),
-            Cell::List(parts) => {
-                let index = parts
-                    .iter()
-                    .position(|part| matches!(part.field("text"), Some(Cell::Text(_))))?;
-                Some(format!("{field}.{index}.text"))
-            }
-            _ => None,
-        })
+    ["value", "content", "text"].iter().find_map(|field| match turn.field(field)? {
+        Cell::Text(_) => Some((*field).to_owned()),
+        Cell::List(parts) => {
+            let index = parts.iter().position(|part| matches!(part.field("text"), Some(Cell::Text(_))))?;
+            Some(format!("{field}.{index}.text"))
+        }
+        _ => None,
+    })
 }
 
 #[cfg(test)]
@@ -104,16 +87,8 @@ mod tests {
             {"role": "system", "content": "Be brief."},
             {"role": "user", "content": [{"type": "image"}, {"type": "text", "text": "?"}]},
         ]);
-        assert_eq!(
-            paths(parts),
-            Some(("chat.1.content.1.text".to_owned(), None))
-        );
-        for other in [
-            json!("[\"x\"]"),
-            json!(["human"]),
-            json!({"from": "human"}),
-            json!([]),
-        ] {
+        assert_eq!(paths(parts), Some(("chat.1.content.1.text".to_owned(), None)));
+        for other in [json!("[\"x\"]"), json!(["human"]), json!({"from": "human"}), json!([])] {
             assert_eq!(paths(other), None);
         }
     }

@@ -1,10 +1,10 @@
 //! Parser for lists and dictionaries in Python's notation: [`python_list`], [`python_dict`].
 
-/// Parses a list such as `['it\'s', "b", 3]`, a tuple of strings, or an array of strings as NumPy prints it (`['a' 'b']`) to texts;
-/// `None` if the text is anything else. Nothing is evaluated.
+/// Parses a list such as `['it\'s', "b", 3]`, a tuple of strings, or an array of strings as NumPy prints it (`['a'
+/// 'b']`) to texts; `None` if the text is anything else. Nothing is evaluated.
 ///
-/// Items are strings in single or double quotes with the escapes of Python's `repr` (The Python Language Reference, 2.4.1), numbers, and
-/// the words `True`, `False` and `None`.
+/// Items are strings in single or double quotes with the escapes of Python's `repr` (The Python Language Reference,
+/// 2.4.1), numbers, and the words `True`, `False` and `None`.
 pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
     let text = text.trim();
     let is_tuple = text.starts_with('(');
@@ -34,8 +34,8 @@ pub(super) fn python_list(text: &str) -> Option<Vec<String>> {
     }
 }
 
-/// Parses a dictionary such as `{'A': 'red', "B": 2}` to names and values, where Python's `None` has no value; `None` if the text is
-/// anything else. Nothing is evaluated.
+/// Parses a dictionary such as `{'A': 'red', "B": 2}` to names and values, where Python's `None` has no value; `None`
+/// if the text is anything else. Nothing is evaluated.
 pub(super) fn python_dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
     let mut rest = text.trim().strip_prefix('{')?.trim_start();
     let mut fields = Vec::new();
@@ -47,9 +47,7 @@ pub(super) fn python_dict(text: &str) -> Option<Vec<(String, Option<String>)>> {
         let (name, after) = parse_quoted(&rest[1..], quote)?;
         let after = after.trim_start().strip_prefix(':')?.trim_start();
         let (value, after) = match after.chars().next()? {
-            quote @ ('\'' | '"') => {
-                parse_quoted(&after[1..], quote).map(|(value, end)| (Some(value), end))?
-            }
+            quote @ ('\'' | '"') => parse_quoted(&after[1..], quote).map(|(value, end)| (Some(value), end))?,
             _ => parse_bare(after).map(|(value, end)| ((value != "None").then_some(value), end))?,
         };
         fields.push((name, value));
@@ -89,10 +87,7 @@ fn parse_escape(chars: &mut std::str::CharIndices<'_>) -> Option<char> {
         _ => return None,
     };
     let code: String = chars.by_ref().take(digits).map(|(_, c)| c).collect();
-    (code.len() == digits)
-        .then(|| u32::from_str_radix(&code, 16).ok())
-        .flatten()
-        .and_then(char::from_u32)
+    (code.len() == digits).then(|| u32::from_str_radix(&code, 16).ok()).flatten().and_then(char::from_u32)
 }
 
 /// Parses a number, `True`, `False` or `None`. Returns it with the remaining text.
@@ -115,10 +110,7 @@ mod tests {
     fn python_literals_are_parsed_and_code_is_not() {
         for (text, items) in [
             (r#"['a', "b"]"#, vec!["a", "b"]),
-            (
-                r#"['it\'s', "it's", "say \"x\""]"#,
-                vec!["it's", "it's", "say \"x\""],
-            ),
+            (r#"['it\'s', "it's", "say \"x\""]"#, vec!["it's", "it's", "say \"x\""]),
             (r"['\xe9', '\u00e9', 'a\nb']", vec!["é", "é", "a\nb"]),
             ("[1, 2.5, None, ]", vec!["1", "2.5", "None"]),
             ("[]", vec![]),
@@ -130,19 +122,9 @@ mod tests {
         }
         assert_eq!(
             python_dict(r#"{'A': 'it\'s', "B": 2, 'C': None}"#).unwrap(),
-            [
-                pair("A", Some("it's")),
-                pair("B", Some("2")),
-                pair("C", None)
-            ]
+            [pair("A", Some("it's")), pair("B", Some("2")), pair("C", None)]
         );
-        for text in [
-            "{'a'}",
-            "{'a': }",
-            "{a: 'b'}",
-            "{'a': open('x')}",
-            "{'a': 'b'",
-        ] {
+        for text in ["{'a'}", "{'a': }", "{a: 'b'}", "{'a': open('x')}", "{'a': 'b'"] {
             assert_eq!(python_dict(text), None, "{text}");
         }
         for text in [

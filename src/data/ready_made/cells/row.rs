@@ -14,8 +14,8 @@ use crate::data::ready_made::columns::names::{Role, known_names, normalize};
 /// Maximum number of columns of a set (chosen).
 const MAX_COLUMNS: usize = 4096;
 
-/// Maximum number of rows of a set (chosen): a row takes half a kilobyte of memory, and a compressed file of a few kilobytes can have
-/// millions of rows.
+/// Maximum number of rows of a set (chosen): a row takes half a kilobyte of memory, and a compressed file of a few
+/// kilobytes can have millions of rows.
 pub(crate) const MAX_ROWS: usize = 1_000_000;
 
 /// Maximum memory for all rows of a set without its images, in bytes (chosen).
@@ -106,12 +106,7 @@ impl fmt::Display for RowPlace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Record(position) => write!(f, "line {}", position.line()),
-            Self::Json {
-                number,
-                unit,
-                inner,
-                ..
-            } => {
+            Self::Json { number, unit, inner, .. } => {
                 write!(f, "{unit} {number}")?;
                 match inner.as_deref() {
                     Some((index, _)) => write!(f, ".{}", index + 1),
@@ -158,9 +153,7 @@ impl Table {
         }
         let index = self.columns.len();
         if index == MAX_COLUMNS {
-            return Err(format!(
-                "more than {MAX_COLUMNS} columns; is it a table of questions?"
-            ));
+            return Err(format!("more than {MAX_COLUMNS} columns; is it a table of questions?"));
         }
         self.columns.push(name.to_owned());
         self.column_indices.insert(name.to_owned(), index);
@@ -176,19 +169,11 @@ impl Table {
     ///
     /// # Errors
     /// If there are more rows than [`MAX_ROWS`], or more bytes than [`MAX_TABLE_BYTES`].
-    pub(crate) fn push(
-        &mut self,
-        place: RowPlace,
-        cells: Vec<(usize, Cell)>,
-    ) -> Result<(), String> {
+    pub(crate) fn push(&mut self, place: RowPlace, cells: Vec<(usize, Cell)>) -> Result<(), String> {
         if self.rows.len() == MAX_ROWS {
             return Err(too_many_rows());
         }
-        let width = cells
-            .iter()
-            .map(|(column, _)| column + 1)
-            .max()
-            .unwrap_or(0);
+        let width = cells.iter().map(|(column, _)| column + 1).max().unwrap_or(0);
         let mut row = vec![Cell::Absent; width];
         for (column, cell) in cells {
             row[column] = cell.without_files(&mut self.field_names);
@@ -200,11 +185,7 @@ impl Table {
                 MAX_TABLE_BYTES >> 20
             ));
         }
-        self.rows.push(Row {
-            file: self.files.len().saturating_sub(1),
-            place,
-            cells: row.into(),
-        });
+        self.rows.push(Row { file: self.files.len().saturating_sub(1), place, cells: row.into() });
         Ok(())
     }
 
@@ -245,11 +226,7 @@ impl Table {
     /// As [`Self::add_column`].
     pub(crate) fn add_ids(&mut self, from: usize, ids: Vec<String>) -> Result<(), String> {
         let names = known_names(Role::Id);
-        if self
-            .columns
-            .iter()
-            .any(|column| names.contains(&normalize(column)))
-        {
+        if self.columns.iter().any(|column| names.contains(&normalize(column))) {
             return Ok(());
         }
         let column = self.add_column("id")?;
@@ -270,7 +247,8 @@ impl Table {
         format!("{}, {}", self.files[row.file].path.display(), row.place)
     }
 
-    /// As [`Self::place`], but without the file if the set has only one, for messages that begin with the file of the set.
+    /// As [`Self::place`], but without the file if the set has only one, for messages that begin with the file of the
+    /// set.
     pub(crate) fn place_in_set(&self, row: usize) -> String {
         match &*self.files {
             [_] => self.rows[row].place.to_string(),
@@ -281,9 +259,7 @@ impl Table {
 
 /// Error message for a set with too many rows.
 pub(crate) fn too_many_rows() -> String {
-    format!(
-        "more than {MAX_ROWS} rows, which are not read; write a part of them to a file of its own"
-    )
+    format!("more than {MAX_ROWS} rows, which are not read; write a part of them to a file of its own")
 }
 
 impl Row {

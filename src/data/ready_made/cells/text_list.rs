@@ -16,8 +16,8 @@ pub(crate) fn parse_list(text: &str) -> Option<Vec<String>> {
         .or_else(|| python_list(text))
 }
 
-/// Parses an object in JSON, or else a dictionary in Python's notation, to names and values; `None` if the text is not an object of
-/// scalars. A value is `None` if it is null.
+/// Parses an object in JSON, or else a dictionary in Python's notation, to names and values; `None` if the text is not
+/// an object of scalars. A value is `None` if it is null.
 pub(crate) fn parse_object(text: &str) -> Option<Vec<(String, Option<String>)>> {
     let text = text.trim();
     if !text.starts_with('{') || !has_few_values(text) {
@@ -39,10 +39,7 @@ pub(crate) fn parse_object(text: &str) -> Option<Vec<(String, Option<String>)>> 
 
 /// True if a text has at most about a million values, which limits the memory to parse it.
 fn has_few_values(text: &str) -> bool {
-    text.bytes()
-        .filter(|byte| matches!(byte, b',' | b'[' | b'{'))
-        .count()
-        <= 1 << 20
+    text.bytes().filter(|byte| matches!(byte, b',' | b'[' | b'{')).count() <= 1 << 20
 }
 
 /// Text of a string, number or truth value.

@@ -49,17 +49,11 @@ impl AnswerFormat {
                     return None;
                 }
                 let upper = character.to_ascii_uppercase();
-                option_at(
-                    options,
-                    (0..Choices::MOST).find(|&index| letter(index) == upper)?,
-                )
+                option_at(options, (0..Choices::MOST).find(|&index| letter(index) == upper)?)
             }
             Self::Text => {
                 let answer = normalize_text(answer);
-                options
-                    .texts
-                    .iter()
-                    .position(|option| normalize_text(option) == answer)
+                options.texts.iter().position(|option| normalize_text(option) == answer)
             }
             Self::Index0 => option_at(options, parse_index(answer)?),
             Self::Index1 => option_at(options, parse_index(answer)?.checked_sub(1)?),
@@ -74,8 +68,8 @@ impl AnswerFormat {
         }
     }
 
-    /// Like [`Self::choice_index`], for a format that the user did not choose: numbers do not identify options that the text of the
-    /// question lists by letter.
+    /// Like [`Self::choice_index`], for a format that the user did not choose: numbers do not identify options that the
+    /// text of the question lists by letter.
     pub(crate) fn inferred_choice_index(self, answer: &str, options: &OptionList) -> Option<usize> {
         let is_number = matches!(self, Self::Index0 | Self::Index1);
         if is_number && options.origin == OptionOrigin::Question {
@@ -87,10 +81,7 @@ impl AnswerFormat {
 
 /// Index of the option with this position in its row.
 fn option_at(options: &OptionList, wanted: usize) -> Option<usize> {
-    options
-        .positions
-        .iter()
-        .position(|position| *position == wanted)
+    options.positions.iter().position(|position| *position == wanted)
 }
 
 /// Normalizes a text for comparison: one line in lower case, without surrounding space and full stops at its end.
@@ -126,15 +117,9 @@ pub(super) enum FormatSearch {
     /// This format fits all rows.
     Fits(AnswerFormat),
     /// No format fits all rows: the one that fits most, and the indices of the rows that it does not fit.
-    None {
-        best: AnswerFormat,
-        unfit: Vec<usize>,
-    },
+    None { best: AnswerFormat, unfit: Vec<usize> },
     /// Two formats fit all rows, but identify different choices in this row.
-    Ambiguous {
-        formats: [AnswerFormat; 2],
-        row: usize,
-    },
+    Ambiguous { formats: [AnswerFormat; 2], row: usize },
 }
 
 /// Finds the format that fits the answers of all rows; the first of several that agree in every row.
@@ -148,11 +133,8 @@ pub(super) fn find_format(rows: &[RowAnswer<'_>]) -> FormatSearch {
             .collect();
         (format, unfit)
     });
-    let fitting: Vec<AnswerFormat> = unfit_rows
-        .iter()
-        .filter(|(_, unfit)| unfit.is_empty())
-        .map(|(format, _)| *format)
-        .collect();
+    let fitting: Vec<AnswerFormat> =
+        unfit_rows.iter().filter(|(_, unfit)| unfit.is_empty()).map(|(format, _)| *format).collect();
     let Some((&first, others)) = fitting.split_first() else {
         let (best, unfit) = unfit_rows
             .into_iter()
@@ -162,14 +144,9 @@ pub(super) fn find_format(rows: &[RowAnswer<'_>]) -> FormatSearch {
     };
     for (index, row) in rows.iter().enumerate() {
         let choice = row.choice_index(first);
-        let differing = others
-            .iter()
-            .find(|other| row.choice_index(**other) != choice);
+        let differing = others.iter().find(|other| row.choice_index(**other) != choice);
         if let Some(&other) = differing {
-            return FormatSearch::Ambiguous {
-                formats: [first, other],
-                row: index,
-            };
+            return FormatSearch::Ambiguous { formats: [first, other], row: index };
         }
     }
     FormatSearch::Fits(first)
@@ -196,14 +173,10 @@ pub(crate) fn digit_index(answer: &str) -> Option<usize> {
 /// True if the question begins with a verb that asks for yes or no.
 pub(super) fn asks_yes_or_no(question: &str) -> bool {
     const VERBS: [&str; 15] = [
-        "is", "are", "was", "were", "do", "does", "did", "can", "could", "has", "have", "had",
-        "will", "would", "should",
+        "is", "are", "was", "were", "do", "does", "did", "can", "could", "has", "have", "had", "will", "would",
+        "should",
     ];
-    let first: String = question
-        .trim_start()
-        .chars()
-        .take_while(|c| c.is_alphanumeric() || *c == '\'')
-        .collect();
+    let first: String = question.trim_start().chars().take_while(|c| c.is_alphanumeric() || *c == '\'').collect();
     VERBS.iter().any(|verb| first.eq_ignore_ascii_case(verb))
 }
 
@@ -222,8 +195,7 @@ mod tests {
             positions: vec![0, 2],
             origin: OptionOrigin::Columns,
         };
-        let read =
-            |answer: &str| AnswerFormat::ALL.map(|format| format.choice_index(answer, &options));
+        let read = |answer: &str| AnswerFormat::ALL.map(|format| format.choice_index(answer, &options));
         assert_eq!(read("C"), [Some(1), None, None, None]);
         assert_eq!(read("B"), [None; 4]);
         assert_eq!(read("2"), [None, None, Some(1), None]);
@@ -254,62 +226,28 @@ mod tests {
 
     fn find(answers: &[&str], texts: &[&str]) -> FormatSearch {
         let options = options(texts);
-        let rows: Vec<RowAnswer<'_>> = answers
-            .iter()
-            .map(|answer| RowAnswer {
-                answer,
-                options: &options,
-            })
-            .collect();
+        let rows: Vec<RowAnswer<'_>> = answers.iter().map(|answer| RowAnswer { answer, options: &options }).collect();
         find_format(&rows)
     }
 
     #[test]
     fn one_format_must_fit_all_rows() {
         let texts = ["x", "y", "z"];
-        assert_eq!(
-            find(&["1", "0"], &texts),
-            FormatSearch::Fits(AnswerFormat::Index0)
-        );
+        assert_eq!(find(&["1", "0"], &texts), FormatSearch::Fits(AnswerFormat::Index0));
         let formats = [AnswerFormat::Index0, AnswerFormat::Index1];
-        assert_eq!(
-            find(&["1", "2"], &texts),
-            FormatSearch::Ambiguous { formats, row: 0 }
-        );
+        assert_eq!(find(&["1", "2"], &texts), FormatSearch::Ambiguous { formats, row: 0 });
         let formats = [AnswerFormat::Letter, AnswerFormat::Text];
-        assert_eq!(
-            find(&["A"], &["B", "A"]),
-            FormatSearch::Ambiguous { formats, row: 0 }
-        );
-        assert_eq!(
-            find(&["x", "A", "y"], &texts),
-            FormatSearch::None {
-                best: AnswerFormat::Text,
-                unfit: vec![1]
-            }
-        );
+        assert_eq!(find(&["A"], &["B", "A"]), FormatSearch::Ambiguous { formats, row: 0 });
+        assert_eq!(find(&["x", "A", "y"], &texts), FormatSearch::None { best: AnswerFormat::Text, unfit: vec![1] });
         // Formats that agree in every row are not ambiguous.
-        assert_eq!(
-            find(&["B"], &["A", "B"]),
-            FormatSearch::Fits(AnswerFormat::Letter)
-        );
+        assert_eq!(find(&["B"], &["A", "B"]), FormatSearch::Fits(AnswerFormat::Letter));
     }
 
     #[test]
     fn yes_or_no_questions_and_answers_are_recognized() {
         assert!(asks_yes_or_no("Is it red?") && asks_yes_or_no(" are they?"));
         assert!(!asks_yes_or_no("How many?") && !asks_yes_or_no("Issue?"));
-        assert_eq!(
-            (
-                yes_no_index("Yes."),
-                yes_no_index("false"),
-                yes_no_index("1")
-            ),
-            (Some(0), Some(1), None)
-        );
-        assert_eq!(
-            (digit_index("1"), digit_index("0"), digit_index("2")),
-            (Some(0), Some(1), None)
-        );
+        assert_eq!((yes_no_index("Yes."), yes_no_index("false"), yes_no_index("1")), (Some(0), Some(1), None));
+        assert_eq!((digit_index("1"), digit_index("0"), digit_index("2")), (Some(0), Some(1), None));
     }
 }

@@ -43,9 +43,9 @@ static INSTRUCTION: LazyLock<Option<Regex>> = LazyLock::new(|| {
 
 /// Splits a text into the question and its options.
 ///
-/// The options follow the last sequence of at least two marks A, B, … in order. Each option has a letter or a digit. A mark is at the
-/// start, or after space, a comma, a semicolon or a colon. If the other options have one line each, the last option ends with its line,
-/// and the rest belongs to the question.
+/// The options follow the last sequence of at least two marks A, B, … in order. Each option has a letter or a digit. A
+/// mark is at the start, or after space, a comma, a semicolon or a colon. If the other options have one line each, the
+/// last option ends with its line, and the rest belongs to the question.
 pub(crate) fn find_in_question(text: &str) -> LetteredOptions {
     let (body, _) = split_instructions(text);
     let tail = text[body.len()..].trim();
@@ -64,9 +64,7 @@ pub(crate) fn find_in_question(text: &str) -> LetteredOptions {
             Err(problem) if found.is_none() => return LetteredOptions::Unclear(problem),
             Err(_) => continue,
         };
-        let are_options = options
-            .iter()
-            .all(|option| option.contains(char::is_alphanumeric));
+        let are_options = options.iter().all(|option| option.contains(char::is_alphanumeric));
         if !are_options {
             continue;
         }
@@ -95,10 +93,7 @@ pub(crate) fn find_in_question(text: &str) -> LetteredOptions {
     };
     let mut parts = vec![without_announcement(&body[..start]), rest, tail];
     parts.retain(|part| !part.is_empty());
-    LetteredOptions::Found {
-        question: parts.join("\n"),
-        options,
-    }
+    LetteredOptions::Found { question: parts.join("\n"), options }
 }
 
 /// Removes the word that announces the options, such as `Options:`, from the end of a text.
@@ -133,8 +128,7 @@ fn split_options<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a s
     if is_instruction(last_line) && !options.iter().any(|option| is_instruction(option)) {
         return Err(unclear_end(&last));
     }
-    let last_option =
-        last_line.trim_end_matches(|c: char| c.is_whitespace() || c == ',' || c == ';');
+    let last_option = last_line.trim_end_matches(|c: char| c.is_whitespace() || c == ',' || c == ';');
     options.push(last_option.to_owned());
     Ok((options, rest))
 }
@@ -148,9 +142,7 @@ fn unclear_end(last: &str) -> String {
 
 /// True if a text has the words of an instruction how to answer.
 fn is_instruction(text: &str) -> bool {
-    INSTRUCTION
-        .as_ref()
-        .is_some_and(|words| words.is_match(text))
+    INSTRUCTION.as_ref().is_some_and(|words| words.is_match(text))
 }
 
 /// Splits a cell that has only options, such as `(a) Open (b) Closed`; `None` for other texts.
@@ -226,8 +218,7 @@ fn marks(text: &str) -> Vec<Mark> {
     let mut marks = Vec::new();
     let mut before = None;
     for (start, c) in text.char_indices() {
-        let is_separate =
-            before.is_none_or(|b: char| b.is_whitespace() || ",;:，；：。？、".contains(b));
+        let is_separate = before.is_none_or(|b: char| b.is_whitespace() || ",;:，；：。？、".contains(b));
         before = Some(c);
         if !is_separate {
             continue;
@@ -280,30 +271,14 @@ mod tests {
     #[test]
     fn options_at_the_end_of_a_question_are_found() {
         for (text, question, options) in [
-            (
-                "Which?\nOptions: A: red, B: green, C: blue",
-                "Which?",
-                vec!["red", "green", "blue"],
-            ),
+            ("Which?\nOptions: A: red, B: green, C: blue", "Which?", vec!["red", "green", "blue"]),
             ("Which?\nA. red\nB. green", "Which?", vec!["red", "green"]),
-            (
-                "Which? (A) red (B) a.b; (C) no",
-                "Which?",
-                vec!["red", "a.b", "no"],
-            ),
-            (
-                "Is A. or B. better?\nA) one\nB) two",
-                "Is A. or B. better?",
-                vec!["one", "two"],
-            ),
+            ("Which? (A) red (B) a.b; (C) no", "Which?", vec!["red", "a.b", "no"]),
+            ("Is A. or B. better?\nA) one\nB) two", "Is A. or B. better?", vec!["one", "two"]),
             ("Which?\nChoices:\nA.1\nB.2", "Which?", vec!["1", "2"]),
             ("走哪边？\nA、左\nB、右", "走哪边？", vec!["左", "右"]),
             ("走哪边？（A）左，（B）右", "走哪边？", vec!["左", "右"]),
-            (
-                "Which?\n(A) red\n(B) blue\nThink of it first.",
-                "Which?\nThink of it first.",
-                vec!["red", "blue"],
-            ),
+            ("Which?\n(A) red\n(B) blue\nThink of it first.", "Which?\nThink of it first.", vec!["red", "blue"]),
             (
                 "Which? (A) red (B) blue\nThink of it.\n\nAnswer with the letter.",
                 "Which?\nThink of it.\nAnswer with the letter.",
@@ -343,35 +318,22 @@ mod tests {
             "Which?\nA. one\nB. two\nSay (A) or (B) only",
         ] {
             let found = find_in_question(text);
-            assert!(
-                matches!(found, LetteredOptions::Unclear(_)),
-                "{text}: {found:?}"
-            );
+            assert!(matches!(found, LetteredOptions::Unclear(_)), "{text}: {found:?}");
         }
     }
 
     #[test]
     fn cell_with_only_options_is_split() {
-        assert_eq!(
-            split_cell("(a) Open (b) Closed").unwrap(),
-            ["Open", "Closed"]
-        );
+        assert_eq!(split_cell("(a) Open (b) Closed").unwrap(), ["Open", "Closed"]);
         assert_eq!(split_cell("（A）开（B）关").unwrap(), ["开", "关"]);
-        for text in [
-            "(a) Open",
-            "see (a) x (b) y",
-            "(b) x (a) y",
-            "(a) f(x) (b) y (x) z",
-            "red|green",
-        ] {
+        for text in ["(a) Open", "see (a) x (b) y", "(b) x (a) y", "(a) f(x) (b) y (x) z", "red|green"] {
             assert_eq!(split_cell(text), None, "{text}");
         }
     }
 
     #[test]
     fn letters_are_removed_if_every_option_has_its_own() {
-        let cut =
-            |options: &[&str]| without_letters(options.iter().map(ToString::to_string).collect());
+        let cut = |options: &[&str]| without_letters(options.iter().map(ToString::to_string).collect());
         assert_eq!(cut(&["A. yes", "(B) no"]), ["yes", "no"]);
         for own in [
             ["（A） 直走。", "（B） 左转。"],

@@ -25,25 +25,15 @@ pub(super) enum OptionOrigin {
 
 /// Joins the lines of a text with spaces and trims it, because a prompt has one line for each option.
 pub(crate) fn one_line(text: &str) -> String {
-    let breaks = [
-        '\n', '\r', '\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}',
-    ];
-    let lines: Vec<&str> = text
-        .split(breaks)
-        .map(str::trim)
-        .filter(|line| !line.is_empty())
-        .collect();
+    let breaks = ['\n', '\r', '\u{b}', '\u{c}', '\u{85}', '\u{2028}', '\u{2029}'];
+    let lines: Vec<&str> = text.split(breaks).map(str::trim).filter(|line| !line.is_empty()).collect();
     lines.join(" ")
 }
 
 impl OptionList {
     /// Options in columns, with their positions among these columns.
     pub(super) fn with_positions(texts: &[String], positions: Vec<usize>) -> Self {
-        Self {
-            texts: texts.iter().map(|text| one_line(text)).collect(),
-            positions,
-            origin: OptionOrigin::Columns,
-        }
+        Self { texts: texts.iter().map(|text| one_line(text)).collect(), positions, origin: OptionOrigin::Columns }
     }
 
     /// Excerpt of the options with at most `max` characters, for messages.
@@ -53,10 +43,7 @@ impl OptionList {
 
     /// Options in the text of a question, in order.
     pub(crate) fn from_question(texts: &[String]) -> Self {
-        Self {
-            origin: OptionOrigin::Question,
-            ..Self::from_list(texts)
-        }
+        Self { origin: OptionOrigin::Question, ..Self::from_list(texts) }
     }
 
     /// Options in a list, in order.

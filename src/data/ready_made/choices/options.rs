@@ -45,11 +45,7 @@ impl Options {
             let separator = roles.option_separator.as_deref();
             let options = match object_fields(cell).filter(|_| separator.is_none()) {
                 Some(fields) => lettered_options(&fields).map_err(|problem| {
-                    format!(
-                        "the options in the column {:?} {problem}: {}",
-                        column.name,
-                        cell.excerpt(60)
-                    )
+                    format!("the options in the column {:?} {problem}: {}", column.name, cell.excerpt(60))
                 }),
                 None => listed_options(cell, separator)
                     .map(|texts| OptionList::from_list(&without_letters(texts)))
@@ -115,10 +111,7 @@ fn lettered_options(fields: &[(Arc<str>, Cell)]) -> Result<OptionList, String> {
                 sorted.push((key.to_ascii_uppercase(), cell));
             }
             _ => {
-                return Err(format!(
-                    "have the name {:?}, where a letter is expected",
-                    excerpt(name, 60)
-                ));
+                return Err(format!("have the name {:?}, where a letter is expected", excerpt(name, 60)));
             }
         }
     }
@@ -140,10 +133,7 @@ fn lettered_options(fields: &[(Arc<str>, Cell)]) -> Result<OptionList, String> {
             None => return Err(format!("hold no text at {key}")),
         }
     }
-    Ok(OptionList::with_positions(
-        &without_letters(texts),
-        positions,
-    ))
+    Ok(OptionList::with_positions(&without_letters(texts), positions))
 }
 
 /// The names of columns with commas between them, as in the value of `--map`.
@@ -161,15 +151,12 @@ fn single_option(cell: &Cell) -> Option<String> {
     (!is_missing).then_some(text)
 }
 
-/// The options of a cell that lists them, as a list or as text, split at `separator` if given; `None` if it lists no options.
+/// The options of a cell that lists them, as a list or as text, split at `separator` if given; `None` if it lists no
+/// options.
 fn listed_options(cell: &Cell, separator: Option<&str>) -> Option<Vec<String>> {
     match (cell, separator) {
         (Cell::List(cells), _) => cells.iter().map(Cell::text).collect(),
-        (Cell::Text(text), Some(separator)) => Some(
-            text.split(separator)
-                .map(|part| part.trim().to_owned())
-                .collect(),
-        ),
+        (Cell::Text(text), Some(separator)) => Some(text.split(separator).map(|part| part.trim().to_owned()).collect()),
         (Cell::Text(text), None) => parse_list(text).or_else(|| split_cell(text)),
         _ => None,
     }

@@ -32,12 +32,14 @@ pub(crate) struct Truths {
     pub(crate) columns: Vec<String>,
 }
 
-/// Minimum share of questions that begin with a verb, as yes/no questions do (heuristic). Below it, 0 and 1 do not mean no and yes.
+/// Minimum share of questions that begin with a verb, as yes/no questions do (heuristic). Below it, 0 and 1 do not mean
+/// no and yes.
 const MIN_VERB_SHARE: f64 = 0.9;
 
 /// Finds the correct option of each question.
 ///
-/// The answers to multiple-choice questions share one format. The answers to yes/no questions have a format of their own.
+/// The answers to multiple-choice questions share one format. The answers to yes/no questions have a format of their
+/// own.
 ///
 /// # Errors
 /// If there are no answers, no format fits any row, or two formats fit but identify different options.
@@ -60,20 +62,11 @@ pub(crate) fn find_truths(
             || "a test split without them? (--ask FILE asks questions without answers about every image.)".to_owned(),
             |flag| format!("{flag} reads those of a column."),
         );
-        return Err(format!(
-            "no answers among its columns: {remedy} Its columns:\n{}",
-            describe_columns(table)
-        ));
+        return Err(format!("no answers among its columns: {remedy} Its columns:\n{}", describe_columns(table)));
     }
     let (with_options, without_options) = items
         .into_iter()
-        .map(|item| {
-            if letters_are_not_options(table, roles, &item) {
-                item.without_options()
-            } else {
-                item
-            }
-        })
+        .map(|item| if letters_are_not_options(table, roles, &item) { item.without_options() } else { item })
         .partition::<Vec<Item>, _>(|item| item.options.is_some());
     let mut truths = Truths::default();
     add_choice_questions(table, roles, format, with_options, omissions, &mut truths)?;
@@ -82,7 +75,8 @@ pub(crate) fn find_truths(
     Ok(truths)
 }
 
-/// True if lettered texts in a question are labels in the image, not options: the answer is yes or no, and identifies none of them.
+/// True if lettered texts in a question are labels in the image, not options: the answer is yes or no, and identifies
+/// none of them.
 fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
     // `whole` is set only if the options were found in the question's text.
     let Some(options) = item.options.as_deref().filter(|_| item.whole.is_some()) else {
@@ -91,12 +85,10 @@ fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
     let answers: Vec<String> = roles
         .answers
         .iter()
-        .filter_map(
-            |column| match AnswerCell::from_row(&table.rows[item.row], column) {
-                AnswerCell::One(answer) => Some(answer),
-                AnswerCell::Absent | AnswerCell::Several(_) => None,
-            },
-        )
+        .filter_map(|column| match AnswerCell::from_row(&table.rows[item.row], column) {
+            AnswerCell::One(answer) => Some(answer),
+            AnswerCell::Absent | AnswerCell::Several(_) => None,
+        })
         .collect();
     answers.iter().any(|answer| yes_no_index(answer).is_some())
         && !answers.iter().any(|answer| {
@@ -108,40 +100,22 @@ fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
 
 /// True if the table is in this program's own format, in which the answer is the text of a choice.
 pub(crate) fn is_native_format(table: &Table) -> bool {
-    const FIELDS: [&str; 11] = [
-        "id",
-        "frame",
-        "image",
-        "family",
-        "question",
-        "choices",
-        "answer",
-        "evidence",
-        "group",
-        "group_size",
-        "scene",
-    ];
-    ["question", "choices", "answer"]
-        .iter()
-        .all(|name| table.find(name).is_some())
-        && table
-            .columns
-            .iter()
-            .all(|column| FIELDS.contains(&column.as_str()))
+    const FIELDS: [&str; 11] =
+        ["id", "frame", "image", "family", "question", "choices", "answer", "evidence", "group", "group_size", "scene"];
+    ["question", "choices", "answer"].iter().all(|name| table.find(name).is_some())
+        && table.columns.iter().all(|column| FIELDS.contains(&column.as_str()))
 }
 
 /// True if all cells of the column are texts.
 fn are_texts(table: &Table, column: &Column) -> bool {
-    table
-        .rows
-        .iter()
-        .all(|row| matches!(column.cell(row), Cell::Text(_)))
+    table.rows.iter().all(|row| matches!(column.cell(row), Cell::Text(_)))
 }
 
 /// Pairs each item with its answer. Items without an answer, or with several, are added to the omissions.
 ///
 /// # Errors
-/// If the column has no answer in any row. The error suggests `other_column_flag`, the flag to read another column, if there is one.
+/// If the column has no answer in any row. The error suggests `other_column_flag`, the flag to read another column, if
+/// there is one.
 fn with_answers(
     table: &Table,
     column: &Column,
@@ -160,28 +134,16 @@ fn with_answers(
             AnswerCell::Absent => absent.push(item.row),
         }
     }
-    if table
-        .rows
-        .iter()
-        .all(|row| AnswerCell::from_row(row, column) == AnswerCell::Absent)
-    {
+    if table.rows.iter().all(|row| AnswerCell::from_row(row, column) == AnswerCell::Absent) {
         let remedy = other_column_flag.map_or_else(
             || "a test split without them? --read split names another, and --ask FILE asks questions without answers about every image".to_owned(),
             |flag| format!("{flag} reads those of another column"),
         );
-        return Err(format!(
-            "no answer in any row (column {:?}): {remedy}",
-            column.name
-        ));
+        return Err(format!("no answer in any row (column {:?}): {remedy}", column.name));
     }
     for row in absent {
-        omissions.add(OmissionReason::Bad, || {
-            format!(
-                "{}: no answer (column {:?})",
-                table.place_in_set(row),
-                column.name
-            )
-        });
+        omissions
+            .add(OmissionReason::Bad, || format!("{}: no answer (column {:?})", table.place_in_set(row), column.name));
     }
     Ok(found)
 }
@@ -209,14 +171,10 @@ fn add_choice_questions(
     truths.columns.push(format!("{} ({name})", column.name));
     truths.questions.reserve(items.len());
     for (item, answer) in items {
-        let Item {
-            row, text, options, ..
-        } = item;
+        let Item { row, text, options, .. } = item;
         match column_format.choices(&answer, &options.unwrap_or_default()) {
             Ok(choices) => truths.questions.push(ParsedQuestion { row, text, choices }),
-            Err(problem) => omissions.add(OmissionReason::Bad, || {
-                format!("{}: {problem}", table.place_in_set(row))
-            }),
+            Err(problem) => omissions.add(OmissionReason::Bad, || format!("{}: {problem}", table.place_in_set(row))),
         }
     }
     Ok(())
@@ -236,19 +194,11 @@ impl ColumnFormat {
     ///
     /// # Errors
     /// If the format fits no row, or two formats fit but identify different options.
-    fn choose(
-        table: &Table,
-        column: &Column,
-        format: &CellFormat,
-        items: &[(Item, String)],
-    ) -> Result<Self, String> {
+    fn choose(table: &Table, column: &Column, format: &CellFormat, items: &[(Item, String)]) -> Result<Self, String> {
         let none = OptionList::default();
         let rows: Vec<RowAnswer<'_>> = items
             .iter()
-            .map(|(item, answer)| RowAnswer {
-                answer,
-                options: item.options.as_deref().unwrap_or(&none),
-            })
+            .map(|(item, answer)| RowAnswer { answer, options: item.options.as_deref().unwrap_or(&none) })
             .collect();
         let chosen = match format {
             CellFormat::Answer(format) => Self::new(*format, true, &rows),
@@ -260,9 +210,8 @@ impl ColumnFormat {
                 if let Some(texts) = texts {
                     texts
                 } else {
-                    let format = infer_format(&rows).map_err(|(formats, row)| {
-                        ambiguous_answer(table, &items[row].0, rows[row], formats, column)
-                    })?;
+                    let format = infer_format(&rows)
+                        .map_err(|(formats, row)| ambiguous_answer(table, &items[row].0, rows[row], formats, column))?;
                     Self::new(format, false, &rows)
                 }
             }
@@ -280,19 +229,9 @@ impl ColumnFormat {
     }
 
     fn new(format: AnswerFormat, is_chosen: bool, rows: &[RowAnswer<'_>]) -> Self {
-        let mut column_format = Self {
-            format,
-            is_chosen,
-            fitting_rows: 0,
-        };
-        column_format.fitting_rows = rows
-            .iter()
-            .filter(|row| {
-                column_format
-                    .choice_index(row.answer, row.options)
-                    .is_some()
-            })
-            .count();
+        let mut column_format = Self { format, is_chosen, fitting_rows: 0 };
+        column_format.fitting_rows =
+            rows.iter().filter(|row| column_format.choice_index(row.answer, row.options).is_some()).count();
         column_format
     }
 
@@ -311,8 +250,7 @@ impl ColumnFormat {
     /// If the answer does not identify an option, or the options are not valid choices.
     fn choices(&self, answer: &str, options: &OptionList) -> Result<Choices, String> {
         match self.choice_index(answer, options) {
-            Some(truth) => Choices::with_truth(Arc::clone(&options.texts), Some(truth))
-                .map_err(|e| e.to_string()),
+            Some(truth) => Choices::with_truth(Arc::clone(&options.texts), Some(truth)).map_err(|e| e.to_string()),
             None => Err(format!(
                 "the answer {:?} is not one of the options {} (read as {}, which fits {})",
                 excerpt(answer, 60),
@@ -357,8 +295,7 @@ fn ambiguous_answer(
     column: &Column,
 ) -> String {
     let [one, other] = formats.map(AnswerFormat::name);
-    let [one_flag, other_flag] =
-        formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
+    let [one_flag, other_flag] = formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
     format!(
         "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {one_flag} or {other_flag} says which is meant",
         table.place_in_set(item.row),
@@ -367,8 +304,8 @@ fn ambiguous_answer(
     )
 }
 
-/// Adds the yes/no questions with their correct options to `truths`. The other questions without options are open-ended: they are added
-/// to the omissions.
+/// Adds the yes/no questions with their correct options to `truths`. The other questions without options are
+/// open-ended: they are added to the omissions.
 fn add_yes_no_questions(
     table: &Table,
     roles: &Roles,
@@ -381,38 +318,25 @@ fn add_yes_no_questions(
     }
     let column = answer_column::yes_or_no_column(table, roles, &items)?;
     let items = with_answers(table, column, items, omissions, None)?;
-    let verb_questions = items
-        .iter()
-        .filter(|(item, _)| asks_yes_or_no(last_line(&item.text)))
-        .count();
+    let verb_questions = items.iter().filter(|(item, _)| asks_yes_or_no(last_line(&item.text))).count();
     let digits_mean_yes_no = verb_questions as f64 >= MIN_VERB_SHARE * items.len() as f64
-        && items
-            .iter()
-            .all(|(_, answer)| digit_index(answer).is_some());
+        && items.iter().all(|(_, answer)| digit_index(answer).is_some());
     let yes_and_no: Arc<[String]> = ["yes", "no"].map(str::to_owned).into();
     let mut count = 0;
     for (Item { row, text, .. }, answer) in items {
-        let digit = if digits_mean_yes_no {
-            digit_index(&answer)
-        } else {
-            None
-        };
+        let digit = if digits_mean_yes_no { digit_index(&answer) } else { None };
         let truth = digit.or_else(|| yes_no_index(&answer));
         match Choices::with_truth(Arc::clone(&yes_and_no), truth) {
             Ok(choices) if choices.truth().is_some() => {
                 count += 1;
                 truths.questions.push(ParsedQuestion { row, text, choices });
             }
-            Ok(_) | Err(_) => omissions.add(OmissionReason::Open, || {
-                format!("{:?}", excerpt(&answer, 60))
-            }),
+            Ok(_) | Err(_) => omissions.add(OmissionReason::Open, || format!("{:?}", excerpt(&answer, 60))),
         }
     }
     if count > 0 {
         let digits = if digits_mean_yes_no { ", 1 is yes" } else { "" };
-        truths
-            .columns
-            .push(format!("{} (yes/no{digits})", column.name));
+        truths.columns.push(format!("{} (yes/no{digits})", column.name));
     }
     Ok(())
 }

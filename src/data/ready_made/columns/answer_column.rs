@@ -1,6 +1,7 @@
 //! Choice of the answer column among several candidates: [`option_column`], [`yes_or_no_column`].
 //!
-//! Columns are compared in the rows where both have a valid answer, so a gap or a broken answer in a column does not exclude it.
+//! Columns are compared in the rows where both have a valid answer, so a gap or a broken answer in a column does not
+//! exclude it.
 
 use super::column::Column;
 use super::map::map_flag;
@@ -31,32 +32,20 @@ fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
 
 /// Answer of each row in a column.
 fn column_answers(table: &Table, items: &[Item], column: &Column) -> Vec<Option<String>> {
-    items
-        .iter()
-        .map(|item| answer(table, item, column))
-        .collect()
+    items.iter().map(|item| answer(table, item, column)).collect()
 }
 
 /// Column whose answers identify options.
 ///
 /// # Errors
 /// If two columns have different answers for a row; the error shows the row and the flags to choose a column.
-pub(crate) fn option_column<'a>(
-    table: &Table,
-    roles: &'a Roles,
-    items: &[Item],
-) -> Result<&'a Column, String> {
-    choose(table, roles, items, |column| {
-        option_candidate(table, items, column)
-    })
+pub(crate) fn option_column<'a>(table: &Table, roles: &'a Roles, items: &[Item]) -> Result<&'a Column, String> {
+    choose(table, roles, items, |column| option_candidate(table, items, column))
 }
 
-/// A column as candidate for the answers of questions with options; `None` if at most half of its answers identify options.
-fn option_candidate<'a>(
-    table: &Table,
-    items: &[Item],
-    column: &'a Column,
-) -> Option<Candidate<'a>> {
+/// A column as candidate for the answers of questions with options; `None` if at most half of its answers identify
+/// options.
+fn option_candidate<'a>(table: &Table, items: &[Item], column: &'a Column) -> Option<Candidate<'a>> {
     let none = OptionList::default();
     let answers = column_answers(table, items, column);
     let filled = answers.iter().flatten().count();
@@ -80,14 +69,11 @@ fn option_candidate<'a>(
             interpretations.push(choices);
         }
     }
-    Some(Candidate {
-        column,
-        interpretations,
-    })
+    Some(Candidate { column, interpretations })
 }
 
-/// Flag for a column without a role whose cells identify an option in every row, in the first format that fits; `None` if there is no
-/// such column.
+/// Flag for a column without a role whose cells identify an option in every row, in the first format that fits; `None`
+/// if there is no such column.
 pub(crate) fn suggest_column(table: &Table, roles: &Roles, items: &[Item]) -> Option<String> {
     let none = OptionList::default();
     for (index, name) in table.columns.iter().enumerate() {
@@ -98,8 +84,7 @@ pub(crate) fn suggest_column(table: &Table, roles: &Roles, items: &[Item]) -> Op
         let fitting = AnswerFormat::ALL.into_iter().find(|format| {
             items.iter().all(|item| {
                 let options = item.options.as_deref().unwrap_or(&none);
-                answer(table, item, &column)
-                    .is_some_and(|answer| format.choice_index(&answer, options).is_some())
+                answer(table, item, &column).is_some_and(|answer| format.choice_index(&answer, options).is_some())
             })
         });
         if let Some(format) = fitting {
@@ -113,47 +98,27 @@ pub(crate) fn suggest_column(table: &Table, roles: &Roles, items: &[Item]) -> Op
 ///
 /// # Errors
 /// As [`option_column`].
-pub(crate) fn yes_or_no_column<'a>(
-    table: &Table,
-    roles: &'a Roles,
-    items: &[Item],
-) -> Result<&'a Column, String> {
-    choose(table, roles, items, |column| {
-        yes_or_no_candidate(table, items, column)
-    })
+pub(crate) fn yes_or_no_column<'a>(table: &Table, roles: &'a Roles, items: &[Item]) -> Result<&'a Column, String> {
+    choose(table, roles, items, |column| yes_or_no_candidate(table, items, column))
 }
 
 /// A column as candidate for the answers of yes/no questions; `None` if it has no answers.
-fn yes_or_no_candidate<'a>(
-    table: &Table,
-    items: &[Item],
-    column: &'a Column,
-) -> Option<Candidate<'a>> {
+fn yes_or_no_candidate<'a>(table: &Table, items: &[Item], column: &'a Column) -> Option<Candidate<'a>> {
     let answers = column_answers(table, items, column);
     if !answers.iter().any(Option::is_some) {
         return None;
     }
     let mut interpretations = vec![parse_answers(&answers, yes_no_index)];
-    if answers
-        .iter()
-        .flatten()
-        .all(|answer| digit_index(answer).is_some())
-    {
+    if answers.iter().flatten().all(|answer| digit_index(answer).is_some()) {
         interpretations.push(parse_answers(&answers, digit_index));
     }
-    Some(Candidate {
-        column,
-        interpretations,
-    })
+    Some(Candidate { column, interpretations })
 }
 
 /// Index of yes or no for each answer, and a third index for other words.
 fn parse_answers(answers: &[Option<String>], parse: fn(&str) -> Option<usize>) -> RowChoices {
     const OTHER: usize = usize::MAX;
-    answers
-        .iter()
-        .map(|answer| Some(parse(answer.as_ref()?).unwrap_or(OTHER)))
-        .collect()
+    answers.iter().map(|answer| Some(parse(answer.as_ref()?).unwrap_or(OTHER))).collect()
 }
 
 /// Number of rows with a valid answer.
@@ -175,20 +140,13 @@ fn choose<'a>(
         return Ok(only);
     }
     let candidates: Vec<Candidate<'a>> = roles.answers.iter().filter_map(candidate).collect();
-    let unambiguous = candidates
-        .iter()
-        .find(|candidate| candidate.interpretations.len() == 1);
+    let unambiguous = candidates.iter().find(|candidate| candidate.interpretations.len() == 1);
     let Some(chosen) = unambiguous.or(candidates.first()) else {
         return Ok(&roles.answers[0]);
     };
     for other in &candidates {
         if let Some(row) = first_difference(chosen, other) {
-            return Err(differing_answers(
-                table,
-                &items[row],
-                chosen.column,
-                other.column,
-            ));
+            return Err(differing_answers(table, &items[row], chosen.column, other.column));
         }
     }
     Ok(chosen.column)

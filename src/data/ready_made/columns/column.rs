@@ -16,20 +16,12 @@ pub(crate) struct Column {
 impl Column {
     /// A whole column.
     pub(crate) fn new(index: usize, name: &str) -> Self {
-        Self {
-            index,
-            field: None,
-            name: name.to_owned(),
-        }
+        Self { index, field: None, name: name.to_owned() }
     }
 
     /// A field of the structs in a column.
     pub(super) fn with_field(index: usize, name: &str, field: &str) -> Self {
-        Self {
-            index,
-            field: Some(field.to_owned()),
-            name: format!("{name}.{field}"),
-        }
+        Self { index, field: Some(field.to_owned()), name: format!("{name}.{field}") }
     }
 
     /// Cell of the column in a row.
@@ -37,10 +29,7 @@ impl Column {
         let cell = row.cell(self.index);
         match &self.field {
             None => cell,
-            Some(path) => path
-                .split('.')
-                .try_fold(cell, |cell, field| cell.field(field))
-                .unwrap_or(&Cell::Absent),
+            Some(path) => path.split('.').try_fold(cell, |cell, field| cell.field(field)).unwrap_or(&Cell::Absent),
         }
     }
 

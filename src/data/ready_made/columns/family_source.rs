@@ -15,34 +15,22 @@ pub(crate) enum FamilySource {
 }
 
 impl FamilySource {
-    /// Chooses the column given by the user. Without one: the first candidate with more than one value among the questions, else the
-    /// configuration if there are several, else the first candidate.
-    pub(crate) fn choose(
-        table: &Table,
-        families: &FamilyColumns,
-        questions: &[ParsedQuestion],
-    ) -> Self {
+    /// Chooses the column given by the user. Without one: the first candidate with more than one value among the
+    /// questions, else the configuration if there are several, else the first candidate.
+    pub(crate) fn choose(table: &Table, families: &FamilyColumns, questions: &[ParsedQuestion]) -> Self {
         let columns = match families {
             FamilyColumns::Candidates(columns) => columns,
             FamilyColumns::Chosen(column) => {
                 return column.clone().map_or(Self::None, Self::Column);
             }
         };
-        let varying = columns.iter().find(|column| {
-            has_several_values(
-                questions
-                    .iter()
-                    .map(|question| column.text(&table.rows[question.row])),
-            )
-        });
+        let varying = columns
+            .iter()
+            .find(|column| has_several_values(questions.iter().map(|question| column.text(&table.rows[question.row]))));
         if let Some(column) = varying {
             return Self::Column(column.clone());
         }
-        if has_several_values(
-            questions
-                .iter()
-                .map(|question| config(table, &table.rows[question.row])),
-        ) {
+        if has_several_values(questions.iter().map(|question| config(table, &table.rows[question.row]))) {
             return Self::Configuration;
         }
         columns.first().cloned().map_or(Self::None, Self::Column)

@@ -40,10 +40,9 @@ pub(crate) enum CellFormat {
 pub(crate) fn map_flag(role: Role, column: &str, format: Option<AnswerFormat>) -> String {
     let suffix = match format {
         Some(format) => format!(":{}", format.name()),
-        // A colon ends a column name that contains colons: the text after the last colon is the format, and an empty one is inferred.
-        None if column.contains(':') && matches!(role, Role::Options | Role::Answer) => {
-            ":".to_owned()
-        }
+        // A colon ends a column name that contains colons: the text after the last colon is the format, and an empty
+        // one is inferred.
+        None if column.contains(':') && matches!(role, Role::Options | Role::Answer) => ":".to_owned(),
         None => String::new(),
     };
     let value = format!("{column}{suffix}");
@@ -82,14 +81,9 @@ impl FromStr for ColumnMap {
         let starts = entry_starts(text);
         if starts.first() != Some(&0) {
             let roles = Role::ALL.map(Role::name).join(", ");
-            return Err(format!(
-                "role=column expected, with one of the roles {roles}"
-            ));
+            return Err(format!("role=column expected, with one of the roles {roles}"));
         }
-        let ends = starts[1..]
-            .iter()
-            .map(|start| start - 1)
-            .chain([text.len()]);
+        let ends = starts[1..].iter().map(|start| start - 1).chain([text.len()]);
         let mut entries: Vec<MapEntry> = Vec::new();
         for (start, end) in starts.iter().zip(ends) {
             let entry = parse_entry(&text[*start..end])?;
@@ -98,10 +92,7 @@ impl FromStr for ColumnMap {
             }
             entries.push(entry);
         }
-        Ok(Self {
-            text: text.to_owned(),
-            entries,
-        })
+        Ok(Self { text: text.to_owned(), entries })
     }
 }
 
@@ -121,10 +112,7 @@ fn entry_starts(text: &str) -> Vec<usize> {
 fn parse_entry(text: &str) -> Result<MapEntry, String> {
     let (name, value) = text.split_once('=').ok_or("role=column expected")?;
     let name = name.trim();
-    let role = Role::ALL
-        .into_iter()
-        .find(|role| role.name() == name)
-        .ok_or_else(|| format!("no role {name:?}"))?;
+    let role = Role::ALL.into_iter().find(|role| role.name() == name).ok_or_else(|| format!("no role {name:?}"))?;
     let (column, format) = match (role, value.rsplit_once(':')) {
         (Role::Options | Role::Answer, Some((column, ""))) => (column, CellFormat::Inferred),
         (Role::Options, Some((column, split))) => {
@@ -149,47 +137,28 @@ fn parse_entry(text: &str) -> Result<MapEntry, String> {
     let columns = if column.is_empty() {
         Vec::new()
     } else if is_list {
-        column
-            .split(',')
-            .map(|column| column.trim().to_owned())
-            .collect()
+        column.split(',').map(|column| column.trim().to_owned()).collect()
     } else {
         vec![column.trim().to_owned()]
     };
-    Ok(MapEntry {
-        role,
-        columns,
-        unsplit: column.trim().to_owned(),
-        format,
-    })
+    Ok(MapEntry { role, columns, unsplit: column.trim().to_owned(), format })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const TEXT: &str = "id=nr,question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1,family=";
+    const TEXT: &str =
+        "id=nr,question=frage,image=pics/{bild}.png,options=auswahl:split(|),answer=richtig:index1,family=";
 
     #[test]
     fn map_names_columns_by_role() {
         let map: ColumnMap = TEXT.parse().unwrap();
         assert_eq!(map.to_string(), TEXT);
-        assert_eq!(
-            map.entry(Role::Image).unwrap().columns.clone(),
-            ["pics/{bild}.png"]
-        );
-        assert_eq!(
-            map.entry(Role::Family).unwrap().columns.clone(),
-            Vec::<String>::new()
-        );
-        assert_eq!(
-            map.entry(Role::Options).unwrap().format,
-            CellFormat::Split("|".into())
-        );
-        assert_eq!(
-            map.entry(Role::Answer).unwrap().format,
-            CellFormat::Answer(AnswerFormat::Index1)
-        );
+        assert_eq!(map.entry(Role::Image).unwrap().columns.clone(), ["pics/{bild}.png"]);
+        assert_eq!(map.entry(Role::Family).unwrap().columns.clone(), Vec::<String>::new());
+        assert_eq!(map.entry(Role::Options).unwrap().format, CellFormat::Split("|".into()));
+        assert_eq!(map.entry(Role::Answer).unwrap().format, CellFormat::Answer(AnswerFormat::Index1));
         assert_eq!(map.entry(Role::Hint), None);
     }
 
@@ -197,20 +166,11 @@ mod tests {
     fn option_columns_split_at_commas() {
         assert!("options=first,second:x,third".parse::<ColumnMap>().is_err());
         let cells: ColumnMap = "options=first,second,answer=truth".parse().unwrap();
-        assert_eq!(
-            cells.entry(Role::Options).unwrap().columns,
-            ["first", "second"]
-        );
+        assert_eq!(cells.entry(Role::Options).unwrap().columns, ["first", "second"]);
         let comma: ColumnMap = "options=all:split(,)".parse().unwrap();
-        assert_eq!(
-            comma.entry(Role::Options).unwrap().format,
-            CellFormat::Split(",".into())
-        );
+        assert_eq!(comma.entry(Role::Options).unwrap().format, CellFormat::Split(",".into()));
         let line_break: ColumnMap = r"options=all:split(\n)".parse().unwrap();
-        assert_eq!(
-            line_break.entry(Role::Options).unwrap().format,
-            CellFormat::Split("\n".into())
-        );
+        assert_eq!(line_break.entry(Role::Options).unwrap().format, CellFormat::Split("\n".into()));
     }
 
     #[test]

@@ -11,6 +11,5 @@ mod template;
 pub(super) use column::Column;
 pub(super) use family_source::FamilySource;
 pub(super) use roles::{
-    ImageColumns, OptionsInQuestion, QuestionSource, Roles, describe_columns, embedded_images,
-    find_column,
+    ImageColumns, OptionsInQuestion, QuestionSource, Roles, describe_columns, embedded_images, find_column,
 };

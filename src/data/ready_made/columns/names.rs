@@ -83,28 +83,20 @@ static ENDINGS: LazyLock<Vec<Regex>> = LazyLock::new(|| {
 
 /// Known column names of a role, normalized, in order of preference.
 pub(crate) fn known_names(role: Role) -> &'static [String] {
-    KNOWN
-        .as_ref()
-        .and_then(|known| known.roles.get(&role))
-        .map_or(&[], Vec::as_slice)
+    KNOWN.as_ref().and_then(|known| known.roles.get(&role)).map_or(&[], Vec::as_slice)
 }
 
 /// Normalizes a name: only letters and digits, in lower case.
 pub(crate) fn normalize(name: &str) -> String {
-    name.chars()
-        .filter(|c| c.is_alphanumeric())
-        .flat_map(char::to_lowercase)
-        .collect()
+    name.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
 /// Splits the instructions off the end of a text. Returns the rest and the instructions, the last one first.
 pub(crate) fn split_instructions(text: &str) -> (&str, Vec<String>) {
     let (mut text, mut instructions) = (text.trim_end(), Vec::new());
     loop {
-        let instruction = ENDINGS
-            .iter()
-            .filter_map(|ending| ending.find(text))
-            .find(|ending| is_separate(text, ending));
+        let instruction =
+            ENDINGS.iter().filter_map(|ending| ending.find(text)).find(|ending| is_separate(text, ending));
         let Some(instruction) = instruction else {
             return (text, instructions);
         };
@@ -132,13 +124,7 @@ mod tests {
         for role in Role::ALL.iter().filter(|role| **role != Role::Group) {
             assert!(!known.roles[role].is_empty(), "{role:?}");
         }
-        assert!(
-            known
-                .roles
-                .values()
-                .flatten()
-                .all(|name| normalize(name) == *name)
-        );
+        assert!(known.roles.values().flatten().all(|name| normalize(name) == *name));
         assert_eq!(ENDINGS.len(), known.instructions.endings.len());
     }
 
@@ -146,21 +132,9 @@ mod tests {
     fn only_an_instruction_at_the_end_is_cut() {
         for (text, rest, count) in [
             ("Is it? Please answer yes or no.", "Is it?", 1),
-            (
-                "Is it?\nAnswer the question using a single word or phrase. Please answer yes or no.",
-                "Is it?",
-                2,
-            ),
-            (
-                "Did he answer yes or no to that?",
-                "Did he answer yes or no to that?",
-                0,
-            ),
-            (
-                "Do they always answer yes or no",
-                "Do they always answer yes or no",
-                0,
-            ),
+            ("Is it?\nAnswer the question using a single word or phrase. Please answer yes or no.", "Is it?", 2),
+            ("Did he answer yes or no to that?", "Did he answer yes or no to that?", 0),
+            ("Do they always answer yes or no", "Do they always answer yes or no", 0),
             ("Answer yes or no.", "Answer yes or no.", 0),
             ("A. x\nB. y\nPlease answer yes or no.", "A. x\nB. y", 1),
         ] {

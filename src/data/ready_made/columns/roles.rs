@@ -109,11 +109,7 @@ impl Roles {
     ///
     /// # Errors
     /// If a column of the map does not exist.
-    pub(crate) fn with_question(
-        table: &Table,
-        map: &ColumnMap,
-        question: QuestionSource,
-    ) -> Result<Self, String> {
+    pub(crate) fn with_question(table: &Table, map: &ColumnMap, question: QuestionSource) -> Result<Self, String> {
         let options_entry = map.entry(Role::Options);
         let options = columns_of(table, map, Role::Options)?;
         let (option_lists, option_cells) = match options_entry {
@@ -131,9 +127,7 @@ impl Roles {
             ids: columns_of(table, map, Role::Id)?,
             hint: columns_of(table, map, Role::Hint)?.into_iter().next(),
             families: match map.entry(Role::Family) {
-                Some(_) => {
-                    FamilyColumns::Chosen(columns_of(table, map, Role::Family)?.into_iter().next())
-                }
+                Some(_) => FamilyColumns::Chosen(columns_of(table, map, Role::Family)?.into_iter().next()),
                 None => FamilyColumns::Candidates(columns_of(table, map, Role::Family)?),
             },
             evidence,
@@ -160,7 +154,8 @@ impl Roles {
             .chain(&self.answers)
     }
 
-    /// Columns that are not read again after the questions are parsed. Images, ids, families, evidence and scenes are read later.
+    /// Columns that are not read again after the questions are parsed. Images, ids, families, evidence and scenes are
+    /// read later.
     pub(crate) fn columns_to_clear(&self) -> BTreeSet<usize> {
         let (ImageColumns::First(images) | ImageColumns::All(images)) = &self.images else {
             // A template may name any column.
@@ -174,10 +169,7 @@ impl Roles {
             .chain(&self.scene)
             .map(|column| column.index)
             .collect();
-        self.question_columns()
-            .map(|column| column.index)
-            .filter(|index| !needed.contains(index))
-            .collect()
+        self.question_columns().map(|column| column.index).filter(|index| !needed.contains(index)).collect()
     }
 
     /// True if the column is used for a question, image, id or family.
@@ -203,11 +195,7 @@ fn columns_of(table: &Table, map: &ColumnMap, role: Role) -> Result<Vec<Column>,
         {
             return Ok(vec![Column::new(index, &entry.unsplit)]);
         }
-        return entry
-            .columns
-            .iter()
-            .map(|name| find_column(table, name))
-            .collect();
+        return entry.columns.iter().map(|name| find_column(table, name)).collect();
     }
     Ok(known_names(role)
         .iter()
@@ -228,8 +216,7 @@ fn image_columns(table: &Table, map: &ColumnMap) -> Result<ImageColumns, String>
     if let Some([template]) = entry.map(|entry| &*entry.columns)
         && template.contains('{')
     {
-        return Template::parse(table, template, |name| find_column(table, name))
-            .map(ImageColumns::Template);
+        return Template::parse(table, template, |name| find_column(table, name)).map(ImageColumns::Template);
     }
     let columns = columns_of(table, map, Role::Image)?;
     if entry.is_some() && columns.len() > 1 {
@@ -240,26 +227,21 @@ fn image_columns(table: &Table, map: &ColumnMap) -> Result<ImageColumns, String>
         None => Ok(ImageColumns::All(numbered)),
         Some(_) if numbered.is_empty() => Ok(ImageColumns::First(columns)),
         // With numbered columns, a column without a number has one of several images.
-        Some(first) => Ok(ImageColumns::All(
-            std::iter::once(first.clone()).chain(numbered).collect(),
-        )),
+        Some(first) => Ok(ImageColumns::All(std::iter::once(first.clone()).chain(numbered).collect())),
     }
 }
 
-/// Column without a role that most likely has the questions: the one with most texts that end in a question mark, else with most texts.
+/// Column without a role that most likely has the questions: the one with most texts that end in a question mark, else
+/// with most texts.
 fn likely_question_column(table: &Table) -> Option<&String> {
-    let known: BTreeSet<&String> = Role::ALL
-        .iter()
-        .flat_map(|role| known_names(*role))
-        .collect();
+    let known: BTreeSet<&String> = Role::ALL.iter().flat_map(|role| known_names(*role)).collect();
     let option_cells = option_cells(table);
     table
         .columns
         .iter()
         .enumerate()
         .filter(|(_, name)| {
-            !known.contains(&normalize(name))
-                && !option_cells.iter().any(|column| column.name == **name)
+            !known.contains(&normalize(name)) && !option_cells.iter().any(|column| column.name == **name)
         })
         .map(|(index, name)| {
             let texts: Vec<&String> = table
@@ -270,10 +252,7 @@ fn likely_question_column(table: &Table) -> Option<&String> {
                     _ => None,
                 })
                 .collect();
-            let questions = texts
-                .iter()
-                .filter(|text| text.trim_end().ends_with(['?', '？']))
-                .count();
+            let questions = texts.iter().filter(|text| text.trim_end().ends_with(['?', '？'])).count();
             (questions, texts.len(), name)
         })
         .filter(|(_, texts, _)| *texts > 0)
@@ -286,10 +265,7 @@ fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
     let has_images = embedded_images(table).is_some();
     let [options, answers] = [Role::Options, Role::Answer].map(|role| columns_of(table, map, role));
     let is_unanswerable = options?.is_empty() && answers?.is_empty();
-    let remedy = match (
-        ConversationPaths::find(table),
-        likely_question_column(table),
-    ) {
+    let remedy = match (ConversationPaths::find(table), likely_question_column(table)) {
         (Some(ConversationPaths { question, answer }), _) => {
             let answer = answer.map_or_else(String::new, |path| format!(",answer={path}"));
             format!(
@@ -311,10 +287,7 @@ fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
             QuestionSource::IN_IMAGE_TEXT
         ),
     };
-    Ok(format!(
-        "no question among its columns:\n{}\n {remedy}",
-        describe_columns(table)
-    ))
+    Ok(format!("no question among its columns:\n{}\n {remedy}", describe_columns(table)))
 }
 
 /// A column with images in its cells.
@@ -324,10 +297,7 @@ pub(crate) fn embedded_images(table: &Table) -> Option<Column> {
         Cell::Fields(fields) => fields.iter().any(|(name, _)| &**name == "bytes"),
         _ => false,
     };
-    let index = table
-        .rows
-        .iter()
-        .find_map(|row| (0..table.columns.len()).find(|index| is_image(row.cell(*index))))?;
+    let index = table.rows.iter().find_map(|row| (0..table.columns.len()).find(|index| is_image(row.cell(*index))))?;
     Some(Column::new(index, &table.columns[index]))
 }
 
@@ -348,13 +318,8 @@ pub(crate) fn find_column(table: &Table, name: &str) -> Result<Column, String> {
         .columns
         .iter()
         .find(|known| normalize(known) == normalize(name))
-        .map_or_else(String::new, |similar| {
-            format!("; did you mean {similar:?}?")
-        });
-    Err(format!(
-        "--map names the column {name:?}, which is not there{similar}\n{}",
-        describe_columns(table)
-    ))
+        .map_or_else(String::new, |similar| format!("; did you mean {similar:?}?"));
+    Err(format!("--map names the column {name:?}, which is not there{similar}\n{}", describe_columns(table)))
 }
 
 /// Columns with one of these names and a number, in the order of their numbers.
@@ -362,10 +327,7 @@ fn numbered_columns(table: &Table, names: &[&str]) -> Vec<Column> {
     let mut found: Vec<(u32, Column)> = Vec::new();
     for (index, column) in table.columns.iter().enumerate() {
         let normalized = normalize(column);
-        let number = names
-            .iter()
-            .find_map(|name| normalized.strip_prefix(name))
-            .and_then(|digits| digits.parse().ok());
+        let number = names.iter().find_map(|name| normalized.strip_prefix(name)).and_then(|digits| digits.parse().ok());
         if let Some(number) = number {
             found.push((number, Column::new(index, column)));
         }
@@ -393,10 +355,7 @@ fn option_cells(table: &Table) -> Vec<Column> {
         .map_while(|option| {
             let letter = letter(option).to_ascii_lowercase();
             let names = [format!("option{letter}"), format!("choice{letter}")];
-            let index = table
-                .columns
-                .iter()
-                .position(|column| names.contains(&normalize(column)))?;
+            let index = table.columns.iter().position(|column| names.contains(&normalize(column)))?;
             Some(Column::new(index, &table.columns[index]))
         })
         .collect();
@@ -409,10 +368,7 @@ fn refuse_several_questions(table: &Table, map: &ColumnMap) -> Result<(), String
     if questions.len() < 2 || map.entry(Role::Question).is_some() {
         return Ok(());
     }
-    let names: Vec<&str> = questions
-        .iter()
-        .map(|column| column.name.as_str())
-        .collect();
+    let names: Vec<&str> = questions.iter().map(|column| column.name.as_str()).collect();
     Err(format!(
         "several questions per row, in the columns {}; one question per row is read: write a row for each, or take the ones in a column \
          with {}",
@@ -442,18 +398,10 @@ pub(crate) fn describe_columns(table: &Table) -> String {
         .enumerate()
         .take(MAX_LISTED_COLUMNS)
         .map(|(index, name)| {
-            let cell = table
-                .rows
-                .iter()
-                .map(|row| row.cell(index))
-                .find(|cell| !cell.is_absent())
-                .unwrap_or(&Cell::Absent);
+            let cell =
+                table.rows.iter().map(|row| row.cell(index)).find(|cell| !cell.is_absent()).unwrap_or(&Cell::Absent);
             let name = excerpt(name, MAX_LISTED_NAME);
-            format!(
-                "   {name:width$}  {:8} {}",
-                cell.kind(),
-                cell.excerpt(max_value)
-            )
+            format!("   {name:width$}  {:8} {}", cell.kind(), cell.excerpt(max_value))
         })
         .collect();
     if table.columns.len() > lines.len() {

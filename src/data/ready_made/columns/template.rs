@@ -6,7 +6,8 @@ use crate::data::ready_made::cells::{Row, Table};
 /// Maximum width of a number (chosen).
 const MAX_WIDTH: usize = 64;
 
-/// Name of an image file with columns in braces: `images/{id}.jpg`, or `images/{id:012}.jpg` for a number in twelve digits.
+/// Name of an image file with columns in braces: `images/{id}.jpg`, or `images/{id:012}.jpg` for a number in twelve
+/// digits.
 #[derive(Debug)]
 pub(crate) struct Template {
     text: String,
@@ -34,18 +35,13 @@ impl Template {
         let mut parts = Vec::new();
         let mut rest = text;
         while let Some((literal, after)) = rest.split_once('{') {
-            let (field, after) = after
-                .split_once('}')
-                .ok_or_else(|| format!("{text:?}: '}}' is missing"))?;
+            let (field, after) = after.split_once('}').ok_or_else(|| format!("{text:?}: '}}' is missing"))?;
             parts.push(TemplatePart::Literal(literal.to_owned()));
             parts.push(parse_field(table, field, &find_column)?);
             rest = after;
         }
         parts.push(TemplatePart::Literal(rest.to_owned()));
-        Ok(Self {
-            text: text.to_owned(),
-            parts,
-        })
+        Ok(Self { text: text.to_owned(), parts })
     }
 
     /// Template as written by the user.
@@ -68,8 +64,8 @@ impl Template {
     }
 }
 
-/// Parses a field in braces: a column, or a column with a width in Python's notation, `id:012` or `id:012d`. A column with the whole
-/// name takes precedence.
+/// Parses a field in braces: a column, or a column with a width in Python's notation, `id:012` or `id:012d`. A column
+/// with the whole name takes precedence.
 fn parse_field(
     table: &Table,
     field: &str,
@@ -80,9 +76,7 @@ fn parse_field(
         && let Some(width) = parse_width(format)
     {
         if width > MAX_WIDTH {
-            return Err(format!(
-                "{{{field}}}: a width of at most {MAX_WIDTH} expected"
-            ));
+            return Err(format!("{{{field}}}: a width of at most {MAX_WIDTH} expected"));
         }
         let column = find_column(name)?;
         return Ok(TemplatePart::Cell { column, width });

@@ -18,7 +18,8 @@ use crate::types::FrameId;
 /// Maximum number of entries (chosen).
 const MAX_ENTRIES: usize = 500_000;
 
-/// Maximum length of the directory, in bytes (chosen). The shortest entry has 47 bytes and takes half a kilobyte in memory.
+/// Maximum length of the directory, in bytes (chosen). The shortest entry has 47 bytes and takes half a kilobyte in
+/// memory.
 const MAX_DIRECTORY_BYTES: u64 = 48 << 20;
 
 /// Maximum length of an image, in bytes.
@@ -45,10 +46,7 @@ struct BoundedFile {
 impl Read for BoundedFile {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.file.read(buffer)?;
-        let remaining = self
-            .remaining
-            .load(Ordering::Relaxed)
-            .saturating_sub(count as u64);
+        let remaining = self.remaining.load(Ordering::Relaxed).saturating_sub(count as u64);
         self.remaining.store(remaining, Ordering::Relaxed);
         if remaining == 0 {
             return Err(io::Error::other("the directory is too long"));
@@ -77,46 +75,32 @@ impl Archive {
     pub(crate) fn open(path: &Path) -> Result<Self> {
         let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
         let remaining = Arc::new(AtomicU64::new(MAX_DIRECTORY_BYTES));
-        let bounded = BoundedFile {
-            file,
-            remaining: Arc::clone(&remaining),
-        };
+        let bounded = BoundedFile { file, remaining: Arc::clone(&remaining) };
         let opened = ZipArchive::new(BufReader::new(bounded));
         let count = opened.as_ref().map_or(0, ZipArchive::len);
         if count > MAX_ENTRIES || remaining.load(Ordering::Relaxed) == 0 {
             return Err(Error::data(
                 path.display(),
-                format_args!(
-                    "more than {MAX_ENTRIES} entries, which are not read; unpack it, and name its folder"
-                ),
+                format_args!("more than {MAX_ENTRIES} entries, which are not read; unpack it, and name its folder"),
             ));
         }
-        let mut zip = opened
-            .map_err(|e| Error::data(path.display(), format_args!("not a whole ZIP file: {e}")))?;
+        let mut zip = opened.map_err(|e| Error::data(path.display(), format_args!("not a whole ZIP file: {e}")))?;
         remaining.store(u64::MAX, Ordering::Relaxed);
         let mut indices = BTreeMap::new();
         for index in 0..zip.len() {
-            let entry = zip
-                .by_index_raw(index)
-                .map_err(|e| Error::data(path.display(), e))?;
+            let entry = zip.by_index_raw(index).map_err(|e| Error::data(path.display(), e))?;
             let name = entry.name().to_owned();
             if entry.is_symlink() || !is_inside(&name) {
                 return Err(Error::data(
                     path.display(),
-                    format_args!(
-                        "the entry {name:?} leads out of the file, or is a link; such files are not read"
-                    ),
+                    format_args!("the entry {name:?} leads out of the file, or is a link; such files are not read"),
                 ));
             }
             if entry.is_file() {
                 indices.insert(name, index);
             }
         }
-        Ok(Self {
-            path: path.to_owned(),
-            indices,
-            zip: Mutex::new(zip),
-        })
+        Ok(Self { path: path.to_owned(), indices, zip: Mutex::new(zip) })
     }
 
     /// Path of the ZIP file.
@@ -128,11 +112,7 @@ impl Archive {
     pub(super) fn files(&self) -> Vec<PathBuf> {
         self.indices
             .keys()
-            .filter(|name| {
-                !name
-                    .split('/')
-                    .any(|part| part.starts_with('.') || part == "__MACOSX")
-            })
+            .filter(|name| !name.split('/').any(|part| part.starts_with('.') || part == "__MACOSX"))
             .map(PathBuf::from)
             .collect()
     }
@@ -154,8 +134,7 @@ impl Archive {
 
     /// Decompresses a file to a temporary copy.
     pub(super) fn decompress(&self, name: &str) -> Result<NamedTempFile> {
-        let mut file =
-            NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
+        let mut file = NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
         let max = max_decompressed_size(self.compressed_size(name)?);
         self.copy(name, max, &mut file)?;
         Ok(file)
@@ -175,19 +154,14 @@ impl Archive {
 
     /// Index of a file.
     fn index(&self, name: &str) -> Result<usize> {
-        self.indices
-            .get(name)
-            .copied()
-            .ok_or_else(|| Error::data(self.place(name), "no such file in it"))
+        self.indices.get(name).copied().ok_or_else(|| Error::data(self.place(name), "no such file in it"))
     }
 
     /// Compressed size of a file, in bytes.
     fn compressed_size(&self, name: &str) -> Result<u64> {
         let index = self.index(name)?;
         let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = zip
-            .by_index_raw(index)
-            .map_err(|e| Error::data(self.place(name), e))?;
+        let entry = zip.by_index_raw(index).map_err(|e| Error::data(self.place(name), e))?;
         Ok(entry.compressed_size())
     }
 
@@ -195,11 +169,9 @@ impl Archive {
     fn copy(&self, name: &str, max: u64, to: &mut impl std::io::Write) -> Result<()> {
         let index = self.index(name)?;
         let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
-        let entry = zip
-            .by_index(index)
-            .map_err(|e| Error::data(self.place(name), e))?;
-        let copied = std::io::copy(&mut entry.take(max.saturating_add(1)), to)
-            .map_err(|e| Error::data(self.place(name), e))?;
+        let entry = zip.by_index(index).map_err(|e| Error::data(self.place(name), e))?;
+        let copied =
+            std::io::copy(&mut entry.take(max.saturating_add(1)), to).map_err(|e| Error::data(self.place(name), e))?;
         if copied > max {
             let problem = format_args!("longer than {} MB", max >> 20);
             return Err(Error::data(self.place(name), problem));
@@ -238,6 +210,5 @@ impl Archive {
 /// True if the name of an entry is a relative path that stays inside the archive.
 fn is_inside(name: &str) -> bool {
     let mut parts = Path::new(name).components();
-    !name.contains(['\\', '\0'])
-        && parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+    !name.contains(['\\', '\0']) && parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
 }

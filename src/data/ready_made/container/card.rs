@@ -1,8 +1,8 @@
 //! Configurations in the dataset card of a repository: [`parse_configs`].
 //!
-//! A card is a `README.md` that starts with YAML. Only its field `configs` is used (Hugging Face, "Manual Configuration"): a list of
-//! mappings with `config_name`, `default`, `data_dir` and `data_files`. `data_files` is a pattern, a list of patterns, a list of `split`
-//! and `path`, or a mapping of splits to patterns.
+//! A card is a `README.md` that starts with YAML. Only its field `configs` is used (Hugging Face, "Manual
+//! Configuration"): a list of mappings with `config_name`, `default`, `data_dir` and `data_files`. `data_files` is a
+//! pattern, a list of patterns, a list of `split` and `path`, or a mapping of splits to patterns.
 
 use super::yaml::{Yaml, value};
 
@@ -31,19 +31,13 @@ pub(super) struct SplitPattern {
 /// If `configs` is not in a supported form.
 pub(super) fn parse_configs(card: &str) -> Result<Vec<Config>, String> {
     let card = card.trim_start_matches('\u{feff}').replace("\r\n", "\n");
-    let head = card
-        .strip_prefix("---\n")
-        .and_then(|rest| rest.split_once("\n---"));
-    let mut lines = head
-        .map_or("", |(head, _)| head)
-        .lines()
-        .skip_while(|line| top_level_key(line) != Some("configs"));
+    let head = card.strip_prefix("---\n").and_then(|rest| rest.split_once("\n---"));
+    let mut lines = head.map_or("", |(head, _)| head).lines().skip_while(|line| top_level_key(line) != Some("configs"));
     let Some(first) = lines.next() else {
         return Ok(Vec::new());
     };
-    let text: Vec<&str> = std::iter::once(first)
-        .chain(lines.take_while(|line| top_level_key(line).is_none()))
-        .collect();
+    let text: Vec<&str> =
+        std::iter::once(first).chain(lines.take_while(|line| top_level_key(line).is_none())).collect();
     let configs = value(&text.join("\n"))?;
     match configs.field("configs") {
         None | Some(Yaml::Nothing) => Ok(Vec::new()),
@@ -71,9 +65,7 @@ fn parse_config(config: &Yaml) -> Result<Config, String> {
     };
     let with_name = |problem: String| format!("configuration {name:?}: {problem}");
     Ok(Config {
-        is_default: text_field(config, "default")
-            .map_err(with_name)?
-            .eq_ignore_ascii_case("true"),
+        is_default: text_field(config, "default").map_err(with_name)?.eq_ignore_ascii_case("true"),
         folder: text_field(config, "data_dir").map_err(with_name)?,
         files: match config.field("data_files") {
             None | Some(Yaml::Nothing) => None,
@@ -117,9 +109,7 @@ fn parse_data_files(files: &Yaml) -> Result<Vec<SplitPattern>, String> {
 
 /// Parses a mapping of `split` and `path`: the split (empty if it is missing) and the patterns.
 fn parse_split_entry(entry: &Yaml) -> Result<(&str, &Yaml), String> {
-    let path = entry
-        .field("path")
-        .ok_or("an entry of data_files has no path")?;
+    let path = entry.field("path").ok_or("an entry of data_files has no path")?;
     match entry.field("split") {
         Some(Yaml::Text(split)) => Ok((split.as_str(), path)),
         None => Ok(("", path)),
@@ -130,10 +120,7 @@ fn parse_split_entry(entry: &Yaml) -> Result<(&str, &Yaml), String> {
 /// Adds the patterns of a split.
 fn add_patterns(split: &str, files: &Yaml, found: &mut Vec<SplitPattern>) -> Result<(), String> {
     for pattern in parse_patterns(files)? {
-        found.push(SplitPattern {
-            split: split.to_owned(),
-            pattern,
-        });
+        found.push(SplitPattern { split: split.to_owned(), pattern });
     }
     Ok(())
 }
@@ -158,49 +145,24 @@ mod tests {
     use super::*;
 
     fn file(split: &str, pattern: &str) -> SplitPattern {
-        SplitPattern {
-            split: split.to_owned(),
-            pattern: pattern.to_owned(),
-        }
+        SplitPattern { split: split.to_owned(), pattern: pattern.to_owned() }
     }
 
     fn config(name: &str, is_default: bool, files: Vec<SplitPattern>) -> Config {
-        Config {
-            name: name.to_owned(),
-            is_default,
-            folder: String::new(),
-            files: Some(files),
-        }
+        Config { name: name.to_owned(), is_default, folder: String::new(), files: Some(files) }
     }
 
     #[test]
     fn configs_of_cards_are_parsed() {
         let card = "---\nlicense: mit\nconfigs:\n- config_name: Full\n  data_files:\n  - split: adversarial\n    path: Full/adversarial-*\n  - split: popular\n    path: \"Full/popular-*\"\n- config_name: default\n  default: true\n  data_files:\n  - split: test\n    path:\n    - data/a.parquet\n    - 'data/b: c.parquet'\n- config_name: one\n  data_files: one/*.csv\n- config_name: two\n  data_files: [\"x.csv\", y.csv]\ndataset_info:\n- config_name: none\n---\n# text\n- config_name: no\n";
         let expected = [
-            config(
-                "Full",
-                false,
-                vec![
-                    file("adversarial", "Full/adversarial-*"),
-                    file("popular", "Full/popular-*"),
-                ],
-            ),
-            config(
-                "default",
-                true,
-                vec![
-                    file("test", "data/a.parquet"),
-                    file("test", "data/b: c.parquet"),
-                ],
-            ),
+            config("Full", false, vec![file("adversarial", "Full/adversarial-*"), file("popular", "Full/popular-*")]),
+            config("default", true, vec![file("test", "data/a.parquet"), file("test", "data/b: c.parquet")]),
             config("one", false, vec![file("", "one/*.csv")]),
             config("two", false, vec![file("", "x.csv"), file("", "y.csv")]),
         ];
         assert_eq!(parse_configs(card).unwrap(), expected);
-        assert_eq!(
-            parse_configs(&card.replace('\n', "\r\n")).unwrap(),
-            expected
-        );
+        assert_eq!(parse_configs(&card.replace('\n', "\r\n")).unwrap(), expected);
         for none in ["", "# text", "---\nlicense: mit\n---\n", "---\nconfigs:\n"] {
             assert_eq!(parse_configs(none).unwrap(), [], "{none:?}");
         }
@@ -214,18 +176,10 @@ mod tests {
     #[test]
     fn splits_may_be_field_names() {
         let found = first_config("  - config_name: a\n    data_files:\n      test: data/test-*\n      train:\n      - x.csv\n      - y.csv\n").unwrap();
-        let files = vec![
-            file("test", "data/test-*"),
-            file("train", "x.csv"),
-            file("train", "y.csv"),
-        ];
+        let files = vec![file("test", "data/test-*"), file("train", "x.csv"), file("train", "y.csv")];
         assert_eq!(found.files, Some(files));
-        let found =
-            first_config("- data_files: {test: \"data/*.csv\"}\n  data_dir: inner\n").unwrap();
-        assert_eq!(
-            (found.name.as_str(), found.folder.as_str()),
-            ("default", "inner")
-        );
+        let found = first_config("- data_files: {test: \"data/*.csv\"}\n  data_dir: inner\n").unwrap();
+        assert_eq!((found.name.as_str(), found.folder.as_str()), ("default", "inner"));
         assert_eq!(found.files, Some(vec![file("test", "data/*.csv")]));
         let found = first_config("- config_name: a\n  data_dir: inner\n").unwrap();
         assert_eq!(found.files, None);

@@ -26,9 +26,7 @@ const METADATA: [&str; 3] = ["metadata.jsonl", "metadata.csv", "metadata.parquet
 pub(super) fn is_set(tree: &Tree, files: &[PathBuf]) -> bool {
     is_arrow(tree)
         || !card_configs(tree).0.is_empty()
-        || files
-            .iter()
-            .any(|path| is_metadata(path) || is_table(path) || extension(path) == "parquet")
+        || files.iter().any(|path| is_metadata(path) || is_table(path) || extension(path) == "parquet")
 }
 
 /// True if the tree is a folder of Arrow files, as written by the Python package `datasets`.
@@ -50,10 +48,7 @@ fn card_configs(tree: &Tree) -> (Vec<Config>, Option<String>) {
     if !tree.has(CARD) {
         return (Vec::new(), None);
     }
-    let configs = tree
-        .read_text(CARD)
-        .map_err(|e| e.to_string())
-        .and_then(|card| parse_configs(&card));
+    let configs = tree.read_text(CARD).map_err(|e| e.to_string()).and_then(|card| parse_configs(&card));
     match configs {
         Ok(configs) => (configs, None),
         Err(problem) => {
@@ -66,8 +61,8 @@ fn card_configs(tree: &Tree) -> (Vec<Config>, Option<String>) {
     }
 }
 
-/// Chooses the files of one split, and returns a note if the card cannot be parsed. Without a configuration in the card, metadata files
-/// are preferred, then Parquet files, then other tables.
+/// Chooses the files of one split, and returns a note if the card cannot be parsed. Without a configuration in the
+/// card, metadata files are preferred, then Parquet files, then other tables.
 ///
 /// # Errors
 /// If there are no files, or it is not clear which to use; the error lists the files.
@@ -90,34 +85,22 @@ pub(super) fn choose_files(
         }
         files_by_kind(tree, files)?
             .into_iter()
-            .map(|path| Candidate {
-                split: splits::split_in_name(&path),
-                config: String::new(),
-                path,
-            })
+            .map(|path| Candidate { split: splits::split_in_name(&path), config: String::new(), path })
             .collect()
     } else {
-        let wanted = args
-            .config_name
-            .as_deref()
-            .or(args.preset_config.as_deref());
+        let wanted = args.config_name.as_deref().or(args.preset_config.as_deref());
         files_by_card(tree, &configs, &files, wanted)?
     };
     let candidates = splits::choose_split(tree, candidates, args.split.as_deref())?;
     Ok((candidates, note))
 }
 
-/// Files of the wanted configuration, or of all configurations for `all`. The default is the one marked so in the card, or named
-/// `default`, or the only one.
+/// Files of the wanted configuration, or of all configurations for `all`. The default is the one marked so in the card,
+/// or named `default`, or the only one.
 ///
 /// # Errors
 /// If there is no such configuration; the error lists them.
-fn files_by_card(
-    tree: &Tree,
-    configs: &[Config],
-    files: &[PathBuf],
-    wanted: Option<&str>,
-) -> Result<Vec<Candidate>> {
+fn files_by_card(tree: &Tree, configs: &[Config], files: &[PathBuf], wanted: Option<&str>) -> Result<Vec<Candidate>> {
     let names: Vec<&str> = configs.iter().map(|config| config.name.as_str()).collect();
     let chosen: Vec<&Config> = match wanted {
         Some("all") => configs.iter().collect(),
@@ -144,11 +127,7 @@ fn files_by_card(
                         "" => splits::split_in_name(&path),
                         split => split.to_owned(),
                     },
-                    config: if several {
-                        config.name.clone()
-                    } else {
-                        String::new()
-                    },
+                    config: if several { config.name.clone() } else { String::new() },
                     path,
                 });
             }
@@ -164,41 +143,23 @@ fn find_config<'a>(configs: &'a [Config], name: &str) -> Option<&'a Config> {
 fn default_config(configs: &[Config]) -> Option<&Config> {
     match configs {
         [only] => Some(only),
-        _ => configs
-            .iter()
-            .find(|config| config.is_default)
-            .or_else(|| find_config(configs, "default")),
+        _ => configs.iter().find(|config| config.is_default).or_else(|| find_config(configs, "default")),
     }
 }
 
 /// Files of a configuration with the name of their split in the card, which may be empty.
-fn files_of_config(
-    tree: &Tree,
-    config: &Config,
-    files: &[PathBuf],
-) -> Result<Vec<(String, Vec<PathBuf>)>> {
+fn files_of_config(tree: &Tree, config: &Config, files: &[PathBuf]) -> Result<Vec<(String, Vec<PathBuf>)>> {
     let folder = config.folder.trim_start_matches("./").trim_matches('/');
     let Some(patterns) = &config.files else {
-        let inside = files
-            .iter()
-            .filter_map(|path| path.strip_prefix(folder).ok())
-            .map(Path::to_owned)
-            .collect();
-        let found = files_by_kind(tree, inside)?
-            .into_iter()
-            .map(|path| Path::new(folder).join(path))
-            .collect();
+        let inside = files.iter().filter_map(|path| path.strip_prefix(folder).ok()).map(Path::to_owned).collect();
+        let found = files_by_kind(tree, inside)?.into_iter().map(|path| Path::new(folder).join(path)).collect();
         return Ok(vec![(String::new(), found)]);
     };
     patterns
         .iter()
         .map(|SplitPattern { split, pattern }| {
             let pattern = pattern.trim_start_matches("./");
-            let pattern = if folder.is_empty() {
-                pattern.to_owned()
-            } else {
-                format!("{folder}/{pattern}")
-            };
+            let pattern = if folder.is_empty() { pattern.to_owned() } else { format!("{folder}/{pattern}") };
             Ok((split.clone(), matching_files(tree, &pattern, files)?))
         })
         .collect()
@@ -207,31 +168,14 @@ fn files_of_config(
 /// Files that match a pattern of the card.
 fn matching_files(tree: &Tree, pattern: &str, files: &[PathBuf]) -> Result<Vec<PathBuf>> {
     if pattern.split('/').any(|part| part == "..") || pattern.starts_with('/') {
-        return Err(card_error(
-            tree,
-            format_args!("the files {pattern:?} lie outside the folder of the card"),
-        ));
+        return Err(card_error(tree, format_args!("the files {pattern:?} lie outside the folder of the card")));
     }
-    let glob = Pattern::new(pattern.trim_start_matches("./")).map_err(|e| {
-        card_error(
-            tree,
-            format_args!("the files {pattern:?}: not a pattern: {e}"),
-        )
-    })?;
-    let options = MatchOptions {
-        require_literal_separator: true,
-        ..MatchOptions::default()
-    };
-    let matching: Vec<PathBuf> = files
-        .iter()
-        .filter(|path| glob.matches_path_with(path, options))
-        .cloned()
-        .collect();
+    let glob = Pattern::new(pattern.trim_start_matches("./"))
+        .map_err(|e| card_error(tree, format_args!("the files {pattern:?}: not a pattern: {e}")))?;
+    let options = MatchOptions { require_literal_separator: true, ..MatchOptions::default() };
+    let matching: Vec<PathBuf> = files.iter().filter(|path| glob.matches_path_with(path, options)).cloned().collect();
     if matching.is_empty() {
-        return Err(card_error(
-            tree,
-            format_args!("no file {pattern:?} beside it; download the whole repository"),
-        ));
+        return Err(card_error(tree, format_args!("no file {pattern:?} beside it; download the whole repository")));
     }
     Ok(matching)
 }
@@ -250,15 +194,11 @@ fn is_metadata(path: &Path) -> bool {
 /// # Errors
 /// If there are no files, or files of several kinds.
 fn files_by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
-    let (metadata, others) = files
-        .into_iter()
-        .partition::<Vec<PathBuf>, _>(|path| is_metadata(path));
+    let (metadata, others) = files.into_iter().partition::<Vec<PathBuf>, _>(|path| is_metadata(path));
     if !metadata.is_empty() {
         return require_one_kind(tree, metadata);
     }
-    let (parquet, others) = others
-        .into_iter()
-        .partition::<Vec<PathBuf>, _>(|path| extension(path) == "parquet");
+    let (parquet, others) = others.into_iter().partition::<Vec<PathBuf>, _>(|path| extension(path) == "parquet");
     if !parquet.is_empty() {
         return Ok(parquet);
     }
@@ -274,10 +214,7 @@ fn files_by_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
 fn is_table(path: &Path) -> bool {
     const NO_TABLES: [&str; 3] = ["dataset.json", "classes.json", "info.json"];
     let is_in_top_folder = path.parent() == Some(Path::new(""));
-    let is_text = matches!(
-        &*extension(path),
-        "tsv" | "csv" | "jsonl" | "ndjson" | "json"
-    );
+    let is_text = matches!(&*extension(path), "tsv" | "csv" | "jsonl" | "ndjson" | "json");
     is_in_top_folder && is_text && !NO_TABLES.iter().any(|name| path == Path::new(name))
 }
 
@@ -290,10 +227,7 @@ fn require_one_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
     if kinds.len() == 1 {
         return Ok(files);
     }
-    let names: Vec<String> = files
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
+    let names: Vec<String> = files.iter().map(|path| path.display().to_string()).collect();
     let problem = format!(
         "files of several kinds, {}; name the one that is meant: --data {}",
         names.join(", "),

@@ -61,10 +61,8 @@ fn named_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
     let mut files = Vec::with_capacity(places.len());
     for place in places {
         if !place.is_file() || extension(place) == "zip" {
-            let problem = format_args!(
-                "{}: no file of questions; several --data name the files of one set",
-                place.display()
-            );
+            let problem =
+                format_args!("{}: no file of questions; several --data name the files of one set", place.display());
             return Err(Error::usage("--data", problem));
         }
         if places.iter().filter(|other| *other == place).count() > 1 {
@@ -79,11 +77,7 @@ fn named_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
         folder: folders.next().unwrap_or_default(),
         further: folders.collect(),
         archive: None,
-        notes: check_shards(places)
-            .err()
-            .map(|e| e.to_string())
-            .into_iter()
-            .collect(),
+        notes: check_shards(places).err().map(|e| e.to_string()).into_iter().collect(),
         joined: Joined::OneTable,
     })
 }
@@ -98,13 +92,9 @@ fn folder_of(file: &Path) -> PathBuf {
 
 /// Refuses the flags that choose files of a folder.
 fn refuse_choice(text: &str, args: &SetArgs) -> Result<()> {
-    for (flag, value) in [
-        ("--read config", &args.config_name),
-        ("--read split", &args.split),
-    ] {
+    for (flag, value) in [("--read config", &args.config_name), ("--read split", &args.split)] {
         if let Some(value) = value {
-            let problem =
-                format_args!("{text} is not a folder from which {value:?} could be chosen");
+            let problem = format_args!("{text} is not a folder from which {value:?} could be chosen");
             return Err(Error::usage(flag, problem));
         }
     }
@@ -139,14 +129,11 @@ fn files_at(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
     matching_files(place, &text, args)
 }
 
-/// Files that match a pattern. Links out of the folder before its first wildcard are skipped; a warning names the first.
+/// Files that match a pattern. Links out of the folder before its first wildcard are skipped; a warning names the
+/// first.
 fn matching_files(place: &Path, text: &str, args: &SetArgs) -> Result<FoundFiles> {
-    let paths = glob::glob(text)
-        .map_err(|e| Error::usage("--data", format_args!("{text}: not a pattern: {e}")))?;
-    let folder: PathBuf = place
-        .iter()
-        .take_while(|part| !part.to_string_lossy().contains(['*', '?', '[']))
-        .collect();
+    let paths = glob::glob(text).map_err(|e| Error::usage("--data", format_args!("{text}: not a pattern: {e}")))?;
+    let folder: PathBuf = place.iter().take_while(|part| !part.to_string_lossy().contains(['*', '?', '['])).collect();
     let root = Root::new(&folder, &args.root.data_root)?;
     let mut links_out = Vec::new();
     let mut files = Vec::new();
@@ -159,17 +146,11 @@ fn matching_files(place: &Path, text: &str, args: &SetArgs) -> Result<FoundFiles
     }
     root.warn_of_links_out(&links_out);
     if files.is_empty() {
-        return Err(Error::usage(
-            "--data",
-            format_args!("{text}: no file has such a name"),
-        ));
+        return Err(Error::usage("--data", format_args!("{text}: no file has such a name")));
     }
     check_shards(&files)?;
     Ok(FoundFiles {
-        files: files
-            .into_iter()
-            .map(|path| SetFile::open(path, String::new()))
-            .collect::<Result<_>>()?,
+        files: files.into_iter().map(|path| SetFile::open(path, String::new())).collect::<Result<_>>()?,
         folder,
         further: Vec::new(),
         archive: None,
@@ -182,15 +163,9 @@ fn matching_files(place: &Path, text: &str, args: &SetArgs) -> Result<FoundFiles
 fn files_in_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
     let (all, outside) = tree.files()?;
     let (chosen, card_note) = choose_files(tree, all, args)?;
-    let paths: Vec<PathBuf> = chosen
-        .iter()
-        .map(|file| tree.full_path(&file.path))
-        .collect();
+    let paths: Vec<PathBuf> = chosen.iter().map(|file| tree.full_path(&file.path)).collect();
     check_shards(&paths)?;
-    let files = chosen
-        .into_iter()
-        .map(|file| tree.open(&file.path, file.config))
-        .collect::<Result<_>>()?;
+    let files = chosen.into_iter().map(|file| tree.open(&file.path, file.config)).collect::<Result<_>>()?;
     let link_note = outside.first().map(|first| {
         format!(
             "links that lead out of the folder or nowhere, and were skipped: {}, as {}",

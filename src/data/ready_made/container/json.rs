@@ -25,10 +25,7 @@ const MAX_VALUES: usize = 1 << 20;
 
 /// Checks that a row has at most [`MAX_VALUES`] values.
 fn check_values(bytes: &[u8]) -> Result<(), String> {
-    let separators = bytes
-        .iter()
-        .filter(|byte| matches!(byte, b',' | b'['))
-        .count();
+    let separators = bytes.iter().filter(|byte| matches!(byte, b',' | b'[')).count();
     if separators <= MAX_VALUES {
         return Ok(());
     }
@@ -69,17 +66,12 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
         let bytes = line.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(&line);
         if !bytes.trim_ascii().is_empty() {
             check_values(bytes).map_err(|problem| Error::line(path, number, problem))?;
-            let value =
-                serde_json::from_slice(bytes).map_err(|e| match json_problem(bytes, &e) {
-                    Some(problem) => Error::line(path, number, problem),
-                    None => Error::json_line(path, number, &e),
-                })?;
+            let value = serde_json::from_slice(bytes).map_err(|e| match json_problem(bytes, &e) {
+                Some(problem) => Error::line(path, number, problem),
+                None => Error::json_line(path, number, &e),
+            })?;
             let Value::Object(fields) = value else {
-                return Err(Error::line(
-                    path,
-                    number,
-                    "not an object; {\"question\": …} expected",
-                ));
+                return Err(Error::line(path, number, "not an object; {\"question\": …} expected"));
             };
             let place = RowPlace::Json {
                 offset: offset + (length - bytes.len()) as u64,
@@ -88,8 +80,7 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
                 unit: JsonUnit::Line,
                 inner: None,
             };
-            push_row(table, place, fields, None)
-                .map_err(|problem| Error::line(path, number, problem))?;
+            push_row(table, place, fields, None).map_err(|problem| Error::line(path, number, problem))?;
         }
         offset += length as u64;
     }
@@ -101,8 +92,7 @@ pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut Table) -> Result
     let steps: Vec<&str> = rows.iter().flat_map(|rows| rows.split('.')).collect();
     let before = table.rows.len();
     let scanner = JsonScanner::new(open(path)?);
-    read_rows_at(scanner, path, &steps, table)
-        .map_err(|problem| Error::data(path.display(), problem))?;
+    read_rows_at(scanner, path, &steps, table).map_err(|problem| Error::data(path.display(), problem))?;
     if table.rows.len() == before && !steps.is_empty() {
         let problem = format_args!("{}: no list of objects there", steps.join("."));
         return Err(Error::usage("--read rows", problem).at("--read rows"));
@@ -111,12 +101,7 @@ pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut Table) -> Result
 }
 
 /// Appends the rows of the list at the end of a path.
-fn read_rows_at(
-    mut scanner: FileScanner,
-    path: &Path,
-    steps: &[&str],
-    table: &mut Table,
-) -> Result<(), String> {
+fn read_rows_at(mut scanner: FileScanner, path: &Path, steps: &[&str], table: &mut Table) -> Result<(), String> {
     match (scanner.next_kind()?, steps) {
         (ValueKind::Other, _) => return Err("neither a list nor an object".to_owned()),
         (ValueKind::Object, []) => return read_rows_by_id(path, table),
@@ -126,11 +111,7 @@ fn read_rows_at(
 }
 
 /// Scans to the list of rows and appends them.
-fn scan_to_rows(
-    scanner: &mut FileScanner,
-    steps: &[&str],
-    table: &mut Table,
-) -> Result<(), String> {
+fn scan_to_rows(scanner: &mut FileScanner, steps: &[&str], table: &mut Table) -> Result<(), String> {
     match (steps, scanner.next_kind()?) {
         ([] | ["*", _], ValueKind::List) => {
             let inner = steps.get(1).copied();
@@ -142,23 +123,15 @@ fn scan_to_rows(
             })
         }
         ([name, rest @ ..], ValueKind::Object) => scanner.for_each_field(|scanner, field| {
-            if field == *name {
-                scan_to_rows(scanner, rest, table)
-            } else {
-                scanner.skip_value()
-            }
+            if field == *name { scan_to_rows(scanner, rest, table) } else { scanner.skip_value() }
         }),
         _ => scanner.skip_value(),
     }
 }
 
-/// Appends an object as a row. With `inner`, appends the objects in its list of this name, each with the other fields of the object.
-fn push_value(
-    value: &JsonValue,
-    number: u64,
-    inner: Option<&str>,
-    table: &mut Table,
-) -> Result<(), String> {
+/// Appends an object as a row. With `inner`, appends the objects in its list of this name, each with the other fields
+/// of the object.
+fn push_value(value: &JsonValue, number: u64, inner: Option<&str>, table: &mut Table) -> Result<(), String> {
     let fields = parse_object(value, number)?;
     let Some(list) = inner else {
         return push_row(table, object_place(value, number, None), fields, None);
@@ -170,9 +143,7 @@ fn push_value(
     };
     for (index, row) in rows.into_iter().enumerate() {
         let Value::Object(row) = row else {
-            return Err(format!(
-                "object {number}: {list:?} is not a list of objects"
-            ));
+            return Err(format!("object {number}: {list:?} is not a list of objects"));
         };
         let place = object_place(value, number, Some(Box::new((index, Arc::clone(&name)))));
         push_row(table, place, row, Some(&outer))?;
@@ -181,13 +152,7 @@ fn push_value(
 }
 
 fn object_place(value: &JsonValue, number: u64, inner: Option<Box<(usize, Arc<str>)>>) -> RowPlace {
-    RowPlace::Json {
-        offset: value.offset,
-        length: value.bytes.len(),
-        number,
-        unit: JsonUnit::Object,
-        inner,
-    }
+    RowPlace::Json { offset: value.offset, length: value.bytes.len(), number, unit: JsonUnit::Object, inner }
 }
 
 /// Parses a value that must be an object; `number` is its position, counted from 1.
@@ -198,10 +163,7 @@ fn parse_object(value: &JsonValue, number: u64) -> Result<Map<String, Value>, St
         Ok(_) => Err(format!("value {number} of the list is not an object")),
         Err(e) => match json_problem(&value.bytes, &e) {
             Some(problem) => Err(format!("object {number}: {problem}")),
-            None => Err(format!(
-                "object {number}, at byte {}: {e}",
-                value.offset + 1
-            )),
+            None => Err(format!("object {number}, at byte {}: {e}", value.offset + 1)),
         },
     }
 }
@@ -282,7 +244,8 @@ fn push_row(
     table.push(place, cells)
 }
 
-/// Reads one whole cell of the object at an offset. For nested rows, `inner` is the index of the row and the name of its list.
+/// Reads one whole cell of the object at an offset. For nested rows, `inner` is the index of the row and the name of
+/// its list.
 pub(super) fn cell(
     path: &Path,
     offset: u64,
@@ -291,15 +254,9 @@ pub(super) fn cell(
     column: &str,
 ) -> Result<Cell> {
     let bytes = read_range(path, offset, length).map_err(|e| Error::file(path, "read", e))?;
-    let value: Value = serde_json::from_slice(&bytes).map_err(|e| {
-        Error::data(
-            path.display(),
-            format_args!("changed while it was read: {e}"),
-        )
-    })?;
-    let cell = inner
-        .and_then(|(index, list)| value.get(list)?.get(index)?.get(column))
-        .or_else(|| value.get(column));
+    let value: Value = serde_json::from_slice(&bytes)
+        .map_err(|e| Error::data(path.display(), format_args!("changed while it was read: {e}")))?;
+    let cell = inner.and_then(|(index, list)| value.get(list)?.get(index)?.get(column)).or_else(|| value.get(column));
     Ok(cell.cloned().map_or(Cell::Absent, Cell::from))
 }
 

@@ -1,7 +1,7 @@
 //! Scanner for the rows of a large JSON file: [`JsonScanner`].
 //!
-//! The scanner walks over the list of rows and the objects around it byte by byte. Only one row at a time is in memory, to be parsed by
-//! `serde_json`.
+//! The scanner walks over the list of rows and the objects around it byte by byte. Only one row at a time is in memory,
+//! to be parsed by `serde_json`.
 
 use std::io::{self, BufRead};
 
@@ -125,10 +125,7 @@ impl<R: BufRead> JsonScanner<R> {
         }
         loop {
             if self.peek_token()? != b'"' {
-                return Err(format!(
-                    "byte {} is not the name of a field",
-                    self.offset + 1
-                ));
+                return Err(format!("byte {} is not the name of a field", self.offset + 1));
             }
             let name = self.read_value(MAX_FIELD_NAME_BYTES)?;
             let name = serde_json::from_slice(&name.bytes).map_err(|e| e.to_string())?;
@@ -153,11 +150,7 @@ impl<R: BufRead> JsonScanner<R> {
             }
         })?;
         if too_long {
-            return Err(format!(
-                "a value of more than {} MB begins at byte {}",
-                max >> 20,
-                offset + 1
-            ));
+            return Err(format!("a value of more than {} MB begins at byte {}", max >> 20, offset + 1));
         }
         Ok(JsonValue { offset, bytes })
     }
@@ -180,10 +173,7 @@ impl<R: BufRead> JsonScanner<R> {
             if buffer.is_empty() {
                 return match state.depth {
                     0 if state.has_started && !state.in_string => Ok(()),
-                    _ => Err(format!(
-                        "the file ends at byte {} inside a value",
-                        self.offset
-                    )),
+                    _ => Err(format!("the file ends at byte {} inside a value", self.offset)),
                 };
             }
             let (length, is_end) = state.advance(buffer);
@@ -288,8 +278,7 @@ mod tests {
 
     #[test]
     fn values_are_complete_at_any_buffer_size() {
-        let text =
-            r#" {"a": [1, {"b": "}]"}], "items" : [ {"x": "\"]}"} ,3,"a,b",[] ], "z": null} "#;
+        let text = r#" {"a": [1, {"b": "}]"}], "items" : [ {"x": "\"]}"} ,3,"a,b",[] ], "z": null} "#;
         let values = [r#"{"x": "\"]}"}"#, "3", r#""a,b""#, "[]"];
         for buffer in [1, 2, 7, 4096] {
             let found = items(text, buffer).unwrap();
@@ -310,10 +299,7 @@ mod tests {
             (r"{items: 1}", "not the name of a field"),
             (r#"{"items": []} {"items": []}"#, "ends in .jsonl"),
             (r#"{"items": [1 2]}"#, "']' is expected"),
-            (
-                r#"{"items": ["0123456789012345678901234567890123456789"]}"#,
-                "a value of more than",
-            ),
+            (r#"{"items": ["0123456789012345678901234567890123456789"]}"#, "a value of more than"),
         ] {
             let problem = items(text, 4).unwrap_err();
             assert!(problem.contains(message), "{text}: {problem}");

@@ -33,8 +33,7 @@ pub(crate) use parquet_columns::ParquetColumns;
 pub(crate) use tree::cached_snapshot;
 
 /// Supported file types, for messages.
-const SUPPORTED: &str =
-    ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
+const SUPPORTED: &str = ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
 
 /// One file of a table.
 #[derive(Debug)]
@@ -60,11 +59,7 @@ impl SetFile {
     /// Opens a file. Its extension decides its format.
     pub(super) fn open(path: PathBuf, config: String) -> Result<Self> {
         refuse_lfs_pointer(&path)?;
-        let decompressed = if extension(&path) == "gz" {
-            Some(decompress::decompress_gzip(&path)?)
-        } else {
-            None
-        };
+        let decompressed = if extension(&path) == "gz" { Some(decompress::decompress_gzip(&path)?) } else { None };
         Self::new(path, decompressed, config)
     }
 
@@ -81,13 +76,9 @@ impl SetFile {
             "gz" => path.with_extension(""),
             _ => path.clone(),
         };
-        let content = decompressed
-            .as_ref()
-            .map_or(path.as_path(), NamedTempFile::path);
+        let content = decompressed.as_ref().map_or(path.as_path(), NamedTempFile::path);
         let kind = match &*extension(&uncompressed_name) {
-            name @ ("tsv" | "csv") => FileKind::Table {
-                delimiter: table::delimiter(content, name)?,
-            },
+            name @ ("tsv" | "csv") => FileKind::Table { delimiter: table::delimiter(content, name)? },
             "jsonl" | "ndjson" => FileKind::JsonLines,
             "json" => FileKind::Json,
             "parquet" => FileKind::Parquet,
@@ -105,33 +96,20 @@ impl SetFile {
                 return Err(Error::data(path.display(), problem));
             }
         };
-        let label = FileLabel {
-            path,
-            inner: None,
-            config,
-        };
-        Ok(Self {
-            label,
-            kind,
-            decompressed,
-            footer: parquet::Footer::default(),
-        })
+        let label = FileLabel { path, inner: None, config };
+        Ok(Self { label, kind, decompressed, footer: parquet::Footer::default() })
     }
 
     /// Path of the content: the decompressed copy of a compressed file, else the file.
     fn content_path(&self) -> &Path {
-        self.decompressed
-            .as_ref()
-            .map_or(&self.label.path, NamedTempFile::path)
+        self.decompressed.as_ref().map_or(&self.label.path, NamedTempFile::path)
     }
 
     /// Appends the rows of the file to a table. In a JSON file, `rows` is the path to the list of rows.
     pub(super) fn read(&self, rows: Option<&str>, table: &mut Table) -> Result<()> {
         if let Some(rows) = rows.filter(|_| self.kind != FileKind::Json) {
-            let problem = format_args!(
-                "{} is not a JSON file of one object that could hold {rows:?}",
-                self.label.path.display()
-            );
+            let problem =
+                format_args!("{} is not a JSON file of one object that could hold {rows:?}", self.label.path.display());
             return Err(Error::usage("--read rows", problem));
         }
         table.begin_file(self.label.clone());
@@ -145,10 +123,7 @@ impl SetFile {
         // Name the compressed file instead of its temporary copy.
         result.map_err(|error| match error {
             Error::Data { place, problem } => {
-                let place = place.replace(
-                    &path.display().to_string(),
-                    &self.label.path.display().to_string(),
-                );
+                let place = place.replace(&path.display().to_string(), &self.label.path.display().to_string());
                 Error::data(place, problem)
             }
             error => error,
@@ -165,15 +140,7 @@ impl SetFile {
             (RowPlace::Record(position), FileKind::Table { delimiter }) => {
                 table::cell(self.content_path(), delimiter, position, column)?
             }
-            (
-                RowPlace::Json {
-                    offset,
-                    length,
-                    inner,
-                    ..
-                },
-                _,
-            ) => {
+            (RowPlace::Json { offset, length, inner, .. }, _) => {
                 let inner = inner.as_deref().map(|(index, list)| (*index, &**list));
                 json::cell(self.content_path(), *offset, *length, inner, column)?
             }
@@ -198,10 +165,7 @@ pub(crate) fn is_zip_file(path: &Path) -> bool {
 
 /// Extension of a file name, in lower case.
 fn extension(path: &Path) -> String {
-    path.extension()
-        .and_then(|extension| extension.to_str())
-        .unwrap_or_default()
-        .to_ascii_lowercase()
+    path.extension().and_then(|extension| extension.to_str()).unwrap_or_default().to_ascii_lowercase()
 }
 
 /// Refuses a Git LFS pointer, the placeholder of a file that was not downloaded.
@@ -210,8 +174,7 @@ pub(crate) fn refuse_lfs_pointer(path: &Path) -> Result<()> {
     let mut file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut head = [0; POINTER.len()];
     if file.read_exact(&mut head).is_ok() && head == POINTER {
-        let problem =
-            "not downloaded, only its pointer: git lfs pull in its folder brings the file";
+        let problem = "not downloaded, only its pointer: git lfs pull in its folder brings the file";
         return Err(Error::data(path.display(), problem));
     }
     Ok(())

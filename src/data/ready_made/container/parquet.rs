@@ -1,7 +1,7 @@
 //! Reader of Parquet files of data sets.
 //!
-//! [`read()`] decodes every row once, for a table that keeps only the digests of images. [`bytes()`] later reads one image: it skips
-//! the pages before the image by their headers.
+//! [`read()`] decodes every row once, for a table that keeps only the digests of images. [`bytes()`] later reads one
+//! image: it skips the pages before the image by their headers.
 
 use std::cell::RefCell;
 use std::fs::File;
@@ -44,10 +44,7 @@ impl Footer {
         let file = open(path)?;
         let footer = guarded(|| {
             let mut reader = ParquetMetaDataReader::new();
-            reader
-                .try_parse(&file)
-                .and_then(|()| reader.finish())
-                .map_err(|e| e.to_string())
+            reader.try_parse(&file).and_then(|()| reader.finish()).map_err(|e| e.to_string())
         });
         let footer = footer.map_err(|problem| corrupt_file(path, &problem))?;
         Ok(Arc::clone(self.0.get_or_init(|| Arc::new(footer))))
@@ -57,10 +54,7 @@ impl Footer {
 /// Error for a file that the Parquet library cannot read.
 pub(super) fn corrupt_file(path: &Path, problem: &str) -> Error {
     let problem = problem.trim_start_matches("Parquet error: ");
-    Error::data(
-        path.display(),
-        format_args!("not a whole Parquet file: {problem}; download or write it again"),
-    )
+    Error::data(path.display(), format_args!("not a whole Parquet file: {problem}; download or write it again"))
 }
 
 /// The number of rows in a file, from its footer.
@@ -86,10 +80,7 @@ pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()
     let mut columns: Vec<(String, usize)> = Vec::new();
     let mut too_long = None;
     let mut add_row = |place: RowPlace, record: Record| -> Result<(), String> {
-        let size: usize = record
-            .get_column_iter()
-            .map(|(_, field)| byte_length(field))
-            .sum();
+        let size: usize = record.get_column_iter().map(|(_, field)| byte_length(field)).sum();
         if size > MAX_ROW_BYTES {
             let problem = format!("more than {} MB in a row", MAX_ROW_BYTES >> 20);
             too_long = Some((place, problem.clone()));
@@ -136,34 +127,21 @@ fn byte_length(field: &Field) -> usize {
         Field::Null => 0,
         Field::Str(text) => text.len(),
         Field::Bytes(bytes) => bytes.len(),
-        Field::Group(record) => record
-            .get_column_iter()
-            .map(|(_, field)| byte_length(field))
-            .sum(),
+        Field::Group(record) => record.get_column_iter().map(|(_, field)| byte_length(field)).sum(),
         Field::ListInternal(list) => list.elements().iter().map(byte_length).sum(),
-        Field::MapInternal(map) => map
-            .entries()
-            .iter()
-            .map(|(key, value)| byte_length(key) + byte_length(value))
-            .sum(),
+        Field::MapInternal(map) => map.entries().iter().map(|(key, value)| byte_length(key) + byte_length(value)).sum(),
         _ => size_of::<u64>(),
     }
 }
 
 /// Rejects a file with a compression codec that is not supported.
 pub(super) fn check_codecs(path: &Path, footer: &ParquetMetaData) -> Result<()> {
-    let columns = footer
-        .row_groups()
-        .iter()
-        .flat_map(RowGroupMetaData::columns);
+    let columns = footer.row_groups().iter().flat_map(RowGroupMetaData::columns);
     for column in columns {
         let codec = column.compression();
         let is_supported = matches!(
             codec,
-            Compression::UNCOMPRESSED
-                | Compression::SNAPPY
-                | Compression::GZIP(_)
-                | Compression::ZSTD(_)
+            Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::GZIP(_) | Compression::ZSTD(_)
         );
         if !is_supported {
             let problem = format!(
@@ -197,15 +175,9 @@ fn convert_field(field: Field) -> Cell {
         Field::UInt(value) => number(&value),
         Field::ULong(value) => number(&value),
         Field::Group(record) => Cell::Fields(
-            record
-                .into_columns()
-                .into_iter()
-                .map(|(name, field)| (name.into(), convert_field(field)))
-                .collect(),
+            record.into_columns().into_iter().map(|(name, field)| (name.into(), convert_field(field))).collect(),
         ),
-        Field::ListInternal(list) => {
-            Cell::List(list.elements().iter().cloned().map(convert_field).collect())
-        }
+        Field::ListInternal(list) => Cell::List(list.elements().iter().cloned().map(convert_field).collect()),
         other => Cell::Text(other.to_string()),
     }
 }
@@ -214,7 +186,8 @@ fn number(value: &impl ToString) -> Cell {
     Cell::Number(value.to_string().into())
 }
 
-/// Reader of one leaf column of a row group. It keeps its position between calls, because the next image is usually a few rows ahead.
+/// Reader of one leaf column of a row group. It keeps its position between calls, because the next image is usually a
+/// few rows ahead.
 struct Cursor {
     path: PathBuf,
     group: usize,
@@ -234,18 +207,12 @@ thread_local! {
 }
 
 impl Cursor {
-    fn open(
-        path: &Path,
-        footer: &ParquetMetaData,
-        group: usize,
-        leaf: usize,
-    ) -> Result<Self, String> {
+    fn open(path: &Path, footer: &ParquetMetaData, group: usize, leaf: usize) -> Result<Self, String> {
         let file = reading::open(path).map_err(|e| e.to_string())?;
         let row_group = &footer.row_groups()[group];
         let chunk = &row_group.columns()[leaf];
         let rows = usize::try_from(row_group.num_rows()).unwrap_or(0);
-        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None)
-            .map_err(|e| e.to_string())?;
+        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None).map_err(|e| e.to_string())?;
         let reader = get_column_reader(chunk.column_descr_ptr(), Box::new(pages));
         let ColumnReader::ByteArrayColumnReader(reader) = reader else {
             return Err("no column of bytes".to_owned());
@@ -268,46 +235,29 @@ impl Cursor {
 
     /// Reads the value of a row, or one item if the column is a list, and moves past the row.
     fn read_value(&mut self, row: usize, item: usize) -> Result<Vec<u8>, String> {
-        self.reader
-            .skip_records(row - self.next)
-            .map_err(|e| e.to_string())?;
+        self.reader.skip_records(row - self.next).map_err(|e| e.to_string())?;
         self.next = row + 1;
         let (mut definitions, mut repetitions) = (Vec::new(), Vec::new());
         let mut values: Vec<ByteArray> = Vec::new();
         self.reader
-            .read_records(
-                1,
-                Some(&mut definitions),
-                Some(&mut repetitions),
-                &mut values,
-            )
+            .read_records(1, Some(&mut definitions), Some(&mut repetitions), &mut values)
             .map_err(|e| e.to_string())?;
         let item = if self.is_list { item } else { 0 };
-        if definitions
-            .get(item)
-            .is_some_and(|level| *level < self.max_definition)
-        {
+        if definitions.get(item).is_some_and(|level| *level < self.max_definition) {
             return Err("the value is null".to_owned());
         }
         // `values` has no nulls: the index is the number of non-null items before this one.
         let index = if definitions.is_empty() {
             item
         } else {
-            definitions
-                .iter()
-                .take(item)
-                .filter(|level| **level == self.max_definition)
-                .count()
+            definitions.iter().take(item).filter(|level| **level == self.max_definition).count()
         };
-        values
-            .get(index)
-            .map(|value| value.data().to_vec())
-            .ok_or_else(|| "the value is gone".to_owned())
+        values.get(index).map(|value| value.data().to_vec()).ok_or_else(|| "the value is gone".to_owned())
     }
 }
 
-/// Reads the bytes of one value of bytes or text. `row` counts from the start of row group `group`, and `steps` is the path to the value
-/// inside the cell of `column`.
+/// Reads the bytes of one value of bytes or text. `row` counts from the start of row group `group`, and `steps` is the
+/// path to the value inside the cell of `column`.
 ///
 /// # Errors
 /// If the file is corrupt or does not have this value.
@@ -325,15 +275,9 @@ pub(super) fn bytes(
         Step::Field(_) => None,
     });
     guarded(|| {
-        let columns = footer
-            .row_groups()
-            .get(group)
-            .ok_or("no such row group")?
-            .columns();
+        let columns = footer.row_groups().get(group).ok_or("no such row group")?.columns();
         let leaf = leaf_index(columns, column, steps).ok_or("no such column")?;
-        let kept = CURSOR
-            .take()
-            .filter(|kept| kept.can_reach(path, group, leaf, row));
+        let kept = CURSOR.take().filter(|kept| kept.can_reach(path, group, leaf, row));
         let mut cursor = match kept {
             Some(cursor) => cursor,
             None => Cursor::open(path, &footer, group, leaf)?,
@@ -355,13 +299,9 @@ pub(super) fn bytes(
     .map_err(|problem| corrupt_file(path, &problem))
 }
 
-/// Index of the first leaf column under `column` whose path has the fields of `steps` in their order, the last one at its end; any leaf
-/// matches if `steps` has no field. Parts of the path between them are the lists of Parquet.
-fn leaf_index(
-    columns: &[parquet::file::metadata::ColumnChunkMetaData],
-    column: &str,
-    steps: &[Step],
-) -> Option<usize> {
+/// Index of the first leaf column under `column` whose path has the fields of `steps` in their order, the last one at
+/// its end; any leaf matches if `steps` has no field. Parts of the path between them are the lists of Parquet.
+fn leaf_index(columns: &[parquet::file::metadata::ColumnChunkMetaData], column: &str, steps: &[Step]) -> Option<usize> {
     let fields: Vec<&String> = steps
         .iter()
         .filter_map(|step| match step {
@@ -376,8 +316,6 @@ fn leaf_index(
         let mut parts = path.iter();
         first == column
             && fields.iter().all(|field| parts.any(|part| part == *field))
-            && fields
-                .last()
-                .is_none_or(|field| path.last() == Some(*field))
+            && fields.last().is_none_or(|field| path.last() == Some(*field))
     })
 }

@@ -62,45 +62,27 @@ impl ParquetColumns {
             let problem = format_args!("{rows} rows; at most {MAX_ROWS} in a file are read");
             return Err(Error::data(path.display(), problem));
         }
-        Ok(Self {
-            path: path.to_owned(),
-            footer,
-            metadata,
-        })
+        Ok(Self { path: path.to_owned(), footer, metadata })
     }
 
     /// Names of the columns, in their order.
     pub(crate) fn names(&self) -> Vec<&str> {
         let schema = self.metadata.file_metadata().schema();
-        schema
-            .is_group()
-            .then(|| schema.get_fields().iter().map(|field| field.name()))
-            .into_iter()
-            .flatten()
-            .collect()
+        schema.is_group().then(|| schema.get_fields().iter().map(|field| field.name())).into_iter().flatten().collect()
     }
 
     /// Reads columns of numbers, batch by batch.
     ///
     /// # Errors
     /// If the file lacks a column or is damaged, or `add` fails.
-    pub(crate) fn numbers(
-        &self,
-        columns: &[&str],
-        mut add: impl FnMut(ColumnBatch) -> Result<()>,
-    ) -> Result<()> {
+    pub(crate) fn numbers(&self, columns: &[&str], mut add: impl FnMut(ColumnBatch) -> Result<()>) -> Result<()> {
         for group in 0..self.metadata.row_groups().len() {
-            let mut readers = columns
-                .iter()
-                .map(|column| self.reader(group, column))
-                .collect::<Result<Vec<LeafReader>>>()?;
+            let mut readers =
+                columns.iter().map(|column| self.reader(group, column)).collect::<Result<Vec<LeafReader>>>()?;
             let mut first_row = 0;
             loop {
                 let numbers = guarded(|| {
-                    readers
-                        .iter_mut()
-                        .map(LeafReader::next_numbers)
-                        .collect::<Result<Vec<Vec<f64>>, String>>()
+                    readers.iter_mut().map(LeafReader::next_numbers).collect::<Result<Vec<Vec<f64>>, String>>()
                 })
                 .map_err(|problem| corrupt_file(&self.path, &problem))?;
                 let rows = numbers.first().map_or(0, Vec::len);
@@ -111,11 +93,7 @@ impl ParquetColumns {
                 if rows == 0 {
                     break;
                 }
-                add(ColumnBatch {
-                    group,
-                    first_row,
-                    numbers,
-                })?;
+                add(ColumnBatch { group, first_row, numbers })?;
                 first_row += rows;
             }
         }
@@ -131,8 +109,7 @@ impl ParquetColumns {
         for group in 0..self.metadata.row_groups().len() {
             let mut reader = self.reader(group, column)?;
             loop {
-                let batch = guarded(|| reader.next_texts())
-                    .map_err(|problem| corrupt_file(&self.path, &problem))?;
+                let batch = guarded(|| reader.next_texts()).map_err(|problem| corrupt_file(&self.path, &problem))?;
                 if batch.is_empty() {
                     break;
                 }
@@ -146,7 +123,8 @@ impl ParquetColumns {
         Ok(texts)
     }
 
-    /// Reads the bytes of an image in a column of the type `struct<bytes, path>`. `row` counts from the start of the row group.
+    /// Reads the bytes of an image in a column of the type `struct<bytes, path>`. `row` counts from the start of the
+    /// row group.
     ///
     /// # Errors
     /// If the file lacks the column or is damaged, or the bytes are null.
@@ -186,8 +164,7 @@ struct LeafReader {
 impl LeafReader {
     fn open(file: std::fs::File, chunk: &ColumnChunkMetaData, rows: i64) -> Result<Self, String> {
         let rows = usize::try_from(rows).unwrap_or(0);
-        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None)
-            .map_err(|e| e.to_string())?;
+        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None).map_err(|e| e.to_string())?;
         Ok(Self {
             column: chunk.column_path().string(),
             reader: get_column_reader(chunk.column_descr_ptr(), Box::new(pages)),
@@ -199,36 +176,23 @@ impl LeafReader {
     fn next_numbers(&mut self) -> Result<Vec<f64>, String> {
         let max_definition = self.max_definition;
         let rows = match &mut self.reader {
-            ColumnReader::Int32ColumnReader(reader) => {
-                next_rows(reader, max_definition, |value| f64::from(*value))
-            }
+            ColumnReader::Int32ColumnReader(reader) => next_rows(reader, max_definition, |value| f64::from(*value)),
             // Exact up to 2⁵³; indices are smaller.
-            ColumnReader::Int64ColumnReader(reader) => {
-                next_rows(reader, max_definition, |value| *value as f64)
-            }
-            ColumnReader::FloatColumnReader(reader) => {
-                next_rows(reader, max_definition, |value| f64::from(*value))
-            }
-            ColumnReader::DoubleColumnReader(reader) => {
-                next_rows(reader, max_definition, |value| *value)
-            }
+            ColumnReader::Int64ColumnReader(reader) => next_rows(reader, max_definition, |value| *value as f64),
+            ColumnReader::FloatColumnReader(reader) => next_rows(reader, max_definition, |value| f64::from(*value)),
+            ColumnReader::DoubleColumnReader(reader) => next_rows(reader, max_definition, |value| *value),
             _ => Err(format!("the column {:?} has no numbers", self.column)),
         }?;
-        Ok(rows
-            .into_iter()
-            .map(|value| value.unwrap_or(f64::NAN))
-            .collect())
+        Ok(rows.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
     }
 
     /// The next rows of a column of texts; empty at the end.
     fn next_texts(&mut self) -> Result<Vec<Option<String>>, String> {
         let max_definition = self.max_definition;
         match &mut self.reader {
-            ColumnReader::ByteArrayColumnReader(reader) => {
-                next_rows(reader, max_definition, |value: &ByteArray| {
-                    excerpt(&String::from_utf8_lossy(value.data()), MAX_TEXT_CHARS)
-                })
-            }
+            ColumnReader::ByteArrayColumnReader(reader) => next_rows(reader, max_definition, |value: &ByteArray| {
+                excerpt(&String::from_utf8_lossy(value.data()), MAX_TEXT_CHARS)
+            }),
             _ => Err(format!("the column {:?} has no texts", self.column)),
         }
     }
@@ -241,9 +205,7 @@ fn next_rows<T: DataType, V>(
     convert: impl Fn(&T::T) -> V,
 ) -> Result<Vec<Option<V>>, String> {
     let (mut definitions, mut values) = (Vec::new(), Vec::new());
-    reader
-        .read_records(BATCH_ROWS, Some(&mut definitions), None, &mut values)
-        .map_err(|e| e.to_string())?;
+    reader.read_records(BATCH_ROWS, Some(&mut definitions), None, &mut values).map_err(|e| e.to_string())?;
     if definitions.is_empty() {
         return Ok(values.iter().map(|value| Some(convert(value))).collect());
     }

@@ -35,10 +35,7 @@ impl ShardPath {
 pub(super) fn check_shards(files: &[PathBuf]) -> Result<()> {
     let mut found: BTreeMap<(String, usize), BTreeSet<usize>> = BTreeMap::new();
     for shard in files.iter().filter_map(|path| ShardPath::parse(path)) {
-        found
-            .entry((shard.name, shard.count))
-            .or_default()
-            .insert(shard.number);
+        found.entry((shard.name, shard.count)).or_default().insert(shard.number);
     }
     for ((name, count), numbers) in found {
         if let Some(missing) = (0..count).find(|number| !numbers.contains(number)) {
@@ -63,24 +60,15 @@ mod tests {
     use super::*;
 
     fn files(numbers: &[usize]) -> Vec<PathBuf> {
-        numbers
-            .iter()
-            .map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz")))
-            .collect::<Vec<PathBuf>>()
+        numbers.iter().map(|n| PathBuf::from(format!("d/test-0000{n}-of-00003.jsonl.gz"))).collect::<Vec<PathBuf>>()
     }
 
     #[test]
     fn missing_shard_is_an_error() {
         assert!(check_shards(&files(&[0, 1, 2])).is_ok());
         let problem = check_shards(&files(&[0, 2])).unwrap_err().to_string();
-        assert!(
-            problem.contains("2 of 3 shards are there; number 1 is missing"),
-            "{problem}"
-        );
-        assert_eq!(
-            single_shard_note(Path::new("a-00000-of-00001.parquet")),
-            None
-        );
+        assert!(problem.contains("2 of 3 shards are there; number 1 is missing"), "{problem}");
+        assert_eq!(single_shard_note(Path::new("a-00000-of-00001.parquet")), None);
         assert!(single_shard_note(Path::new("a-00000-of-00002.parquet")).is_some());
     }
 }

@@ -1,4 +1,5 @@
-//! Splits of a data set: the split that a path names ([`split_in_name`]), and the files of the chosen split ([`choose_split`]).
+//! Splits of a data set: the split that a path names ([`split_in_name`]), and the files of the chosen split
+//! ([`choose_split`]).
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -30,33 +31,26 @@ const SPLIT_WORDS: [(&str, &str); 10] = [
     ("evaluation", "test"),
 ];
 
-/// Split that a relative path names, by its first word in [`SPLIT_WORDS`]; empty if it has none. Any character other than a letter
-/// separates words.
+/// Split that a relative path names, by its first word in [`SPLIT_WORDS`]; empty if it has none. Any character other
+/// than a letter separates words.
 pub(super) fn split_in_name(path: &Path) -> String {
     let text = path.to_string_lossy().to_lowercase();
-    let split = text
-        .split(|c: char| !c.is_alphabetic())
-        .find_map(|word| SPLIT_WORDS.iter().find(|(known, _)| *known == word));
+    let split =
+        text.split(|c: char| !c.is_alphabetic()).find_map(|word| SPLIT_WORDS.iter().find(|(known, _)| *known == word));
     split.map_or_else(String::new, |(_, split)| (*split).to_owned())
 }
 
 /// The usual word for a split; the name itself if there is none.
 fn usual_word(name: &str) -> &str {
-    SPLIT_WORDS
-        .iter()
-        .find(|(word, _)| *word == name)
-        .map_or(name, |(_, usual)| usual)
+    SPLIT_WORDS.iter().find(|(word, _)| *word == name).map_or(name, |(_, usual)| usual)
 }
 
 /// Files of the wanted split, or of all splits for `all`. The default is the only split, or `test` if several exist.
 ///
 /// # Errors
-/// If the wanted split does not exist, or if no split is wanted and several exist without `test`. The error lists the splits.
-pub(super) fn choose_split(
-    tree: &Tree,
-    files: Vec<Candidate>,
-    wanted: Option<&str>,
-) -> Result<Vec<Candidate>> {
+/// If the wanted split does not exist, or if no split is wanted and several exist without `test`. The error lists the
+/// splits.
+pub(super) fn choose_split(tree: &Tree, files: Vec<Candidate>, wanted: Option<&str>) -> Result<Vec<Candidate>> {
     let mut splits: BTreeMap<&str, Vec<&Path>> = BTreeMap::new();
     for file in &files {
         splits.entry(&file.split).or_default().push(&file.path);
@@ -67,10 +61,7 @@ pub(super) fn choose_split(
         // `val` names the split that a file `val.parquet` has.
         Some(name) if splits.contains_key(usual_word(name)) => Some(usual_word(name)),
         Some(name) => {
-            let problem = format_args!(
-                "no split {name:?}; there are {}",
-                list_splits(tree, &splits)
-            );
+            let problem = format_args!("no split {name:?}; there are {}", list_splits(tree, &splits));
             return Err(Error::usage("--read split", problem));
         }
         None if splits.len() == 1 => None,
@@ -84,23 +75,16 @@ pub(super) fn choose_split(
         }
     };
     let split = split.map(str::to_owned);
-    Ok(files
-        .into_iter()
-        .filter(|file| split.as_ref().is_none_or(|split| file.split == *split))
-        .collect())
+    Ok(files.into_iter().filter(|file| split.as_ref().is_none_or(|split| file.split == *split)).collect())
 }
 
-/// Lists the splits with their numbers of rows, such as `test (rows: 1000)`. Rows are counted for Parquet files in a folder, which have
-/// the count in their footer; other splits get the number of files.
+/// Lists the splits with their numbers of rows, such as `test (rows: 1000)`. Rows are counted for Parquet files in a
+/// folder, which have the count in their footer; other splits get the number of files.
 fn list_splits(tree: &Tree, splits: &BTreeMap<&str, Vec<&Path>>) -> String {
     splits
         .iter()
         .map(|(split, files)| {
-            let name = if split.is_empty() {
-                "without a name"
-            } else {
-                split
-            };
+            let name = if split.is_empty() { "without a name" } else { split };
             let counts: Option<u64> = files
                 .iter()
                 .map(|file| match (tree, &*extension(file)) {
@@ -140,11 +124,7 @@ mod tests {
         let tree = Tree::from_folder(folder.path()).unwrap();
         let files = splits
             .iter()
-            .map(|split| Candidate {
-                split: (*split).to_owned(),
-                config: String::new(),
-                path: split.into(),
-            })
+            .map(|split| Candidate { split: (*split).to_owned(), config: String::new(), path: split.into() })
             .collect();
         let files = choose_split(&tree, files, wanted)?;
         Ok(files.into_iter().map(|file| file.path).collect())
@@ -153,32 +133,20 @@ mod tests {
     #[test]
     fn default_is_only_split_or_test() {
         assert_eq!(choose(&["a"], None).unwrap(), [Path::new("a")]);
-        assert_eq!(
-            choose(&["test", "train"], None).unwrap(),
-            [Path::new("test")]
-        );
+        assert_eq!(choose(&["test", "train"], None).unwrap(), [Path::new("test")]);
     }
 
     #[test]
     fn wanted_split_is_chosen() {
-        assert_eq!(
-            choose(&["test", "train"], Some("train")).unwrap(),
-            [Path::new("train")]
-        );
+        assert_eq!(choose(&["test", "train"], Some("train")).unwrap(), [Path::new("train")]);
         assert_eq!(choose(&["dev", "train"], Some("all")).unwrap().len(), 2);
-        assert_eq!(
-            choose(&["validation", "train"], Some("val")).unwrap(),
-            [Path::new("validation")]
-        );
+        assert_eq!(choose(&["validation", "train"], Some("val")).unwrap(), [Path::new("validation")]);
     }
 
     #[test]
     fn ambiguous_or_unknown_split_is_error() {
         let problem = choose(&["dev", "train"], None).unwrap_err().to_string();
-        assert!(
-            problem.contains("dev (files: 1), train (files: 1); --read split"),
-            "{problem}"
-        );
+        assert!(problem.contains("dev (files: 1), train (files: 1); --read split"), "{problem}");
         let problem = choose(&["dev"], Some("tset")).unwrap_err().to_string();
         assert!(problem.contains("no split \"tset\""), "{problem}");
     }

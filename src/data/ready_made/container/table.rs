@@ -10,8 +10,8 @@ use super::super::cells::{Cell, RowPlace, Table};
 use crate::error::{Error, Result};
 use crate::files::reading;
 
-/// Returns the delimiter of a table: a tab for the ending `tsv`; otherwise a comma, or, if the header has none, a semicolon or tab that
-/// it has. Spreadsheets write semicolons in many countries.
+/// Returns the delimiter of a table: a tab for the ending `tsv`; otherwise a comma, or, if the header has none, a
+/// semicolon or tab that it has. Spreadsheets write semicolons in many countries.
 pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     if ending == "tsv" {
         return Ok(b'\t');
@@ -19,12 +19,8 @@ pub(super) fn delimiter(path: &Path, ending: &str) -> Result<u8> {
     let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
     let mut header = Vec::new();
     let mut file = BufReader::new(file.take(MAX_RECORD_BYTES));
-    file.read_until(b'\n', &mut header)
-        .map_err(|e| Error::file(path, "read", e))?;
-    Ok([b',', b';', b'\t']
-        .into_iter()
-        .find(|delimiter| header.contains(delimiter))
-        .unwrap_or(b','))
+    file.read_until(b'\n', &mut header).map_err(|e| Error::file(path, "read", e))?;
+    Ok([b',', b';', b'\t'].into_iter().find(|delimiter| header.contains(delimiter)).unwrap_or(b','))
 }
 
 /// Maximum length of a record, in bytes: enough for an image of 48 MB in base64.
@@ -48,7 +44,8 @@ struct QuoteCheck {
     /// First line of a cell of several lines whose closing quote is followed by text.
     fault: Option<usize>,
     last_byte: u8,
-    /// Whether a record ends with CR and LF, as spreadsheets write. The reader ends it at CR, and takes LF for the start of the next.
+    /// Whether a record ends with CR and LF, as spreadsheets write. The reader ends it at CR, and takes LF for the
+    /// start of the next.
     has_crlf: bool,
 }
 
@@ -64,15 +61,7 @@ enum CellState {
 
 impl QuoteCheck {
     fn new(delimiter: u8) -> Self {
-        Self {
-            delimiter,
-            state: CellState::Start,
-            line: 1,
-            first_line: 1,
-            fault: None,
-            last_byte: 0,
-            has_crlf: false,
-        }
+        Self { delimiter, state: CellState::Start, line: 1, first_line: 1, fault: None, last_byte: 0, has_crlf: false }
     }
 
     fn add(&mut self, bytes: &[u8]) {
@@ -95,8 +84,7 @@ impl QuoteCheck {
                 (CellState::Start | CellState::Unquoted, _) => CellState::Unquoted,
             };
             self.line += usize::from(byte == b'\n');
-            self.has_crlf |=
-                (self.last_byte, byte) == (b'\r', b'\n') && matches!(self.state, CellState::Start);
+            self.has_crlf |= (self.last_byte, byte) == (b'\r', b'\n') && matches!(self.state, CellState::Start);
             self.last_byte = byte;
         }
     }
@@ -118,10 +106,7 @@ impl RecordLimited {
 impl Read for RecordLimited {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let count = self.file.read(buffer)?;
-        self.remaining = self
-            .remaining
-            .checked_sub(count as u64)
-            .ok_or_else(|| io::Error::other(TOO_LONG))?;
+        self.remaining = self.remaining.checked_sub(count as u64).ok_or_else(|| io::Error::other(TOO_LONG))?;
         self.quotes.add(&buffer[..count]);
         Ok(count)
     }
@@ -138,23 +123,17 @@ const TOO_LONG: &str = "more than 64 MB; is a quote missing before it or in it?"
 
 fn open_reader(path: &Path, delimiter: u8) -> Result<Reader<RecordLimited>> {
     let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
-    Ok(ReaderBuilder::new()
-        .delimiter(delimiter)
-        .flexible(true)
-        .from_reader(RecordLimited {
-            file,
-            remaining: MAX_RECORD_BYTES,
-            quotes: QuoteCheck::new(delimiter),
-        }))
+    Ok(ReaderBuilder::new().delimiter(delimiter).flexible(true).from_reader(RecordLimited {
+        file,
+        remaining: MAX_RECORD_BYTES,
+        quotes: QuoteCheck::new(delimiter),
+    }))
 }
 
 /// Adds all rows of a file to a table.
 pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> {
     let mut reader = open_reader(path, delimiter)?;
-    let header = reader
-        .byte_headers()
-        .map_err(|e| Error::data(path.display(), e))?
-        .clone();
+    let header = reader.byte_headers().map_err(|e| Error::data(path.display(), e))?.clone();
     let mut columns = Vec::new();
     for name in &header {
         let name = decode(name).map_err(|problem| Error::line(path, 1, problem))?;
@@ -163,9 +142,7 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
             let problem = format_args!("two columns are called {name:?}; rename one");
             return Err(Error::line(path, 1, problem));
         }
-        let column = table
-            .add_column(name)
-            .map_err(|problem| Error::line(path, 1, problem))?;
+        let column = table.add_column(name).map_err(|problem| Error::line(path, 1, problem))?;
         columns.push((name.to_owned(), column));
     }
     let mut record = ByteRecord::new();
@@ -184,13 +161,8 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
         if !has_record {
             break;
         }
-        let row_error =
-            |problem: String| Error::data(format_args!("{}, line {line}", path.display()), problem);
-        if let Some(stray) = record
-            .iter()
-            .skip(columns.len())
-            .find(|cell| !cell.is_empty())
-        {
+        let row_error = |problem: String| Error::data(format_args!("{}, line {line}", path.display()), problem);
+        if let Some(stray) = record.iter().skip(columns.len()).find(|cell| !cell.is_empty()) {
             let problem = format!(
                 "{} cells, but the header has {}, so that {:?} has no column; put cells that hold the delimiter in quotes",
                 record.len(),
@@ -201,15 +173,12 @@ pub(super) fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> 
         }
         let mut cells = Vec::with_capacity(columns.len());
         for ((name, column), cell) in columns.iter().zip(&record) {
-            let text =
-                decode(cell).map_err(|problem| row_error(format!("column {name:?}: {problem}")))?;
+            let text = decode(cell).map_err(|problem| row_error(format!("column {name:?}: {problem}")))?;
             if !text.is_empty() {
                 cells.push((*column, Cell::Text(text.to_owned())));
             }
         }
-        table
-            .push(RowPlace::Record(position.clone()), cells)
-            .map_err(row_error)?;
+        table.push(RowPlace::Record(position.clone()), cells).map_err(row_error)?;
     }
     match reader.get_ref().quotes.faulty_line() {
         None => Ok(()),
@@ -229,24 +198,14 @@ pub(super) fn cell(path: &Path, delimiter: u8, position: &Position, column: &str
         .iter()
         .position(|name| name.trim_ascii() == column.as_bytes());
     let mut record = ByteRecord::new();
-    reader
-        .seek(position.clone())
-        .map_err(|e| Error::data(path.display(), e))?;
-    reader
-        .read_byte_record(&mut record)
-        .map_err(|e| Error::data(path.display(), e))?;
-    let cell = index
-        .and_then(|index| record.get(index))
-        .unwrap_or_default();
+    reader.seek(position.clone()).map_err(|e| Error::data(path.display(), e))?;
+    reader.read_byte_record(&mut record).map_err(|e| Error::data(path.display(), e))?;
+    let cell = index.and_then(|index| record.get(index)).unwrap_or_default();
     Ok(decode(cell).map_or(Cell::Absent, |text| Cell::Text(text.to_owned())))
 }
 
 /// Decodes a cell as UTF-8. The error names the first invalid byte, counted from 1.
 fn decode(cell: &[u8]) -> Result<&str, String> {
-    std::str::from_utf8(cell).map_err(|e| {
-        format!(
-            "byte {} of the cell is not UTF-8; save the file as UTF-8",
-            e.valid_up_to() + 1
-        )
-    })
+    std::str::from_utf8(cell)
+        .map_err(|e| format!("byte {} of the cell is not UTF-8; save the file as UTF-8", e.valid_up_to() + 1))
 }

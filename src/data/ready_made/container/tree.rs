@@ -43,17 +43,11 @@ impl Tree {
         match self {
             Self::Archive(archive) => Ok((archive.files(), Vec::new())),
             Self::Folder { folder, blobs } => {
-                let mut scan = Scan {
-                    root: Root::new(folder, blobs.as_slice())?,
-                    files: Vec::new(),
-                    outside: Vec::new(),
-                };
+                let mut scan =
+                    Scan { root: Root::new(folder, blobs.as_slice())?, files: Vec::new(), outside: Vec::new() };
                 scan.add_folder(folder)?;
-                let files = scan
-                    .files
-                    .iter()
-                    .map(|path| path.strip_prefix(folder).unwrap_or(path).to_owned())
-                    .collect();
+                let files =
+                    scan.files.iter().map(|path| path.strip_prefix(folder).unwrap_or(path).to_owned()).collect();
                 Ok((files, scan.outside))
             }
         }
@@ -90,25 +84,20 @@ impl Tree {
     }
 }
 
-/// The folder itself, or the newest snapshot if the folder is a repository in a hub's cache; and the folder of the cache with the files
-/// that the links in a snapshot lead to, if it lies in the repository.
+/// The folder itself, or the newest snapshot if the folder is a repository in a hub's cache; and the folder of the
+/// cache with the files that the links in a snapshot lead to, if it lies in the repository.
 ///
 /// # Errors
 /// If the cache does not name a snapshot.
 pub(crate) fn cached_snapshot(place: &Path) -> Result<(PathBuf, Option<PathBuf>)> {
     let canonical = place.canonicalize().unwrap_or_else(|_| place.to_owned());
     if !(is_cached_repository(&canonical) && place.join("snapshots").is_dir()) {
-        let repository = canonical
-            .ancestors()
-            .nth(2)
-            .filter(|path| is_cached_repository(path));
+        let repository = canonical.ancestors().nth(2).filter(|path| is_cached_repository(path));
         return Ok((place.to_owned(), repository.and_then(own_blobs)));
     }
     let head = reading::text(&place.join("refs/main"))?;
     let snapshot = place.join("snapshots").join(head.trim());
-    let is_own = snapshot
-        .canonicalize()
-        .is_ok_and(|real| real.starts_with(&canonical));
+    let is_own = snapshot.canonicalize().is_ok_and(|real| real.starts_with(&canonical));
     if !snapshot.is_dir() || !is_own || head.trim().contains(['/', '\\']) {
         let problem = "refs/main names no folder in snapshots; download the repository again";
         return Err(Error::data(place.display(), problem));
@@ -182,10 +171,7 @@ mod tests {
         std::os::unix::fs::symlink(root.join("secret.csv"), root.join("set/b.csv")).unwrap();
         std::os::unix::fs::symlink(root.join("set/a.csv"), root.join("set/inner/c.csv")).unwrap();
         std::os::unix::fs::symlink(root.join("nothing.csv"), root.join("set/d.csv")).unwrap();
-        let (files, outside) = Tree::from_folder(&root.join("set"))
-            .unwrap()
-            .files()
-            .unwrap();
+        let (files, outside) = Tree::from_folder(&root.join("set")).unwrap().files().unwrap();
         assert_eq!(files, [Path::new("a.csv"), Path::new("inner/c.csv")]);
         assert_eq!(outside, [root.join("set/b.csv"), root.join("set/d.csv")]);
     }

@@ -20,10 +20,7 @@ impl Yaml {
         let Self::Fields(fields) = self else {
             return None;
         };
-        fields
-            .iter()
-            .find(|(field, _)| field == name)
-            .map(|(_, value)| value)
+        fields.iter().find(|(field, _)| field == name).map(|(_, value)| value)
     }
 }
 
@@ -65,9 +62,7 @@ impl<'a> EventReader<'a> {
             return Err(format!("values are nested more than {DEEPEST} levels deep"));
         }
         match event {
-            Event::Scalar(text, ScalarStyle::Plain, 0, None)
-                if matches!(&*text, "" | "~" | "null") =>
-            {
+            Event::Scalar(text, ScalarStyle::Plain, 0, None) if matches!(&*text, "" | "~" | "null") => {
                 Ok(Yaml::Nothing)
             }
             Event::Scalar(text, _, 0, None) => Ok(Yaml::Text(text.into_owned())),
@@ -113,7 +108,10 @@ mod tests {
 
     #[test]
     fn parses_block_and_flow_style() {
-        let read = value("- name: 'it''s' # what\n  files:\n  - a: 1\n    b: [x, \"y, z\"]\n  - c\n- {d: e, f: [g]}\n-\n  - h\n").unwrap();
+        let read = value(
+            "- name: 'it''s' # what\n  files:\n  - a: 1\n    b: [x, \"y, z\"]\n  - c\n- {d: e, f: [g]}\n-\n  - h\n",
+        )
+        .unwrap();
         let expected = Yaml::List(vec![
             Yaml::Fields(vec![
                 field("name", text("it's")),
@@ -128,35 +126,22 @@ mod tests {
                     ]),
                 ),
             ]),
-            Yaml::Fields(vec![
-                field("d", text("e")),
-                field("f", Yaml::List(vec![text("g")])),
-            ]),
+            Yaml::Fields(vec![field("d", text("e")), field("f", Yaml::List(vec![text("g")]))]),
             Yaml::List(vec![text("h")]),
         ]);
         assert_eq!(read, expected);
         assert_eq!(value(""), Ok(Yaml::Nothing));
         let long = value("a: >-\n  b\n  c\nd: [e,\n  f]\ng: ~\nh: '~'\n").unwrap();
         assert_eq!(long.field("a"), Some(&text("b c")));
-        assert_eq!(
-            long.field("d"),
-            Some(&Yaml::List(vec![text("e"), text("f")]))
-        );
+        assert_eq!(long.field("d"), Some(&Yaml::List(vec![text("e"), text("f")])));
         assert_eq!(long.field("g"), Some(&Yaml::Nothing));
         assert_eq!(long.field("h"), Some(&text("~")));
     }
 
     #[test]
     fn rejects_invalid_and_unsupported_yaml() {
-        for wrong in [
-            "a: &b c",
-            "a: [b",
-            "a: !x b",
-            "a: 'b",
-            "a: 1\n b: 2\n c\nd",
-            "[a]: b",
-            "a: &x [b]\nc: [*x, *x]",
-        ] {
+        for wrong in ["a: &b c", "a: [b", "a: !x b", "a: 'b", "a: 1\n b: 2\n c\nd", "[a]: b", "a: &x [b]\nc: [*x, *x]"]
+        {
             assert!(value(wrong).is_err(), "{wrong}: {:?}", value(wrong));
         }
     }

@@ -8,11 +8,9 @@ use crate::data::ready_made::choices::ParsedQuestion;
 use crate::data::ready_made::settings::SetArgs;
 use crate::types::Digest;
 
-/// Pairs of indices of questions with equal digests and different answers. Every contradicted question is in at least one pair.
-pub(crate) fn find_contradictions(
-    questions: &[ParsedQuestion],
-    digests: &[Digest],
-) -> Vec<[usize; 2]> {
+/// Pairs of indices of questions with equal digests and different answers. Every contradicted question is in at least
+/// one pair.
+pub(crate) fn find_contradictions(questions: &[ParsedQuestion], digests: &[Digest]) -> Vec<[usize; 2]> {
     let truth = |index: usize| questions[index].choices.truth();
     let mut first: HashMap<&Digest, usize> = HashMap::new();
     let mut opposed: HashMap<&Digest, usize> = HashMap::new();
@@ -55,9 +53,7 @@ pub(crate) fn omit_contradictions(
     for pair in pairs {
         for index in pair {
             if omitted.insert(*index) {
-                omissions.add(OmissionReason::Bad, || {
-                    describe_contradiction(table, questions, *pair)
-                });
+                omissions.add(OmissionReason::Bad, || describe_contradiction(table, questions, *pair));
             }
         }
     }

@@ -71,9 +71,7 @@ impl Omissions {
 
     /// Number of rows left out, by reason.
     pub(crate) fn counts(&self) -> impl Iterator<Item = (OmissionReason, usize)> {
-        self.counts
-            .iter()
-            .map(|(reason, (count, _))| (*reason, *count))
+        self.counts.iter().map(|(reason, (count, _))| (*reason, *count))
     }
 
     /// Number of broken rows, and the problem of the first; `None` if there are none.
@@ -85,7 +83,8 @@ impl Omissions {
     /// Checks that the user allows all omissions; `rows` is the number of rows of the set.
     ///
     /// # Errors
-    /// One line for each reason that is not allowed, with the number of rows, the first row, and the flag that allows it.
+    /// One line for each reason that is not allowed, with the number of rows, the first row, and the flag that allows
+    /// it.
     pub(crate) fn check(&self, rows: usize, args: &SetArgs) -> Result<(), String> {
         let mut problems = Vec::new();
         for (&reason, (count, first)) in &self.counts {
@@ -116,9 +115,7 @@ impl Omissions {
                     reason => reason.flag().to_owned(),
                 };
                 let other = match reason {
-                    OmissionReason::SeveralImages => {
-                        ", --multi-image send shows all of them in one request"
-                    }
+                    OmissionReason::SeveralImages => ", --multi-image send shows all of them in one request",
                     _ => "",
                 };
                 problems.push(format!("{head}; {flag} {verb}{other}"));
@@ -145,28 +142,19 @@ mod tests {
         left.add(OmissionReason::SeveralImages, || "3 images".into());
         let problem = left.check(40, &SetArgs::default()).unwrap_err();
         assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out, --multi-image send shows all of them in one request\n no image in 1 of 40 rows; --skip no-image leaves it out"), "{problem}");
-        let args = SetArgs {
-            no_image: Some(LeaveOut::Skip),
-            multi_image: Some(SeveralImages::Skip),
-            ..SetArgs::default()
-        };
+        let args =
+            SetArgs { no_image: Some(LeaveOut::Skip), multi_image: Some(SeveralImages::Skip), ..SetArgs::default() };
         assert!(left.check(40, &args).is_ok());
         assert_eq!(left.counts().map(|(_, count)| count).sum::<usize>(), 3);
     }
 
     #[test]
     fn too_many_bad_rows_are_an_error() {
-        let args = SetArgs {
-            bad: Some(SkipBad::default()),
-            ..SetArgs::default()
-        };
+        let args = SetArgs { bad: Some(SkipBad::default()), ..SetArgs::default() };
         let mut left = Omissions::default();
         left.add(OmissionReason::Bad, || "a.csv, line 3: empty".into());
         assert!(left.check(20, &args).is_ok());
         let problem = left.check(19, &args).unwrap_err();
-        assert!(
-            problem.contains("line 3: empty; --skip bad leaves out at most 5 %"),
-            "{problem}"
-        );
+        assert!(problem.contains("line 3: empty; --skip bad leaves out at most 5 %"), "{problem}");
     }
 }

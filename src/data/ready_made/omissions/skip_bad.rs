@@ -13,17 +13,12 @@ pub struct SkipBad {
 }
 
 impl SkipBad {
-    /// Checks that `bad` of `all` rows or images may be left out. `noun` names them, and `first` is the problem of the first.
+    /// Checks that `bad` of `all` rows or images may be left out. `noun` names them, and `first` is the problem of the
+    /// first.
     ///
     /// # Errors
     /// If their share is too large. The error names the flag that allows it.
-    pub(crate) fn check(
-        self,
-        bad: usize,
-        all: usize,
-        noun: &str,
-        first: &str,
-    ) -> Result<(), String> {
+    pub(crate) fn check(self, bad: usize, all: usize, noun: &str, first: &str) -> Result<(), String> {
         if percent(bad, all) <= self.max_percent {
             return Ok(());
         }
@@ -45,9 +40,7 @@ impl SkipBad {
 
     /// The default share, or the lowest larger one in whole percent that allows `bad` of `all`.
     pub(crate) fn allowing(bad: usize, all: usize) -> Self {
-        Self {
-            max_percent: percent(bad, all).ceil().max(DEFAULT_PERCENT),
-        }
+        Self { max_percent: percent(bad, all).ceil().max(DEFAULT_PERCENT) }
     }
 }
 
@@ -57,9 +50,7 @@ fn percent(part: usize, all: usize) -> f64 {
 
 impl Default for SkipBad {
     fn default() -> Self {
-        Self {
-            max_percent: DEFAULT_PERCENT,
-        }
+        Self { max_percent: DEFAULT_PERCENT }
     }
 }
 
@@ -81,11 +72,8 @@ impl FromStr for SkipBad {
         }
         // `--bad skip:20%` is an earlier form of `--skip bad=20%`.
         let share = text.strip_prefix("skip:").unwrap_or(text);
-        let share: f64 = share
-            .strip_suffix('%')
-            .unwrap_or(share)
-            .parse()
-            .map_err(|_| "a share of the rows expected, as 20%")?;
+        let share: f64 =
+            share.strip_suffix('%').unwrap_or(share).parse().map_err(|_| "a share of the rows expected, as 20%")?;
         if !(0.0..=100.0).contains(&share) {
             return Err("a share from 0% to 100% expected".to_owned());
         }
@@ -99,26 +87,14 @@ mod tests {
 
     #[test]
     fn share_is_parsed_and_printed() {
-        for (text, max_percent) in [
-            ("skip", 5.0),
-            ("skip:20%", 20.0),
-            ("20%", 20.0),
-            ("skip:0.5%", 0.5),
-            ("skip:100", 100.0),
-        ] {
+        for (text, max_percent) in
+            [("skip", 5.0), ("skip:20%", 20.0), ("20%", 20.0), ("skip:0.5%", 0.5), ("skip:100", 100.0)]
+        {
             let skip: SkipBad = text.parse().unwrap();
             assert_eq!(skip, SkipBad { max_percent }, "{text}");
             assert_eq!(skip.to_string().parse(), Ok(skip));
         }
-        for wrong in [
-            "",
-            "skip:",
-            "skip:-1%",
-            "skip:101%",
-            "skip:NaN",
-            "leave",
-            "skip:x%",
-        ] {
+        for wrong in ["", "skip:", "skip:-1%", "skip:101%", "skip:NaN", "leave", "skip:x%"] {
             assert!(wrong.parse::<SkipBad>().is_err(), "{wrong}");
         }
     }
@@ -128,15 +104,9 @@ mod tests {
         let usual = SkipBad::default();
         assert_eq!(usual.check(1, 20, "rows", "a"), Ok(()));
         let problem = usual.check(3, 40, "rows", "line 3").unwrap_err();
-        assert!(
-            problem.contains("3 of 40 rows are broken; the first: line 3"),
-            "{problem}"
-        );
+        assert!(problem.contains("3 of 40 rows are broken; the first: line 3"), "{problem}");
         let (_, raised) = problem.rsplit_once("--skip bad=").unwrap();
         assert_eq!(raised, "8%");
-        assert_eq!(
-            raised.parse::<SkipBad>().unwrap().check(3, 40, "rows", ""),
-            Ok(())
-        );
+        assert_eq!(raised.parse::<SkipBad>().unwrap().check(3, 40, "rows", ""), Ok(()));
     }
 }

@@ -22,12 +22,7 @@ use crate::types::{Digest, FrameId};
 /// Image of a question.
 pub(super) enum LocatedImage {
     /// In a cell of a row.
-    Cell {
-        row: usize,
-        column: usize,
-        steps: Vec<Step>,
-        facts: FileFacts,
-    },
+    Cell { row: usize, column: usize, steps: Vec<Step>, facts: FileFacts },
     /// An image file: the name of its frame and its path.
     File(FrameId, PathBuf),
     /// An image file in the archive.
@@ -85,20 +80,14 @@ impl<'a> Frames<'a> {
         frames
     }
 
-    /// Names embedded images by the lowest id of the rows that have them, so that the order of rows does not matter, or by their content
-    /// if no id column is unique. Several images of a row get its id and a number: `7#1`, `7#2`.
+    /// Names embedded images by the lowest id of the rows that have them, so that the order of rows does not matter, or
+    /// by their content if no id column is unique. Several images of a row get its id and a number: `7#1`, `7#2`.
     fn name_embedded(&mut self, several: Option<SeveralImages>) {
-        let id_column = self
-            .roles
-            .ids
-            .iter()
-            .find(|column| self.is_unique(column, |_, text| text));
+        let id_column = self.roles.ids.iter().find(|column| self.is_unique(column, |_, text| text));
         let mut has_row_references = false;
         for row in &self.table.rows {
             let found = images(row, self.roles);
-            has_row_references |= found
-                .iter()
-                .any(|image| matches!(image, RowImage::RowOrFile(_)));
+            has_row_references |= found.iter().any(|image| matches!(image, RowImage::RowOrFile(_)));
             if found.len() > 1 && several != Some(SeveralImages::Send) {
                 continue;
             }
@@ -112,10 +101,7 @@ impl<'a> Frames<'a> {
                     Some(id) if found.len() == 1 => id.trim().to_owned(),
                     Some(id) => format!("{}#{number}", id.trim()),
                 };
-                let known = self
-                    .names
-                    .entry(facts.digest)
-                    .or_insert_with(|| FrameId(name.clone()));
+                let known = self.names.entry(facts.digest).or_insert_with(|| FrameId(name.clone()));
                 if id_order(&name) < id_order(&known.0) {
                     *known = FrameId(name);
                 }
@@ -126,12 +112,8 @@ impl<'a> Frames<'a> {
             return;
         }
         // A row id need only be unique in its file.
-        let row_id_column = id_column.or_else(|| {
-            self.roles
-                .ids
-                .iter()
-                .find(|column| self.is_unique(column, |file, text| (file, text)))
-        });
+        let row_id_column = id_column
+            .or_else(|| self.roles.ids.iter().find(|column| self.is_unique(column, |file, text| (file, text))));
         if let Some(column) = row_id_column {
             self.index_image_rows(column);
         }
@@ -140,11 +122,10 @@ impl<'a> Frames<'a> {
     /// True if every row has a text in the column and the keys made of its file and text are unique.
     fn is_unique<K: Eq + Hash>(&self, column: &Column, key: impl Fn(usize, String) -> K) -> bool {
         let mut seen = HashSet::new();
-        self.table.rows.iter().all(|row| {
-            column
-                .text(row)
-                .is_some_and(|text| seen.insert(key(row.file, text.trim().to_owned())))
-        })
+        self.table
+            .rows
+            .iter()
+            .all(|row| column.text(row).is_some_and(|text| seen.insert(key(row.file, text.trim().to_owned()))))
     }
 
     /// Finds the rows whose images other rows may refer to by their ids in this column.
@@ -173,10 +154,7 @@ impl<'a> Frames<'a> {
 
     /// Images of a row, in order.
     pub(super) fn in_row(&self, row: usize) -> impl Iterator<Item = Result<LocatedImage>> {
-        self.form
-            .in_row(&self.table.rows[row], self.roles)
-            .into_iter()
-            .map(move |image| self.locate(row, image))
+        self.form.in_row(&self.table.rows[row], self.roles).into_iter().map(move |image| self.locate(row, image))
     }
 
     /// Error for the first unusable image of a row; `None` if all exist. Files are not opened.
@@ -194,22 +172,10 @@ impl<'a> Frames<'a> {
     /// Finds an image that a row refers to.
     fn locate(&self, row: usize, image: RowImage) -> Result<LocatedImage> {
         match image {
-            RowImage::Embedded {
-                column,
-                steps,
-                facts,
-            } => Ok(LocatedImage::Cell {
-                row,
-                column,
-                steps,
-                facts,
-            }),
-            RowImage::File(path) => self.file(row, &path).map_err(|problem| {
-                Error::data(
-                    self.table.place(row),
-                    self.explain_path_error(row, &path, problem),
-                )
-            }),
+            RowImage::Embedded { column, steps, facts } => Ok(LocatedImage::Cell { row, column, steps, facts }),
+            RowImage::File(path) => self
+                .file(row, &path)
+                .map_err(|problem| Error::data(self.table.place(row), self.explain_path_error(row, &path, problem))),
             RowImage::Frame(name) => Ok(LocatedImage::Frame(FrameId(name))),
             RowImage::RowOrFile(text) => match self.image_of_row(row, &text) {
                 Some(image) => Ok(image),
@@ -229,25 +195,20 @@ impl<'a> Frames<'a> {
         }
     }
 
-    /// Improves the error for a path in a row: says if the text is not a path, and suggests a column of the row that has an image.
+    /// Improves the error for a path in a row: says if the text is not a path, and suggests a column of the row that
+    /// has an image.
     fn explain_path_error(&self, row: usize, text: &str, problem: String) -> String {
         let problem = explain_non_path(text, problem);
         let row = &self.table.rows[row];
-        let image_column =
-            self.table
-                .columns
-                .iter()
-                .enumerate()
-                .find(|(index, _)| match row.cell(*index) {
-                    Cell::File(facts) => facts.format.is_some(),
-                    cell @ Cell::Fields(_) => matches!(cell.field("bytes"), Some(Cell::File(_))),
-                    _ => false,
-                });
+        let image_column = self.table.columns.iter().enumerate().find(|(index, _)| match row.cell(*index) {
+            Cell::File(facts) => facts.format.is_some(),
+            cell @ Cell::Fields(_) => matches!(cell.field("bytes"), Some(Cell::File(_))),
+            _ => false,
+        });
         match image_column {
-            Some((_, name)) => format!(
-                "{problem}; the column {name:?} holds images: {}",
-                map_flag(Role::Image, name, None)
-            ),
+            Some((_, name)) => {
+                format!("{problem}; the column {name:?} holds images: {}", map_flag(Role::Image, name, None))
+            }
             None => problem,
         }
     }
@@ -257,14 +218,7 @@ impl<'a> Frames<'a> {
         let file = self.table.rows[row].file;
         let other = *self.image_rows.get(&(file, id.trim().to_owned()))?;
         let found = images(&self.table.rows[other], self.roles);
-        let [
-            RowImage::Embedded {
-                column,
-                steps,
-                facts,
-            },
-        ] = &*found
-        else {
+        let [RowImage::Embedded { column, steps, facts }] = &*found else {
             return None;
         };
         (other != row).then(|| LocatedImage::Cell {
@@ -283,22 +237,19 @@ impl<'a> Frames<'a> {
         }
         let base = file.path.parent().unwrap_or(Path::new(""));
         let (name, path) = match self.root.image(base, path) {
-            Err(problem) if base != self.root.folder() => self
-                .root
-                .image(self.root.folder(), path)
-                .map_err(|_| problem)?,
+            Err(problem) if base != self.root.folder() => {
+                self.root.image(self.root.folder(), path).map_err(|_| problem)?
+            }
             found => found?,
         };
         Ok(LocatedImage::File(name, path))
     }
 
-    /// Frame of a question, or the name that stands for all frames of a question with several images. Adds their sources.
+    /// Frame of a question, or the name that stands for all frames of a question with several images. Adds their
+    /// sources.
     pub(crate) fn frame(&mut self, question: &ParsedQuestion) -> Result<FrameId> {
         let images: Vec<LocatedImage> = self.in_row(question.row).collect::<Result<_>>()?;
-        let frames: Vec<FrameId> = images
-            .into_iter()
-            .map(|image| self.add_source(image))
-            .collect();
+        let frames: Vec<FrameId> = images.into_iter().map(|image| self.add_source(image)).collect();
         if let [only] = &*frames {
             return Ok(only.clone());
         }
@@ -314,40 +265,22 @@ impl<'a> Frames<'a> {
             LocatedImage::Member(name) => {
                 if let Some(archive) = self.archive {
                     let archive = Arc::clone(archive);
-                    self.sources
-                        .entry(name.clone())
-                        .or_insert(ImageSource::Member(archive));
+                    self.sources.entry(name.clone()).or_insert(ImageSource::Member(archive));
                 }
                 name
             }
             LocatedImage::File(name, path) => {
-                self.sources
-                    .entry(name.clone())
-                    .or_insert_with(|| ImageSource::image(path));
+                self.sources.entry(name.clone()).or_insert_with(|| ImageSource::image(path));
                 name
             }
-            LocatedImage::Cell {
-                row,
-                column,
-                steps,
-                facts,
-            } => {
-                let name = self
-                    .names
-                    .get(&facts.digest)
-                    .cloned()
-                    .unwrap_or_else(|| FrameId(content_name(&facts.digest)));
+            LocatedImage::Cell { row, column, steps, facts } => {
+                let name =
+                    self.names.get(&facts.digest).cloned().unwrap_or_else(|| FrameId(content_name(&facts.digest)));
                 let row = &self.table.rows[row];
                 let columns = &self.table.columns;
-                let part =
-                    self.parts
-                        .entry((column, steps))
-                        .or_insert_with_key(|(column, steps)| {
-                            Arc::new(CellPart {
-                                column: columns[*column].clone(),
-                                steps: steps.clone(),
-                            })
-                        });
+                let part = self.parts.entry((column, steps)).or_insert_with_key(|(column, steps)| {
+                    Arc::new(CellPart { column: columns[*column].clone(), steps: steps.clone() })
+                });
                 self.sources.entry(name.clone()).or_insert_with(|| {
                     ImageSource::Embedded(EmbeddedImage {
                         file: Arc::clone(&self.files[row.file]),
@@ -363,30 +296,24 @@ impl<'a> Frames<'a> {
 
     /// Takes out the sources of all added frames, and the images of questions with several.
     pub(crate) fn take_sources(&mut self) -> (BTreeMap<FrameId, ImageSource>, Series) {
-        (
-            std::mem::take(&mut self.sources),
-            std::mem::take(&mut self.series),
-        )
+        (std::mem::take(&mut self.sources), std::mem::take(&mut self.series))
     }
 }
 
 /// Maximum length of a path in error messages, in characters (chosen).
 const MAX_PATH_LENGTH: usize = 200;
 
-/// Replaces the error for a path if the text is damaged base64 or too long for a path. Long texts are not repeated in the message.
+/// Replaces the error for a path if the text is damaged base64 or too long for a path. Long texts are not repeated in
+/// the message.
 fn explain_non_path(text: &str, problem: String) -> String {
     let length = text.chars().count();
     let start = excerpt(text, 24);
     let is_long = length > MAX_NAME_LENGTH
-        && text
-            .chars()
-            .all(|c| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace());
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || "+/=-_".contains(c) || c.is_whitespace());
     if text.starts_with("data:") || is_long {
         format!("its image is base64 that is cut or damaged ({length} characters, {start:?})")
     } else if length > MAX_PATH_LENGTH {
-        format!(
-            "its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file"
-        )
+        format!("its image is a text of {length} characters, {start:?}, which is neither base64 nor a path of a file")
     } else {
         problem
     }

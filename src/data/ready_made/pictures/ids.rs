@@ -74,12 +74,7 @@ impl Frames<'_> {
         let note = (repeats > 0).then(|| {
             format!("questions that repeat an earlier one, with its image and options: {repeats}; each is asked again")
         });
-        Ok(Ids {
-            texts,
-            source,
-            note,
-            contradictions: find_contradictions(questions, &digests),
-        })
+        Ok(Ids { texts, source, note, contradictions: find_contradictions(questions, &digests) })
     }
 
     /// Texts of the questions in a column; `None` if one is missing or two are equal.
@@ -88,21 +83,14 @@ impl Frames<'_> {
         questions
             .iter()
             .map(|question| {
-                let text = column
-                    .text(&self.table.rows[question.row])?
-                    .trim()
-                    .to_owned();
+                let text = column.text(&self.table.rows[question.row])?.trim().to_owned();
                 seen.insert(text.clone()).then_some(text)
             })
             .collect()
     }
 
     /// Digest of each question over its images, its text and its options.
-    fn digests(
-        &self,
-        questions: &[ParsedQuestion],
-        identity: ImageIdentity,
-    ) -> Result<Vec<Digest>> {
+    fn digests(&self, questions: &[ParsedQuestion], identity: ImageIdentity) -> Result<Vec<Digest>> {
         let mut files: HashMap<FrameId, Digest> = HashMap::new();
         questions
             .iter()
@@ -110,10 +98,9 @@ impl Frames<'_> {
                 let images: Vec<Digest> = self
                     .in_row(question.row)
                     .map(|image| match (image?, identity) {
-                        (
-                            LocatedImage::Member(name) | LocatedImage::File(name, _),
-                            ImageIdentity::Name,
-                        ) => Ok(Digest::from_bytes(name.0.as_bytes())),
+                        (LocatedImage::Member(name) | LocatedImage::File(name, _), ImageIdentity::Name) => {
+                            Ok(Digest::from_bytes(name.0.as_bytes()))
+                        }
                         (image, _) => self.image_digest(image, &mut files),
                     })
                     .collect::<Result<_>>()?;
@@ -126,17 +113,11 @@ impl Frames<'_> {
     }
 
     /// Digest of an image. `files` caches the digests of files.
-    fn image_digest(
-        &self,
-        image: LocatedImage,
-        files: &mut HashMap<FrameId, Digest>,
-    ) -> Result<Digest> {
+    fn image_digest(&self, image: LocatedImage, files: &mut HashMap<FrameId, Digest>) -> Result<Digest> {
         let (name, digest) = match image {
             LocatedImage::Cell { facts, .. } => return Ok(facts.digest),
             LocatedImage::Frame(name) => return Ok(Digest::from_bytes(name.0.as_bytes())),
-            LocatedImage::Member(name) | LocatedImage::File(name, _)
-                if files.contains_key(&name) =>
-            {
+            LocatedImage::Member(name) | LocatedImage::File(name, _) if files.contains_key(&name) => {
                 return Ok(files[&name]);
             }
             LocatedImage::Member(name) => {
@@ -156,8 +137,8 @@ impl Frames<'_> {
     }
 }
 
-/// Makes ids from the digests of the questions: 12 hexadecimal digits, and `-k` for the k-th repeat. Returns the ids and the number of
-/// repeats. The ids depend neither on the order of rows nor on file names.
+/// Makes ids from the digests of the questions: 12 hexadecimal digits, and `-k` for the k-th repeat. Returns the ids
+/// and the number of repeats. The ids depend neither on the order of rows nor on file names.
 fn ids_by_content(digests: &[Digest]) -> (Vec<String>, usize) {
     let mut counts: HashMap<String, usize> = HashMap::new();
     let mut repeats = 0;

@@ -8,11 +8,10 @@ use crate::types::text::excerpt;
 use crate::types::text::image_mark::mark;
 
 /// Mark with the space after it: `<image>`, `<image 2>` or `<image2>`.
-static MARK: LazyLock<Option<Regex>> =
-    LazyLock::new(|| Regex::new(r"<image(?: ?(\d+))?>(\s*)").ok());
+static MARK: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(r"<image(?: ?(\d+))?>(\s*)").ok());
 
-/// Normalizes the image marks of a row. With one image, marks are removed. With several, the texts of the row must be read in order,
-/// because the k-th mark without a number refers to the k-th image.
+/// Normalizes the image marks of a row. With one image, marks are removed. With several, the texts of the row must be
+/// read in order, because the k-th mark without a number refers to the k-th image.
 #[derive(Debug)]
 pub(crate) struct ImageMarks {
     /// Number of images.
@@ -24,11 +23,7 @@ pub(crate) struct ImageMarks {
 
 impl ImageMarks {
     pub(crate) fn new(images: usize) -> Self {
-        Self {
-            images,
-            unnumbered: 0,
-            has_numbers: false,
-        }
+        Self { images, unnumbered: 0, has_numbers: false }
     }
 
     /// Rewrites all marks of a text in one form.
@@ -52,8 +47,7 @@ impl ImageMarks {
                 self.unnumbered
             };
             if self.has_numbers && self.unnumbered > 0 {
-                problem =
-                    Some("of the marks <image …> some have numbers and some have none".to_owned());
+                problem = Some("of the marks <image …> some have numbers and some have none".to_owned());
             } else if number == 0 || number > self.images {
                 problem = Some(format!(
                     "{:?} is not an image of the row, which shows {}",
@@ -88,47 +82,18 @@ mod tests {
     #[test]
     fn marks_are_normalized() {
         for (images, texts, expected) in [
-            (
-                2,
-                ["Is <image 1> like <image 2>?", ""],
-                Ok(["Is <image 1> like <image 2>?", ""]),
-            ),
-            (
-                2,
-                ["<image1> <image2>\nWhich?", "<image 2>"],
-                Ok(["<image 1> <image 2>\nWhich?", "<image 2>"]),
-            ),
-            (
-                3,
-                ["<image> <image>", "<image>"],
-                Ok(["<image 1> <image 2>", "<image 3>"]),
-            ),
-            (
-                2,
-                ["Which is darker?", "the first"],
-                Ok(["Which is darker?", "the first"]),
-            ),
-            (
-                2,
-                ["<image 3>", ""],
-                Err("\"<image 3>\" is not an image of the row, which shows 2"),
-            ),
+            (2, ["Is <image 1> like <image 2>?", ""], Ok(["Is <image 1> like <image 2>?", ""])),
+            (2, ["<image1> <image2>\nWhich?", "<image 2>"], Ok(["<image 1> <image 2>\nWhich?", "<image 2>"])),
+            (3, ["<image> <image>", "<image>"], Ok(["<image 1> <image 2>", "<image 3>"])),
+            (2, ["Which is darker?", "the first"], Ok(["Which is darker?", "the first"])),
+            (2, ["<image 3>", ""], Err("\"<image 3>\" is not an image of the row, which shows 2")),
             (2, ["<image 0>", ""], Err("not an image of the row")),
-            (
-                2,
-                ["<image> <image>", "<image>"],
-                Err("not an image of the row"),
-            ),
-            (
-                2,
-                ["<image 99999999999999999999>", ""],
-                Err("not an image of the row"),
-            ),
+            (2, ["<image> <image>", "<image>"], Err("not an image of the row")),
+            (2, ["<image 99999999999999999999>", ""], Err("not an image of the row")),
             (2, ["<image 1>", "<image>"], Err("some have none")),
         ] {
             let mut marks = ImageMarks::new(images);
-            let read: Result<Vec<String>, String> =
-                texts.iter().map(|text| marks.read(text)).collect();
+            let read: Result<Vec<String>, String> = texts.iter().map(|text| marks.read(text)).collect();
             match (read, expected) {
                 (Ok(read), Ok(expected)) => assert_eq!(read, expected),
                 (Err(problem), Err(expected)) => assert!(problem.contains(expected), "{problem}"),

@@ -15,11 +15,7 @@ use crate::pictures::{DecodeRule, ImageFile};
 #[derive(Debug, Clone)]
 pub(crate) enum RowImage {
     /// Bytes or base64 in a cell.
-    Embedded {
-        column: usize,
-        steps: Vec<Step>,
-        facts: FileFacts,
-    },
+    Embedded { column: usize, steps: Vec<Step>, facts: FileFacts },
     /// Path of a file.
     File(String),
     /// Short text that may be the id of another row, or a path.
@@ -42,10 +38,7 @@ fn named_frame(row: &Row, roles: &Roles) -> Option<RowImage> {
     let (ImageColumns::First(columns) | ImageColumns::All(columns)) = &roles.images else {
         return None;
     };
-    columns
-        .iter()
-        .find_map(|column| column.text(row))
-        .map(RowImage::Frame)
+    columns.iter().find_map(|column| column.text(row)).map(RowImage::Frame)
 }
 
 impl ImageForm {
@@ -66,10 +59,7 @@ pub(crate) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
             for column in columns {
                 let mut in_column = Vec::new();
                 add_column_images(row, column, &mut in_column);
-                if in_column
-                    .iter()
-                    .any(|image| matches!(image, RowImage::Embedded { .. }))
-                {
+                if in_column.iter().any(|image| matches!(image, RowImage::Embedded { .. })) {
                     return in_column;
                 }
                 if found.is_empty() {
@@ -97,11 +87,7 @@ fn add_column_images(row: &Row, column: &Column, found: &mut Vec<RowImage>) {
 
 /// Steps to a field, given as a path with dots.
 fn field_steps(field: Option<&str>) -> Vec<Step> {
-    field
-        .into_iter()
-        .flat_map(|field| field.split('.'))
-        .map(|field| Step::Field(field.to_owned()))
-        .collect()
+    field.into_iter().flat_map(|field| field.split('.')).map(|field| Step::Field(field.to_owned())).collect()
 }
 
 /// Adds the images in a cell, or in a part of a cell at the end of `steps`.
@@ -110,11 +96,7 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
         return;
     }
     match cell {
-        Cell::File(facts) => found.push(RowImage::Embedded {
-            column,
-            steps: steps.to_vec(),
-            facts: (**facts).clone(),
-        }),
+        Cell::File(facts) => found.push(RowImage::Embedded { column, steps: steps.to_vec(), facts: (**facts).clone() }),
         Cell::List(cells) => {
             for (index, cell) in cells.iter().enumerate() {
                 add_images(cell, column, &with_step(steps, Step::Item(index)), found);
@@ -126,12 +108,7 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
                 .filter_map(|name| Some((name, cell.field(name)?)))
                 .find(|(_, cell)| !cell.is_absent());
             if let Some((name, cell)) = field {
-                add_images(
-                    cell,
-                    column,
-                    &with_step(steps, Step::Field(name.to_owned())),
-                    found,
-                );
+                add_images(cell, column, &with_step(steps, Step::Field(name.to_owned())), found);
             }
         }
         Cell::Text(text) => add_text_images(text, column, steps, found),
@@ -147,11 +124,7 @@ fn with_step(steps: &[Step], step: Step) -> Vec<Step> {
 /// Adds the images in a text: a file in base64, a list of texts, a path, or the id of a row.
 fn add_text_images(text: &str, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
     if let Some(bytes) = decode_base64(text) {
-        found.push(RowImage::Embedded {
-            column,
-            steps: steps.to_vec(),
-            facts: FileFacts::from_bytes(&bytes),
-        });
+        found.push(RowImage::Embedded { column, steps: steps.to_vec(), facts: FileFacts::from_bytes(&bytes) });
         return;
     }
     if let Some(items) = parse_list(text) {
@@ -168,7 +141,8 @@ fn add_text_images(text: &str, column: usize, steps: &[Step], found: &mut Vec<Ro
     });
 }
 
-/// Location of an image inside a table. The image is read when needed, so that a large file is never in memory as a whole.
+/// Location of an image inside a table. The image is read when needed, so that a large file is never in memory as a
+/// whole.
 #[derive(Debug, Clone)]
 pub(crate) struct EmbeddedImage {
     pub(super) file: Arc<SetFile>,
@@ -197,13 +171,8 @@ impl EmbeddedImage {
     /// If the table cannot be read, or has changed since it was opened.
     pub(crate) fn read_image(&self, rule: DecodeRule) -> Result<ImageFile> {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
-        let value = self
-            .file
-            .value(&self.row, &self.part.column, &self.part.steps)?;
-        let bytes = std::str::from_utf8(&value)
-            .ok()
-            .and_then(decode_base64)
-            .unwrap_or(value);
+        let value = self.file.value(&self.row, &self.part.column, &self.part.steps)?;
+        let bytes = std::str::from_utf8(&value).ok().and_then(decode_base64).unwrap_or(value);
         if FileFacts::from_bytes(&bytes) != self.facts {
             let problem = "the image has changed since the file was opened; start again";
             return Err(Error::data(place, problem));

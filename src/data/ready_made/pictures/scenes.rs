@@ -18,8 +18,8 @@ pub(crate) type SceneNames = BTreeMap<FrameId, String>;
 #[derive(Debug)]
 pub(crate) struct Scenes<'a> {
     column: Option<&'a Column>,
-    /// True if the user gave the column, or the table is in this program's own format. Then a frame with two scenes is an error;
-    /// otherwise the column is ignored.
+    /// True if the user gave the column, or the table is in this program's own format. Then a frame with two scenes is
+    /// an error; otherwise the column is ignored.
     is_required: bool,
     names: SceneNames,
     frames: BTreeSet<FrameId>,
@@ -53,17 +53,11 @@ impl<'a> Scenes<'a> {
         if scene.is_empty() {
             return Ok(());
         }
-        let known = self
-            .names
-            .entry(frame.clone())
-            .or_insert_with(|| scene.to_owned());
+        let known = self.names.entry(frame.clone()).or_insert_with(|| scene.to_owned());
         if known == scene {
             return Ok(());
         }
-        let problem = format!(
-            "the image {:?} is of the scene {scene:?} here and of {known:?} before",
-            frame.0
-        );
+        let problem = format!("the image {:?} is of the scene {scene:?} here and of {known:?} before", frame.0);
         if self.is_required {
             let remedy = map_flag(Role::Scene, "", None);
             let problem = format!("{problem}; an image has one scene ({remedy} ignores scenes)");

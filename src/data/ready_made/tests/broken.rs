@@ -34,9 +34,7 @@ fn good(id: i64) -> Map<String, Value> {
 
 #[test]
 fn row_with_any_damaged_column_is_handled() {
-    for column in [
-        "id", "question", "options", "answer", "category", "hint", "image",
-    ] {
+    for column in ["id", "question", "options", "answer", "category", "hint", "image"] {
         for damage in damages() {
             for form in ["json", "jsonl", "csv", "tsv"] {
                 let mut bad = good(2);
@@ -57,10 +55,7 @@ fn row_with_any_damaged_column_is_handled() {
                     }
                     Err(e) => {
                         let text = e.to_string();
-                        assert!(
-                            text.contains("set.") && text.len() < 3000,
-                            "{column} {form}: {text}"
-                        );
+                        assert!(text.contains("set.") && text.len() < 3000, "{column} {form}: {text}");
                     }
                 }
             }
@@ -77,10 +72,7 @@ fn damaged_parquet_file_is_an_error() {
         let copy = path.with_file_name(format!("cut{cut}.parquet"));
         fs::write(&copy, &whole[..cut]).unwrap();
         let problem = refusal(&copy, &SetArgs::default());
-        assert!(
-            problem.contains("not a whole Parquet file"),
-            "{cut}: {problem}"
-        );
+        assert!(problem.contains("not a whole Parquet file"), "{cut}: {problem}");
     }
     for at in (0..whole.len()).step_by(29) {
         let copy = path.with_file_name(format!("flipped{at}.parquet"));
@@ -104,21 +96,13 @@ fn errors_in_text_files_name_the_line() {
         ("a.json", b"[{\"id\": 1}, {\"id\"", "the file ends at byte"),
         ("b.json", b"3", "neither a list nor an object"),
         ("c.json", b"[1, 2]", "is not an object"),
-        (
-            "a.tsv",
-            b"index\tquestion\n1\ta\tstray\n",
-            "a.tsv, line 2: 3 cells, but the header has 2",
-        ),
+        ("a.tsv", b"index\tquestion\n1\ta\tstray\n", "a.tsv, line 2: 3 cells, but the header has 2"),
         (
             "b.tsv",
             b"index\tquestion\n1\ta\xff\n",
             "b.tsv, line 2: column \"question\": byte 2 of the cell is not UTF-8",
         ),
-        (
-            "c.csv",
-            b"question,question\na,b\n",
-            "two columns are called",
-        ),
+        ("c.csv", b"question,question\na,b\n", "two columns are called"),
         ("d.csv", b"", "no questions in it"),
         (
             "e.parquet",
@@ -142,23 +126,15 @@ fn question(id: usize, image: &str) -> Map<String, Value> {
 fn unusable_images_are_left_out_with_skip_bad() {
     for image in ["none.png", &"QUJD".repeat(40), &"QUJD".repeat(200)[1..]] {
         let whole = base64(1);
-        let rows: Vec<_> = (0..40)
-            .map(|id| question(id, if id == 7 { image } else { &whole }))
-            .collect();
+        let rows: Vec<_> = (0..40).map(|id| question(id, if id == 7 { image } else { &whole })).collect();
         let (_folder, path) = set("set.tsv", &rows);
-        let skip = SetArgs {
-            bad: Some(crate::data::SkipBad::default()),
-            ..SetArgs::default()
-        };
+        let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
         let dataset = open(&path, &skip).unwrap();
         assert_eq!(dataset.questions.len(), 39, "{image}");
     }
     let (_folder, path) = set("set.tsv", &[question(1, &"QUJD".repeat(2000)[1..])]);
     let problem = refusal(&path, &SetArgs::default());
-    assert!(
-        problem.contains("base64 that is cut or damaged"),
-        "{problem}"
-    );
+    assert!(problem.contains("base64 that is cut or damaged"), "{problem}");
     assert!(problem.len() < 400, "{problem}");
     assert!(problem.ends_with("; --skip bad leaves such rows out"));
 }
@@ -166,10 +142,7 @@ fn unusable_images_are_left_out_with_skip_bad() {
 #[test]
 fn skip_bad_is_not_advised_twice() {
     let (_folder, path) = set("set.tsv", &[question(1, &"QUJD".repeat(2000)[1..])]);
-    let skip = SetArgs {
-        bad: Some(crate::data::SkipBad::default()),
-        ..SetArgs::default()
-    };
+    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
     let problem = refusal(&path, &skip);
     assert!(!problem.contains("leaves such rows out"), "{problem}");
 }
@@ -182,10 +155,7 @@ fn missing_quotes_in_csv_are_named() {
     for (rows, is_refused) in [
         ([&*good, &open_quote, &good], true),
         ([&open_quote, &good, &open_quote], true),
-        (
-            [&good, &row("2", "\"Which \"\"one\"\",\nor not?\""), &good],
-            false,
-        ),
+        ([&good, &row("2", "\"Which \"\"one\"\",\nor not?\""), &good], false),
         ([&good, &row("2", "A 5\" screen?"), &good], false),
         ([&good, &row("2", "\"Which\" one?"), &good], false),
     ] {
@@ -209,11 +179,7 @@ fn csv_may_have_tabs() {
 fn lines_of_windows_are_counted() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("set.csv");
-    let rows = [
-        "image,question,A,B,answer",
-        "a.png,\"Is it\r\nred?\",x,y,A",
-        "a.png,Is it?,x,x,B",
-    ];
+    let rows = ["image,question,A,B,answer", "a.png,\"Is it\r\nred?\",x,y,A", "a.png,Is it?,x,x,B"];
     for ending in ["\n", "\r\n"] {
         std::fs::write(&path, rows.join(ending) + ending).unwrap();
         let problem = refusal(&path, &SetArgs::default());
@@ -227,22 +193,14 @@ fn backslash_in_path_is_named() {
     std::fs::create_dir(folder.path().join("images")).unwrap();
     std::fs::write(folder.path().join("images/a.png"), "").unwrap();
     let problem = refusal(&path, &SetArgs::default());
-    assert!(
-        problem.contains("; it is named \"images/a.png\": write this in the data;"),
-        "{problem}"
-    );
+    assert!(problem.contains("; it is named \"images/a.png\": write this in the data;"), "{problem}");
 }
 
 #[test]
 fn message_names_the_file_once() {
     let broken = question(1, "none.png");
-    let other = row(
-        json!({"id": 2, "question": "?", "options": ["x", "y"], "answer": "z", "image": base64(1)}),
-    );
-    let skip = SetArgs {
-        bad: Some(crate::data::SkipBad::default()),
-        ..SetArgs::default()
-    };
+    let other = row(json!({"id": 2, "question": "?", "options": ["x", "y"], "answer": "z", "image": base64(1)}));
+    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
     for bad in [broken, other] {
         let (folder, path) = set("set.json", &[question(3, &base64(2)), bad]);
         for place in [&path, folder.path()] {
@@ -281,10 +239,7 @@ fn columns_by_index_and_in_lists_are_read() {
     let listed = row(json!({"id": 1, "conversations": turns, "image": base64(1)}));
     let (_folder, path) = set("set.jsonl", &[listed]);
     let map = "question=conversations.0.value,answer=conversations.1.value";
-    let args = SetArgs {
-        map: vec![map.parse().unwrap()],
-        ..SetArgs::default()
-    };
+    let args = SetArgs { map: vec![map.parse().unwrap()], ..SetArgs::default() };
     let dataset = open(&path, &args).unwrap();
     assert_eq!(dataset.questions[0].choices.truth(), Some(1));
     let with_pixels = row(
@@ -310,20 +265,12 @@ fn outside_paths_and_invalid_images_are_errors() {
             assert!(problem.contains(message), "{form}: {problem}");
         }
     }
-    for (cell, message) in [
-        (base64(1)[..80].to_owned(), "not a"),
-        ("QUJD".repeat(40), "not an image"),
-    ] {
+    for (cell, message) in [(base64(1)[..80].to_owned(), "not a"), ("QUJD".repeat(40), "not an image")] {
         let (_folder, path) = set("set.tsv", &[question(1, &cell)]);
         let dataset = open(&path, &SetArgs::default()).unwrap();
-        let picture = dataset
-            .picture(&FrameId("1".into()))
-            .and_then(|picture| picture.decode());
+        let picture = dataset.picture(&FrameId("1".into())).and_then(|picture| picture.decode());
         let problem = picture.unwrap_err().to_string();
-        assert!(
-            problem.contains("set.tsv, line 2: ") && problem.contains(message),
-            "{problem}"
-        );
+        assert!(problem.contains("set.tsv, line 2: ") && problem.contains(message), "{problem}");
     }
 }
 
@@ -332,14 +279,8 @@ fn changed_file_is_an_error() {
     let (_folder, path) = set("set.tsv", &[question(1, &base64(1))]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     super::fixture::write(&path, &[question(1, &base64(2))]);
-    let problem = dataset
-        .picture(&FrameId("1".into()))
-        .unwrap_err()
-        .to_string();
-    assert!(
-        problem.contains("the image has changed since the file was opened"),
-        "{problem}"
-    );
+    let problem = dataset.picture(&FrameId("1".into())).unwrap_err().to_string();
+    assert!(problem.contains("the image has changed since the file was opened"), "{problem}");
 }
 
 fn line(image: &str) -> String {
@@ -350,42 +291,15 @@ fn line(image: &str) -> String {
 fn malicious_archives_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (name, entries, message) in [
-        (
-            "a.zip",
-            vec![("../a.png", "x".to_owned())],
-            "leads out of the file",
-        ),
-        (
-            "b.zip",
-            vec![("/etc/a.png", "x".to_owned())],
-            "leads out of the file",
-        ),
-        (
-            "c.zip",
-            vec![("metadata.jsonl", line("../a.png"))],
-            "lies outside",
-        ),
-        (
-            "d.zip",
-            vec![("metadata.jsonl", line("/etc/hostname"))],
-            "lies outside",
-        ),
-        (
-            "e.zip",
-            vec![("metadata.jsonl", line("none.png"))],
-            "no such file: \"none.png\"",
-        ),
-        (
-            "f.zip",
-            vec![("a.txt", String::new())],
-            "no file of questions in it",
-        ),
+        ("a.zip", vec![("../a.png", "x".to_owned())], "leads out of the file"),
+        ("b.zip", vec![("/etc/a.png", "x".to_owned())], "leads out of the file"),
+        ("c.zip", vec![("metadata.jsonl", line("../a.png"))], "lies outside"),
+        ("d.zip", vec![("metadata.jsonl", line("/etc/hostname"))], "lies outside"),
+        ("e.zip", vec![("metadata.jsonl", line("none.png"))], "no such file: \"none.png\""),
+        ("f.zip", vec![("a.txt", String::new())], "no file of questions in it"),
     ] {
         let path = folder.path().join(name);
-        let entries: Vec<(&str, &[u8])> = entries
-            .iter()
-            .map(|(name, text)| (*name, text.as_bytes()))
-            .collect();
+        let entries: Vec<(&str, &[u8])> = entries.iter().map(|(name, text)| (*name, text.as_bytes())).collect();
         super::shapes::pack(&path, &entries);
         let problem = refusal(&path, &SetArgs::default());
         assert!(problem.contains(message), "{name}: {problem}");

@@ -12,10 +12,7 @@ fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 fn skipping() -> SetArgs {
-    SetArgs {
-        bad: Some(crate::data::SkipBad::default()),
-        ..SetArgs::default()
-    }
+    SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() }
 }
 
 /// Forty rows with the answer x, and a label made from the number of the row.
@@ -41,18 +38,12 @@ fn answer_column_with_a_gap_is_kept() {
         rows[7]["answer"] = gap.clone();
         let (_folder, path) = with(rows);
         let problem = refusal(&path, &SetArgs::default());
-        assert!(
-            problem.contains("1 of 40 rows are broken"),
-            "{gap}: {problem}"
-        );
+        assert!(problem.contains("1 of 40 rows are broken"), "{gap}: {problem}");
         let questions = read(&open(&path, &skipping()).unwrap());
         assert_eq!(questions.len(), 39);
         assert!(questions.iter().all(|question| question.4 == "x"));
         // The flag in the message names the other column, which has no gap.
-        assert_eq!(
-            open(&path, &map("answer=label")).unwrap().questions().len(),
-            40
-        );
+        assert_eq!(open(&path, &map("answer=label")).unwrap().questions().len(), 40);
     }
 }
 
@@ -80,46 +71,27 @@ fn yes_no_columns_are_compared_where_both_have_answers() {
     let (_folder, path) = with(rows("0", &json!("yes")));
     assert!(refusal(&path, &skipping()).contains("differ"));
     // A column of correctness is not an answer column.
-    let (_folder, path) = with(vec![
-        json!({"question": "What?", "answer": "a chair", "correct": true, "image": base64(1)}),
-    ]);
+    let (_folder, path) =
+        with(vec![json!({"question": "What?", "answer": "a chair", "correct": true, "image": base64(1)})]);
     assert!(refusal(&path, &skipping()).contains("\"answer\" and \"correct\" differ"));
 }
 
 #[test]
 fn printed_flags_are_quoted_for_the_shell() {
-    for name in [
-        "Correct Answer",
-        "correct answer's",
-        "correct $answer (1)",
-        "correct, answer",
-        "correct: answer",
-    ] {
-        let (_folder, path) = with(vec![
-            json!({"question": "?", "options": ["x", "y", "z"], name: 1, "image": base64(1)}),
-        ]);
+    for name in ["Correct Answer", "correct answer's", "correct $answer (1)", "correct, answer", "correct: answer"] {
+        let (_folder, path) =
+            with(vec![json!({"question": "?", "options": ["x", "y", "z"], name: 1, "image": base64(1)})]);
         let args = map(&format!("answer={name}:"));
         let problem = refusal(&path, &args);
         let (_, command) = problem.split_once("; --map ").unwrap();
         let (command, _) = command.split_once(" or --map ").unwrap();
         let mut shell = std::process::Command::new("sh");
-        let output = shell
-            .args(["-c", &format!("printf %s {command}")])
-            .output()
-            .unwrap();
+        let output = shell.args(["-c", &format!("printf %s {command}")]).output().unwrap();
         let pasted = String::from_utf8(output.stdout).unwrap();
-        assert_eq!(
-            read(&open(&path, &map(&pasted)).unwrap())[0].4,
-            "y",
-            "{pasted}"
-        );
+        assert_eq!(read(&open(&path, &map(&pasted)).unwrap())[0].4, "y", "{pasted}");
     }
     // A name with a comma is one column.
-    let (_folder, path) = with(vec![
-        json!({"question": "?", "the, options": ["x", "y"], "answer": "y", "image": base64(1)}),
-    ]);
-    assert_eq!(
-        read(&open(&path, &map("options=the, options")).unwrap())[0].4,
-        "y"
-    );
+    let (_folder, path) =
+        with(vec![json!({"question": "?", "the, options": ["x", "y"], "answer": "y", "image": base64(1)})]);
+    assert_eq!(read(&open(&path, &map("options=the, options")).unwrap())[0].4, "y");
 }

@@ -17,9 +17,7 @@ use serde_json::{Map, Value, json};
 
 /// A PNG of one colour, large enough that its base64 is longer than a name.
 pub(super) fn png(colour: u8) -> Vec<u8> {
-    let image = RgbImage::from_fn(8, 8, |x, y| {
-        image::Rgb([colour, (x * 9) as u8, (y * 17) as u8])
-    });
+    let image = RgbImage::from_fn(8, 8, |x, y| image::Rgb([colour, (x * 9) as u8, (y * 17) as u8]));
     let mut file = std::io::Cursor::new(Vec::new());
     image.write_to(&mut file, ImageFormat::Png).unwrap();
     file.into_inner()
@@ -56,9 +54,7 @@ pub(super) fn set(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir
 pub(super) fn write(path: &Path, rows: &[Map<String, Value>]) {
     let text = match path.extension().unwrap().to_str().unwrap() {
         "json" => serde_json::to_string_pretty(rows).unwrap(),
-        "jsonl" => rows.iter().fold(String::new(), |text, row| {
-            text + &json!(row).to_string() + "\n"
-        }),
+        "jsonl" => rows.iter().fold(String::new(), |text, row| text + &json!(row).to_string() + "\n"),
         "tsv" => table(rows, b'\t'),
         "csv" => table(rows, b','),
         "parquet" => return parquet(path, rows, None),
@@ -79,9 +75,7 @@ fn columns(rows: &[Map<String, Value>]) -> Vec<String> {
 
 fn table(rows: &[Map<String, Value>], delimiter: u8) -> String {
     let columns = columns(rows);
-    let mut writer = csv::WriterBuilder::new()
-        .delimiter(delimiter)
-        .from_writer(Vec::new());
+    let mut writer = csv::WriterBuilder::new().delimiter(delimiter).from_writer(Vec::new());
     writer.write_record(&columns).unwrap();
     for row in rows {
         let cells = columns.iter().map(|column| match row.get(column) {
@@ -106,10 +100,7 @@ enum Form {
 }
 
 fn form(rows: &[Map<String, Value>], column: &str) -> Form {
-    match rows
-        .iter()
-        .find_map(|row| row.get(column).filter(|value| !value.is_null()))
-    {
+    match rows.iter().find_map(|row| row.get(column).filter(|value| !value.is_null())) {
         Some(Value::Number(_)) => Form::Number,
         Some(Value::Array(items)) if items[0].is_object() => Form::Images,
         Some(Value::Array(_)) => Form::Texts,
@@ -128,12 +119,7 @@ fn leaf(name: &str, physical: Physical, logical: Option<LogicalType>) -> TypePtr
     )
 }
 
-fn group(
-    name: &str,
-    repetition: Repetition,
-    logical: Option<LogicalType>,
-    fields: Vec<TypePtr>,
-) -> TypePtr {
+fn group(name: &str, repetition: Repetition, logical: Option<LogicalType>, fields: Vec<TypePtr>) -> TypePtr {
     Arc::new(
         Type::group_type_builder(name)
             .with_repetition(repetition)
@@ -146,19 +132,12 @@ fn group(
 
 fn list(name: &str, item: TypePtr) -> TypePtr {
     let items = group("list", Repetition::REPEATED, None, vec![item]);
-    group(
-        name,
-        Repetition::OPTIONAL,
-        Some(LogicalType::List),
-        vec![items],
-    )
+    group(name, Repetition::OPTIONAL, Some(LogicalType::List), vec![items])
 }
 
 fn image(name: &str) -> TypePtr {
-    let fields = vec![
-        leaf("bytes", Physical::BYTE_ARRAY, None),
-        leaf("path", Physical::BYTE_ARRAY, Some(LogicalType::String)),
-    ];
+    let fields =
+        vec![leaf("bytes", Physical::BYTE_ARRAY, None), leaf("path", Physical::BYTE_ARRAY, Some(LogicalType::String))];
     group(name, Repetition::OPTIONAL, None, fields)
 }
 
@@ -172,18 +151,14 @@ struct Levels {
 
 impl Levels {
     fn add(&mut self, value: Option<Vec<u8>>, defined: i16, absent: i16, repeated: i16) {
-        self.defined
-            .push(if value.is_some() { defined } else { absent });
+        self.defined.push(if value.is_some() { defined } else { absent });
         self.repeated.push(repeated);
         self.values.extend(value.map(ByteArray::from));
     }
 }
 
 /// A Parquet file whose metadata have these features, as the library `datasets` writes them.
-pub(super) fn set_with_features(
-    rows: &[Map<String, Value>],
-    features: &Value,
-) -> (tempfile::TempDir, PathBuf) {
+pub(super) fn set_with_features(rows: &[Map<String, Value>], features: &Value) -> (tempfile::TempDir, PathBuf) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("set.parquet");
     let info = serde_json::json!({"info": {"features": features}});
@@ -205,16 +180,10 @@ fn parquet(path: &Path, rows: &[Map<String, Value>], metadata: Option<Vec<KeyVal
         Form::Images => list(column, image("element")),
     });
     let schema = group("schema", Repetition::REQUIRED, None, fields.collect());
-    let schema = Arc::new(
-        Type::group_type_builder("schema")
-            .with_fields(schema.get_fields().to_vec())
-            .build()
-            .unwrap(),
-    );
-    let properties = WriterProperties::builder()
-        .set_compression(Compression::SNAPPY)
-        .set_key_value_metadata(metadata)
-        .build();
+    let schema =
+        Arc::new(Type::group_type_builder("schema").with_fields(schema.get_fields().to_vec()).build().unwrap());
+    let properties =
+        WriterProperties::builder().set_compression(Compression::SNAPPY).set_key_value_metadata(metadata).build();
     let file = File::create(path).unwrap();
     let mut writer = SerializedFileWriter::new(file, schema, Arc::new(properties)).unwrap();
     let half = rows.len().div_ceil(2).max(1);
@@ -224,28 +193,17 @@ fn parquet(path: &Path, rows: &[Map<String, Value>], metadata: Option<Vec<KeyVal
             let numbers = *form == Form::Number;
             if numbers {
                 let mut leaf = group.next_column().unwrap().unwrap();
-                let values: Vec<i64> = rows
-                    .iter()
-                    .filter_map(|row| row.get(column)?.as_i64())
-                    .collect();
-                let defined: Vec<i16> = rows
-                    .iter()
-                    .map(|row| i16::from(row.get(column).is_some_and(Value::is_number)))
-                    .collect();
-                leaf.typed::<Int64Type>()
-                    .write_batch(&values, Some(&defined), None)
-                    .unwrap();
+                let values: Vec<i64> = rows.iter().filter_map(|row| row.get(column)?.as_i64()).collect();
+                let defined: Vec<i16> =
+                    rows.iter().map(|row| i16::from(row.get(column).is_some_and(Value::is_number))).collect();
+                leaf.typed::<Int64Type>().write_batch(&values, Some(&defined), None).unwrap();
                 leaf.close().unwrap();
                 continue;
             }
             for levels in leaves(rows, column, *form) {
                 let mut leaf = group.next_column().unwrap().unwrap();
                 leaf.typed::<ByteArrayType>()
-                    .write_batch(
-                        &levels.values,
-                        Some(&levels.defined),
-                        Some(&levels.repeated),
-                    )
+                    .write_batch(&levels.values, Some(&levels.defined), Some(&levels.repeated))
                     .unwrap();
                 leaf.close().unwrap();
             }
@@ -257,17 +215,12 @@ fn parquet(path: &Path, rows: &[Map<String, Value>], metadata: Option<Vec<KeyVal
 
 /// Leaves of a column of texts, lists or images.
 fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> {
-    let cells = rows
-        .iter()
-        .map(|row| row.get(column).filter(|value| !value.is_null()));
+    let cells = rows.iter().map(|row| row.get(column).filter(|value| !value.is_null()));
     match form {
         Form::Text | Form::Number => {
             let mut levels = Levels::default();
             for cell in cells {
-                let value = cell.map(|cell| {
-                    cell.as_str()
-                        .map_or_else(|| cell.to_string(), str::to_owned)
-                });
+                let value = cell.map(|cell| cell.as_str().map_or_else(|| cell.to_string(), str::to_owned));
                 levels.add(value.map(String::into_bytes), 1, 0, 0);
             }
             vec![levels]

@@ -13,11 +13,7 @@ fn with(rows: Vec<Value>) -> (tempfile::TempDir, std::path::PathBuf) {
 }
 
 fn skipping() -> SetArgs {
-    SetArgs {
-        bad: Some(crate::data::SkipBad::default()),
-        open: Some(LeaveOut::Skip),
-        ..SetArgs::default()
-    }
+    SetArgs { bad: Some(crate::data::SkipBad::default()), open: Some(LeaveOut::Skip), ..SetArgs::default() }
 }
 
 fn question_with_answer(answer: i64) -> Value {
@@ -26,9 +22,7 @@ fn question_with_answer(answer: i64) -> Value {
 
 #[test]
 fn broken_row_does_not_decide_the_answer_format() {
-    let rows = (0..39)
-        .map(|n| question_with_answer(1 + n % 3))
-        .chain([question_with_answer(9)]);
+    let rows = (0..39).map(|n| question_with_answer(1 + n % 3)).chain([question_with_answer(9)]);
     let (_folder, path) = with(rows.collect());
     let problem = refusal(&path, &skipping());
     assert!(problem.contains("index0 or as index1"), "{problem}");
@@ -36,14 +30,10 @@ fn broken_row_does_not_decide_the_answer_format() {
 
 #[test]
 fn yes_no_question_without_answer_is_bad() {
-    let question =
-        |answer: Value| json!({"question": "Is it?", "answer": answer, "image": base64(1)});
+    let question = |answer: Value| json!({"question": "Is it?", "answer": answer, "image": base64(1)});
     let (_folder, path) = with(vec![question(json!("yes")), question(Value::Null)]);
     let problem = refusal(&path, &skipping());
-    assert!(
-        problem.contains("1 of 2 rows are broken") && problem.contains("at most 5 %"),
-        "{problem}"
-    );
+    assert!(problem.contains("1 of 2 rows are broken") && problem.contains("at most 5 %"), "{problem}");
     let (_folder, path) = with(vec![question(Value::Null), question(json!(""))]);
     let problem = refusal(&path, &skipping());
     assert!(problem.contains("no answer in any row"), "{problem}");
@@ -69,9 +59,8 @@ fn empty_option_list_is_no_options_but_none_is_one() {
         json!({"question": "How many?", "options": "[]", "answer": "7", "image": base64(2)}),
     ]);
     assert_eq!(read(&open(&path, &skipping()).unwrap()).len(), 1);
-    let (_folder, path) = with(vec![
-        json!({"question": "Which?", "A": "x", "B": "None", "C": "n/a", "answer": "A", "image": base64(1)}),
-    ]);
+    let (_folder, path) =
+        with(vec![json!({"question": "Which?", "A": "x", "B": "None", "C": "n/a", "answer": "A", "image": base64(1)})]);
     assert_eq!(read(&open(&path, &skipping()).unwrap())[0].3, ["x", "None"]);
 }
 
@@ -84,42 +73,26 @@ fn unnumbered_image_column_joins_numbered_ones() {
 }
 
 fn question_about(id: i64, image: &str) -> Map<String, Value> {
-    row(
-        json!({"index": id, "question": format!("{id}?"), "options": ["x", "y"], "answer": "x", "image": image}),
-    )
+    row(json!({"index": id, "question": format!("{id}?"), "options": ["x", "y"], "answer": "x", "image": image}))
 }
 
 #[test]
 fn row_reference_stays_in_the_same_file() {
-    let (folder, first) = set(
-        "a.tsv",
-        &[question_about(1, &base64(1)), question_about(2, "1")],
-    );
-    write(
-        &first.with_file_name("b.tsv"),
-        &[question_about(1, &base64(3)), question_about(4, "1")],
-    );
+    let (folder, first) = set("a.tsv", &[question_about(1, &base64(1)), question_about(2, "1")]);
+    write(&first.with_file_name("b.tsv"), &[question_about(1, &base64(3)), question_about(4, "1")]);
     let dataset = open(&folder.path().join("*.tsv"), &skipping()).unwrap();
     let reds: Vec<u8> = read(&dataset).into_iter().map(|read| read.5).collect();
     assert_eq!(reds, [1, 1, 3, 3]);
 }
 
 fn question_with_id(id: &str, red: u8) -> Map<String, Value> {
-    row(
-        json!({"index": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(red)}),
-    )
+    row(json!({"index": id, "question": "?", "options": ["x", "y"], "answer": "x", "image": base64(red)}))
 }
 
 #[test]
 fn ids_that_differ_only_in_space_are_not_unique() {
-    let (_folder, path) = set(
-        "set.csv",
-        &[question_with_id("1", 1), question_with_id("1 ", 2)],
-    );
-    let reds: Vec<u8> = read(&open(&path, &skipping()).unwrap())
-        .into_iter()
-        .map(|read| read.5)
-        .collect();
+    let (_folder, path) = set("set.csv", &[question_with_id("1", 1), question_with_id("1 ", 2)]);
+    let reds: Vec<u8> = read(&open(&path, &skipping()).unwrap()).into_iter().map(|read| read.5).collect();
     assert_eq!(reds, [1, 2]);
 }
 

@@ -9,7 +9,8 @@ use super::fixture::{png, row, set};
 use super::{map, open, refusal};
 use crate::data::{Dataset, SetArgs};
 
-/// Six rows about three images, with numbers from 1 and two columns that form a group together. The last row is an open question.
+/// Six rows about three images, with numbers from 1 and two columns that form a group together. The last row is an open
+/// question.
 fn rows() -> Vec<Map<String, Value>> {
     (1..=6).map(|number| {
         let answer = if number == 6 { "seven" } else { "yes" };
@@ -41,10 +42,7 @@ fn groups(dataset: &Dataset) -> Vec<Option<(&str, usize)>> {
 }
 
 fn with(text: &str) -> SetArgs {
-    SetArgs {
-        open: Some(LeaveOut::Skip),
-        ..map(text)
-    }
+    SetArgs { open: Some(LeaveOut::Skip), ..map(text) }
 }
 
 #[test]
@@ -53,10 +51,7 @@ fn groups_follow_column_template_or_run_of_numbers() {
     // There are no groups by default.
     assert_eq!(groups(&open(&path, &with("id=nr")).unwrap()), [None; 5]);
     let by_image = open(&path, &with("id=nr,group=image")).unwrap();
-    assert_eq!(
-        groups(&by_image)[..3],
-        [Some(("0.png", 2)), Some(("0.png", 2)), Some(("1.png", 2))]
-    );
+    assert_eq!(groups(&by_image)[..3], [Some(("0.png", 2)), Some(("0.png", 2)), Some(("1.png", 2))]);
     // The open question is left out, and its group is incomplete.
     assert_eq!(groups(&by_image)[4], Some(("2.png", 2)));
     let summary = by_image.summary().join("\n");
@@ -65,16 +60,7 @@ fn groups_follow_column_template_or_run_of_numbers() {
         "{summary}"
     );
     let template = open(&path, &with("id=nr,group={set}_{figure}")).unwrap();
-    assert_eq!(
-        groups(&template),
-        [
-            Some(("s0_1", 1)),
-            Some(("s0_0", 1)),
-            None,
-            Some(("s1_0", 2)),
-            Some(("s1_1", 1))
-        ]
-    );
+    assert_eq!(groups(&template), [Some(("s0_1", 1)), Some(("s0_0", 1)), None, Some(("s1_0", 2)), Some(("s1_1", 1))]);
     let summary = template.summary().join("\n");
     assert!(
         summary.contains("group = {set}_{figure}: 4 groups of 1 to 2 questions, 3 of one question, 1 with questions that are left out, never complete; 1 question without a group"),
@@ -83,35 +69,25 @@ fn groups_follow_column_template_or_run_of_numbers() {
     let alone = open(&path, &with("id=nr,group={nr:1}")).unwrap();
     let summary = alone.summary().join("\n");
     assert!(
-        summary.contains("5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"),
+        summary.contains(
+            "5 groups of one question, so that the strict score is accuracy, 1 more of which every question is left out"
+        ),
         "{summary}"
     );
     let from_one: Vec<&str> = vec!["0", "0", "1", "1", "2"];
     let runs = open(&path, &with("id=nr,group={nr:2 from 1}")).unwrap();
-    let names: Vec<&str> = groups(&runs)
-        .into_iter()
-        .flatten()
-        .map(|(name, _)| name)
-        .collect();
+    let names: Vec<&str> = groups(&runs).into_iter().flatten().map(|(name, _)| name).collect();
     assert_eq!(names, from_one);
     let from_nought = open(&path, &with("id=nr,group={nr:2}")).unwrap();
     assert_ne!(groups(&from_nought), groups(&runs));
-    assert!(
-        from_nought
-            .summary()
-            .join("\n")
-            .contains("about several images")
-    );
+    assert!(from_nought.summary().join("\n").contains("about several images"));
 }
 
 #[test]
 fn invalid_group_error_names_expected() {
     let (_folder, path) = made(&rows());
     for (text, message) in [
-        (
-            "group=figures",
-            "names the column \"figures\", which is not there",
-        ),
+        ("group=figures", "names the column \"figures\", which is not there"),
         ("group={set}_{Figure}", "did you mean \"figure\"?"),
         ("group={set", "'}' is missing"),
         ("group={nr:two}", "{COLUMN:2} or {COLUMN:2 from 1} expected"),
@@ -145,10 +121,7 @@ fn stored_questions_keep_their_groups() {
     assert_eq!(groups(&off), [None; 2]);
     // A column with this name in a foreign set does not make groups.
     let (_folder, path) = made(&[foreign_question("a"), foreign_question("b")]);
-    assert_eq!(
-        groups(&open(&path, &SetArgs::default()).unwrap()),
-        [None; 2]
-    );
+    assert_eq!(groups(&open(&path, &SetArgs::default()).unwrap()), [None; 2]);
 }
 
 fn open_preset(name: &str, path: &std::path::Path, args: &SetArgs) -> Dataset {
@@ -180,8 +153,5 @@ fn presets_have_groups() {
     let dataset = open_preset("mme", &path, &SetArgs::default());
     assert_eq!(groups(&dataset), [None; 4]);
     let summary = dataset.summary().join("\n");
-    assert!(
-        summary.contains("no groups: MME scores questions together by {category}_{question_id} or"),
-        "{summary}"
-    );
+    assert!(summary.contains("no groups: MME scores questions together by {category}_{question_id} or"), "{summary}");
 }

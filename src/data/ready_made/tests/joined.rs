@@ -32,31 +32,23 @@ fn written(text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
 
 #[test]
 fn names_of_rows_become_ids() {
-    let text = json!({"q7": question(json!({})), "q2": question(json!({"question": "Which?"}))})
-        .to_string();
+    let text = json!({"q7": question(json!({})), "q2": question(json!({"question": "Which?"}))}).to_string();
     let (_folder, path) = written(&text);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
     ids.sort();
     assert_eq!(ids, ["q2", "q7"]);
     let summary = dataset.summary().join("\n");
-    assert!(
-        summary.contains("id = id") && summary.contains("the names of the rows"),
-        "{summary}"
-    );
+    assert!(summary.contains("id = id") && summary.contains("the names of the rows"), "{summary}");
     // A column of ids takes precedence.
-    let text = json!({"q7": question(json!({"question_id": 1})), "q2": question(json!({"question_id": 2}))}).to_string();
+    let text =
+        json!({"q7": question(json!({"question_id": 1})), "q2": question(json!({"question_id": 2}))}).to_string();
     let (_folder, path) = written(&text);
     let dataset = open(&path, &SetArgs::default()).unwrap();
     let mut ids: Vec<String> = read(&dataset).into_iter().map(|read| read.0).collect();
     ids.sort();
     assert_eq!(ids, ["1", "2"]);
-    assert!(
-        !dataset
-            .summary()
-            .join("\n")
-            .contains("the names of the rows")
-    );
+    assert!(!dataset.summary().join("\n").contains("the names of the rows"));
 }
 
 #[test]
@@ -67,19 +59,10 @@ fn family_column_varies_among_asked_questions() {
         json!({"id": 2, "category": "choice", "topic": "balls"}),
         json!({"id": 3, "category": "open", "topic": "balls", "options": "[]", "answer": "7"}),
     ];
-    let rows: Vec<_> = rows
-        .into_iter()
-        .map(|fields| row(question(fields)))
-        .collect();
+    let rows: Vec<_> = rows.into_iter().map(|fields| row(question(fields))).collect();
     let (_folder, path) = set("set.json", &rows);
-    let args = SetArgs {
-        open: Some(LeaveOut::Skip),
-        ..SetArgs::default()
-    };
-    let families: Vec<String> = read(&open(&path, &args).unwrap())
-        .into_iter()
-        .map(|read| read.1)
-        .collect();
+    let args = SetArgs { open: Some(LeaveOut::Skip), ..SetArgs::default() };
+    let families: Vec<String> = read(&open(&path, &args).unwrap()).into_iter().map(|read| read.1).collect();
     assert_eq!(families, ["cups", "balls"]);
 }
 
@@ -93,29 +76,15 @@ fn configuration_is_the_family_if_no_column_varies() {
     super::fixture::write(&folder.path().join("music.jsonl"), &choice_row(2));
     let card = "---\nconfigs:\n- config_name: Art\n  data_files: art/test.jsonl\n- config_name: Music\n  data_files: music.jsonl\n---\n";
     fs::write(folder.path().join("README.md"), card).unwrap();
-    let args = SetArgs {
-        config_name: Some("all".to_owned()),
-        split: Some("all".to_owned()),
-        ..SetArgs::default()
-    };
+    let args = SetArgs { config_name: Some("all".to_owned()), split: Some("all".to_owned()), ..SetArgs::default() };
     let dataset = open(folder.path(), &args).unwrap();
     let families: Vec<String> = read(&dataset).into_iter().map(|read| read.1).collect();
     assert_eq!(families, ["Art", "Music"]);
-    assert!(
-        dataset.summary()[0].contains("in 2 families (by configuration)"),
-        "{:?}",
-        dataset.summary()
-    );
+    assert!(dataset.summary()[0].contains("in 2 families (by configuration)"), "{:?}", dataset.summary());
     // A column given by the user takes precedence, and so does any column if there is only one configuration.
-    let mapped = SetArgs {
-        map: vec!["family=category".parse().unwrap()],
-        ..args
-    };
+    let mapped = SetArgs { map: vec!["family=category".parse().unwrap()], ..args };
     assert_eq!(read(&open(folder.path(), &mapped).unwrap())[0].1, "choice");
-    assert_eq!(
-        read(&open(&path, &SetArgs::default()).unwrap())[0].1,
-        "choice"
-    );
+    assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].1, "choice");
 }
 
 /// A ZIP file with these files.
@@ -124,8 +93,7 @@ fn zip(files: &[(&str, &[u8])]) -> (tempfile::TempDir, std::path::PathBuf) {
     let path = folder.path().join("set.zip");
     let mut zip = zip::ZipWriter::new(fs::File::create(&path).unwrap());
     for (name, bytes) in files {
-        zip.start_file(*name, zip::write::SimpleFileOptions::default())
-            .unwrap();
+        zip.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
         zip.write_all(bytes).unwrap();
     }
     zip.finish().unwrap();
@@ -137,31 +105,13 @@ fn zip_file_has_its_own_name_and_map() {
     let table = b"nr,frage,bild,A,B,richtig\n1,Which?,0,x,y,B\n";
     let info = br#"{"name": "Probe", "map": "id=nr,question=frage,image=images/{bild}.png,answer=richtig"}"#;
     let image = png(3);
-    let files: &[(&str, &[u8])] = &[
-        ("set.csv", table),
-        ("dataset.json", info),
-        ("images/0.png", &image),
-    ];
+    let files: &[(&str, &[u8])] = &[("set.csv", table), ("dataset.json", info), ("images/0.png", &image)];
     let (_folder, path) = zip(files);
     let dataset = open(&path, &SetArgs::default()).unwrap();
-    assert_eq!(
-        (
-            dataset.name(),
-            dataset.title(),
-            read(&dataset)[0].4.as_str()
-        ),
-        ("Probe", "Probe", "y")
-    );
-    let (_folder, path) = zip(&[
-        files[0],
-        ("dataset.json", b"{\"map\": \"colour=x\"}"),
-        files[2],
-    ]);
+    assert_eq!((dataset.name(), dataset.title(), read(&dataset)[0].4.as_str()), ("Probe", "Probe", "y"));
+    let (_folder, path) = zip(&[files[0], ("dataset.json", b"{\"map\": \"colour=x\"}"), files[2]]);
     let problem = refusal(&path, &SetArgs::default());
-    assert!(
-        problem.contains("dataset.json") && problem.contains("one of the roles"),
-        "{problem}"
-    );
+    assert!(problem.contains("dataset.json") && problem.contains("one of the roles"), "{problem}");
 }
 
 #[test]
@@ -173,15 +123,10 @@ fn ambiguous_image_in_zip_is_refused() {
         let (_folder, path) = zip(&[(name, image), metadata]);
         assert_eq!(read(&open(&path, &SetArgs::default()).unwrap())[0].5, red);
     }
-    let (_folder, path) = zip(&[
-        ("data/images/0.png", &near),
-        ("images/0.png", &top),
-        metadata,
-    ]);
+    let (_folder, path) = zip(&[("data/images/0.png", &near), ("images/0.png", &top), metadata]);
     let problem = refusal(&path, &SetArgs::default());
     assert!(
-        problem.contains("may be \"data/images/0.png\" or \"images/0.png\"")
-            && problem.contains("line 2"),
+        problem.contains("may be \"data/images/0.png\" or \"images/0.png\"") && problem.contains("line 2"),
         "{problem}"
     );
 }
@@ -190,11 +135,7 @@ fn rows_with_answers(answers: [&str; 2]) -> Vec<Map<String, Value>> {
     (0..40)
         .map(|at| {
             let answer = answers.get(at).unwrap_or(&"x");
-            let text = if at < 2 {
-                "Which?".to_owned()
-            } else {
-                format!("{at}?")
-            };
+            let text = if at < 2 { "Which?".to_owned() } else { format!("{at}?") };
             row(question(json!({"question": text, "answer": answer})))
         })
         .collect()
@@ -210,28 +151,15 @@ fn equal_rows_with_different_answers_are_refused() {
             && problem.contains("line 2 (\"y\") ask the same of the same image, and their answers differ; --skip bad"),
         "{problem}"
     );
-    let skip = SetArgs {
-        bad: Some(crate::data::SkipBad::default()),
-        ..SetArgs::default()
-    };
+    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
     let dataset = open(&path, &skip).unwrap();
     assert_eq!(dataset.questions().len(), 38);
-    assert!(
-        dataset
-            .summary()
-            .join("\n")
-            .contains("left out: 2 of 40 rows")
-    );
+    assert!(dataset.summary().join("\n").contains("left out: 2 of 40 rows"));
     // An exact repeat is asked again, with a note.
     let (_folder, path) = set("set.jsonl", &rows_with_answers(["x", "x"]));
     let dataset = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 40);
-    assert!(
-        dataset
-            .summary()
-            .join("\n")
-            .contains("that repeat an earlier one, with its image and options: 1;")
-    );
+    assert!(dataset.summary().join("\n").contains("that repeat an earlier one, with its image and options: 1;"));
 }
 
 fn open_with_images(rows: &[Map<String, Value>], args: &SetArgs) -> Result<Dataset> {
@@ -256,20 +184,12 @@ fn rows_ending_with(same: &Value, last: [(&Value, &str); 3]) -> Vec<Map<String, 
 
 #[test]
 fn contradictions_are_found_with_ids_too() {
-    let skip = SetArgs {
-        bad: Some(crate::data::SkipBad::default()),
-        ..SetArgs::default()
-    };
+    let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
     let strict = SetArgs::default();
     // Images of the rows 39 to 41, in cells and in files.
-    for [same, other] in [
-        [json!(base64(1)), json!(base64(2))],
-        [json!("a.png"), json!("b.png")],
-    ] {
+    for [same, other] in [[json!(base64(1)), json!(base64(2))], [json!("a.png"), json!("b.png")]] {
         let differ = [(&same, "x"), (&same, "x"), (&same, "y")];
-        let problem = open_with_images(&rows_ending_with(&same, differ), &strict)
-            .unwrap_err()
-            .to_string();
+        let problem = open_with_images(&rows_ending_with(&same, differ), &strict).unwrap_err().to_string();
         assert!(
             problem.contains("3 of 60 rows are broken")
                 && problem.contains("line 39 (\"x\")")
@@ -281,17 +201,8 @@ fn contradictions_are_found_with_ids_too() {
         assert_eq!(ids.len(), 57);
         assert!(!ids.iter().any(|id| ["38", "39", "40"].contains(id)));
         // With another image or the same answer there is no contradiction.
-        for fine in [
-            [(&same, "x"), (&same, "x"), (&other, "y")],
-            [(&same, "y"), (&same, "y"), (&same, "y")],
-        ] {
-            assert_eq!(
-                open_with_images(&rows_ending_with(&same, fine), &strict)
-                    .unwrap()
-                    .questions()
-                    .len(),
-                60
-            );
+        for fine in [[(&same, "x"), (&same, "x"), (&other, "y")], [(&same, "y"), (&same, "y"), (&same, "y")]] {
+            assert_eq!(open_with_images(&rows_ending_with(&same, fine), &strict).unwrap().questions().len(), 60);
         }
     }
 }
@@ -304,16 +215,9 @@ fn dataset_json_maps_columns_of_questions() {
     let line = json!({"id": "a", "frame": "0.png", "frage": "Which?", "choices": ["x", "y"], "answer": "y"});
     fs::write(root.join("questions.jsonl"), line.to_string()).unwrap();
     assert!(refusal(folder.path(), &SetArgs::default()).contains("no question among its columns"));
-    fs::write(
-        root.join("dataset.json"),
-        r#"{"schema": "darkqa.dataset/1", "map": "question=frage"}"#,
-    )
-    .unwrap();
+    fs::write(root.join("dataset.json"), r#"{"schema": "darkqa.dataset/1", "map": "question=frage"}"#).unwrap();
     let found = read(&open(folder.path(), &SetArgs::default()).unwrap());
-    assert_eq!(
-        (found[0].2.as_str(), found[0].4.as_str(), found[0].5),
-        ("Which?", "y", 9)
-    );
+    assert_eq!((found[0].2.as_str(), found[0].4.as_str(), found[0].5), ("Which?", "y", 9));
 }
 
 #[test]
@@ -334,21 +238,12 @@ fn bmp_image_is_read() {
     );
     let dataset = open(&path, &SetArgs::default()).unwrap();
     let frame = dataset.frames().next().unwrap();
-    let problem = dataset
-        .picture(frame)
-        .and_then(|picture| picture.decode())
-        .unwrap_err()
-        .to_string();
-    assert!(
-        problem.contains("line 1") && problem.contains("a GIF image, which is not read"),
-        "{problem}"
-    );
+    let problem = dataset.picture(frame).and_then(|picture| picture.decode()).unwrap_err().to_string();
+    assert!(problem.contains("line 1") && problem.contains("a GIF image, which is not read"), "{problem}");
 }
 
 fn numbered_row(id: i64) -> [Map<String, Value>; 1] {
-    [row(question(
-        json!({"id": id, "image": format!("{id}.png")}),
-    ))]
+    [row(question(json!({"id": id, "image": format!("{id}.png")})))]
 }
 
 fn open_joined(paths: &[&PathBuf]) -> Result<Dataset> {

@@ -27,17 +27,12 @@ fn open(path: &Path, args: &SetArgs) -> Result<Dataset> {
 
 /// Flags with this map.
 fn map(text: &str) -> SetArgs {
-    SetArgs {
-        map: vec![text.parse().unwrap()],
-        ..SetArgs::default()
-    }
+    SetArgs { map: vec![text.parse().unwrap()], ..SetArgs::default() }
 }
 
 /// Error message for a set that is refused.
 fn refusal(path: &Path, args: &SetArgs) -> String {
-    open(path, args)
-        .err()
-        .map_or_else(|| "it was read".to_owned(), |e| e.to_string())
+    open(path, args).err().map_or_else(|| "it was read".to_owned(), |e| e.to_string())
 }
 
 /// Compared parts of a question: id, family, text, choices, true choice, and the first sample of its image.
@@ -76,12 +71,5 @@ fn digests(dataset: &Dataset) -> Vec<(String, String)> {
 
 fn expected(id: &str, family: &str, text: &str, choices: &[&str], truth: &str, red: u8) -> Read {
     let choices = choices.iter().map(ToString::to_string).collect();
-    (
-        id.into(),
-        family.into(),
-        text.into(),
-        choices,
-        truth.into(),
-        red,
-    )
+    (id.into(), family.into(), text.into(), choices, truth.into(), red)
 }

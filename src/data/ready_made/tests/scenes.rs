@@ -29,12 +29,7 @@ fn made(name: &str, rows: &[Map<String, Value>]) -> (tempfile::TempDir, PathBuf)
 
 /// Scene of each frame with a question.
 fn scenes(dataset: &Dataset) -> Vec<String> {
-    dataset
-        .questions()
-        .iter()
-        .step_by(2)
-        .map(|question| dataset.scene(&question.frame))
-        .collect()
+    dataset.questions().iter().step_by(2).map(|question| dataset.scene(&question.frame)).collect()
 }
 
 const TWO: [&str; 6] = ["a", "a", "a", "a", "b", "b"];
@@ -46,23 +41,11 @@ fn scene_column_is_read_in_every_format() {
         let read = open(&path, &SetArgs::default()).unwrap();
         assert_eq!(scenes(&read), ["a", "a", "b"], "{name}");
         let summary = read.summary().join("\n");
-        assert!(
-            summary.contains("scene = Scene: 2 scenes of 3 images"),
-            "{summary}"
-        );
+        assert!(summary.contains("scene = Scene: 2 scenes of 3 images"), "{summary}");
     }
-    let (_folder, path) = made(
-        "set.jsonl",
-        &rows("house", [3, 3, 3, 3, 4, 4].map(|n| json!(n))),
-    );
-    assert_eq!(
-        scenes(&open(&path, &SetArgs::default()).unwrap()),
-        ["", "", ""]
-    );
-    assert_eq!(
-        scenes(&open(&path, &map("scene=house")).unwrap()),
-        ["3", "3", "4"]
-    );
+    let (_folder, path) = made("set.jsonl", &rows("house", [3, 3, 3, 3, 4, 4].map(|n| json!(n))));
+    assert_eq!(scenes(&open(&path, &SetArgs::default()).unwrap()), ["", "", ""]);
+    assert_eq!(scenes(&open(&path, &map("scene=house")).unwrap()), ["3", "3", "4"]);
 }
 
 #[test]
@@ -86,22 +69,12 @@ fn questions_assign_scenes_to_frames() {
 
 #[test]
 fn some_frames_may_have_no_scene() {
-    let some = [
-        json!("a"),
-        json!("a"),
-        json!(" "),
-        Value::Null,
-        json!("b"),
-        Value::Null,
-    ];
+    let some = [json!("a"), json!("a"), json!(" "), Value::Null, json!("b"), Value::Null];
     let (_folder, path) = made("set.jsonl", &rows("scene", some));
     let read = open(&path, &map("id=id")).unwrap();
     assert_eq!(scenes(&read), ["a", "", "b"]);
     let summary = read.summary().join("\n");
-    assert!(
-        summary.contains("2 scenes of 3 images, 1 image without a scene"),
-        "{summary}"
-    );
+    assert!(summary.contains("2 scenes of 3 images, 1 image without a scene"), "{summary}");
 }
 
 #[test]
@@ -116,10 +89,7 @@ fn contradictory_scenes_are_refused_or_ignored() {
     );
     assert_eq!(scenes(&open(&path, &map("scene=")).unwrap()), ["", "", ""]);
     // A column of a foreign set that has this name by coincidence.
-    let mut foreign = rows(
-        "scene",
-        ["a", "b", "a", "a", "b", "b"].map(|scene| json!(scene)),
-    );
+    let mut foreign = rows("scene", ["a", "b", "a", "a", "b", "b"].map(|scene| json!(scene)));
     for row in &mut foreign {
         row.insert("source".to_owned(), json!("web"));
     }
@@ -127,8 +97,5 @@ fn contradictory_scenes_are_refused_or_ignored() {
     let read = open(&path, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["", "", ""]);
     let summary = read.summary().join("\n");
-    assert!(
-        summary.contains("scene is not used as the scene: the image \"0.png\" is of"),
-        "{summary}"
-    );
+    assert!(summary.contains("scene is not used as the scene: the image \"0.png\" is of"), "{summary}");
 }

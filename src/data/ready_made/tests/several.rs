@@ -7,10 +7,7 @@ use super::fixture::{bytes, row, set};
 use super::{SetArgs, open, refusal};
 
 fn send() -> SetArgs {
-    SetArgs {
-        multi_image: Some(SeveralImages::Send),
-        ..SetArgs::default()
-    }
+    SetArgs { multi_image: Some(SeveralImages::Send), ..SetArgs::default() }
 }
 
 /// Id and text of a question, and the name and the red value of each of its images.
@@ -29,11 +26,7 @@ fn shown(rows: &[Map<String, Value>]) -> Vec<Shown> {
                     let picture = dataset.picture(frame).unwrap().decode().unwrap();
                     (frame.0.clone(), picture.samples()[0])
                 });
-                (
-                    question.id.0.clone(),
-                    question.text.clone(),
-                    frames.collect(),
-                )
+                (question.id.0.clone(), question.text.clone(), frames.collect())
             })
             .collect();
         questions.sort();
@@ -49,13 +42,7 @@ fn rows() -> Vec<Map<String, Value>> {
         {"id": "3", "question": "<image 1>?", "choices": ["x", "y"], "answer": "y", "image_1": bytes(2), "image_2": null},
         {"id": "40", "question": "Alike?", "choices": ["x", "y"], "answer": "y", "image_1": bytes(5), "image_2": bytes(5)},
     ]);
-    fields
-        .as_array()
-        .unwrap()
-        .iter()
-        .cloned()
-        .map(row)
-        .collect()
+    fields.as_array().unwrap().iter().cloned().map(row).collect()
 }
 
 fn image(name: &str, red: u8) -> (String, u8) {
@@ -66,16 +53,8 @@ fn image(name: &str, red: u8) -> (String, u8) {
 fn images_are_named_by_the_lowest_row_id() {
     let expected = [
         ("3".to_owned(), "?".to_owned(), vec![image("3", 2)]),
-        (
-            "40".to_owned(),
-            "Alike?".to_owned(),
-            vec![image("40#1", 5), image("40#1", 5)],
-        ),
-        (
-            "7".to_owned(),
-            "Is <image 1> or <image 2> red?".to_owned(),
-            vec![image("7#1", 1), image("3", 2)],
-        ),
+        ("40".to_owned(), "Alike?".to_owned(), vec![image("40#1", 5), image("40#1", 5)]),
+        ("7".to_owned(), "Is <image 1> or <image 2> red?".to_owned(), vec![image("7#1", 1), image("3", 2)]),
     ];
     assert_eq!(shown(&rows()), expected);
     let backwards: Vec<_> = rows().into_iter().rev().collect();
@@ -102,13 +81,7 @@ fn content_ids_depend_on_all_images() {
         {"question": "?", "choices": ["x", "y"], "answer": "x", "image": [bytes(2), bytes(1)]},
         {"question": "?", "choices": ["x", "y"], "answer": "y", "image": [bytes(1)]},
     ]);
-    let rows: Vec<_> = fields
-        .as_array()
-        .unwrap()
-        .iter()
-        .cloned()
-        .map(row)
-        .collect();
+    let rows: Vec<_> = fields.as_array().unwrap().iter().cloned().map(row).collect();
     let found = shown(&rows);
     assert_eq!(found.len(), 4);
     assert!(found.iter().all(|question| question.0.len() == 12));
@@ -131,13 +104,7 @@ fn mark_without_image_makes_a_bad_row() {
             && problem.contains("\"<image 3>\" is not an image of the row, which shows 2"),
         "{problem}"
     );
-    let args = SetArgs {
-        bad: Some(crate::data::SkipBad::default()),
-        ..send()
-    };
+    let args = SetArgs { bad: Some(crate::data::SkipBad::default()), ..send() };
     let summary = open(&path, &args).unwrap().summary().join("\n");
-    assert!(
-        summary.contains("2 questions show 2 images, all in one request"),
-        "{summary}"
-    );
+    assert!(summary.contains("2 questions show 2 images, all in one request"), "{summary}");
 }

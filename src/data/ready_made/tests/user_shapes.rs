@@ -39,31 +39,18 @@ fn error_for_conversations_suggests_a_map() {
             let (_folder, path) = set(&format!("set.{form}"), &rows);
             let problem = refusal(&path, &SetArgs::default());
             assert!(problem.contains("conversations"), "{problem}");
-            let expected = (
-                "Which room?".to_owned(),
-                words(&["hall", "attic"]),
-                "attic".to_owned(),
-            );
-            assert_eq!(
-                first(&path, &map_in(&problem)),
-                expected,
-                "{form}: {problem}"
-            );
+            let expected = ("Which room?".to_owned(), words(&["hall", "attic"]), "attic".to_owned());
+            assert_eq!(first(&path, &map_in(&problem)), expected, "{form}: {problem}");
             // A list is neither an empty question nor a question as JSON text.
             let problem = refusal(&path, &map("question=turns,answer=id"));
-            assert!(
-                !problem.contains("is empty") && problem.contains("--map question=turns."),
-                "{problem}"
-            );
+            assert!(!problem.contains("is empty") && problem.contains("--map question=turns."), "{problem}");
         }
     }
 }
 
 #[test]
 fn empty_question_map_asks_the_question_in_the_image() {
-    let rows = [row(
-        json!({"id": "1", "image": base64(9), "options": "['x', 'y']", "answer": "B", "subject": "Art"}),
-    )];
+    let rows = [row(json!({"id": "1", "image": base64(9), "options": "['x', 'y']", "answer": "B", "subject": "Art"}))];
     let (_folder, path) = set("set.json", &rows);
     let problem = refusal(&path, &SetArgs::default());
     assert!(problem.contains("stands in the image"), "{problem}");
@@ -79,17 +66,12 @@ fn question_column_with_unknown_name_is_suggested() {
     )];
     let (_folder, path) = set("set.json", &rows);
     let problem = refusal(&path, &SetArgs::default());
-    assert_eq!(
-        first(&path, &map_in(&problem)).0,
-        "What is it?",
-        "{problem}"
-    );
+    assert_eq!(first(&path, &map_in(&problem)).0, "What is it?", "{problem}");
 }
 
 fn question_with_image_in(column: &str) -> Map<String, Value> {
-    let mut fields = row(
-        json!({"pid": "1", "question": "?", "image": "images/1.jpg", "choices": ["x", "y"], "answer": "y"}),
-    );
+    let mut fields =
+        row(json!({"pid": "1", "question": "?", "image": "images/1.jpg", "choices": ["x", "y"], "answer": "y"}));
     fields.insert(column.to_owned(), bytes(77));
     fields
 }
@@ -101,11 +83,7 @@ fn image_data_is_preferred_to_a_path() {
     // A column without a known name is suggested.
     let (_folder, path) = set("set.parquet", &[question_with_image_in("pixels")]);
     let problem = refusal(&path, &SetArgs::default());
-    assert_eq!(
-        read(&open(&path, &map_in(&problem)).unwrap())[0].5,
-        77,
-        "{problem}"
-    );
+    assert_eq!(read(&open(&path, &map_in(&problem)).unwrap())[0].5, 77, "{problem}");
 }
 
 fn question_with_index_in(column: &str, at: usize) -> Map<String, Value> {
@@ -119,25 +97,15 @@ fn question_with_index_in(column: &str, at: usize) -> Map<String, Value> {
 #[test]
 fn index_answers_are_read_or_suggested() {
     for form in ["json", "csv", "tsv", "parquet"] {
-        let rows = [
-            question_with_index_in("correct_choice_idx", 2),
-            question_with_index_in("correct_choice_idx", 0),
-        ];
+        let rows = [question_with_index_in("correct_choice_idx", 2), question_with_index_in("correct_choice_idx", 0)];
         let (_folder, path) = set(&format!("set.{form}"), &rows);
-        let args = if form == "json" {
-            SetArgs::default()
-        } else {
-            map("question=question")
-        };
+        let args = if form == "json" { SetArgs::default() } else { map("question=question") };
         match open(&path, &args) {
             Ok(dataset) => assert_eq!(read(&dataset)[0].4, "z", "{form}"),
             Err(e) => panic!("{form}: {e}"),
         }
     }
-    let rows = [
-        question_with_index_in("richtig", 2),
-        question_with_index_in("richtig", 0),
-    ];
+    let rows = [question_with_index_in("richtig", 2), question_with_index_in("richtig", 0)];
     let (_folder, path) = set("set.json", &rows);
     let problem = refusal(&path, &SetArgs::default());
     assert!(problem.contains("--map answer=richtig:index0"), "{problem}");
@@ -146,8 +114,7 @@ fn index_answers_are_read_or_suggested() {
 
 #[test]
 fn template_has_a_number_width() {
-    let fields =
-        row(json!({"image_id": 42, "question": "?", "options": ["x", "y"], "answer": "x"}));
+    let fields = row(json!({"image_id": 42, "question": "?", "options": ["x", "y"], "answer": "x"}));
     let (folder, path) = set("set.json", &[fields]);
     std::fs::create_dir(folder.path().join("val")).unwrap();
     std::fs::write(folder.path().join("val/000000000042.png"), png(5)).unwrap();
@@ -210,14 +177,8 @@ fn messages_excerpt_long_values() {
             let (_folder, path) = set("set.json", &[bad.clone()]);
             let problem = refusal(&path, &args);
             let longest = problem.lines().map(|line| line.chars().count()).max();
-            assert!(
-                longest <= Some(620) && problem.len() < 2000,
-                "{column}: {problem}"
-            );
-            assert!(
-                !(column == "image" && problem.contains("no such file")),
-                "{problem}"
-            );
+            assert!(longest <= Some(620) && problem.len() < 2000, "{column}: {problem}");
+            assert!(!(column == "image" && problem.contains("no such file")), "{problem}");
         }
     }
 }

@@ -20,16 +20,8 @@ fn ceramic(rng: &mut SeededRng) -> (Surface, &'static str) {
 pub(crate) fn vanity(rng: &mut SeededRng) -> FurnitureSet {
     let names = ["brown", "brown", "grey", "blue", "green", "black"];
     let paint = Paint::random(&names, rng);
-    let base = cabinet_in_paint(
-        kind("bathroom cabinet", "cabinet"),
-        vec3(0.8, 0.74, 0.48),
-        2,
-        paint,
-    );
-    FurnitureSet::from_piece(base).with(
-        parts::piece("sink:3", rng),
-        Pose::new(vec3(0.0, 0.74, 0.0), 0.0),
-    )
+    let base = cabinet_in_paint(kind("bathroom cabinet", "cabinet"), vec3(0.8, 0.74, 0.48), 2, paint);
+    FurnitureSet::from_piece(base).with(parts::piece("sink:3", rng), Pose::new(vec3(0.0, 0.74, 0.0), 0.0))
 }
 
 /// A bathtub along the wall, open above.
@@ -39,18 +31,8 @@ pub(crate) fn bathtub(rng: &mut SeededRng) -> Piece {
     let (length, height, depth) = (rng.between(1.55, 1.75), 0.56, 0.74);
     let mut mesh = Mesh::default();
     let outside = [(0.0, -0.03), (height - 0.04, -0.005)];
-    let rim = [
-        (height - 0.04, 0.0),
-        (height - 0.01, 0.012),
-        (height, 0.0),
-        (height, -0.06),
-    ];
-    let inside = [
-        (height, -0.06),
-        (height * 0.5, -0.1),
-        (0.16, -0.18),
-        (0.13, -0.3),
-    ];
+    let rim = [(height - 0.04, 0.0), (height - 0.01, 0.012), (height, 0.0), (height, -0.06)];
+    let inside = [(height, -0.06), (height * 0.5, -0.1), (0.16, -0.18), (0.13, -0.3)];
     for profile in [&outside[..], &rim, &inside] {
         let rings: Vec<Vec<Vec3>> = profile
             .iter()
@@ -72,12 +54,7 @@ pub(crate) fn bathtub(rng: &mut SeededRng) -> Piece {
     );
     let tap = vec3(length / 2.0 - 0.08, height, depth / 2.0);
     mesh.rod(tap, tap + vec3(0.0, 0.16, 0.0), 0.018, &steel);
-    mesh.rod(
-        tap + vec3(0.0, 0.15, 0.0),
-        tap + vec3(-0.16, 0.12, 0.0),
-        0.014,
-        &steel,
-    );
+    mesh.rod(tap + vec3(0.0, 0.15, 0.0), tap + vec3(-0.16, 0.12, 0.0), 0.014, &steel);
     Piece::new(kind("bathtub", "bathtub"), mesh, name)
 }
 

@@ -13,11 +13,7 @@ use super::{FurnitureSet, add_legs};
 /// A bed with a blanket and one or two pillows.
 pub(crate) fn bed(rng: &mut SeededRng) -> FurnitureSet {
     let is_double = rng.chance(0.6);
-    let width = if is_double {
-        rng.between(1.45, 1.7)
-    } else {
-        rng.between(0.95, 1.1)
-    };
+    let width = if is_double { rng.between(1.45, 1.7) } else { rng.between(0.95, 1.1) };
     let half = width / 2.0;
     let length = 2.05;
     let mut mesh = Mesh::default();
@@ -29,22 +25,10 @@ pub(crate) fn bed(rng: &mut SeededRng) -> FurnitureSet {
     mesh.board(half, [0.16, 0.3], [0.02, length], &wood);
     let head_height = rng.between(0.85, 1.1);
     mesh.cushion(half + 0.03, [0.1, head_height], [0.0, 0.07], 0.03, &wood);
-    mesh.cushion(
-        half - 0.02,
-        [0.28, 0.5],
-        [0.07, length - 0.02],
-        0.07,
-        &sheet,
-    );
+    mesh.cushion(half - 0.02, [0.28, 0.5], [0.07, length - 0.02], 0.07, &sheet);
     // The blanket overhangs both sides and the foot of the bed. It is folded back at `fold`, measured from the head.
     let fold = rng.between(0.55, 0.7);
-    mesh.cushion(
-        half + 0.035,
-        [0.2, 0.56],
-        [fold, length + 0.035],
-        0.06,
-        &blanket,
-    );
+    mesh.cushion(half + 0.035, [0.2, 0.56], [fold, length + 0.035], 0.06, &blanket);
     mesh.cushion(
         half + 0.03,
         [0.44, 0.575],
@@ -66,13 +50,7 @@ pub(crate) fn bed(rng: &mut SeededRng) -> FurnitureSet {
 }
 
 /// A pillow or cushion with its center at the origin, tilted backwards by `lean` radians.
-pub(crate) fn pillow(
-    word: &'static str,
-    size: Vec3,
-    lean: f32,
-    surface: &Surface,
-    color: &'static str,
-) -> Piece {
+pub(crate) fn pillow(word: &'static str, size: Vec3, lean: f32, surface: &Surface, color: &'static str) -> Piece {
     let mut mesh = Mesh::default();
     mesh.pillow(Vec3::ZERO, size, -lean, surface);
     Piece::new(kind(word, "cushion"), mesh, color)

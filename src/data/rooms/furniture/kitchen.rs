@@ -25,9 +25,7 @@ pub(crate) struct Style {
 
 impl Style {
     pub(crate) fn new(rng: &mut SeededRng) -> Self {
-        let cabinets = [
-            "white", "brown", "brown", "blue", "green", "grey", "red", "yellow",
-        ];
+        let cabinets = ["white", "brown", "brown", "blue", "green", "grey", "red", "yellow"];
         let counters = ["white", "black", "grey", "brown", "green", "blue"];
         Self {
             cabinets: Paint::random(&cabinets, rng),
@@ -43,12 +41,7 @@ impl Style {
 }
 
 /// Cabinets below a counter, with a sink if `sink` is set.
-pub(crate) fn base_cabinets(
-    width: f32,
-    sink: bool,
-    style: &Style,
-    rng: &mut SeededRng,
-) -> FurnitureSet {
+pub(crate) fn base_cabinets(width: f32, sink: bool, style: &Style, rng: &mut SeededRng) -> FurnitureSet {
     let doors = ((width / 0.5) as usize).max(1);
     let base = cabinet_in_paint(
         kind("kitchen cabinet", "cabinet"),
@@ -64,10 +57,7 @@ pub(crate) fn base_cabinets(
         let [half, back, front] = hole;
         for [from, to] in [
             [vec3(-width / 2.0, low, 0.0), vec3(width / 2.0, high, back)],
-            [
-                vec3(-width / 2.0, low, front),
-                vec3(width / 2.0, high, DEPTH),
-            ],
+            [vec3(-width / 2.0, low, front), vec3(width / 2.0, high, DEPTH)],
             [vec3(-width / 2.0, low, 0.0), vec3(-half, high, DEPTH)],
             [vec3(half, low, 0.0), vec3(width / 2.0, high, DEPTH)],
         ] {
@@ -79,24 +69,12 @@ pub(crate) fn base_cabinets(
     mesh.board(width / 2.0, [high, high + 0.06], [0.0, 0.02], &top);
     let counter = Piece::new(kind("kitchen counter", "counter"), mesh, style.counter.name);
     let set = FurnitureSet::from_piece(base).with(counter, Pose::new(Vec3::ZERO, 0.0));
-    let set = if sink {
-        set.with(parts::piece("sink:2", rng), Pose::new(Vec3::ZERO, 0.0))
-    } else {
-        set
-    };
-    FurnitureSet {
-        size: vec3(width, COUNTER, DEPTH),
-        ..set
-    }
+    let set = if sink { set.with(parts::piece("sink:2", rng), Pose::new(Vec3::ZERO, 0.0)) } else { set };
+    FurnitureSet { size: vec3(width, COUNTER, DEPTH), ..set }
 }
 
 /// Wall cabinets, with their lower edge at y = 0.
 pub(crate) fn wall_cabinets(width: f32, style: &Style) -> Piece {
     let doors = ((width / 0.45) as usize).max(1);
-    cabinet_in_paint(
-        kind("kitchen cabinet", "cabinet"),
-        vec3(width, 0.68, 0.35),
-        doors,
-        style.cabinets,
-    )
+    cabinet_in_paint(kind("kitchen cabinet", "cabinet"), vec3(width, 0.68, 0.35), doors, style.cabinets)
 }

@@ -26,15 +26,13 @@ pub(super) struct FurnitureSet {
 }
 
 impl FurnitureSet {
-    /// Creates a set of one piece. Its size is a box from y = 0 and z = 0, symmetric about x = 0, that contains the piece.
+    /// Creates a set of one piece. Its size is a box from y = 0 and z = 0, symmetric about x = 0, that contains the
+    /// piece.
     pub(super) fn from_piece(piece: Piece) -> Self {
         let [low, high] = bounds(&piece.mesh.faces);
         let width = 2.0 * high.x.max(-low.x);
         let size = vec3(width, high.y, high.z);
-        Self {
-            pieces: vec![(piece, Pose::new(Vec3::ZERO, 0.0))],
-            size,
-        }
+        Self { pieces: vec![(piece, Pose::new(Vec3::ZERO, 0.0))], size }
     }
 
     /// Returns the set with one more piece; `size` stays the same.
@@ -44,14 +42,11 @@ impl FurnitureSet {
     }
 }
 
-/// Adds four square legs under a plate. `size` is the width of the plate, the height of the legs, and the depth of the plate.
+/// Adds four square legs under a plate. `size` is the width of the plate, the height of the legs, and the depth of the
+/// plate.
 fn add_legs(mesh: &mut Mesh, size: Vec3, inset: f32, thick: f32, surface: &Surface) {
     for (x, z) in [(-1.0, 0.0), (1.0, 0.0), (-1.0, 1.0), (1.0, 1.0)] {
-        let foot = vec3(
-            x * (size.x / 2.0 - inset),
-            0.0,
-            inset + z * (size.z - 2.0 * inset),
-        );
+        let foot = vec3(x * (size.x / 2.0 - inset), 0.0, inset + z * (size.z - 2.0 * inset));
         mesh.slab(foot, vec3(thick, size.y, thick), surface);
     }
 }

@@ -1,7 +1,7 @@
 //! Pieces described by a table: [`piece`] makes one by its name, [`names_found_at`] lists names by place.
 //!
-//! `parts.txt` describes small objects, lamps and other furniture of a fixed form. A new object needs only a few lines of text; the head of
-//! the table documents the format.
+//! `parts.txt` describes small objects, lamps and other furniture of a fixed form. A new object needs only a few lines
+//! of text; the head of the table documents the format.
 
 use std::sync::LazyLock;
 
@@ -62,11 +62,7 @@ enum Copies {
 /// The first line that cannot be parsed.
 fn parse(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
     let mut recipes: Vec<Recipe> = Vec::new();
-    for line in table
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-        .filter(|line| !line.trim().is_empty())
-    {
+    for line in table.lines().filter(|line| !line.starts_with('#')).filter(|line| !line.trim().is_empty()) {
         if line.starts_with('[') {
             recipes.push(parse_head(line).ok_or(line)?);
         } else {
@@ -111,9 +107,7 @@ fn parse_solid(line: &'static str) -> Option<Solid> {
         copies,
         shape: words.next()?,
         surface: words.next()?,
-        numbers: words
-            .map(|number| number.parse().ok())
-            .collect::<Option<_>>()?,
+        numbers: words.map(|number| number.parse().ok()).collect::<Option<_>>()?,
     })
 }
 
@@ -121,8 +115,7 @@ impl Solid {
     /// True if shape and numbers are valid.
     fn is_valid(&self) -> bool {
         let surface = Surface::plain([128, 128, 128]);
-        self.shape == "light" && self.numbers.len() == 5
-            || self.add_to(&mut Mesh::default(), &surface).is_some()
+        self.shape == "light" && self.numbers.len() == 5 || self.add_to(&mut Mesh::default(), &surface).is_some()
     }
 
     /// Adds the solid to a mesh; `None` if its shape is unknown or its numbers do not fit the shape.
@@ -174,10 +167,7 @@ impl Solid {
 }
 
 fn pairs(numbers: &[f32]) -> Vec<(f32, f32)> {
-    numbers
-        .chunks_exact(2)
-        .map(|pair| (pair[0], pair[1]))
-        .collect()
+    numbers.chunks_exact(2).map(|pair| (pair[0], pair[1])).collect()
 }
 
 /// Returns the paint for a colour of the table: a name or a hexadecimal code.
@@ -218,8 +208,7 @@ fn parse_surface(word: &str, main: Paint, rng: &mut SeededRng) -> Surface {
         "=" => Surface::wood(paint, 0),
         "/" => Surface::wood(paint, 1),
         "^" => Surface::paint(paint).with_pattern(Pattern::Pile),
-        "%" => Surface::paint(paint)
-            .with_pattern(Pattern::Tiles([0.24, 0.08], linear_rgb([186, 180, 170]))),
+        "%" => Surface::paint(paint).with_pattern(Pattern::Tiles([0.24, 0.08], linear_rgb([186, 180, 170]))),
         _ => Surface::paint(paint),
     }
 }
@@ -243,10 +232,7 @@ fn find(name: &str) -> Option<&'static Recipe> {
 pub(crate) fn piece_in_paint(name: &str, main: Paint, rng: &mut SeededRng) -> Piece {
     let mut mesh = Mesh::default();
     let Some(recipe) = find(name) else {
-        let nothing = ThingKind {
-            word: "",
-            class: "objects",
-        };
+        let nothing = ThingKind { word: "", class: "objects" };
         return Piece::new(nothing, mesh, "");
     };
     let scale = rng.between(recipe.scale[0], recipe.scale[1]);
@@ -254,11 +240,7 @@ pub(crate) fn piece_in_paint(name: &str, main: Paint, rng: &mut SeededRng) -> Pi
     for solid in &recipe.solids {
         match (solid.shape, &solid.numbers[..]) {
             ("light", &[x, y, z, radius, strength]) => {
-                light = Some(LightSource::Bulb {
-                    middle: vec3(x, y, z) * scale,
-                    radius,
-                    radiance: WARM * strength,
-                });
+                light = Some(LightSource::Bulb { middle: vec3(x, y, z) * scale, radius, radiance: WARM * strength });
             }
             _ => solid.add_all_to(&mut mesh, &parse_surface(solid.surface, main, rng)),
         }
@@ -271,11 +253,7 @@ pub(crate) fn piece_in_paint(name: &str, main: Paint, rng: &mut SeededRng) -> Pi
 
 /// Names of the things that are found at a place, such as `floor`.
 pub(crate) fn names_found_at(place: &str) -> Vec<&'static str> {
-    RECIPES
-        .iter()
-        .filter(|recipe| recipe.places.contains(&place))
-        .map(|recipe| recipe.name)
-        .collect()
+    RECIPES.iter().filter(|recipe| recipe.places.contains(&place)).map(|recipe| recipe.name).collect()
 }
 
 #[cfg(test)]
@@ -296,11 +274,7 @@ mod tests {
     #[test]
     fn invalid_line_is_the_error() {
         let head = "[x] objects | floor | 1 1 | red\n";
-        for line in [
-            "box main 1 2 3",
-            "bax main 0 1 0 1 0 1",
-            "*x box main 0 1 0 1 0 1",
-        ] {
+        for line in ["box main 1 2 3", "bax main 0 1 0 1 0 1", "*x box main 0 1 0 1 0 1"] {
             let table: &'static str = format!("{head}{line}").leak();
             assert_eq!(parse(table).err(), Some(line));
         }

@@ -12,16 +12,8 @@ use super::{FurnitureSet, add_legs};
 
 /// A chair with four legs and a back.
 pub(crate) fn chair(name: ThingKind, paint: Paint, rng: &mut SeededRng) -> Piece {
-    let surface = if rng.chance(0.5) {
-        Surface::wood(paint, 1)
-    } else {
-        Surface::gloss(paint)
-    };
-    let back = if rng.chance(0.5) {
-        ChairBack::Closed
-    } else {
-        ChairBack::Slats
-    };
+    let surface = if rng.chance(0.5) { Surface::wood(paint, 1) } else { Surface::gloss(paint) };
+    let back = if rng.chance(0.5) { ChairBack::Closed } else { ChairBack::Slats };
     chair_with_back(name, paint, &surface, back)
 }
 
@@ -33,23 +25,12 @@ pub(crate) enum ChairBack {
 }
 
 /// A chair with a given kind of back.
-pub(crate) fn chair_with_back(
-    name: ThingKind,
-    paint: Paint,
-    surface: &Surface,
-    back: ChairBack,
-) -> Piece {
+pub(crate) fn chair_with_back(name: ThingKind, paint: Paint, surface: &Surface, back: ChairBack) -> Piece {
     let mut mesh = Mesh::default();
     let (width, depth, seat) = (0.44, 0.44, 0.45);
     let half = width / 2.0;
     add_legs(&mut mesh, vec3(width, seat, depth), 0.03, 0.04, surface);
-    mesh.cushion(
-        half,
-        [seat - 0.03, seat + 0.025],
-        [0.0, depth],
-        0.02,
-        surface,
-    );
+    mesh.cushion(half, [seat - 0.03, seat + 0.025], [0.0, depth], 0.02, surface);
     let top = 0.94;
     let post = vec3(0.04, top - seat, 0.04);
     mesh.mirrored_slabs(vec3(half - 0.03, seat, 0.03), post, surface);
@@ -57,11 +38,7 @@ pub(crate) fn chair_with_back(
         mesh.cushion(half, [top - 0.12, top], [0.01, 0.05], 0.015, surface);
         for i in -2..=2 {
             let x = i as f32 * 0.075;
-            mesh.slab(
-                vec3(x, seat, 0.03),
-                vec3(0.026, top - seat - 0.06, 0.018),
-                surface,
-            );
+            mesh.slab(vec3(x, seat, 0.03), vec3(0.026, top - seat - 0.06, 0.018), surface);
         }
     } else {
         mesh.cushion(half, [seat + 0.1, top], [0.01, 0.055], 0.02, surface);
@@ -80,10 +57,7 @@ pub(crate) fn sofa(seats: usize, rng: &mut SeededRng) -> FurnitureSet {
             if piece.color == paint.name {
                 piece = cushion(rng);
             }
-            set = set.with(
-                piece,
-                Pose::new(vec3(x * (width / 2.0 - 0.42), 0.64, 0.36), x * -0.2),
-            );
+            set = set.with(piece, Pose::new(vec3(x * (width / 2.0 - 0.42), 0.64, 0.36), x * -0.2));
         }
     }
     set
@@ -109,27 +83,12 @@ fn upholstered(name: ThingKind, seats: usize, paint: Paint, rng: &mut SeededRng)
     mesh.cushion(half, [0.12, back], [0.0, 0.2], 0.06, &cloth);
     for x in [-1.0, 1.0_f32] {
         let (a, b) = (x * half, x * (half - arm));
-        mesh.rounded_box(
-            vec3(a.min(b), 0.1, 0.0),
-            vec3(a.max(b), 0.62, depth + 0.01),
-            0.06,
-            &cloth,
-        );
+        mesh.rounded_box(vec3(a.min(b), 0.1, 0.0), vec3(a.max(b), 0.62, depth + 0.01), 0.06, &cloth);
     }
     for i in 0..seats {
         let left = -half + arm + i as f32 * seat;
-        mesh.rounded_box(
-            vec3(left + 0.004, 0.32, 0.16),
-            vec3(left + seat - 0.004, 0.46, depth + 0.03),
-            0.05,
-            &cloth,
-        );
-        mesh.rounded_box(
-            vec3(left + 0.006, 0.44, 0.13),
-            vec3(left + seat - 0.006, back + 0.03, 0.3),
-            0.07,
-            &cloth,
-        );
+        mesh.rounded_box(vec3(left + 0.004, 0.32, 0.16), vec3(left + seat - 0.004, 0.46, depth + 0.03), 0.05, &cloth);
+        mesh.rounded_box(vec3(left + 0.006, 0.44, 0.13), vec3(left + seat - 0.006, back + 0.03, 0.3), 0.07, &cloth);
     }
     Piece::new(name, mesh, paint.name)
 }

@@ -10,10 +10,8 @@ use super::super::surface::Surface;
 use super::add_legs;
 
 /// Colours of tables. A colour that is listed more often is more likely.
-const COLORS: [&str; 11] = [
-    "brown", "brown", "brown", "white", "black", "orange", "grey", "purple", "green", "blue",
-    "yellow",
-];
+const COLORS: [&str; 11] =
+    ["brown", "brown", "brown", "white", "black", "orange", "grey", "purple", "green", "blue", "yellow"];
 
 fn finish(paint: Paint) -> Surface {
     match paint.name {
@@ -28,19 +26,8 @@ pub(crate) fn table(name: ThingKind, size: Vec3, rng: &mut SeededRng) -> Piece {
     let surface = finish(paint);
     let mut mesh = Mesh::default();
     add_legs(&mut mesh, size - vec3(0.0, 0.03, 0.0), 0.06, 0.06, &surface);
-    mesh.board(
-        size.x / 2.0 - 0.05,
-        [size.y - 0.11, size.y - 0.03],
-        [0.05, size.z - 0.05],
-        &surface,
-    );
-    mesh.cushion(
-        size.x / 2.0,
-        [size.y - 0.035, size.y],
-        [0.0, size.z],
-        0.012,
-        &surface,
-    );
+    mesh.board(size.x / 2.0 - 0.05, [size.y - 0.11, size.y - 0.03], [0.05, size.z - 0.05], &surface);
+    mesh.cushion(size.x / 2.0, [size.y - 0.035, size.y], [0.0, size.z], 0.012, &surface);
     Piece::new(name, mesh, paint.name)
 }
 

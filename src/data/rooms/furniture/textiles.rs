@@ -9,8 +9,8 @@ use super::super::scene::{Piece, kind};
 use super::super::seeded_rng::SeededRng;
 use super::super::surface::Surface;
 
-/// The two curtains at the sides of a window of a width, from y = 0 downwards. Each is one thing; the rod belongs to the
-/// first.
+/// The two curtains at the sides of a window of a width, from y = 0 downwards. Each is one thing; the rod belongs to
+/// the first.
 pub(crate) fn curtains(window: f32, drop: f32, rng: &mut SeededRng) -> [Piece; 2] {
     let paint = Paint::random(&COMMON_COLORS, rng);
     let cloth = Surface::fabric(paint, rng);
@@ -51,12 +51,7 @@ pub(crate) fn towel(rng: &mut SeededRng) -> Piece {
     mesh.board(a, [b, b + 0.022], [0.045, 0.095], &cloth);
     let steel = Surface::steel();
     let reach = width / 2.0 + 0.06;
-    mesh.rod(
-        vec3(-reach, 0.0, 0.068),
-        vec3(reach, 0.0, 0.068),
-        0.01,
-        &steel,
-    );
+    mesh.rod(vec3(-reach, 0.0, 0.068), vec3(reach, 0.0, 0.068), 0.01, &steel);
     for x in [-reach, reach] {
         mesh.rod(vec3(x, 0.0, 0.0), vec3(x, 0.0, 0.07), 0.012, &steel);
     }
@@ -65,23 +60,11 @@ pub(crate) fn towel(rng: &mut SeededRng) -> Piece {
 
 /// A rug of a size, with its center at the origin.
 pub(crate) fn rug(width: f32, depth: f32, rng: &mut SeededRng) -> Piece {
-    let tints = [
-        [136, 74, 62],
-        [78, 92, 116],
-        [166, 150, 124],
-        [96, 104, 82],
-        [72, 66, 74],
-    ];
+    let tints = [[136, 74, 62], [78, 92, 116], [166, 150, 124], [96, 104, 82], [72, 66, 74]];
     let borders = [[226, 216, 196], [70, 58, 56], [206, 188, 140]];
     let border = Surface::plain(rng.pick(&borders)).color;
-    let surface =
-        Surface::plain(rng.pick(&tints)).with_pattern(Pattern::Rug(vec2(width, depth), border));
+    let surface = Surface::plain(rng.pick(&tints)).with_pattern(Pattern::Rug(vec2(width, depth), border));
     let mut mesh = Mesh::default();
-    mesh.board(
-        width / 2.0,
-        [0.0, 0.012],
-        [-depth / 2.0, depth / 2.0],
-        &surface,
-    );
+    mesh.board(width / 2.0, [0.0, 0.012], [-depth / 2.0, depth / 2.0], &surface);
     Piece::new(kind("rug", "floor"), mesh, "")
 }

@@ -10,15 +10,13 @@ use super::super::seeded_rng::SeededRng;
 use super::super::surface::{Surface, SurfaceFinish};
 use super::parts;
 
-/// Adds a frame of four bars around a rectangle with its lower edge at y = 0. `bar` is the width of a bar, `thick` its depth.
+/// Adds a frame of four bars around a rectangle with its lower edge at y = 0. `bar` is the width of a bar, `thick` its
+/// depth.
 fn add_frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, surface: &Surface) {
     let (left, right) = (-width / 2.0, width / 2.0);
     for [low, high] in [
         [vec3(left - bar, -bar, 0.0), vec3(left, height + bar, thick)],
-        [
-            vec3(right, -bar, 0.0),
-            vec3(right + bar, height + bar, thick),
-        ],
+        [vec3(right, -bar, 0.0), vec3(right + bar, height + bar, thick)],
         [vec3(left, -bar, 0.0), vec3(right, 0.0, thick)],
         [vec3(left, height, 0.0), vec3(right, height + bar, thick)],
     ] {
@@ -29,15 +27,7 @@ fn add_frame(mesh: &mut Mesh, width: f32, height: f32, bar: f32, thick: f32, sur
 /// Adds a vertical rectangle with its lower edge at y = 0.
 fn add_sheet(mesh: &mut Mesh, width: f32, height: f32, z: f32, surface: &Surface) {
     let (left, right) = (-width / 2.0, width / 2.0);
-    mesh.quad(
-        [
-            vec3(left, 0.0, z),
-            vec3(right, 0.0, z),
-            vec3(right, height, z),
-            vec3(left, height, z),
-        ],
-        surface,
-    );
+    mesh.quad([vec3(left, 0.0, z), vec3(right, 0.0, z), vec3(right, height, z), vec3(left, height, z)], surface);
 }
 
 pub(crate) fn picture(rng: &mut SeededRng) -> Piece {
@@ -82,12 +72,7 @@ fn flat_screen_piece(name: ThingKind, width: f32, foot: bool) -> Piece {
     let lift = if foot { 0.09 } else { 0.0 };
     let z = if foot { 0.1 } else { 0.0 };
     mesh.board(width / 2.0, [lift, lift + height], [z, z + 0.035], &case);
-    mesh.board(
-        width / 2.0 - 0.015,
-        [lift + 0.02, lift + height - 0.015],
-        [z + 0.035, z + 0.037],
-        &screen,
-    );
+    mesh.board(width / 2.0 - 0.015, [lift + 0.02, lift + height - 0.015], [z + 0.035, z + 0.037], &screen);
     if foot {
         mesh.slab(vec3(0.0, 0.0, 0.12), vec3(width * 0.36, 0.012, 0.2), &case);
         mesh.slab(vec3(0.0, 0.0, 0.1), vec3(0.06, 0.14, 0.02), &case);
@@ -99,21 +84,12 @@ fn flat_screen_piece(name: ThingKind, width: f32, foot: bool) -> Piece {
 pub(crate) fn window(width: f32, height: f32, daylight: f32) -> Piece {
     let half = width / 2.0;
     let white = Surface::plain([240, 240, 238]);
-    let view = Surface {
-        color: Vec3::ONE,
-        pattern: Pattern::Outdoors(height),
-        finish: SurfaceFinish::Glow(1.4),
-    };
+    let view = Surface { color: Vec3::ONE, pattern: Pattern::Outdoors(height), finish: SurfaceFinish::Glow(1.4) };
     let mut mesh = Mesh::default();
     add_sheet(&mut mesh, width, height, 0.012, &view);
     add_frame(&mut mesh, width, height, 0.06, 0.05, &white);
     mesh.board(0.02, [0.0, height], [0.0, 0.04], &white);
-    mesh.board(
-        half,
-        [height * 0.55, height * 0.55 + 0.03],
-        [0.0, 0.035],
-        &white,
-    );
+    mesh.board(half, [height * 0.55, height * 0.55 + 0.03], [0.0, 0.035], &white);
     mesh.board(half + 0.1, [-0.08, -0.05], [0.0, 0.14], &white);
     let mut piece = Piece::new(kind("window", "window"), mesh, "");
     piece.light = Some(LightSource::Panel {
@@ -125,16 +101,11 @@ pub(crate) fn window(width: f32, height: f32, daylight: f32) -> Piece {
     piece
 }
 
-/// Blinds in front of a window of this width and height, with the lower edge of the pane at y = 0. `share` is the covered part of the
-/// height, in 0..1.
+/// Blinds in front of a window of this width and height, with the lower edge of the pane at y = 0. `share` is the
+/// covered part of the height, in 0..1.
 pub(crate) fn blinds(width: f32, height: f32, share: f32, rng: &mut SeededRng) -> Piece {
     let half = width / 2.0;
-    let paint = Paint::random(
-        &[
-            "white", "grey", "brown", "green", "blue", "yellow", "orange", "red",
-        ],
-        rng,
-    );
+    let paint = Paint::random(&["white", "grey", "brown", "green", "blue", "yellow", "orange", "red"], rng);
     let slat = Surface::paint(paint);
     let mut mesh = Mesh::default();
     mesh.board(half, [height - 0.02, height + 0.04], [0.07, 0.11], &slat);
@@ -161,12 +132,7 @@ pub(crate) fn door([width, height]: [f32; 2], angle: f32, rng: &mut SeededRng) -
     let mut mesh = Mesh::default();
     let side = vec3(0.08, height, 0.14);
     mesh.mirrored_slabs(vec3(half + 0.03, 0.0, -0.05), side, &frame_surface);
-    mesh.board(
-        half + 0.07,
-        [height - 0.02, height + 0.06],
-        [-0.12, 0.02],
-        &frame_surface,
-    );
+    mesh.board(half + 0.07, [height - 0.02, height + 0.06], [-0.12, 0.02], &frame_surface);
     let leaf = parts::piece("door", rng);
     let hinge = vec3(0.01 - half, 0.0, if angle > 0.0 { -0.07 } else { 0.045 });
     mesh.add(&leaf.mesh, hinge, angle);

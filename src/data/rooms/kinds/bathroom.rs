@@ -22,10 +22,7 @@ pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
     }
     if !tub || plan.rng.chance(0.5) {
         plan.focus_on_next();
-        let set = FurnitureSet::from_piece(parts::piece(
-            ["shower", "shower:2"][plan.rng.below(2)],
-            &mut plan.rng,
-        ));
+        let set = FurnitureSet::from_piece(parts::piece(["shower", "shower:2"][plan.rng.below(2)], &mut plan.rng));
         plan.place_in_corner(&set, &WALLS);
     }
     if plan.rng.chance(0.92) {
@@ -50,11 +47,7 @@ pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
             plan.hang_above(&pose, piece, 1.22);
         }
     }
-    let dressing = plan.rng.pick(&[
-        WindowDressing::Blinds,
-        WindowDressing::Bare,
-        WindowDressing::Curtains,
-    ]);
+    let dressing = plan.rng.pick(&[WindowDressing::Blinds, WindowDressing::Bare, WindowDressing::Curtains]);
     plan.add_window(&WALLS, 0.75, 1.25, dressing);
     for _ in 0..2 {
         plan.maybe_hang(0.7, 1.35, textiles::towel);

@@ -19,11 +19,7 @@ pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
     add_bed(&mut plan, wall);
     plan.add_door(&[wall.opposite()]);
     let width = plan.rng.between(1.1, 1.5);
-    let dressing = if plan.rng.chance(0.75) {
-        WindowDressing::Curtains
-    } else {
-        WindowDressing::Blinds
-    };
+    let dressing = if plan.rng.chance(0.75) { WindowDressing::Curtains } else { WindowDressing::Blinds };
     plan.add_windows(&wall.neighbours(), width, 0.85, dressing);
     if let Some(pose) = plan.maybe_place_at_wall(0.6, dresser) {
         plan.camera_targets.push(plan.scene.things.len() - 1);
@@ -31,17 +27,10 @@ pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
             let piece = walls::mirror(0.6, 0.7, &mut plan.rng);
             plan.hang_above(&pose, piece, 1.1);
         } else if plan.rng.chance(0.4) {
-            plan.add_relative(
-                &pose,
-                walls::television(0.8, true),
-                vec3(0.0, 0.9, 0.05),
-                0.0,
-            );
+            plan.add_relative(&pose, walls::television(0.8, true), vec3(0.0, 0.9, 0.05), 0.0);
         }
     }
-    plan.maybe_place_at_wall(0.35, |rng| {
-        storage::cabinet(kind("wardrobe", "furniture"), vec3(1.2, 2.0, 0.58), 2, rng)
-    });
+    plan.maybe_place_at_wall(0.35, |rng| storage::cabinet(kind("wardrobe", "furniture"), vec3(1.2, 2.0, 0.58), 2, rng));
     plan.maybe_place_at_wall(0.4, |rng| {
         let paint = Paint::random(&ALL_COLORS, rng);
         seats::chair(kind("chair", "chair"), paint, rng)

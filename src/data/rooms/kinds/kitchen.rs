@@ -22,11 +22,7 @@ pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
     add_kitchen_row(&mut plan, wall, &style);
     let [left, right] = wall.neighbours();
     plan.add_door(&[wall.opposite()]);
-    let dressing = plan.rng.pick(&[
-        WindowDressing::Bare,
-        WindowDressing::Blinds,
-        WindowDressing::Curtains,
-    ]);
+    let dressing = plan.rng.pick(&[WindowDressing::Bare, WindowDressing::Blinds, WindowDressing::Curtains]);
     plan.add_windows(&[left, right, wall.opposite()], 1.2, 1.05, dressing);
     add_eating_area(&mut plan, wall);
     plan.maybe_place_plant(0.3);
@@ -64,9 +60,7 @@ fn add_kitchen_row(plan: &mut FloorPlan, wall: Wall, style: &Style) {
     }
     plan.focus_on_next();
     let stove = style.appliance("stove", &mut plan.rng);
-    if let Some(pose) =
-        plan.try_place_at_wall(FurnitureSet::from_piece(stove), wall, next_middle(0.63))
-    {
+    if let Some(pose) = plan.try_place_at_wall(FurnitureSet::from_piece(stove), wall, next_middle(0.63)) {
         let hood = parts::piece("range hood", &mut plan.rng);
         plan.hang_above(&pose, hood, 1.6);
     }

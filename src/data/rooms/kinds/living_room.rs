@@ -20,11 +20,7 @@ pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
     add_opposite_sofa(&mut plan, facing);
     plan.add_door(&[wall.neighbours()[0], facing]);
     let width = plan.rng.between(1.3, 1.9);
-    let dressing = if plan.rng.chance(0.75) {
-        WindowDressing::Curtains
-    } else {
-        WindowDressing::Bare
-    };
+    let dressing = if plan.rng.chance(0.75) { WindowDressing::Curtains } else { WindowDressing::Bare };
     plan.add_windows(&wall.neighbours(), width, 0.7, dressing);
     plan.maybe_place_at_wall(0.45, storage::bookshelf);
     plan.maybe_place_at_wall(0.6, |rng| parts::piece("floor lamp", rng));
@@ -71,12 +67,7 @@ fn add_sofa_group(plan: &mut FloorPlan, wall: Wall) {
         plan.place_away_from_walls(piece, place, pose.angle - side * 1.9);
     }
     if plan.rng.chance(0.5) {
-        let piece = FurnitureSet::from_piece(tables::round(
-            kind("side table", "table"),
-            0.24,
-            0.5,
-            &mut plan.rng,
-        ));
+        let piece = FurnitureSet::from_piece(tables::round(kind("side table", "table"), 0.24, 0.5, &mut plan.rng));
         let place = along + size.x / 2.0 + 0.32;
         if let Some(pose) = plan.try_place_at_wall(piece, wall, place) {
             plan.add_part(&pose, "table lamp", vec3(0.0, 0.5, 0.1));
@@ -99,12 +90,7 @@ fn add_opposite_sofa(plan: &mut FloorPlan, wall: Wall) {
         return;
     }
     let width = plan.rng.between(1.3, 1.7);
-    let cabinet = storage::cabinet(
-        kind("cabinet", "cabinet"),
-        vec3(width, 0.5, 0.42),
-        3,
-        &mut plan.rng,
-    );
+    let cabinet = storage::cabinet(kind("cabinet", "cabinet"), vec3(width, 0.5, 0.42), 3, &mut plan.rng);
     if let Some(pose) = plan.try_place_at_wall(FurnitureSet::from_piece(cabinet), wall, along) {
         let screen = plan.rng.between(1.0, 1.25);
         let tv = walls::television(screen, true);

@@ -24,14 +24,8 @@ pub(super) enum RoomKind {
 
 impl RoomKind {
     /// All kinds, in the order in which scenes use them.
-    pub(super) const ALL: [Self; 6] = [
-        Self::Bedroom,
-        Self::Bathroom,
-        Self::Kitchen,
-        Self::LivingRoom,
-        Self::DiningRoom,
-        Self::Office,
-    ];
+    pub(super) const ALL: [Self; 6] =
+        [Self::Bedroom, Self::Bathroom, Self::Kitchen, Self::LivingRoom, Self::DiningRoom, Self::Office];
 
     /// Name of the kind, such as `living room`.
     pub(super) fn name(self) -> &'static str {

@@ -18,11 +18,7 @@ pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
     add_desk(&mut plan, wall);
     plan.add_door(&[wall.opposite()]);
     let width = plan.rng.between(1.1, 1.6);
-    let dressing = plan.rng.pick(&[
-        WindowDressing::Blinds,
-        WindowDressing::Curtains,
-        WindowDressing::Bare,
-    ]);
+    let dressing = plan.rng.pick(&[WindowDressing::Blinds, WindowDressing::Curtains, WindowDressing::Bare]);
     plan.add_windows(&wall.neighbours(), width, 0.9, dressing);
     if plan.maybe_place_at_wall(0.8, storage::bookshelf).is_some() {
         plan.camera_targets.push(plan.scene.things.len() - 1);

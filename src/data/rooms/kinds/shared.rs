@@ -28,19 +28,15 @@ impl FloorPlan {
     }
 
     /// Hangs a piece on a random wall, `up` metres high, with this probability.
-    pub(super) fn maybe_hang(
-        &mut self,
-        probability: f32,
-        up: f32,
-        make: impl FnOnce(&mut SeededRng) -> Piece,
-    ) {
+    pub(super) fn maybe_hang(&mut self, probability: f32, up: f32, make: impl FnOnce(&mut SeededRng) -> Piece) {
         if self.rng.chance(probability) {
             let piece = make(&mut self.rng);
             self.hang(&piece, &WALLS, up);
         }
     }
 
-    /// Adds a piece of the parts table on another piece, whose pose is `base`; `position` is in the coordinates of `base`.
+    /// Adds a piece of the parts table on another piece, whose pose is `base`; `position` is in the coordinates of
+    /// `base`.
     pub(super) fn add_part(&mut self, base: &Pose, name: &str, position: Vec3) -> usize {
         let piece = parts::piece(name, &mut self.rng);
         self.add_relative(base, piece, position, 0.0)
@@ -69,13 +65,7 @@ impl FloorPlan {
     }
 
     /// Adds a rug of this width and depth, with this probability.
-    pub(super) fn maybe_add_rug(
-        &mut self,
-        probability: f32,
-        position: Vec3,
-        [width, depth]: [f32; 2],
-        angle: f32,
-    ) {
+    pub(super) fn maybe_add_rug(&mut self, probability: f32, position: Vec3, [width, depth]: [f32; 2], angle: f32) {
         if self.rng.chance(probability) {
             let piece = textiles::rug(width, depth, &mut self.rng);
             self.add(piece, Pose::new(position, angle));

@@ -8,21 +8,11 @@ fn key(name: &str) -> Key {
 }
 
 fn entry(bytes: usize) -> Entry {
-    Entry {
-        image: vec![7; bytes],
-        size: [4, 3],
-        facts: EntryFacts::new(Shown::default(), 30, serde_json::Value::Null),
-    }
+    Entry { image: vec![7; bytes], size: [4, 3], facts: EntryFacts::new(Shown::default(), 30, serde_json::Value::Null) }
 }
 
 fn store(folder: &Path, capacity: u64) -> ImageStore {
-    ImageStore::open(
-        folder,
-        FolderAccess::Private,
-        StoredKinds::Enhanced,
-        capacity,
-    )
-    .unwrap()
+    ImageStore::open(folder, FolderAccess::Private, StoredKinds::Enhanced, capacity).unwrap()
 }
 
 /// File of the entry with this name.
@@ -37,9 +27,7 @@ fn total_bytes(store: &ImageStore) -> u64 {
 }
 
 fn image(store: &ImageStore, name: &str) -> Option<Vec<u8>> {
-    store
-        .get(&key(name), Content::Image, |_| true)
-        .map(|entry| entry.image)
+    store.get(&key(name), Content::Image, |_| true).map(|entry| entry.image)
 }
 
 #[test]
@@ -146,10 +134,7 @@ fn only_the_user_can_enter_the_folder() {
 fn entries_without_an_image_are_counted_separately() {
     let place = tempfile::tempdir().unwrap();
     let store = store(place.path(), 1 << 20);
-    let shown = Shown {
-        content: Content::Probe,
-        ..Shown::default()
-    };
+    let shown = Shown { content: Content::Probe, ..Shown::default() };
     let facts = EntryFacts::new(shown, 500, serde_json::json!("found"));
     assert!(!store.contains(&key("a")));
     store.put(&key("a"), &Entry::from_facts(facts));

@@ -1,4 +1,5 @@
-//! The dark frames on which an enhancer is probed before a run: [`DarkFrames`] selects them, [`dark_frames`] makes them.
+//! The dark frames on which an enhancer is probed before a run: [`DarkFrames`] selects them, [`dark_frames`] makes
+//! them.
 
 use std::collections::BTreeSet;
 
@@ -14,13 +15,14 @@ use darkqa_light::expose;
 /// Exposure drops that darken frames if the plan has too few dark ones; L3 is used first.
 const DROPS: [Severity; 3] = [Severity::L3, Severity::L2, Severity::L4];
 
-/// Sources whose middle frames an enhancer is probed on, with the conditions to use. From a plan: at most [`FRAMES`], evenly spaced.
+/// Sources whose middle frames an enhancer is probed on, with the conditions to use. From a plan: at most [`FRAMES`],
+/// evenly spaced.
 pub(crate) struct DarkFrames<'a>(Vec<(&'a Source, Vec<Condition>)>);
 
 impl<'a> DarkFrames<'a> {
-    /// All sources of a run (`whole`), with the conditions that the enhancer of this name enhances in a shard's plan, except photographs in
-    /// the dark. So all shards probe an enhancer on the same frames, and those that share a store probe it once. Without such sources or
-    /// conditions, the sources of the plan are used.
+    /// All sources of a run (`whole`), with the conditions that the enhancer of this name enhances in a shard's plan,
+    /// except photographs in the dark. So all shards probe an enhancer on the same frames, and those that share a store
+    /// probe it once. Without such sources or conditions, the sources of the plan are used.
     pub(crate) fn for_whole_run<I>(
         whole: &'a [Source],
         sources: &'a [Source],
@@ -30,47 +32,28 @@ impl<'a> DarkFrames<'a> {
         let conditions: BTreeSet<Condition> = plan
             .iter()
             .flat_map(SourcePlan::conditions)
-            .filter(|condition| {
-                condition.enhancer.as_ref() == Some(name) && condition.photograph().is_none()
-            })
+            .filter(|condition| condition.enhancer.as_ref() == Some(name) && condition.photograph().is_none())
             .cloned()
             .collect();
         if whole.is_empty() || conditions.is_empty() {
             return Self::new(sources, plan, name);
         }
         let conditions: Vec<Condition> = conditions.into_iter().collect();
-        Self(
-            whole
-                .iter()
-                .map(|source| (source, conditions.clone()))
-                .collect(),
-        )
+        Self(whole.iter().map(|source| (source, conditions.clone())).collect())
     }
 
     /// Sources of a plan, with the conditions that the enhancer of this name enhances.
-    pub(crate) fn new<I>(
-        sources: &'a [Source],
-        plan: &[SourcePlan<I>],
-        name: &EnhancerName,
-    ) -> Self {
+    pub(crate) fn new<I>(sources: &'a [Source], plan: &[SourcePlan<I>], name: &EnhancerName) -> Self {
         let parts: Vec<(&Source, Vec<Condition>)> = plan
             .iter()
             .map(|part| {
-                let enhanced: Vec<Condition> = part
-                    .conditions()
-                    .filter(|condition| condition.enhancer.as_ref() == Some(name))
-                    .cloned()
-                    .collect();
+                let enhanced: Vec<Condition> =
+                    part.conditions().filter(|condition| condition.enhancer.as_ref() == Some(name)).cloned().collect();
                 (&sources[part.source], enhanced)
             })
             .filter(|(_, conditions)| !conditions.is_empty())
             .collect();
-        Self(
-            evenly_spaced_indices(parts.len(), FRAMES)
-                .into_iter()
-                .map(|index| parts[index].clone())
-                .collect(),
-        )
+        Self(evenly_spaced_indices(parts.len(), FRAMES).into_iter().map(|index| parts[index].clone()).collect())
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -83,7 +66,8 @@ impl<'a> DarkFrames<'a> {
     }
 }
 
-/// Makes up to [`FRAMES`] dark images of these frames in their conditions. If too few are dark, frames are darkened by an exposure drop.
+/// Makes up to [`FRAMES`] dark images of these frames in their conditions. If too few are dark, frames are darkened by
+/// an exposure drop.
 ///
 /// # Errors
 /// If a frame cannot be read.
@@ -96,11 +80,7 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
             conditions.push(enhanced);
         }
     }
-    let rounds = conditions
-        .iter()
-        .map(|conditions| conditions.len())
-        .max()
-        .unwrap_or(0);
+    let rounds = conditions.iter().map(|conditions| conditions.len()).max().unwrap_or(0);
     let mut found = Vec::new();
     for round in 0..rounds {
         for (index, (work, conditions)) in works.iter_mut().zip(&conditions).enumerate() {
@@ -130,26 +110,18 @@ pub(crate) fn dark_frames(steps: ImageSteps<'_>, frames: &DarkFrames<'_>) -> Res
     Ok(found)
 }
 
-/// Up to [`FRAMES`] images to probe an enhancer without a plan: the dark ones of `images`, then darkened copies. Images that show nothing are
-/// left out.
+/// Up to [`FRAMES`] images to probe an enhancer without a plan: the dark ones of `images`, then darkened copies. Images
+/// that show nothing are left out.
 pub(crate) fn dark_or_darkened(images: &[Rgb]) -> Vec<Rgb> {
     let dark = images.iter().filter(|image| brightness(image) <= DARK);
-    let darkened = DROPS
-        .iter()
-        .flat_map(|drop| images.iter().map(|image| expose(image, *drop)));
-    dark.cloned()
-        .chain(darkened)
-        .filter(|image| !shows_nothing(image))
-        .take(FRAMES)
-        .collect()
+    let darkened = DROPS.iter().flat_map(|drop| images.iter().map(|image| expose(image, *drop)));
+    dark.cloned().chain(darkened).filter(|image| !shows_nothing(image)).take(FRAMES).collect()
 }
 
 /// Up to `max` evenly spaced indices below `count`.
 pub(crate) fn evenly_spaced_indices(count: usize, max: usize) -> Vec<usize> {
     let taken = count.min(max);
-    (0..taken)
-        .map(|i| (2 * i + 1) * count / (2 * taken))
-        .collect()
+    (0..taken).map(|i| (2 * i + 1) * count / (2 * taken)).collect()
 }
 
 #[cfg(test)]

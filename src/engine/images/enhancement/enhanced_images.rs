@@ -1,4 +1,5 @@
-//! Images that another program enhanced, from the dark images of `synthesize`: [`EnhancedImages`], the folder of `--enhanced NAME=DIR`.
+//! Images that another program enhanced, from the dark images of `synthesize`: [`EnhancedImages`], the folder of
+//! `--enhanced NAME=DIR`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -23,7 +24,8 @@ const NAMED: usize = 4;
 /// Maximum depth of subfolders that are searched; chosen as protection against cyclic links.
 const MAX_DEPTH: usize = 16;
 
-/// The images of one folder. Each has the name of its dark image, and next to it the JSON file that `synthesize` wrote for the dark image.
+/// The images of one folder. Each has the name of its dark image, and next to it the JSON file that `synthesize` wrote
+/// for the dark image.
 #[derive(Debug)]
 pub(crate) struct EnhancedImages {
     name: EnhancerName,
@@ -57,10 +59,7 @@ struct Fault {
 
 impl Fault {
     fn new(words: &'static str, detail: impl Into<String>) -> Self {
-        Self {
-            words,
-            detail: detail.into(),
-        }
+        Self { words, detail: detail.into() }
     }
 }
 
@@ -75,10 +74,7 @@ impl EnhancedImages {
     ) -> Result<Vec<Self>> {
         let mut names: BTreeSet<&EnhancerName> = models.into_iter().collect();
         if let Some(repeated) = folders.iter().find(|folder| !names.insert(&folder.name)) {
-            let problem = format_args!(
-                "two enhancers are named {}; choose another NAME",
-                repeated.name
-            );
+            let problem = format_args!("two enhancers are named {}; choose another NAME", repeated.name);
             return Err(Error::usage("--enhanced", problem));
         }
         folders.iter().map(Self::open).collect()
@@ -98,12 +94,7 @@ impl EnhancedImages {
             let problem = format_args!("{} contains no images", args.folder.display());
             return Err(Error::usage("--enhanced", problem));
         }
-        Ok(Self {
-            name: args.name.clone(),
-            folder: args.folder.clone(),
-            files,
-            usage: Usage::for_external(),
-        })
+        Ok(Self { name: args.name.clone(), folder: args.folder.clone(), files, usage: Usage::for_external() })
     }
 
     pub(crate) fn name(&self) -> &EnhancerName {
@@ -122,10 +113,7 @@ impl EnhancedImages {
 
     /// Digest of the names and contents of all images.
     pub(crate) fn digest(&self) -> Digest {
-        let parts = self
-            .files
-            .iter()
-            .flat_map(|(path, file)| [path.as_bytes(), file.digest.as_bytes()]);
+        let parts = self.files.iter().flat_map(|(path, file)| [path.as_bytes(), file.digest.as_bytes()]);
         Digest::from_parts(std::iter::once(&b"darkqa.enhanced-folder/1"[..]).chain(parts))
     }
 
@@ -135,10 +123,7 @@ impl EnhancedImages {
     /// If it is missing.
     pub(crate) fn image_digest(&self, frame: &FrameId, condition: &Condition) -> Result<Digest> {
         let path = path(frame, condition)?;
-        let file = self
-            .files
-            .get(&path)
-            .ok_or_else(|| Error::data(self.folder.join(&path).display(), "missing"))?;
+        let file = self.files.get(&path).ok_or_else(|| Error::data(self.folder.join(&path).display(), "missing"))?;
         Ok(file.digest)
     }
 
@@ -169,8 +154,8 @@ impl EnhancedImages {
         Ok((image, used))
     }
 
-    /// Checks that each of these dark images has an enhanced image. Logs images that are missing, have another size or format, or were made
-    /// from other dark images, and files that no dark image needs.
+    /// Checks that each of these dark images has an enhanced image. Logs images that are missing, have another size or
+    /// format, or were made from other dark images, and files that no dark image needs.
     ///
     /// # Errors
     /// If an image cannot be used, or all images are identical to the dark images.
@@ -194,31 +179,18 @@ impl EnhancedImages {
         }
         if !faults.is_empty() {
             for (words, names) in &faults {
-                tracing::error!(
-                    "{}: {words}: {}",
-                    self.folder.display(),
-                    first_names(names, NAMED)
-                );
+                tracing::error!("{}: {words}: {}", self.folder.display(), first_names(names, NAMED));
             }
             let count: usize = faults.values().map(Vec::len).sum();
-            let problem = format_args!(
-                "{count} of the {} images of {} cannot be used; nothing was asked",
-                dark.len(),
-                self.name
-            );
+            let problem =
+                format_args!("{count} of the {} images of {} cannot be used; nothing was asked", dark.len(), self.name);
             return Err(Error::data(self.folder.display(), problem));
         }
         if unchanged == dark.len() && !dark.is_empty() {
-            let problem =
-                "all images are the dark images themselves; name the folder of the enhanced ones";
+            let problem = "all images are the dark images themselves; name the folder of the enhanced ones";
             return Err(Error::data(self.folder.display(), problem));
         }
-        let surplus: Vec<String> = self
-            .files
-            .keys()
-            .filter(|path| !wanted.contains(*path))
-            .cloned()
-            .collect();
+        let surplus: Vec<String> = self.files.keys().filter(|path| !wanted.contains(*path)).cloned().collect();
         if !surplus.is_empty() {
             tracing::warn!(
                 "{}: {} of {} images are not used, because no question is about their frames or conditions: {}",
@@ -237,18 +209,14 @@ impl EnhancedImages {
     /// The fault of the image.
     fn check_image(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, Fault> {
         if dark.condition.pair().is_some() {
-            let words =
-                "`synthesize` does not write dark photographs or their matches; see --llie-on";
+            let words = "`synthesize` does not write dark photographs or their matches; see --llie-on";
             return Err(Fault::new(words, ""));
         }
         let Some(file) = self.files.get(path) else {
             let other = self.other_format(path).unwrap_or_default();
             return Err(Fault::new("missing", other));
         };
-        let (width, height) = *file
-            .size
-            .as_ref()
-            .map_err(|problem| Fault::new("not an 8-bit PNG file", &**problem))?;
+        let (width, height) = *file.size.as_ref().map_err(|problem| Fault::new("not an 8-bit PNG file", &**problem))?;
         if (width, height) != dark.frame.size {
             let (w, h) = dark.frame.size;
             let words = "another size than the dark image, and nothing is resized";
@@ -256,18 +224,15 @@ impl EnhancedImages {
         }
         let json = self.folder.join(path).with_extension("json");
         if !json.exists() {
-            let words = "the JSON file of the dark image, from `synthesize`, is missing; copy it next to the enhanced one";
+            let words =
+                "the JSON file of the dark image, from `synthesize`, is missing; copy it next to the enhanced one";
             return Err(Fault::new(words, ""));
         }
         let words = "the JSON file next to it is not from `synthesize`";
-        let sidecar =
-            Sidecar::<ImageRecipe>::read(&json).map_err(|e| Fault::new(words, e.to_string()))?;
+        let sidecar = Sidecar::<ImageRecipe>::read(&json).map_err(|e| Fault::new(words, e.to_string()))?;
         if sidecar.recipe != dark.recipe {
             let words = "made from another dark image than this run's; call `synthesize` with the same data and the same light flags";
-            return Err(Fault::new(
-                words,
-                recipe_differences(&sidecar.recipe, &dark.recipe),
-            ));
+            return Err(Fault::new(words, recipe_differences(&sidecar.recipe, &dark.recipe)));
         }
         Ok(sidecar.has_digest(file.digest))
     }
@@ -284,10 +249,7 @@ impl EnhancedImages {
 impl EnhancedFile {
     fn open(path: &Path) -> Result<Self> {
         let file = ImageFile::open(path, DecodeRule::default())?;
-        Ok(Self {
-            digest: Digest::from_bytes(file.bytes()),
-            size: png_size(&file),
-        })
+        Ok(Self { digest: Digest::from_bytes(file.bytes()), size: png_size(&file) })
     }
 }
 
@@ -311,7 +273,8 @@ fn png_size(file: &ImageFile) -> std::result::Result<(u32, u32), String> {
     Ok(size)
 }
 
-/// The fields in which two recipes differ. The sensor state follows from other fields, so it is named only if nothing else differs.
+/// The fields in which two recipes differ. The sensor state follows from other fields, so it is named only if nothing
+/// else differs.
 fn recipe_differences(one: &ImageRecipe, other: &ImageRecipe) -> String {
     let without_state = [one, other].map(|recipe| {
         let mut fields = json!(recipe);
@@ -332,7 +295,8 @@ fn path(frame: &FrameId, condition: &Condition) -> Result<String> {
     Ok(format!("{}_{raw}.png", stem(frame)?))
 }
 
-/// Adds the files of a folder and its subfolders except JSON and hidden files. `below` is the path of the folder below the first one.
+/// Adds the files of a folder and its subfolders except JSON and hidden files. `below` is the path of the folder below
+/// the first one.
 fn add_files(folder: &Path, below: &str, depth: usize, files: &mut Vec<String>) -> Result<()> {
     for path in reading::entries(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy();

@@ -33,10 +33,7 @@ impl EnhancerRunArgs {
     /// If ONNX Runtime is not found, or the file is not a model that it can run.
     pub(crate) fn open(&self, file: ModelFile) -> Result<Enhancer> {
         let runtime = self.runtime.search().open()?;
-        let limits = LoadLimits {
-            time: self.runtime.llie_timeout,
-            memory: self.runtime.memory_limit(),
-        };
+        let limits = LoadLimits { time: self.runtime.llie_timeout, memory: self.runtime.memory_limit() };
         let enhancer = Enhancer::open_within(file, &runtime, self.threads.threads, limits)?
             .with_tiling(self.size.tile)
             .with_max_side(self.size.llie_max_side)
@@ -54,10 +51,7 @@ pub(crate) fn read_models(models: &[PathBuf]) -> Result<Vec<ModelFile>> {
     for path in models {
         let file = ModelFile::read(path)?;
         if enhancers.iter().any(|other| other.name() == file.name()) {
-            let problem = format_args!(
-                "two models are named {}; rename one of the files",
-                file.name()
-            );
+            let problem = format_args!("two models are named {}; rename one of the files", file.name());
             return Err(Error::usage("--llie", problem));
         }
         enhancers.push(file);
@@ -124,11 +118,7 @@ pub(crate) struct EnhancerModels<'a> {
 impl<'a> EnhancerModels<'a> {
     /// The models in these files, not loaded yet.
     pub(crate) fn from_files(files: Vec<ModelFile>, settings: &'a EnhancerRunArgs) -> Self {
-        Self {
-            settings,
-            models: files.into_iter().map(Model::File).collect(),
-            runtime: None,
-        }
+        Self { settings, models: files.into_iter().map(Model::File).collect(), runtime: None }
     }
 
     /// Loads the models in these files.
@@ -176,10 +166,7 @@ impl<'a> EnhancerModels<'a> {
     /// # Errors
     /// See [`Self::open`].
     pub(crate) fn take(&mut self) -> Result<Vec<Enhancer>> {
-        self.take_models()?
-            .into_iter()
-            .map(|model| model.open(self.settings))
-            .collect()
+        self.take_models()?.into_iter().map(|model| model.open(self.settings)).collect()
     }
 
     /// Takes all models out, loaded or not, and opens ONNX Runtime.

@@ -9,8 +9,8 @@ use crate::error::{Error, Result};
 use crate::types::{EnhancerName, Rgb};
 use darkqa_enhance::{Enhancer, Findings, ImageUse, Implausible, ModelFile, Stopper, Usage};
 
-/// An enhancer that an earlier run probed, and whose images were all in the store when this run began. It is opened once, for all threads,
-/// if a stored image turns out to be missing or damaged.
+/// An enhancer that an earlier run probed, and whose images were all in the store when this run began. It is opened
+/// once, for all threads, if a stored image turns out to be missing or damaged.
 pub(crate) struct LazyEnhancer {
     name: EnhancerName,
     path: PathBuf,
@@ -35,10 +35,7 @@ impl LazyEnhancer {
     /// The model in a file, with the findings of its probe in an earlier run.
     pub(crate) fn new(file: ModelFile, settings: EnhancerRunArgs, findings: Findings) -> Self {
         findings.warn(file.name(), file.path());
-        tracing::debug!(
-            "{}: not opened, because the store has all its images",
-            file.name()
-        );
+        tracing::debug!("{}: not opened, because the store has all its images", file.name());
         Self {
             name: file.name().clone(),
             path: file.path().to_owned(),
@@ -106,10 +103,7 @@ impl LazyEnhancer {
     }
 
     fn ended(&self, problem: &str) -> Error {
-        Error::EnhancerEnded {
-            path: self.path.clone(),
-            problem: problem.to_owned(),
-        }
+        Error::EnhancerEnded { path: self.path.clone(), problem: problem.to_owned() }
     }
 
     /// Stops the current image and all later ones; may be called from another thread.

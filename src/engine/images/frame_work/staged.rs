@@ -69,20 +69,13 @@ pub(crate) struct ImageFinisher<'a> {
 }
 
 impl<'a> FrameWork<'a> {
-    /// Prepares the frame in a condition: as it is sent, or as input of its enhancer. Uses the store if it has everything needed.
+    /// Prepares the frame in a condition: as it is sent, or as input of its enhancer. Uses the store if it has
+    /// everything needed.
     ///
     /// # Errors
     /// If the frame cannot be read, or cannot be shown in the condition.
-    pub(crate) fn stage(
-        &mut self,
-        condition: &Condition,
-        needed: Needed,
-    ) -> Result<StagedImage<'a>> {
-        let Resolved {
-            work,
-            condition,
-            pair,
-        } = self.resolve(condition)?;
+    pub(crate) fn stage(&mut self, condition: &Condition, needed: Needed) -> Result<StagedImage<'a>> {
+        let Resolved { work, condition, pair } = self.resolve(condition)?;
         let steps = work.steps;
         let place = work.stored_place(&condition)?;
         if let Some(payload) = work.unchanged_file(&condition)? {
@@ -94,10 +87,7 @@ impl<'a> FrameWork<'a> {
             }));
         }
         let (note, exposure) = (work.note()?, work.exposure(&condition)?);
-        if let Some(stored) = place
-            .as_ref()
-            .and_then(|place| steps.stored_image(place, needed))
-        {
+        if let Some(stored) = place.as_ref().and_then(|place| steps.stored_image(place, needed)) {
             let payload = steps.stored_payload(stored.payload, &note, exposure)?;
             let image = PreparedImage {
                 payload: with_pair_facts(payload, pair),
@@ -107,19 +97,12 @@ impl<'a> FrameWork<'a> {
             };
             return Ok(match condition.enhancer {
                 None => StagedImage::Ready(image),
-                Some(enhancer) => StagedImage::Stored {
-                    image,
-                    enhancer,
-                    notes: stored.notes,
-                },
+                Some(enhancer) => StagedImage::Stored { image, enhancer, notes: stored.notes },
             });
         }
         let started = Instant::now();
         let is_compared = needed == Needed::Similarity;
-        let known = place
-            .as_ref()
-            .filter(|_| is_compared)
-            .and_then(|place| steps.stored_similarity(place));
+        let known = place.as_ref().filter(|_| is_compared).and_then(|place| steps.stored_similarity(place));
         let clean = (is_compared && known.is_none()).then(|| work.clean_as_sent());
         let finish = ImageFinisher {
             steps,
@@ -132,17 +115,10 @@ impl<'a> FrameWork<'a> {
             took: Duration::ZERO,
         };
         let degraded = Arc::clone(work.degraded(condition.degradation())?);
-        let finish = ImageFinisher {
-            took: started.elapsed(),
-            ..finish
-        };
+        let finish = ImageFinisher { took: started.elapsed(), ..finish };
         match condition.enhancer {
             None => finish.image(&degraded, None).map(StagedImage::Ready),
-            Some(enhancer) => Ok(StagedImage::ToEnhance {
-                degraded,
-                enhancer,
-                finish,
-            }),
+            Some(enhancer) => Ok(StagedImage::ToEnhance { degraded, enhancer, finish }),
         }
     }
 }
@@ -152,30 +128,16 @@ impl<'a> ImageFinisher<'a> {
     ///
     /// # Errors
     /// If it cannot be encoded, or is larger than the endpoint accepts.
-    pub(crate) fn image(
-        self,
-        pixels: &Arc<Rgb>,
-        enhanced: Option<ImageUse>,
-    ) -> Result<PreparedImage<'a>> {
+    pub(crate) fn image(self, pixels: &Arc<Rgb>, enhanced: Option<ImageUse>) -> Result<PreparedImage<'a>> {
         let started = Instant::now();
         let (payload, encoded) = self.steps.payload(pixels, &self.note, self.exposure)?;
         let measuring = Instant::now();
-        let measured = self.clean.map(|clean| {
-            self.steps
-                .timings
-                .time(TimedStep::Measure, || similarity(&encoded, &clean))
-        });
+        let measured =
+            self.clean.map(|clean| self.steps.timings.time(TimedStep::Measure, || similarity(&encoded, &clean)));
         let similarity = self.known.or(measured.transpose()?);
         if let Some(place) = self.place.as_ref().filter(|_| self.known.is_none()) {
-            let notes = StoredNotes {
-                enhanced,
-                similarity,
-            };
-            let took = if place.keeps_image() {
-                self.took + started.elapsed()
-            } else {
-                measuring.elapsed()
-            };
+            let notes = StoredNotes { enhanced, similarity };
+            let took = if place.keeps_image() { self.took + started.elapsed() } else { measuring.elapsed() };
             self.steps.store(place, &payload, &notes, took);
         }
         Ok(PreparedImage {

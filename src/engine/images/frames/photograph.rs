@@ -1,9 +1,7 @@
 //! A photograph of a frame's scene in the dark, and how dark it is: [`SourcePhotograph`].
 
 use crate::types::degradations::Kind;
-use crate::types::{
-    Degradation, Digest, InputNote, PairFacts, PhotoName, ProfileName, Rgb, Severity,
-};
+use crate::types::{Degradation, Digest, InputNote, PairFacts, PhotoName, ProfileName, Rgb, Severity};
 use darkqa_light::PairEv;
 
 /// A photograph of a frame's scene in the dark.
@@ -34,8 +32,8 @@ impl SourcePhotograph {
     }
 }
 
-/// The degradation of this kind that is as dark as the first of these photographs, rounded to a hundredth of an EV; `None` if the
-/// exposure drop is unknown or cannot be synthesised.
+/// The degradation of this kind that is as dark as the first of these photographs, rounded to a hundredth of an EV;
+/// `None` if the exposure drop is unknown or cannot be synthesised.
 pub(crate) fn matching_degradation(
     photos: &[SourcePhotograph],
     kind: Kind,

@@ -23,23 +23,19 @@ pub(crate) fn names(sources: &[Source]) -> Vec<PhotoName> {
         let lowest = positions.entry(&photo.name).or_insert(position);
         *lowest = position.min(*lowest);
     }
-    let mut names: Vec<(usize, &PhotoName)> = positions
-        .into_iter()
-        .map(|(name, position)| (position, name))
-        .collect();
+    let mut names: Vec<(usize, &PhotoName)> = positions.into_iter().map(|(name, position)| (position, name)).collect();
     names.sort_unstable();
     names.into_iter().map(|(_, name)| name.clone()).collect()
 }
 
-/// Measures the photographs of a sample of the frames and prints how dark they are. Warns if frames have no photograph, if a photograph
-/// shows another scene, and of the findings of [`PairDarkness::warnings`]. Broken files are skipped; their trials report the error.
+/// Measures the photographs of a sample of the frames and prints how dark they are. Warns if frames have no photograph,
+/// if a photograph shows another scene, and of the findings of [`PairDarkness::warnings`]. Broken files are skipped;
+/// their trials report the error.
 pub(crate) fn print_darkness(frames: &dyn Frames, sources: &[Source], progress: &Progress) {
     let all: Vec<&SourceFrame> = sources.iter().flat_map(|source| &source.frames).collect();
     for name in names(sources) {
-        let pairs: Vec<(&SourceFrame, &SourcePhotograph)> = all
-            .iter()
-            .filter_map(|frame| Some((*frame, frame.photograph(&name)?)))
-            .collect();
+        let pairs: Vec<(&SourceFrame, &SourcePhotograph)> =
+            all.iter().filter_map(|frame| Some((*frame, frame.photograph(&name)?))).collect();
         let sample = pairs.len().min(SAMPLED);
         let (facts, others): (Vec<PairFacts>, Vec<Option<String>>) = (0..sample)
             .into_par_iter()
@@ -49,8 +45,7 @@ pub(crate) fn print_darkness(frames: &dyn Frames, sources: &[Source], progress: 
                 let low = frames.photograph(&frame.id, &photo.name).ok()?;
                 let low = low.pixels().ok()?.codes();
                 let facts = photo.measure(&normal, &low);
-                let has_same_size =
-                    (normal.height(), normal.width()) == (low.height(), low.width());
+                let has_same_size = (normal.height(), normal.width()) == (low.height(), low.width());
                 let shows_other_scene = facts
                     .ev()
                     .filter(|_| has_same_size)
@@ -73,9 +68,7 @@ pub(crate) fn print_darkness(frames: &dyn Frames, sources: &[Source], progress: 
             );
         }
         let Some(darkness) = PairDarkness::new(&name, &facts) else {
-            tracing::warn!(
-                "how dark the photographs {name} are is not known: they, or their frames, are black"
-            );
+            tracing::warn!("how dark the photographs {name} are is not known: they, or their frames, are black");
             continue;
         };
         progress.print_on_terminal(&format!(
@@ -118,7 +111,8 @@ pub(crate) fn check_matches(sources: &[Source], matches: &[PairDark]) -> Result<
     Ok(())
 }
 
-/// Measures the first photograph of each frame, so that equally dark images can be synthesised. Each file is decoded once more.
+/// Measures the first photograph of each frame, so that equally dark images can be synthesised. Each file is decoded
+/// once more.
 ///
 /// # Errors
 /// If a file is broken.

@@ -9,9 +9,7 @@ use crate::engine::images::frames::photograph::{SourcePhotograph, matching_degra
 use crate::engine::images::progress::Progress;
 use crate::error::{Error, Result};
 use crate::types::text::excerpt;
-use crate::types::{
-    Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PhotoName, Question,
-};
+use crate::types::{Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PhotoName, Question};
 
 /// Access to the files of frames.
 pub(crate) trait Frames: Sync {
@@ -28,10 +26,7 @@ pub(crate) trait Frames: Sync {
 
     /// The file of a photograph of a frame's scene in the dark, not decoded.
     fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
-        Err(Error::data(
-            frame,
-            format_args!("no photograph {name} of it"),
-        ))
+        Err(Error::data(frame, format_args!("no photograph {name} of it")))
     }
 }
 
@@ -45,10 +40,7 @@ impl Frames for Dataset {
     }
 
     fn photographs(&self, frame: &FrameId) -> Vec<(PhotoName, Option<f64>)> {
-        self.photographs(frame)
-            .iter()
-            .map(|photo| (photo.name.clone(), photo.ev))
-            .collect()
+        self.photographs(frame).iter().map(|photo| (photo.name.clone(), photo.ev)).collect()
     }
 
     fn photograph(&self, frame: &FrameId, name: &PhotoName) -> Result<Picture> {
@@ -112,18 +104,18 @@ impl SourceFrame {
     pub(crate) fn degradation(&self, condition: &Condition) -> Result<Option<Degradation>> {
         match condition.pair() {
             Some(PairDark::Match(kind, reading)) => {
-                let (how, _) = matching_degradation(&self.photographs, *kind, reading.as_ref())
-                    .ok_or_else(|| {
-                        let problem = "no photograph of it in the dark with a known exposure drop";
-                        Error::data(&self.id, problem)
-                    })?;
+                let (how, _) = matching_degradation(&self.photographs, *kind, reading.as_ref()).ok_or_else(|| {
+                    let problem = "no photograph of it in the dark with a known exposure drop";
+                    Error::data(&self.id, problem)
+                })?;
                 Ok(Some(how))
             }
             _ => Ok(condition.degradation().cloned()),
         }
     }
 
-    /// True if the frame can be shown in a condition: it has the photograph, or one whose exposure drop can be synthesised.
+    /// True if the frame can be shown in a condition: it has the photograph, or one whose exposure drop can be
+    /// synthesised.
     pub(crate) fn can_show(&self, condition: &Condition) -> bool {
         match condition.pair() {
             None => true,
@@ -143,13 +135,7 @@ fn inspect_photographs(frames: &dyn Frames, id: &FrameId) -> Result<Vec<SourcePh
         .map(|(name, stated)| {
             let picture = frames.photograph(id, &name)?;
             picture.check()?;
-            Ok(SourcePhotograph {
-                digest: picture.digest(),
-                note: picture.note(),
-                name,
-                stated,
-                facts: None,
-            })
+            Ok(SourcePhotograph { digest: picture.digest(), note: picture.note(), name, stated, facts: None })
         })
         .collect()
 }
@@ -161,15 +147,16 @@ pub(crate) struct Source {
     pub(crate) name: FrameId,
     /// The distinct frames; empty if only blind models are asked, or if the source cannot be shown.
     pub(crate) frames: Vec<SourceFrame>,
-    /// Indices into `frames`, in the order shown. Repeats a frame if a question shows it twice, or if a walk has fewer frames than are
-    /// shown.
+    /// Indices into `frames`, in the order shown. Repeats a frame if a question shows it twice, or if a walk has fewer
+    /// frames than are shown.
     pub(crate) order: Vec<usize>,
     /// Reason why the source cannot be shown; `None` if it can.
     pub(crate) problem: Option<String>,
 }
 
 impl Source {
-    /// The source for questions about this name: a single frame, or the group of frames with this name. Each file is read once.
+    /// The source for questions about this name: a single frame, or the group of frames with this name. Each file is
+    /// read once.
     pub(crate) fn from_questions(dataset: &Dataset, name: &FrameId) -> Result<Self> {
         let mut frames: Vec<SourceFrame> = Vec::new();
         let mut order = Vec::new();
@@ -180,22 +167,12 @@ impl Source {
             }
             order.push(known.unwrap_or(frames.len() - 1));
         }
-        Ok(Self {
-            name: name.clone(),
-            frames,
-            order,
-            problem: None,
-        })
+        Ok(Self { name: name.clone(), frames, order, problem: None })
     }
 
     /// A source without frames, for blind models.
     pub(crate) fn without_frames(name: FrameId) -> Self {
-        Self {
-            name,
-            frames: Vec::new(),
-            order: Vec::new(),
-            problem: None,
-        }
+        Self { name, frames: Vec::new(), order: Vec::new(), problem: None }
     }
 
     /// True if all frames can be shown in a condition.
@@ -220,10 +197,7 @@ pub(crate) fn input_summary(sources: &[Source]) -> InputSummary {
     for frame in sources.iter().flat_map(|source| &source.frames) {
         summary.add(&frame.id, &frame.note);
         for photo in &frame.photographs {
-            summary.add(
-                &FrameId(format!("{} ({})", frame.id, photo.name)),
-                &photo.note,
-            );
+            summary.add(&FrameId(format!("{} ({})", frame.id, photo.name)), &photo.note);
         }
     }
     summary
@@ -247,13 +221,9 @@ pub(crate) fn first_question_per_frame(questions: &[Question]) -> Vec<&Question>
     first.into_iter().map(|(_, question)| question).collect()
 }
 
-/// Reads the sources of all questions. Missing or broken files are found here, before anything is paid for, and the trial keys include the
-/// content of the files.
-pub(crate) fn inspect_all(
-    dataset: &Dataset,
-    questions: &[Question],
-    progress: &Progress,
-) -> Result<Vec<Source>> {
+/// Reads the sources of all questions. Missing or broken files are found here, before anything is paid for, and the
+/// trial keys include the content of the files.
+pub(crate) fn inspect_all(dataset: &Dataset, questions: &[Question], progress: &Progress) -> Result<Vec<Source>> {
     let first = first_question_per_frame(questions);
     let bar = progress.bar("reading images", first.len());
     first
@@ -261,10 +231,7 @@ pub(crate) fn inspect_all(
         .map(|question| {
             let source = Source::from_questions(dataset, &question.frame).map_err(|e| {
                 let problem = format_args!("{e}; --skip bad leaves such questions out");
-                Error::data(
-                    format_args!("question {:?}", excerpt(&question.id.0, 60)),
-                    problem,
-                )
+                Error::data(format_args!("question {:?}", excerpt(&question.id.0, 60)), problem)
             })?;
             bar.inc();
             Ok(source)

@@ -1,4 +1,5 @@
-//! Recorded walks through houses (OpenEQA): their folder ([`WalkFolder`]) and the flags for their frames ([`WalkArgs`]).
+//! Recorded walks through houses (OpenEQA): their folder ([`WalkFolder`]) and the flags for their frames
+//! ([`WalkArgs`]).
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;
@@ -25,7 +26,8 @@ pub(crate) struct WalkArgs {
     /// The folder of walks: the frames of a question lie in DIR/EPISODE_HISTORY/*-rgb.png
     #[arg(id = "frames", long, value_name = "DIR", add = Decides::Reply)]
     pub folder: PathBuf,
-    /// How many frames of a walk are shown, spread evenly over it: 50 as upstream shows GPT-4V (Claude 3: 20, Gemini: 15)
+    /// How many frames of a walk are shown, spread evenly over it: 50 as upstream shows GPT-4V (Claude 3: 20, Gemini:
+    /// 15)
     #[arg(id = "num-frames", long, value_name = "K", default_value = "50", add = Decides::Reply)]
     pub frames: NonZeroUsize,
     /// The longer side of the frames as sent, in pixels, or native; scaled as upstream does (OpenCV, bilinear)
@@ -94,21 +96,13 @@ impl Frames for WalkFolder {
 
 impl WalkFolder {
     pub(crate) fn new(walk: &WalkArgs, root: &RootArgs, rule: DecodeRule) -> Self {
-        Self {
-            folder: walk.folder.clone(),
-            further: root.data_root.clone(),
-            rule,
-        }
+        Self { folder: walk.folder.clone(), further: root.data_root.clone(), rule }
     }
 
-    /// Reads every sampled frame once and returns one source per walk. Missing or broken frames are found here, before any paid request,
-    /// and the trial keys include the content of the frames. A walk with such a frame gets a problem; other walks are unaffected.
-    pub(crate) fn inspect(
-        &self,
-        names: &[String],
-        settings: &WalkArgs,
-        progress: &Progress,
-    ) -> Vec<Source> {
+    /// Reads every sampled frame once and returns one source per walk. Missing or broken frames are found here, before
+    /// any paid request, and the trial keys include the content of the frames. A walk with such a frame gets a problem;
+    /// other walks are unaffected.
+    pub(crate) fn inspect(&self, names: &[String], settings: &WalkArgs, progress: &Progress) -> Vec<Source> {
         let bar = progress.bar("reading walks", names.len());
         names
             .par_iter()
@@ -126,7 +120,8 @@ impl WalkFolder {
     /// Reads the sampled frames of a walk.
     ///
     /// # Errors
-    /// If the folder of the walk is missing, has no frame or lies outside the folder of walks, or if a sampled frame is broken.
+    /// If the folder of the walk is missing, has no frame or lies outside the folder of walks, or if a sampled frame is
+    /// broken.
     pub(crate) fn source(&self, name: &str, settings: &WalkArgs) -> Result<Source> {
         let root = Root::new(&self.folder, &self.further)?;
         let paths = walk_frames(&root, name)?;

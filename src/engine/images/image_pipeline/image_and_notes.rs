@@ -15,7 +15,8 @@ use crate::pictures::Payload;
 use crate::types::{Condition, FrameId, Rgb, Thumbnail};
 
 impl ImagePipeline<'_> {
-    /// Makes the image of a frame in a condition as it is sent, with the wanted notes. `objects` are cropped for the thumbnail.
+    /// Makes the image of a frame in a condition as it is sent, with the wanted notes. `objects` are cropped for the
+    /// thumbnail.
     pub(super) fn image_and_notes(
         &mut self,
         work: &mut FrameWork<'_>,
@@ -24,18 +25,11 @@ impl ImagePipeline<'_> {
         objects: Option<ShownObjects<'_>>,
         wanted: WantedNotes,
     ) -> Result<(Arc<Payload>, ImageNotes)> {
-        let needed = if wanted.fidelity {
-            Needed::Similarity
-        } else {
-            Needed::Image
-        };
+        let needed = if wanted.fidelity { Needed::Similarity } else { Needed::Image };
         let image = self.image(work, condition, needed)?;
         let similarity = image.similarity.filter(|_| wanted.fidelity);
-        let thumbnail = if wanted.thumbnail {
-            stored_or_new_thumbnail(work, condition, name, objects, &image)?
-        } else {
-            None
-        };
+        let thumbnail =
+            if wanted.thumbnail { stored_or_new_thumbnail(work, condition, name, objects, &image)? } else { None };
         let notes = ImageNotes {
             thumbnail,
             fidelity: similarity.map(|found| fidelity(name, condition, &image.payload, found)),
@@ -63,9 +57,8 @@ fn stored_or_new_thumbnail(
         .as_ref()
         .filter(|_| payload.facts().pair.is_none())
         .and_then(|place| place.thumbnail(name, condition, objects));
-    let stored = place
-        .as_ref()
-        .and_then(|place| timings.time(TimedStep::Decode, || place.read(payload.facts().digest)));
+    let stored =
+        place.as_ref().and_then(|place| timings.time(TimedStep::Decode, || place.read(payload.facts().digest)));
     if stored.is_some() {
         return Ok(stored);
     }
@@ -75,9 +68,7 @@ fn stored_or_new_thumbnail(
         PixelsSent::InFrameFile => Some(Arc::clone(work.resolve(condition)?.work.clean()?)),
         PixelsSent::Stored => None,
     };
-    let made = timings.time(TimedStep::Encode, || {
-        thumbnail(name, condition, payload, encoded.as_deref(), objects)
-    });
+    let made = timings.time(TimedStep::Encode, || thumbnail(name, condition, payload, encoded.as_deref(), objects));
     let made = ok_or_warn(name, condition, made);
     if let (Some(place), Some(made)) = (place, &made) {
         place.write(made, started.elapsed().as_millis() as u64);

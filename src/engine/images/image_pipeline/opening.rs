@@ -44,9 +44,9 @@ enum StoredState<'a> {
 }
 
 impl<'a> ImagePipeline<'a> {
-    /// Adds these models. Each one that the plan needs is opened and probed on a few dark frames, so that implausible output or unknown
-    /// value ranges are found before anything is asked. A model is not probed if the store has its findings, and not opened if the store
-    /// also has all its images.
+    /// Adds these models. Each one that the plan needs is opened and probed on a few dark frames, so that implausible
+    /// output or unknown value ranges are found before anything is asked. A model is not probed if the store has its
+    /// findings, and not opened if the store also has all its images.
     ///
     /// # Errors
     /// If a model cannot be opened, its images are implausible, or a frame cannot be read.
@@ -116,12 +116,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// The frames on which an enhancer is probed.
-    fn dark_frames<'s, I>(
-        &self,
-        sources: &'s [Source],
-        plan: &[SourcePlan<I>],
-        name: &EnhancerName,
-    ) -> DarkFrames<'s>
+    fn dark_frames<'s, I>(&self, sources: &'s [Source], plan: &[SourcePlan<I>], name: &EnhancerName) -> DarkFrames<'s>
     where
         'a: 's,
     {
@@ -129,12 +124,7 @@ impl<'a> ImagePipeline<'a> {
     }
 
     /// The stored state of a model.
-    fn stored_state<I>(
-        &self,
-        model: &Model,
-        sources: &[Source],
-        plan: &[SourcePlan<I>],
-    ) -> Result<StoredState<'a>> {
+    fn stored_state<I>(&self, model: &Model, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<StoredState<'a>> {
         let Some(stored) = self.steps.stored else {
             return Ok(StoredState::Nothing(None));
         };
@@ -174,20 +164,13 @@ impl<'a> ImagePipeline<'a> {
         Ok(())
     }
 
-    fn probe_one<I>(
-        &self,
-        enhancer: &mut Enhancer,
-        sources: &[Source],
-        plan: &[SourcePlan<I>],
-    ) -> Result<()> {
+    fn probe_one<I>(&self, enhancer: &mut Enhancer, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         let frames = self.dark_frames(sources, plan, enhancer.name());
         let dark = dark_frames(self.steps, &frames)?;
         if dark.is_empty() {
             return Ok(());
         }
-        self.steps.timings.time(TimedStep::Enhance, || {
-            enhancer.probe(&dark, self.implausible)
-        })
+        self.steps.timings.time(TimedStep::Enhance, || enhancer.probe(&dark, self.implausible))
     }
 
     /// Handles that stop the enhancers.
@@ -203,20 +186,10 @@ impl<'a> ImagePipeline<'a> {
 
     /// The usage notes of all enhancers, with their names.
     pub(crate) fn usages(&self) -> Vec<(EnhancerName, Usage)> {
-        let open = self
-            .enhancers
-            .iter()
-            .map(|enhancer| (enhancer.name().clone(), enhancer.usage()));
-        let lazy = self
-            .lazy
-            .iter()
-            .map(|enhancer| (enhancer.name().clone(), enhancer.usage().clone()));
-        let imported = self
-            .steps
-            .recipe
-            .enhanced_images
-            .iter()
-            .map(|images| (images.name().clone(), images.usage().clone()));
+        let open = self.enhancers.iter().map(|enhancer| (enhancer.name().clone(), enhancer.usage()));
+        let lazy = self.lazy.iter().map(|enhancer| (enhancer.name().clone(), enhancer.usage().clone()));
+        let imported =
+            self.steps.recipe.enhanced_images.iter().map(|images| (images.name().clone(), images.usage().clone()));
         open.chain(lazy).chain(imported).collect()
     }
 }

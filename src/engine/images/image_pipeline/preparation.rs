@@ -19,8 +19,9 @@ use darkqa_enhance::{Enhancer, FRAMES, sets_in_memory};
 const LARGE_IMAGE: usize = 5_000_000;
 
 impl ImagePipeline<'_> {
-    /// Makes a few images before anything is paid for, to find errors that would stop a run later: the first image of each enhancer and,
-    /// for an endpoint, the images of the largest frame without an enhancer. Warns if these are large and the endpoint's limit is unknown.
+    /// Makes a few images before anything is paid for, to find errors that would stop a run later: the first image of
+    /// each enhancer and, for an endpoint, the images of the largest frame without an enhancer. Warns if these are
+    /// large and the endpoint's limit is unknown.
     pub(crate) fn check<I>(&mut self, sources: &[Source], plan: &[SourcePlan<I>]) -> Result<()> {
         self.try_enhancers(sources, plan)?;
         // Test images do not count as images of the run.
@@ -76,8 +77,8 @@ impl ImagePipeline<'_> {
         Ok(())
     }
 
-    /// Checks that the endpoint accepts the images of the frame with the most pixels in the conditions without an enhancer, and returns the
-    /// facts of the largest one; `None` without frames.
+    /// Checks that the endpoint accepts the images of the frame with the most pixels in the conditions without an
+    /// enhancer, and returns the facts of the largest one; `None` without frames.
     ///
     /// # Errors
     /// If an image cannot be made, or is too large for the endpoint.
@@ -104,18 +105,12 @@ impl ImagePipeline<'_> {
         };
         let mut work = FrameWork::for_source(self.steps.without_store(), source, frame);
         let mut largest: Option<ImageFacts> = None;
-        for condition in part
-            .conditions()
-            .filter(|condition| condition.enhancer.is_none())
-        {
+        for condition in part.conditions().filter(|condition| condition.enhancer.is_none()) {
             let image = self
                 .image(&mut work, condition, Needed::Image)
                 .map_err(|e| e.at(format!("frame {} at {condition}", frame.id)))?;
             let facts = image.payload.facts();
-            if largest
-                .as_ref()
-                .is_none_or(|known| facts.bytes > known.bytes)
-            {
+            if largest.as_ref().is_none_or(|known| facts.bytes > known.bytes) {
                 largest = Some(facts.clone());
             }
         }
@@ -129,9 +124,9 @@ impl ImagePipeline<'_> {
         Ok(largest)
     }
 
-    /// Opens a set of enhancers for each worker, so that several images are enhanced at the same time, if there are enough frames and
-    /// memory. Measured CPU time of two workers with one thread each, relative to one worker with two threads: 0.86 for Zero-DCE, 0.59 for
-    /// RUAS.
+    /// Opens a set of enhancers for each worker, so that several images are enhanced at the same time, if there are
+    /// enough frames and memory. Measured CPU time of two workers with one thread each, relative to one worker with two
+    /// threads: 0.86 for Zero-DCE, 0.59 for RUAS.
     ///
     /// # Errors
     /// If a session cannot be opened.
@@ -151,12 +146,7 @@ impl ImagePipeline<'_> {
         }
         let threads = NonZeroUsize::new(cores / count).unwrap_or(NonZeroUsize::MIN);
         self.enhancer_sets = (1..=count)
-            .map(|number| {
-                self.enhancers
-                    .iter()
-                    .map(|enhancer| enhancer.twin(number, threads))
-                    .collect()
-            })
+            .map(|number| self.enhancers.iter().map(|enhancer| enhancer.twin(number, threads)).collect())
             .collect::<Result<_>>()?;
         self.enhancers.clear();
         Ok(())

@@ -44,23 +44,13 @@ fn pipeline_output(
         enhancers: Vec::new(),
         enhanced_images: Vec::new(),
     };
-    let steps = ImageSteps {
-        frames: &dataset,
-        recipe: &recipe,
-        limit: None,
-        timings: &Timings::default(),
-        stored: None,
-    };
+    let steps =
+        ImageSteps { frames: &dataset, recipe: &recipe, limit: None, timings: &Timings::default(), stored: None };
     let mut pipeline = ImagePipeline::new(steps, Vec::new(), Implausible::default());
     let mut work = FrameWork::for_source(steps, &source, &source.frames[0]);
     let condition = condition.parse().unwrap();
-    let wanted = WantedNotes {
-        thumbnail,
-        fidelity: condition != Condition::L0,
-    };
-    let (image, notes) = pipeline
-        .image_and_notes(&mut work, &condition, &source.name, None, wanted)
-        .unwrap();
+    let wanted = WantedNotes { thumbnail, fidelity: condition != Condition::L0 };
+    let (image, notes) = pipeline.image_and_notes(&mut work, &condition, &source.name, None, wanted).unwrap();
     (image, notes, work.is_decoded())
 }
 
@@ -110,7 +100,8 @@ fn fidelity_is_measured_in_the_size_sent() {
     let (_, notes, _) = pipeline_output("L0", "png", None, false);
     assert_eq!(notes.fidelity, None);
     assert!(psnr("L1-ev", None) > psnr("L3-ev", None));
-    // The frame is compared in the size sent. A side of 30 pixels is larger than the SSIM window, and the PSNR is about the same.
+    // The frame is compared in the size sent. A side of 30 pixels is larger than the SSIM window, and the PSNR is about
+    // the same.
     assert!((psnr("L3-ev", Some(30)) - psnr("L3-ev", None)).abs() < 2.0);
     // The sides of this image are smaller than the SSIM window.
     let (_, notes, _) = pipeline_output("L3-ev", "png", Some(12), false);

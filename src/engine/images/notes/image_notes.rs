@@ -1,4 +1,5 @@
-//! Notes about images that a run stores for the report ([`ImageNotes`]), and which of them are missing ([`MissingNotes`]).
+//! Notes about images that a run stores for the report ([`ImageNotes`]), and which of them are missing
+//! ([`MissingNotes`]).
 
 use std::collections::BTreeSet;
 
@@ -51,13 +52,7 @@ pub(crate) struct WantedNotes {
 impl MissingNotes {
     /// The missing thumbnails, and the fidelity of all images except those `measured` already.
     pub(crate) fn new(thumbnails: MissingThumbnails, measured: Vec<ImageFidelity>) -> Self {
-        Self {
-            thumbnails,
-            measured: measured
-                .into_iter()
-                .map(|image| (image.frame, image.condition))
-                .collect(),
-        }
+        Self { thumbnails, measured: measured.into_iter().map(|image| (image.frame, image.condition)).collect() }
     }
 
     /// The objects of a frame that the thumbnail crops.
@@ -67,8 +62,8 @@ impl MissingNotes {
 
     /// The notes to make about a frame in a condition. The clean frame is not compared with itself.
     pub(crate) fn wanted(&self, frame: &FrameId, condition: &Condition) -> WantedNotes {
-        // An untouched frame may be dark, so it is no reference for its enhanced image. A photograph in the dark may not be aligned with
-        // its frame.
+        // An untouched frame may be dark, so it is no reference for its enhanced image. A photograph in the dark may
+        // not be aligned with its frame.
         let has_reference = condition.degradation().is_some();
         let image = (Shared::from(frame.clone()), Shared::from(condition.clone()));
         WantedNotes {

@@ -11,9 +11,7 @@ const GREY: u8 = 128;
 
 /// The smallest number of columns for which there are at most as many rows as columns.
 pub(crate) fn columns(images: usize) -> usize {
-    (1..=images)
-        .find(|columns| columns * columns >= images)
-        .unwrap_or(1)
+    (1..=images).find(|columns| columns * columns >= images).unwrap_or(1)
 }
 
 /// Arranges images in rows, unscaled. Each cell has the width of the widest image and the height of the highest.
@@ -52,16 +50,9 @@ mod tests {
     fn images_are_arranged_in_rows() {
         let images = [filled(2, 3, 1), filled(4, 2, 2), filled(1, 1, 3)];
         let picture = montage(&images).unwrap();
-        assert_eq!(
-            (picture.height(), picture.width()),
-            (4 + GAP + 4, 3 + GAP + 3)
-        );
-        let code =
-            |[row, column]: [usize; 2]| picture.samples()[(row * picture.width() + column) * 3];
-        assert_eq!(
-            [[1, 2], [3, 3 + GAP + 1], [4 + GAP, 0]].map(code),
-            [1, 2, 3]
-        );
+        assert_eq!((picture.height(), picture.width()), (4 + GAP + 4, 3 + GAP + 3));
+        let code = |[row, column]: [usize; 2]| picture.samples()[(row * picture.width() + column) * 3];
+        assert_eq!([[1, 2], [3, 3 + GAP + 1], [4 + GAP, 0]].map(code), [1, 2, 3]);
         assert_eq!([[2, 0], [0, 3], [4, 0], [9, 7]].map(code), [GREY; 4]);
     }
 

@@ -1,5 +1,5 @@
-//! Thumbnails of sent images for the report: [`thumbnail`] and [`thumbnail_of_all`] make them, [`MissingThumbnails`] lists the missing
-//! ones.
+//! Thumbnails of sent images for the report: [`thumbnail`] and [`thumbnail_of_all`] make them, [`MissingThumbnails`]
+//! lists the missing ones.
 
 use std::borrow::Cow;
 use std::num::NonZeroU32;
@@ -11,7 +11,8 @@ use crate::pictures::{Payload, PayloadFormat, Scaling};
 use crate::types::questions::PixelBox;
 use crate::types::{Condition, FrameId, ObjectCrop, Rgb, Thumbnail};
 
-/// Version of the thumbnails. Raise it whenever a byte of one changes, so that older thumbnails in an image store are not reused.
+/// Version of the thumbnails. Raise it whenever a byte of one changes, so that older thumbnails in an image store are
+/// not reused.
 pub(crate) const VERSION: u32 = 1;
 
 /// Maximum side of a small copy, in pixels. An arbitrary choice.
@@ -28,8 +29,8 @@ const OBJECT_CROP_SIDES: [usize; 2] = [64, 160];
 /// Margin on each side of an object in its crop, as a share of the object's longer side. An arbitrary choice.
 const OBJECT_MARGIN: f64 = 0.2;
 
-/// Makes one thumbnail of images as they were sent together. The crop is of the middle image. Up to [`MAX_TILES`] images are shown
-/// side by side in the small copy; of more, only the middle image is shown. `None` without images.
+/// Makes one thumbnail of images as they were sent together. The crop is of the middle image. Up to [`MAX_TILES`]
+/// images are shown side by side in the small copy; of more, only the middle image is shown. `None` without images.
 pub(crate) fn thumbnail_of_all(
     frame: &FrameId,
     condition: &Condition,
@@ -54,8 +55,8 @@ pub(crate) fn thumbnail_of_all(
     Ok(Some(thumbnail))
 }
 
-/// Makes the thumbnail of an image as it was sent: a small copy, a centre crop, and crops of the `shown` objects. Crops are
-/// brightened by [`crop_gain`]. With the `encoded` pixels, a PNG is not decoded.
+/// Makes the thumbnail of an image as it was sent: a small copy, a centre crop, and crops of the `shown` objects. Crops
+/// are brightened by [`crop_gain`]. With the `encoded` pixels, a PNG is not decoded.
 pub(crate) fn thumbnail(
     frame: &FrameId,
     condition: &Condition,
@@ -94,12 +95,7 @@ fn crop_gain(condition: &Condition, sent: &Payload) -> f32 {
         (Some(_), Some(exposure)) => exposure.dark.unwrap_or_default() as f32,
         (Some(degradation), None) => degradation.kind().display_gain(degradation.severity()),
         // Photograph of a pair: its drop in light.
-        (None, _) => sent
-            .facts()
-            .pair
-            .and_then(|pair| pair.ev())
-            .unwrap_or(0.0)
-            .max(0.0) as f32,
+        (None, _) => sent.facts().pair.and_then(|pair| pair.ev()).unwrap_or(0.0).max(0.0) as f32,
     }
 }
 
@@ -122,38 +118,32 @@ fn object_crop(image: &Rgb, object: PixelBox, frame_size: [u32; 2], ev: f32) -> 
     Ok(ObjectCrop { object, crop })
 }
 
-/// Square around the centre of an object, with a margin, within the image. The box is in pixels of a frame of width and height
-/// `frame_size`.
+/// Square around the centre of an object, with a margin, within the image. The box is in pixels of a frame of width and
+/// height `frame_size`.
 fn object_rect(image: &Rgb, object: PixelBox, frame_size: [u32; 2]) -> CropRect {
     let image_size = [image.width(), image.height()];
     let scale = [0, 1].map(|axis| image_size[axis] as f64 / f64::from(frame_size[axis].max(1)));
-    let extents =
-        [0, 1].map(|axis| [object[axis], object[axis + 2]].map(|end| f64::from(end) * scale[axis]));
+    let extents = [0, 1].map(|axis| [object[axis], object[axis + 2]].map(|end| f64::from(end) * scale[axis]));
     let longer = (extents[0][1] - extents[0][0]).max(extents[1][1] - extents[1][0]);
     let side = (longer * (1.0 + 2.0 * OBJECT_MARGIN)).round() as usize;
     let side = side.clamp(OBJECT_CROP_SIDES[0], OBJECT_CROP_SIDES[1]);
     let [[left, width], [top, height]] = [0, 1].map(|axis| {
         let length = side.min(image_size[axis]);
         let start = f64::midpoint(extents[axis][0], extents[axis][1]) - length as f64 / 2.0;
-        [
-            (start.max(0.0).round() as usize).min(image_size[axis] - length),
-            length,
-        ]
+        [(start.max(0.0).round() as usize).min(image_size[axis] - length), length]
     });
     [top, left, height, width]
 }
 
 /// Encodes an image in [`FORMAT`], as a `data:` URL.
 fn jpeg_data_url(image: &Rgb) -> Result<String> {
-    let jpeg: PayloadFormat = FORMAT
-        .parse()
-        .map_err(|e| Error::data("the format of thumbnails", e))?;
+    let jpeg: PayloadFormat = FORMAT.parse().map_err(|e| Error::data("the format of thumbnails", e))?;
     let url = Payload::encode(image, jpeg)?.data_url();
     Ok(String::from_utf8_lossy(&url).into_owned())
 }
 
-/// Scales an image down to a longer side of at most `max_side` pixels. Each pixel is the mean of the pixels that it replaces. Four
-/// times as fast as `image::imageops::thumbnail`.
+/// Scales an image down to a longer side of at most `max_side` pixels. Each pixel is the mean of the pixels that it
+/// replaces. Four times as fast as `image::imageops::thumbnail`.
 fn downscaled(image: &Rgb, max_side: u32) -> Result<Cow<'_, Rgb>> {
     let (height, width) = (image.height(), image.width());
     let scaling = NonZeroU32::new(max_side).map_or(Scaling::Never, Scaling::MaxSide);
@@ -196,8 +186,7 @@ fn centre_crop(image: &Rgb, ev: f32) -> Result<Rgb> {
 /// Crops an image, with its linear light (gamma 2.2) amplified by `ev`.
 fn brightened_crop(image: &Rgb, [top, left, height, width]: CropRect, ev: f32) -> Result<Rgb> {
     let scale = libm::exp2(f64::from(ev) / 2.2);
-    let brightened_codes: [u8; 256] =
-        std::array::from_fn(|code| (code as f64 * scale).round().min(255.0) as u8);
+    let brightened_codes: [u8; 256] = std::array::from_fn(|code| (code as f64 * scale).round().min(255.0) as u8);
     let samples: Vec<u8> = (top..top + height)
         .flat_map(|row| {
             let first = (row * image.width() + left) * 3;
@@ -223,14 +212,10 @@ mod tests {
         // 240 × 2: the first row replaces one row of the image, the second two.
         let copy = downscaled(&image, COPY_SIDE).unwrap();
         assert_eq!((copy.height(), copy.width()), (2, 240));
-        let codes =
-            [[0, 0], [0, 3], [1, 0]].map(|[row, column]| copy.samples()[(row * 240 + column) * 3]);
+        let codes = [[0, 0], [0, 3], [1, 0]].map(|[row, column]| copy.samples()[(row * 240 + column) * 3]);
         assert_eq!(codes, [2, 3, 17]);
         let fits = Rgb::black(2, 240);
-        assert!(matches!(
-            downscaled(&fits, COPY_SIDE).unwrap(),
-            Cow::Borrowed(_)
-        ));
+        assert!(matches!(downscaled(&fits, COPY_SIDE).unwrap(), Cow::Borrowed(_)));
     }
 
     #[test]
@@ -238,16 +223,11 @@ mod tests {
         let samples = (0..300 * 400 * 3_u64).map(|i| (i * i % 251) as u8);
         let image = Rgb::new(300, 400, samples.collect()).unwrap();
         let (frame, condition) = (FrameId("f".into()), "L3-ev".parse().unwrap());
-        for (format, side) in [
-            ("png", 400),
-            ("png", 301),
-            ("jpeg:50", 400),
-            ("jpeg:50", 301),
-        ] {
+        for (format, side) in [("png", 400), ("png", 301), ("jpeg:50", 400), ("jpeg:50", 301)] {
             let scaled = fit(&image, NonZeroU32::new(side).unwrap()).unwrap();
             let sent = Payload::encode(&scaled, format.parse().unwrap()).unwrap();
-            let [from_pixels, from_file] = [Some(&*scaled), None]
-                .map(|encoded| thumbnail(&frame, &condition, &sent, encoded, None).unwrap());
+            let [from_pixels, from_file] =
+                [Some(&*scaled), None].map(|encoded| thumbnail(&frame, &condition, &sent, encoded, None).unwrap());
             assert_eq!(from_pixels, from_file, "{format} {side}");
         }
     }
@@ -255,8 +235,8 @@ mod tests {
     #[test]
     fn an_object_crop_is_around_the_object_and_within_the_image() {
         let image = Rgb::black(300, 400);
-        // The image has half the size of the frame: a box of 40 × 20 pixels has the smallest crop, one of 100 × 60 has a margin.
-        // The last two are a box at the edge, and one larger than a crop.
+        // The image has half the size of the frame: a box of 40 × 20 pixels has the smallest crop, one of 100 × 60 has
+        // a margin. The last two are a box at the edge, and one larger than a crop.
         for (object, expected) in [
             ([200, 200, 280, 240], [78, 88, 64, 64]),
             ([200, 200, 400, 320], [60, 80, 140, 140]),
@@ -265,10 +245,7 @@ mod tests {
         ] {
             assert_eq!(object_rect(&image, object, [800, 600]), expected);
         }
-        assert_eq!(
-            object_rect(&Rgb::black(40, 50), [0, 0, 5, 5], [50, 40]),
-            [0, 0, 40, 50]
-        );
+        assert_eq!(object_rect(&Rgb::black(40, 50), [0, 0, 5, 5], [50, 40]), [0, 0, 40, 50]);
     }
 
     #[test]

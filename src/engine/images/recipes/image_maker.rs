@@ -4,9 +4,9 @@ use serde::Serialize;
 
 use darkqa_enhance::SizeArgs;
 
-/// Program, machine and enhancer settings that decide the bytes of an image besides its recipe. The number of threads is not included: six
-/// models (Zero-DCE, RUAS, SCI, Retinexformer, DarkIR, `lift`) gave the same bytes with 1, 2 and 3 threads, and a graph that may give others runs
-/// on one.
+/// Program, machine and enhancer settings that decide the bytes of an image besides its recipe. The number of threads
+/// is not included: six models (Zero-DCE, RUAS, SCI, Retinexformer, DarkIR, `lift`) gave the same bytes with 1, 2 and 3
+/// threads, and a graph that may give others runs on one.
 #[derive(Debug, Serialize)]
 pub(crate) struct Maker {
     /// Version of this program, because encoders may change with it.

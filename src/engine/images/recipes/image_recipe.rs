@@ -9,13 +9,11 @@ use crate::data::Picture;
 use crate::engine::images::stored::{ImageOrigin, Sidecar, differing_fields};
 use crate::error::{Error, Result};
 use crate::types::degradations::{Axis, Kind};
-use crate::types::{
-    Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ProfileName, Rgb,
-};
+use crate::types::{Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, ProfileName, Rgb};
 use darkqa_light::movement::blur::{blur, blurred_codes};
 use darkqa_light::{
-    self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone,
-    develop_with_state, expose, exposure,
+    self, Amplify, AppliedDegradation, CameraState, Clean, Coupling, Draws, NoiseKey, Streak, Tone, develop_with_state,
+    expose, exposure,
 };
 
 /// Everything that decides the pixels of an image.
@@ -38,7 +36,8 @@ pub(crate) struct ImageRecipe {
     exposure: Option<ExposureFacts>,
 }
 
-/// Inputs of the noise synthesis. For automatic exposure: the noise profile `physical` at the gain that the camera chose.
+/// Inputs of the noise synthesis. For automatic exposure: the noise profile `physical` at the gain that the camera
+/// chose.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct SensorRecord {
     seed: u64,
@@ -62,10 +61,7 @@ impl ImageOrigin for ImageRecipe {
     fn difference(&self, wanted: &Self) -> String {
         let mut settings = Vec::new();
         if self.synthesis != wanted.synthesis {
-            settings.push(format!(
-                "synthesis {}, now {}",
-                self.synthesis, wanted.synthesis
-            ));
+            settings.push(format!("synthesis {}, now {}", self.synthesis, wanted.synthesis));
         }
         if let (Some(had), Some(wanted)) = (&self.sensor, &wanted.sensor) {
             settings.extend(had.differences(wanted));
@@ -83,8 +79,8 @@ impl ImageOrigin for ImageRecipe {
 }
 
 impl SensorRecord {
-    /// The flags that differ, with both values. Derived values are omitted: the state follows from the seed, and the noise options from the
-    /// noise profile.
+    /// The flags that differ, with both values. Derived values are omitted: the state follows from the seed, and the
+    /// noise options from the noise profile.
     fn differences(&self, wanted: &Self) -> Vec<String> {
         let mut flags = vec![
             ("--seed", json!(self.seed), json!(wanted.seed)),
@@ -92,18 +88,10 @@ impl SensorRecord {
         ];
         if self.reading == wanted.reading {
             flags.extend([
-                (
-                    "--noise amplify",
-                    json!(self.amplify),
-                    json!(wanted.amplify),
-                ),
+                ("--noise amplify", json!(self.amplify), json!(wanted.amplify)),
                 ("--noise tone", json!(self.tone), json!(wanted.tone)),
                 ("--noise draws", json!(self.draws), json!(wanted.draws)),
-                (
-                    "--noise coupling",
-                    json!(self.coupling),
-                    json!(wanted.coupling),
-                ),
+                ("--noise coupling", json!(self.coupling), json!(wanted.coupling)),
             ]);
         }
         let mut differences = Vec::new();
@@ -124,8 +112,8 @@ impl SensorRecord {
 }
 
 impl ImageRecipe {
-    /// The recipe of an image of a frame. `source` is the digest of the input file, and `read` how it was read. For the clean frame, `how`
-    /// and `applied` are `None`.
+    /// The recipe of an image of a frame. `source` is the digest of the input file, and `read` how it was read. For the
+    /// clean frame, `how` and `applied` are `None`.
     pub(crate) fn new(
         frame: &FrameId,
         source: Digest,
@@ -135,9 +123,7 @@ impl ImageRecipe {
         key: &NoiseKey,
         seed: u64,
     ) -> Self {
-        let drop = how
-            .filter(|how| how.kind().axis() == Axis::LIGHT)
-            .map_or(0.0, |how| how.severity().value());
+        let drop = how.filter(|how| how.kind().axis() == Axis::LIGHT).map_or(0.0, |how| how.severity().value());
         let sensor = applied.and_then(|applied| {
             let synthesis = applied.synthesis()?;
             let named = how.and_then(Degradation::reading).cloned();
@@ -184,7 +170,8 @@ impl ImageRecipe {
     fn image(&self, picture: &Picture, program: &str, path: &Path) -> Result<Rgb> {
         let how = self.condition.degradation();
         if self.source != picture.digest().to_string() {
-            let problem = "made from another image than INPUT (their contents differ, or the flags by which they are read)";
+            let problem =
+                "made from another image than INPUT (their contents differ, or the flags by which they are read)";
             return Err(Error::data(path.display(), problem));
         }
         if self.synthesis != version(how) {
@@ -206,8 +193,7 @@ impl ImageRecipe {
             return Ok(expose(&clean, severity));
         }
         let exposure = self.exposure.filter(|_| kind.has_motion());
-        let blur_length_and_angle =
-            exposure.and_then(|exposure| exposure.blur_px.zip(exposure.blur_angle));
+        let blur_length_and_angle = exposure.and_then(|exposure| exposure.blur_px.zip(exposure.blur_angle));
         let streak = match blur_length_and_angle {
             Some((length, angle)) => Streak::new(length, angle)?,
             None if kind.has_motion() => return Err(missing("the motion blur")),
@@ -217,10 +203,7 @@ impl ImageRecipe {
         if !kind.has_noise() {
             return Ok(blurred_codes(clean, streak));
         }
-        let sensor = self
-            .sensor
-            .as_ref()
-            .ok_or_else(|| missing("the state of the sensor"))?;
+        let sensor = self.sensor.as_ref().ok_or_else(|| missing("the state of the sensor"))?;
         let drop_ev = match exposure {
             Some(exposure) => exposure.dark.ok_or_else(|| missing("what was left dark"))?,
             None => severity.value(),
@@ -231,18 +214,9 @@ impl ImageRecipe {
             Draws::Fresh => frame.at(severity),
         };
         let blurred = (!streak.is_still()).then(|| blur(clean, streak));
-        let light = blurred
-            .as_ref()
-            .map_or(clean, |light| clean.with_light(light));
+        let light = blurred.as_ref().map_or(clean, |light| clean.with_light(light));
         let drops = [drop_ev, sensor.coupling.headroom_ev(drop_ev)];
-        Ok(develop_with_state(
-            light,
-            &key,
-            &sensor.state,
-            sensor.amplify,
-            sensor.tone,
-            drops,
-        ))
+        Ok(develop_with_state(light, &key, &sensor.state, sensor.amplify, sensor.tone, drops))
     }
 }
 

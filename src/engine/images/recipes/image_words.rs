@@ -56,10 +56,7 @@ impl ImageFlags {
     pub(crate) fn read(words: &ImageWords) -> Result<Self, String> {
         let flags = words.iter().flat_map(|(flag, value)| match value {
             Value::Bool(true) => vec![format!("--{flag}")],
-            Value::Array(list) => list
-                .iter()
-                .map(|value| format!("--{flag}={}", flag_text(value)))
-                .collect(),
+            Value::Array(list) => list.iter().map(|value| format!("--{flag}={}", flag_text(value))).collect(),
             value => vec![format!("--{flag}={}", flag_text(value))],
         });
         Self::try_parse_from(flags)
@@ -69,13 +66,11 @@ impl ImageFlags {
 
 /// The text of a flag value: a string without its quotes, other values as JSON.
 fn flag_text(value: &Value) -> String {
-    value
-        .as_str()
-        .map_or_else(|| value.to_string(), str::to_owned)
+    value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
 
-/// The image flags that were typed in a call. A repeatable flag is included even if only its default is set, because a later call may add
-/// values.
+/// The image flags that were typed in a call. A repeatable flag is included even if only its default is set, because a
+/// later call may add values.
 ///
 /// # Errors
 /// If a value is not valid Unicode, so that a manifest cannot store it.
@@ -105,9 +100,7 @@ pub(crate) fn typed_flags(matches: &ArgMatches) -> Result<ImageWords> {
             })?;
         let value = match texts.pop() {
             _ if !action.takes_values() => Value::Bool(true),
-            Some(last) if is_repeatable || !texts.is_empty() => {
-                Value::Array([texts, vec![last]].concat())
-            }
+            Some(last) if is_repeatable || !texts.is_empty() => Value::Array([texts, vec![last]].concat()),
             Some(last) => last,
             None => continue,
         };

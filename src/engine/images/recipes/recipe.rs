@@ -12,9 +12,7 @@ use crate::error::{Error, Result};
 use crate::pictures::PayloadFormat;
 use crate::pictures::Scaling;
 use crate::types::degradations::Kind;
-use crate::types::{
-    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity,
-};
+use crate::types::{Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, Severity};
 use darkqa_enhance::{EnhancedFolder, ModelFile};
 use darkqa_light::{self, AppliedDegradation, FrameView, KindSettings, NoiseKey, Synthesis};
 
@@ -42,11 +40,7 @@ impl Recipe {
         max_side: Option<NonZeroU32>,
         files: &[ModelFile],
     ) -> Self {
-        Self {
-            format,
-            scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide),
-            ..Self::lossless(kinds, files)
-        }
+        Self { format, scaling: max_side.map_or(Scaling::Never, Scaling::MaxSide), ..Self::lossless(kinds, files) }
     }
 
     /// The recipe for PNG images in the size of their frames.
@@ -58,10 +52,7 @@ impl Recipe {
             scaling: Scaling::Never,
             degraded_at: DegradeStage::Native,
             camera_scope: CameraScope::Frame,
-            enhancers: files
-                .iter()
-                .map(|file| (file.name().clone(), file.digest()))
-                .collect(),
+            enhancers: files.iter().map(|file| (file.name().clone(), file.digest())).collect(),
             enhanced_images: Vec::new(),
         }
     }
@@ -72,10 +63,7 @@ impl Recipe {
     /// If a folder cannot be read, or two enhancers have the same name.
     pub(crate) fn with_enhanced_images(self, folders: &[EnhancedFolder]) -> Result<Self> {
         let models = self.enhancers.iter().map(|(name, _)| name);
-        Ok(Self {
-            enhanced_images: EnhancedImages::open_all(folders, models)?,
-            ..self
-        })
+        Ok(Self { enhanced_images: EnhancedImages::open_all(folders, models)?, ..self })
     }
 
     /// The names of all enhancers: first the models to run, then the folders of enhanced images.
@@ -87,19 +75,12 @@ impl Recipe {
 
     /// The folder of enhanced images with this name; `None` if the enhancer is a model to run.
     pub(crate) fn enhanced_images(&self, name: &EnhancerName) -> Option<&EnhancedImages> {
-        self.enhanced_images
-            .iter()
-            .find(|images| images.name() == name)
+        self.enhanced_images.iter().find(|images| images.name() == name)
     }
 
     /// The recipe for frames of walks.
     pub(crate) fn for_walks(self, walk: &WalkArgs) -> Self {
-        Self {
-            scaling: walk.side,
-            degraded_at: walk.degraded_at,
-            camera_scope: walk.camera,
-            ..self
-        }
+        Self { scaling: walk.side, degraded_at: walk.degraded_at, camera_scope: walk.camera, ..self }
     }
 
     /// The key that seeds the noise of a frame.
@@ -111,19 +92,16 @@ impl Recipe {
         }
     }
 
-    /// Digest of exactly the settings that decide the images of a source in a condition. For example, the seed is included only if the
-    /// degradation is random, so that exposure drops have the same digest in runs with different seeds.
+    /// Digest of exactly the settings that decide the images of a source in a condition. For example, the seed is
+    /// included only if the degradation is random, so that exposure drops have the same digest in runs with different
+    /// seeds.
     ///
     /// # Errors
     /// If the recipe lacks the noise profile of the condition.
     pub(crate) fn stimulus_digest(&self, source: &Source, condition: &Condition) -> Result<Digest> {
-        let images: Vec<ImageKeyFacts<'_>> = source
-            .frames
-            .iter()
-            .map(|frame| self.key_facts(&source.name, frame, condition))
-            .collect::<Result<_>>()?;
-        let in_order: Vec<&ImageKeyFacts<'_>> =
-            source.order.iter().map(|index| &images[*index]).collect();
+        let images: Vec<ImageKeyFacts<'_>> =
+            source.frames.iter().map(|frame| self.key_facts(&source.name, frame, condition)).collect::<Result<_>>()?;
+        let in_order: Vec<&ImageKeyFacts<'_>> = source.order.iter().map(|index| &images[*index]).collect();
         Digest::canonical("darkqa.images/2", &in_order)
     }
 
@@ -137,13 +115,8 @@ impl Recipe {
         frame: &'a SourceFrame,
         condition: &Condition,
     ) -> Result<ImageKeyFacts<'a>> {
-        let degradation = frame
-            .degradation(condition)?
-            .map(|how| self.degradation_facts(source, frame, &how));
-        let enhancer = condition
-            .enhancer
-            .as_ref()
-            .map(|name| self.enhancer_facts(name, frame, condition));
+        let degradation = frame.degradation(condition)?.map(|how| self.degradation_facts(source, frame, &how));
+        let enhancer = condition.enhancer.as_ref().map(|name| self.enhancer_facts(name, frame, condition));
         Ok(ImageKeyFacts {
             picture: frame.picture_digest(condition)?,
             degradation: degradation.transpose()?,
@@ -162,16 +135,10 @@ impl Recipe {
         condition: &Condition,
     ) -> Result<Option<EnhancerFacts>> {
         if let Some(images) = self.enhanced_images(name) {
-            return Ok(Some(EnhancerFacts {
-                digest: images.image_digest(&frame.id, condition)?,
-                version: None,
-            }));
+            return Ok(Some(EnhancerFacts { digest: images.image_digest(&frame.id, condition)?, version: None }));
         }
         let model = self.enhancers.iter().find(|(known, _)| known == name);
-        Ok(model.map(|(_, digest)| EnhancerFacts {
-            digest: *digest,
-            version: Some(darkqa_enhance::VERSION),
-        }))
+        Ok(model.map(|(_, digest)| EnhancerFacts { digest: *digest, version: Some(darkqa_enhance::VERSION) }))
     }
 }
 
@@ -209,15 +176,12 @@ impl Recipe {
         let mut images = Vec::new();
         for source in sources {
             for frame in &source.frames {
-                let enhanced = conditions.iter().filter(|condition| {
-                    condition.enhancer.as_ref() == Some(name) && frame.can_show(condition)
-                });
+                let enhanced = conditions
+                    .iter()
+                    .filter(|condition| condition.enhancer.as_ref() == Some(name) && frame.can_show(condition));
                 for condition in enhanced {
                     let how = frame.degradation(condition)?;
-                    let applied = how
-                        .as_ref()
-                        .map(|how| self.apply(&source.name, frame, how))
-                        .transpose()?;
+                    let applied = how.as_ref().map(|how| self.apply(&source.name, frame, how)).transpose()?;
                     let key = self.noise_key(&source.name, &frame.id);
                     images.push(DarkImage {
                         frame,
@@ -238,17 +202,10 @@ impl Recipe {
         Ok(images)
     }
 
-    fn apply(
-        &self,
-        source: &FrameId,
-        frame: &SourceFrame,
-        how: &Degradation,
-    ) -> Result<AppliedDegradation> {
+    fn apply(&self, source: &FrameId, frame: &SourceFrame, how: &Degradation) -> Result<AppliedDegradation> {
         let key = self.noise_key(source, &frame.id);
         let view = self.view(frame.size, frame.focal);
-        self.kinds
-            .apply(how, view, &key)
-            .map_err(|e| Error::data(format_args!("{} at {how}", frame.id), e))
+        self.kinds.apply(how, view, &key).map_err(|e| Error::data(format_args!("{} at {how}", frame.id), e))
     }
 
     fn degradation_facts<'a>(
@@ -273,8 +230,8 @@ impl Recipe {
         })
     }
 
-    /// Width and focal length of a frame of this width and height, in pixels of the size in which it is degraded. `focal` is in pixels of
-    /// the frame.
+    /// Width and focal length of a frame of this width and height, in pixels of the size in which it is degraded.
+    /// `focal` is in pixels of the frame.
     pub(crate) fn view(&self, size: (u32, u32), focal: Option<f64>) -> FrameView {
         let native_width = size.0 as usize;
         let width = match self.degraded_at {
@@ -282,10 +239,7 @@ impl Recipe {
             DegradeStage::Resized => self.scaling.size(size.0, size.1).0,
         };
         let scale = width as f64 / native_width as f64;
-        FrameView {
-            width,
-            focal: focal.map(|focal| focal * scale),
-        }
+        FrameView { width, focal: focal.map(|focal| focal * scale) }
     }
 }
 

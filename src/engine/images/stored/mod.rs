@@ -7,9 +7,7 @@ mod stored_images;
 mod stored_thumbnails;
 
 pub(super) use output_image::differing_fields;
-pub(crate) use output_image::{
-    ImageCounts, ImageOrigin, ImageOutcome, OutputFile, OutputImage, Sidecar,
-};
+pub(crate) use output_image::{ImageCounts, ImageOrigin, ImageOutcome, OutputFile, OutputImage, Sidecar};
 pub(crate) use refusals::Refusals;
 pub(super) use stored_findings::FindingsPlace;
 pub(crate) use stored_findings::StoredFindings;

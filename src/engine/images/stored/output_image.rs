@@ -1,7 +1,8 @@
 //! An image in the output folder with its JSON sidecar: [`OutputImage`].
 //!
-//! A sidecar contains the recipe of its image and the digest of the image file. An existing image is kept if its recipe and bytes match, or
-//! else its pixels; other images are refused. The image is written before its sidecar, so that no sidecar exists without its image.
+//! A sidecar contains the recipe of its image and the digest of the image file. An existing image is kept if its recipe
+//! and bytes match, or else its pixels; other images are refused. The image is written before its sidecar, so that no
+//! sidecar exists without its image.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -38,7 +39,8 @@ pub(crate) struct Sidecar<R> {
     darkqa_eval: String,
     #[serde(flatten)]
     pub(crate) recipe: R,
-    /// Why the image may be wrong (`--allow bad-enhancer`). Depends on all images of a call and does not affect the pixels.
+    /// Why the image may be wrong (`--allow bad-enhancer`). Depends on all images of a call and does not affect the
+    /// pixels.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     overruled_problem: Option<String>,
     /// The image file; `None` in sidecars of the first schema.
@@ -71,10 +73,7 @@ impl OutputFile {
     pub(crate) fn fault(&self, bytes: &[u8]) -> Option<String> {
         if bytes.len() as u64 != self.bytes {
             let found = bytes.len();
-            return Some(format!(
-                "has {found} bytes, was written with {}",
-                self.bytes
-            ));
+            return Some(format!("has {found} bytes, was written with {}", self.bytes));
         }
         let is_same = Digest::from_bytes(bytes).to_string() == self.digest;
         (!is_same).then(|| "has other bytes than were written".to_owned())
@@ -88,12 +87,8 @@ impl<R: ImageOrigin> Sidecar<R> {
     /// If it cannot be read or parsed, or has an unknown schema.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = reading::text(path)?;
-        let sidecar: Self = serde_json::from_str(&text).map_err(|e| {
-            Error::data(
-                path.display(),
-                format_args!("not a JSON file of an image: {e}"),
-            )
-        })?;
+        let sidecar: Self = serde_json::from_str(&text)
+            .map_err(|e| Error::data(path.display(), format_args!("not a JSON file of an image: {e}")))?;
         if !R::SCHEMAS.contains(&&*sidecar.schema) {
             let expected = R::SCHEMAS.join(" or ");
             let problem = format_args!("schema {:?}; {expected} expected", sidecar.schema);
@@ -109,9 +104,7 @@ impl<R: ImageOrigin> Sidecar<R> {
 
     /// True if the image was written with this digest; false for sidecars of the first schema.
     pub(crate) fn has_digest(&self, image: Digest) -> bool {
-        self.output
-            .as_ref()
-            .is_some_and(|output| output.digest == image.to_string())
+        self.output.as_ref().is_some_and(|output| output.digest == image.to_string())
     }
 
     fn new(recipe: R, place: &OutputImage, bytes: &[u8]) -> Self {
@@ -182,17 +175,11 @@ impl ImageCounts {
 
     /// Text about the images that were not written, to append to a line; empty if all were written.
     pub(crate) fn not_written_text(self) -> String {
-        [
-            (
-                self.unchanged,
-                "left as they were (--force makes them again)",
-            ),
-            (self.failed, "failed"),
-        ]
-        .into_iter()
-        .filter(|(number, _)| *number > 0)
-        .map(|(number, what)| format!(", {number} {what}"))
-        .collect()
+        [(self.unchanged, "left as they were (--force makes them again)"), (self.failed, "failed")]
+            .into_iter()
+            .filter(|(number, _)| *number > 0)
+            .map(|(number, what)| format!(", {number} {what}"))
+            .collect()
     }
 }
 
@@ -222,20 +209,12 @@ impl OutputImage {
     /// The output image `name` in a folder.
     pub(crate) fn new(folder: &Path, name: &str, is_forced: bool) -> Self {
         let [image, json] = [".png", ".json"].map(|end| folder.join(name.to_owned() + end));
-        Self {
-            image,
-            json,
-            is_forced,
-            overruled_problem: None,
-        }
+        Self { image, json, is_forced, overruled_problem: None }
     }
 
     /// Sets the reason why the image may be wrong.
     pub(crate) fn with_overruled_problem(self, overruled_problem: Option<String>) -> Self {
-        Self {
-            overruled_problem,
-            ..self
-        }
+        Self { overruled_problem, ..self }
     }
 
     /// Makes and writes the image of a recipe, unless it exists.
@@ -297,9 +276,7 @@ impl OutputImage {
             (Some(None), _) => OutputAction::Keep,
             (_, None) => OutputAction::Make(Some("cut or damaged")),
             (fault, Some(existing)) => {
-                let fault = fault
-                    .flatten()
-                    .unwrap_or_else(|| "its JSON file has no digest".to_owned());
+                let fault = fault.flatten().unwrap_or_else(|| "its JSON file has no digest".to_owned());
                 OutputAction::Compare(existing, format!("{fault}, and its pixels differ"))
             }
         })
@@ -337,10 +314,7 @@ pub(crate) fn differing_fields(one: &Value, other: &Value) -> Vec<String> {
 
 /// The pixels of an image file; `None` if it cannot be decoded.
 fn decode(path: &Path, bytes: &[u8]) -> Option<Rgb> {
-    let rule = DecodeRule {
-        max_pixels: u64::MAX / 8,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { max_pixels: u64::MAX / 8, ..DecodeRule::default() };
     let file = ImageFile::new(bytes.to_vec(), path.display().to_string(), rule);
     file.decode().ok()
 }

@@ -44,7 +44,8 @@ impl<'a> StoredFindings<'a> {
         })
     }
 
-    /// True if all models of a command were opened and probed before. Such models need not be opened again to be checked.
+    /// True if all models of a command were opened and probed before. Such models need not be opened again to be
+    /// checked.
     ///
     /// # Errors
     /// If a sidecar has a number that is infinite or NaN.
@@ -75,11 +76,7 @@ impl<'a> StoredFindings<'a> {
             store: self.store,
             opened_key: self.key(model, None)?,
             probe_key: self.key(model, Some(facts))?,
-            shown: Shown {
-                content: Content::Probe,
-                enhancer: Some(model.name().to_string()),
-                ..Shown::default()
-            },
+            shown: Shown { content: Content::Probe, enhancer: Some(model.name().to_string()), ..Shown::default() },
         })
     }
 }
@@ -96,10 +93,7 @@ fn middle_frame_facts<'a>(
     conditions
         .iter()
         .map(|condition| {
-            let unenhanced = Condition {
-                enhancer: None,
-                ..condition.clone()
-            };
+            let unenhanced = Condition { enhancer: None, ..condition.clone() };
             recipe.key_facts(&source.name, frame, &unenhanced)
         })
         .collect()

@@ -48,12 +48,7 @@ impl<'a> StoredImages<'a> {
     ///
     /// # Errors
     /// If a frame cannot be shown in the condition.
-    pub(crate) fn has_all(
-        self,
-        recipe: &Recipe,
-        source: &Source,
-        condition: &Condition,
-    ) -> Result<bool> {
+    pub(crate) fn has_all(self, recipe: &Recipe, source: &Source, condition: &Condition) -> Result<bool> {
         if condition.photograph().is_some() {
             // Photographs in the dark are not stored.
             return Ok(false);
@@ -66,8 +61,8 @@ impl<'a> StoredImages<'a> {
         Ok(true)
     }
 
-    /// The place of the image of a frame in a condition, or of its similarity alone if such images are not stored. `source` is the name of
-    /// the frame's source.
+    /// The place of the image of a frame in a condition, or of its similarity alone if such images are not stored.
+    /// `source` is the name of the frame's source.
     ///
     /// # Errors
     /// If the recipe lacks the noise profile of the condition.
@@ -90,10 +85,7 @@ impl<'a> StoredImages<'a> {
                 enhanced_with: condition.enhancer.is_some().then_some(self.maker),
             })
         };
-        let raw = Condition {
-            enhancer: None,
-            ..condition.clone()
-        };
+        let raw = Condition { enhancer: None, ..condition.clone() };
         let shown = Shown {
             content: stored_content,
             enhancer: condition.enhancer.as_ref().map(ToString::to_string),
@@ -105,9 +97,7 @@ impl<'a> StoredImages<'a> {
             image: key(Content::Image)?,
             similarity: match stored_content {
                 Content::Image => None,
-                Content::Measures | Content::Probe | Content::Thumbnail => {
-                    Some(key(Content::Measures)?)
-                }
+                Content::Measures | Content::Probe | Content::Thumbnail => Some(key(Content::Measures)?),
             },
             shown,
         })
@@ -180,16 +170,12 @@ impl<'a> StoredPlace<'a> {
             let read: Option<StoredNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
             notes = read.filter(|notes| {
                 let is_enhanced = self.shown.enhancer.is_some();
-                (!is_enhanced || notes.enhanced.is_some())
-                    && (needed == Needed::Image || notes.similarity.is_some())
+                (!is_enhanced || notes.enhanced.is_some()) && (needed == Needed::Image || notes.similarity.is_some())
             });
             notes.is_some()
         })?;
         let [width, height] = entry.size;
-        Some(StoredImage {
-            payload: Payload::from_file(entry.image, width, height, recipe.format),
-            notes: notes?,
-        })
+        Some(StoredImage { payload: Payload::from_file(entry.image, width, height, recipe.format), notes: notes? })
     }
 
     /// Similarity of the image to its clean frame; `None` if the store does not have it without the image.
@@ -211,23 +197,13 @@ impl<'a> StoredPlace<'a> {
         condition: &Condition,
         objects: Option<ShownObjects<'_>>,
     ) -> Option<ThumbnailPlace<'a>> {
-        ThumbnailPlace::new(
-            self.store,
-            &self.image,
-            &self.shown,
-            frame,
-            condition,
-            objects,
-        )
+        ThumbnailPlace::new(self.store, &self.image, &self.shown, frame, condition, objects)
     }
 
-    /// Adds an image and its notes to the store, or the similarity alone if such images are not stored. `took` is the time to make it.
+    /// Adds an image and its notes to the store, or the similarity alone if such images are not stored. `took` is the
+    /// time to make it.
     pub(crate) fn write(&self, image: &Payload, notes: &StoredNotes, took: Duration) {
-        let facts = EntryFacts::new(
-            self.shown.clone(),
-            took.as_millis() as u64,
-            serde_json::json!(notes),
-        );
+        let facts = EntryFacts::new(self.shown.clone(), took.as_millis() as u64, serde_json::json!(notes));
         if let Some(key) = &self.similarity {
             if notes.similarity.is_some() {
                 self.store.put(key, &Entry::from_facts(facts));
@@ -236,8 +212,7 @@ impl<'a> StoredPlace<'a> {
         }
         let entry = Entry {
             image: image.file().to_vec(),
-            size: [image.facts().width, image.facts().height]
-                .map(|pixels| u32::try_from(pixels).unwrap_or(u32::MAX)),
+            size: [image.facts().width, image.facts().height].map(|pixels| u32::try_from(pixels).unwrap_or(u32::MAX)),
             facts,
         };
         self.store.put(&self.image, &entry);

@@ -47,14 +47,7 @@ impl<'a> ThumbnailPlace<'a> {
             objects: objects.map(|shown| (shown.size, shown.objects)),
         })
         .ok()?;
-        Some(Self {
-            store,
-            key,
-            shown: Shown {
-                content: Content::Thumbnail,
-                ..shown.clone()
-            },
-        })
+        Some(Self { store, key, shown: Shown { content: Content::Thumbnail, ..shown.clone() } })
     }
 
     /// Reads the thumbnail of the image with this digest; `None` if the store does not have it.

@@ -1,14 +1,12 @@
 //! The conditions in which frames are shown, in order: [`conditions`].
 
 use crate::error::{Error, Result};
-use crate::types::{
-    Condition, Degradation, EnhancerName, PairDark, PhotoName, Treatment, TreatmentSet,
-};
+use crate::types::{Condition, Degradation, EnhancerName, PairDark, PhotoName, Treatment, TreatmentSet};
 use darkqa_enhance::EnhancerArgs;
 use darkqa_light::LightSettings;
 
-/// All conditions in which a frame is shown: level by level, then its matches and photographs in the dark; each one first raw, then with
-/// every enhancer. In this order a frame is degraded once for all enhancers.
+/// All conditions in which a frame is shown: level by level, then its matches and photographs in the dark; each one
+/// first raw, then with every enhancer. In this order a frame is degraded once for all enhancers.
 pub(crate) fn conditions(
     light: &LightSettings,
     photographs: &[PhotoName],
@@ -24,10 +22,7 @@ pub(crate) fn conditions(
         let raw = Condition::raw(treatment);
         all.push(raw.clone());
         if is_enhanced {
-            all.extend(enhancers.iter().map(|name| Condition {
-                enhancer: Some(name.clone()),
-                ..raw.clone()
-            }));
+            all.extend(enhancers.iter().map(|name| Condition { enhancer: Some(name.clone()), ..raw.clone() }));
         }
     }
     all
@@ -48,8 +43,7 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
     };
     let on = args.on();
     // Photographs in the dark are known only after the data are opened; `check_enhanced` checks them.
-    let may_enhance_pairs =
-        on.intersection(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
+    let may_enhance_pairs = on.intersection(TreatmentSet::DARK).is_some() || !light.matches.is_empty();
     if args.is_empty() || may_enhance_pairs || asked.intersection(on).is_some() {
         return Ok(());
     }
@@ -59,10 +53,7 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
             format!("--llie-on {on} is not among the images asked; --llie-on {dark} is")
         }
     };
-    Err(Error::usage(
-        "--llie",
-        format_args!("the enhancer would never be used: {problem}"),
-    ))
+    Err(Error::usage("--llie", format_args!("the enhancer would never be used: {problem}")))
 }
 
 /// Checks that the named enhancers are used in the conditions of the opened data, which [`check_used`] does not know.
@@ -70,9 +61,7 @@ pub(crate) fn check_used(light: &LightSettings, args: &EnhancerArgs) -> Result<(
 /// # Errors
 /// [`Error::Usage`] if enhancers are named and no condition uses one.
 pub(crate) fn check_enhanced(conditions: &[Condition], args: &EnhancerArgs) -> Result<()> {
-    let is_used = conditions
-        .iter()
-        .any(|condition| condition.enhancer.is_some());
+    let is_used = conditions.iter().any(|condition| condition.enhancer.is_some());
     if args.is_empty() || is_used || conditions.is_empty() {
         return Ok(());
     }
@@ -101,31 +90,16 @@ mod tests {
 
     fn check(words: &str) -> Result<()> {
         let flags = Flags::try_parse_from(words.split_whitespace()).unwrap();
-        check_used(
-            &LightSettings::resolve(&flags.light, SetLight::Lit).unwrap(),
-            &flags.enhancers,
-        )
+        check_used(&LightSettings::resolve(&flags.light, SetLight::Lit).unwrap(), &flags.enhancers)
     }
 
     #[test]
     fn an_unused_enhancer_is_an_error() {
         for (words, remedy) in [
-            (
-                "--llie lift --levels L0",
-                "only L0 is asked; --llie-on l0 enhances the untouched images",
-            ),
-            (
-                "--llie lift --levels L0 --llie-on both",
-                "only L0 is asked; --llie-on l0 enhances the untouched images",
-            ),
-            (
-                "--llie lift --variant ev",
-                "--llie-on noise is not among the images asked; --llie-on ev is",
-            ),
-            (
-                "--llie lift --levels L3 --llie-on l0",
-                "--llie-on l0 is not among the images asked; --llie-on both is",
-            ),
+            ("--llie lift --levels L0", "only L0 is asked; --llie-on l0 enhances the untouched images"),
+            ("--llie lift --levels L0 --llie-on both", "only L0 is asked; --llie-on l0 enhances the untouched images"),
+            ("--llie lift --variant ev", "--llie-on noise is not among the images asked; --llie-on ev is"),
+            ("--llie lift --levels L3 --llie-on l0", "--llie-on l0 is not among the images asked; --llie-on both is"),
         ] {
             let error = check(words).unwrap_err().to_string();
             let expected = format!("the enhancer would never be used: {remedy}");

@@ -30,9 +30,7 @@ pub(crate) struct SourcePlan<I> {
 impl<I> SourcePlan<I> {
     /// The conditions in which the source is shown.
     pub(crate) fn conditions(&self) -> impl Iterator<Item = &Condition> {
-        self.groups
-            .iter()
-            .filter_map(|group| group.condition.as_ref())
+        self.groups.iter().filter_map(|group| group.condition.as_ref())
     }
 
     fn trial_count(&self) -> usize {
@@ -64,11 +62,7 @@ impl<I> Plan<I> {
         for part in &sources {
             *by_source.entry(part.source).or_default() += part.trial_count();
         }
-        let mut plan = Self {
-            keys,
-            by_source,
-            sources,
-        };
+        let mut plan = Self { keys, by_source, sources };
         plan.exclude(|_| false);
         plan
     }
@@ -87,30 +81,17 @@ impl<I> Plan<I> {
     }
 
     /// Adds the wanted images of all groups that are not in the plan, without trials.
-    pub(crate) fn add_images(
-        &mut self,
-        all: Vec<SourcePlan<I>>,
-        is_wanted: impl Fn(usize, &Condition) -> bool,
-    ) {
-        let positions: BTreeMap<usize, usize> = self
-            .sources
-            .iter()
-            .map(|part| part.source)
-            .zip(0..)
-            .collect();
+    pub(crate) fn add_images(&mut self, all: Vec<SourcePlan<I>>, is_wanted: impl Fn(usize, &Condition) -> bool) {
+        let positions: BTreeMap<usize, usize> = self.sources.iter().map(|part| part.source).zip(0..).collect();
         for SourcePlan { source, groups } in all {
             let position = positions.get(&source).copied();
-            let planned: BTreeSet<Condition> = position
-                .map(|position| self.sources[position].conditions().cloned().collect())
-                .unwrap_or_default();
+            let planned: BTreeSet<Condition> =
+                position.map(|position| self.sources[position].conditions().cloned().collect()).unwrap_or_default();
             let groups: Vec<TrialGroup<I>> = groups
                 .into_iter()
                 .filter_map(|group| group.condition)
                 .filter(|condition| !planned.contains(condition) && is_wanted(source, condition))
-                .map(|condition| TrialGroup {
-                    condition: Some(condition),
-                    trials: Vec::new(),
-                })
+                .map(|condition| TrialGroup { condition: Some(condition), trials: Vec::new() })
                 .collect();
             match position {
                 Some(position) => self.sources[position].groups.extend(groups),
@@ -120,20 +101,12 @@ impl<I> Plan<I> {
         }
     }
 
-    /// Moves groups of untouched images to the front until they have at least `trials` trials, because these show whether a server looks at
-    /// the images at all. Nothing is moved if fewer than `min_trials` exist. Only groups of sources for which `is_cheap` is true are moved,
-    /// because the frames of a moved group are read twice.
-    pub(crate) fn ask_untouched_first(
-        &mut self,
-        min_trials: usize,
-        trials: usize,
-        is_cheap: impl Fn(usize) -> bool,
-    ) {
-        let available: usize = self
-            .groups()
-            .filter(|(_, group)| group.is_untouched())
-            .map(|(_, group)| group.trials.len())
-            .sum();
+    /// Moves groups of untouched images to the front until they have at least `trials` trials, because these show
+    /// whether a server looks at the images at all. Nothing is moved if fewer than `min_trials` exist. Only groups of
+    /// sources for which `is_cheap` is true are moved, because the frames of a moved group are read twice.
+    pub(crate) fn ask_untouched_first(&mut self, min_trials: usize, trials: usize, is_cheap: impl Fn(usize) -> bool) {
+        let available: usize =
+            self.groups().filter(|(_, group)| group.is_untouched()).map(|(_, group)| group.trials.len()).sum();
         if available < min_trials {
             return;
         }
@@ -145,10 +118,7 @@ impl<I> Plan<I> {
                 && let Some(index) = part.groups.iter().position(TrialGroup::is_untouched)
             {
                 moved += part.groups[index].trials.len();
-                first.push(SourcePlan {
-                    source: part.source,
-                    groups: vec![part.groups.remove(index)],
-                });
+                first.push(SourcePlan { source: part.source, groups: vec![part.groups.remove(index)] });
             }
         }
         first.append(&mut self.sources);
@@ -157,10 +127,7 @@ impl<I> Plan<I> {
 
     /// Number of trials that remain to be asked and whose keys satisfy `is_counted`.
     pub(crate) fn remaining_where(&self, is_counted: impl Fn(&TrialKey) -> bool) -> usize {
-        self.groups()
-            .flat_map(|(_, group)| &group.trials)
-            .filter(|trial| is_counted(&trial.key))
-            .count()
+        self.groups().flat_map(|(_, group)| &group.trials).filter(|trial| is_counted(&trial.key)).count()
     }
 
     /// Number of trials that remain to be asked.
@@ -170,16 +137,11 @@ impl<I> Plan<I> {
 
     /// The conditions of the remaining trials.
     pub(crate) fn conditions(&self) -> BTreeSet<&Condition> {
-        self.sources
-            .iter()
-            .flat_map(SourcePlan::conditions)
-            .collect()
+        self.sources.iter().flat_map(SourcePlan::conditions).collect()
     }
 
     /// The groups of the remaining trials, each with the index of its source.
     pub(crate) fn groups(&self) -> impl Iterator<Item = (usize, &TrialGroup<I>)> {
-        self.sources
-            .iter()
-            .flat_map(|part| part.groups.iter().map(|group| (part.source, group)))
+        self.sources.iter().flat_map(|part| part.groups.iter().map(|group| (part.source, group)))
     }
 }

@@ -1,4 +1,5 @@
-//! The questions to ask about a data set: opened or generated ([`open_data`]), selected ([`select`]), or from a bank ([`QuestionBank`]).
+//! The questions to ask about a data set: opened or generated ([`open_data`]), selected ([`select`]), or from a bank
+//! ([`QuestionBank`]).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
@@ -7,8 +8,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use crate::data::{
-    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs,
-    SkipBad,
+    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs, SkipBad,
 };
 use crate::engine::images::progress::Progress;
 use crate::engine::images::trials::questions_by_rule::generate_by_rule;
@@ -49,8 +49,8 @@ pub(crate) fn open_data(
     Ok(dataset.with_questions(questions))
 }
 
-/// Removes images that cannot be read, and the questions about them, if `--skip bad` is set. Decodes each image, and also its maps if
-/// questions will be generated.
+/// Removes images that cannot be read, and the questions about them, if `--skip bad` is set. Decodes each image, and
+/// also its maps if questions will be generated.
 ///
 /// # Errors
 /// If more images are broken than `--skip bad` allows.
@@ -64,11 +64,7 @@ fn skip_unusable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -
     let unusable: BTreeMap<FrameId, String> = shown
         .into_par_iter()
         .filter_map(|frame| {
-            let result = if with_maps {
-                dataset.frame(frame).map(drop)
-            } else {
-                dataset.decode_all(frame)
-            };
+            let result = if with_maps { dataset.frame(frame).map(drop) } else { dataset.decode_all(frame) };
             bar.inc();
             Some((frame.clone(), result.err()?.to_string()))
         })
@@ -110,11 +106,7 @@ impl QuestionBank {
         let Some(place) = &args.ask else {
             return Ok(None);
         };
-        Ok(Some(Self {
-            bank: Bank::open(place)?,
-            place: place.clone(),
-            per_image: args.ask_per_image,
-        }))
+        Ok(Some(Self { bank: Bank::open(place)?, place: place.clone(), per_image: args.ask_per_image }))
     }
 
     /// The digest of all questions.
@@ -127,12 +119,7 @@ impl QuestionBank {
 
     /// Description for the manifest: the name of the bank and the number of questions per image.
     pub(crate) fn description(&self) -> String {
-        format!(
-            "{}: {} of {} questions about each image",
-            self.place,
-            self.questions_per_image(),
-            self.bank.len()
-        )
+        format!("{}: {} of {} questions about each image", self.place, self.questions_per_image(), self.bank.len())
     }
 
     /// Number of questions asked about each image.
@@ -141,7 +128,8 @@ impl QuestionBank {
         self.per_image.map_or(all, |count| count.get().min(all))
     }
 
-    /// Opens the images at a place, with the questions about each. Prints which files are ignored, and what is asked in addition.
+    /// Opens the images at a place, with the questions about each. Prints which files are ignored, and what is asked in
+    /// addition.
     ///
     /// # Errors
     /// If the place has no image.
@@ -177,18 +165,12 @@ impl QuestionBank {
 }
 
 /// Selects the first `--limit` questions of the chosen families.
-pub(crate) fn select(
-    mut questions: Vec<Question>,
-    selection: &SelectionArgs,
-) -> Result<Vec<Question>> {
+pub(crate) fn select(mut questions: Vec<Question>, selection: &SelectionArgs) -> Result<Vec<Question>> {
     let wanted = &selection.families;
     let present: BTreeSet<&Family> = questions.iter().map(|question| &question.family).collect();
     if let Some(missing) = wanted.iter().find(|family| !present.contains(family)) {
         let present: Vec<&str> = present.into_iter().map(Family::name).collect();
-        let problem = format!(
-            "no question of the family {missing}; there are: {}",
-            present.join(", ")
-        );
+        let problem = format!("no question of the family {missing}; there are: {}", present.join(", "));
         return Err(Error::usage("--families", problem));
     }
     questions.retain(|question| wanted.is_empty() || wanted.contains(&question.family));

@@ -20,7 +20,8 @@ pub(crate) trait Item: Clone + Send + Sync + 'static {
     /// The question, in the form for built-in models.
     fn query(&self) -> Query<'_>;
 
-    /// Name of the source of its images. If a server refuses only requests about one source, that source may be the cause.
+    /// Name of the source of its images. If a server refuses only requests about one source, that source may be the
+    /// cause.
     fn source(&self) -> &str;
 
     /// Number of earlier trials of the same question (repeats), from 0.
@@ -54,20 +55,12 @@ pub(crate) struct Prompt {
 impl Prompt {
     /// A prompt whose whole text is before the images.
     pub(crate) fn from_text(text: Arc<str>) -> Self {
-        Self {
-            before: text,
-            after: None,
-            places: ImagePlaces::Together,
-        }
+        Self { before: text, after: None, places: ImagePlaces::Together }
     }
 
     /// A prompt whose whole text is after the images.
     pub(crate) fn after_images(text: Arc<str>) -> Self {
-        Self {
-            before: Arc::from(""),
-            after: Some(text),
-            places: ImagePlaces::Together,
-        }
+        Self { before: Arc::from(""), after: Some(text), places: ImagePlaces::Together }
     }
 
     /// The same prompt with images in these places.
@@ -82,12 +75,7 @@ impl Prompt {
 
     pub(crate) fn message<'a>(&'a self, images: &'a [Arc<Payload>]) -> Message<'a> {
         let [before, after] = self.parts();
-        Message {
-            before,
-            images,
-            after,
-            places: self.places,
-        }
+        Message { before, images, after, places: self.places }
     }
 }
 

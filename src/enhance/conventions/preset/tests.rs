@@ -15,12 +15,7 @@ fn ports(all: &[(&str, usize)]) -> Vec<Port> {
             element: ElementType::Float32,
             dims: match channels {
                 0 => vec![Dim::Known(1)],
-                channels => vec![
-                    Dim::Known(1),
-                    Dim::Known(*channels),
-                    Dim::Free("n".into()),
-                    Dim::Free("n".into()),
-                ],
+                channels => vec![Dim::Known(1), Dim::Known(*channels), Dim::Free("n".into()), Dim::Free("n".into())],
             },
         })
         .collect()
@@ -34,25 +29,16 @@ fn stated(name: &str, outputs: &[(&str, usize)]) -> std::result::Result<ModelSid
 
 #[test]
 fn preset_is_split_at_the_colon() {
-    for name in all_presets()
-        .unwrap()
-        .into_keys()
-        .chain(["zero-dce-pp".to_owned()])
-    {
+    for name in all_presets().unwrap().into_keys().chain(["zero-dce-pp".to_owned()]) {
         let model = format!("{name}:a/b.onnx");
         let (preset, file) = Preset::split(Path::new(&model)).unwrap();
-        assert_eq!(
-            (preset.unwrap().name.as_str(), file),
-            (name.as_str(), "a/b.onnx".into())
-        );
+        assert_eq!((preset.unwrap().name.as_str(), file), (name.as_str(), "a/b.onnx".into()));
     }
     for plain in ["a/b.onnx", "./x:y.onnx", "C:\\m.onnx"] {
         let (preset, file) = Preset::split(Path::new(plain)).unwrap();
         assert!(preset.is_none() && file == Path::new(plain), "{plain}");
     }
-    let message = Preset::split(Path::new("zerodce:b.onnx"))
-        .unwrap_err()
-        .to_string();
+    let message = Preset::split(Path::new("zerodce:b.onnx")).unwrap_err().to_string();
     assert!(message.contains("zero-dce, "), "{message}");
 }
 
@@ -91,8 +77,7 @@ fn every_preset_is_documented() {
         }
         let row = format!("{}, {}", content.repository, content.commit);
         let [readme, ..] = texts;
-        let written = readme.contains(&format!("[{}]", content.repository))
-            && readme.contains(&content.commit);
+        let written = readme.contains(&format!("[{}]", content.repository)) && readme.contains(&content.commit);
         assert!(written, "src/docs/enhancers.md lacks {row}");
     }
 }
@@ -102,17 +87,11 @@ fn every_preset_states_its_source() {
     for (name, content) in all_presets().unwrap() {
         assert!(
             content.commit.len() == 7
-                && content
-                    .commit
-                    .chars()
-                    .all(|c: char| c.is_ascii_digit() || ('a'..='f').contains(&c)),
+                && content.commit.chars().all(|c: char| c.is_ascii_digit() || ('a'..='f').contains(&c)),
             "{name}"
         );
         assert_eq!(content.repository.split('/').count(), 2, "{name}");
-        assert!(
-            !content.file.is_empty() && !content.paper.is_empty(),
-            "{name}"
-        );
+        assert!(!content.file.is_empty() && !content.paper.is_empty(), "{name}");
         assert!(!content.names.is_empty(), "{name}");
         for list in &content.signatures {
             assert!((1..=list.channels.len()).contains(&list.nth), "{name}");
@@ -127,18 +106,15 @@ fn every_preset_states_its_source() {
 
 #[test]
 fn image_is_sliced_from_a_stacked_output() {
-    for (name, outputs, start) in [
-        ("agllnet", [("a/b:0", 7)], "`a/b:0`[4:7]"),
-        ("zero-dce-tf", [("y", 24)], "curves(input, `y`[0:3]"),
-    ] {
+    for (name, outputs, start) in
+        [("agllnet", [("a/b:0", 7)], "`a/b:0`[4:7]"), ("zero-dce-tf", [("y", 24)], "curves(input, `y`[0:3]")]
+    {
         let image = stated(name, &outputs).unwrap().image.unwrap().to_string();
         assert!(image.starts_with(start), "{image}");
     }
-    for (name, outputs) in [
-        ("agllnet", &[("y", 3)][..]),
-        ("zero-dce-tf", &[("y", 3)]),
-        ("agllnet", &[("y", 7), ("z", 7)]),
-    ] {
+    for (name, outputs) in
+        [("agllnet", &[("y", 3)][..]), ("zero-dce-tf", &[("y", 3)]), ("agllnet", &[("y", 7), ("z", 7)])]
+    {
         let problem = stated(name, outputs).unwrap_err();
         assert!(problem.contains("one output of "), "{problem}");
     }
@@ -165,11 +141,7 @@ fn output_is_chosen_by_name_then_by_channels() {
         ("zero-dce", &[("a", 3), ("b", 3), ("c", 24)][..], "b"),
         ("zero-dce", &[("a", 3), ("c", 24)], "a"),
         ("zero-dce", &[("half", 3), ("enhanced", 3)], "enhanced"),
-        (
-            "zero-dce",
-            &[("curves", 24), ("enhance_image", 3)],
-            "enhance_image",
-        ),
+        ("zero-dce", &[("curves", 24), ("enhance_image", 3)], "enhance_image"),
         // The name of a first output counts only if the others were named too.
         ("zero-dce", &[("output", 3), ("322", 3), ("300", 24)], "322"),
         ("zero-dce", &[("output", 3), ("half", 3)], "output"),
@@ -214,25 +186,16 @@ fn error_about_unknown_outputs_lists_them() {
 
 #[test]
 fn output_of_the_sidecar_overrides_the_preset() {
-    let sidecar = ModelSidecar {
-        output: Some(OutputChoice::Index(0)),
-        ..ModelSidecar::default()
-    };
+    let sidecar = ModelSidecar { output: Some(OutputChoice::Index(0)), ..ModelSidecar::default() };
     let outputs = ports(&[("1", 3), ("2", 3)]);
     let found = preset("zero-dce").for_graph(&sidecar, &ports(&[("x", 3)]), &outputs);
-    assert_eq!(
-        sidecar.with_defaults(&found.unwrap()).output,
-        Some(OutputChoice::Index(0))
-    );
+    assert_eq!(sidecar.with_defaults(&found.unwrap()).output, Some(OutputChoice::Index(0)));
 }
 
 #[test]
 fn pairlie_is_an_expression_or_takes_its_exponent_as_an_input() {
     let found = stated("pairlie", &[("L", 1), ("R", 3), ("X", 3)]).unwrap();
-    assert_eq!(
-        (found.image, found.output),
-        ("L ^ 0.2 * R".parse().ok(), None)
-    );
+    assert_eq!((found.image, found.output), ("L ^ 0.2 * R".parse().ok(), None));
     // Only exports with the exponent as an input are given it.
     assert!(found.extra.is_empty());
     let inputs = ports(&[("x", 3), ("exposure", 0)]);
@@ -245,21 +208,15 @@ fn pairlie_is_an_expression_or_takes_its_exponent_as_an_input() {
 #[test]
 fn uretinex_is_the_product_of_reflectance_and_illumination() {
     let found = stated("uretinex", &[("R", 3), ("L", 1), ("High_L", 1)]).unwrap();
-    assert_eq!(
-        (found.image, found.output),
-        ("R * High_L".parse().ok(), None)
-    );
+    assert_eq!((found.image, found.output), ("R * High_L".parse().ok(), None));
 }
 
 #[test]
 fn number_becomes_a_map_where_the_graph_takes_one() {
     let outputs = ports(&[("output", 3)]);
-    for (name, channels, expected) in [
-        ("uretinex", 0, "5"),
-        ("uretinex", 1, "map of 5"),
-        ("kind", 0, "5.0"),
-        ("kind", 1, "map of 5.0"),
-    ] {
+    for (name, channels, expected) in
+        [("uretinex", 0, "5"), ("uretinex", 1, "map of 5"), ("kind", 0, "5.0"), ("kind", 1, "map of 5.0")]
+    {
         let inputs = ports(&[("x", 3), ("ratio", channels)]);
         let found = preset(name).for_graph(&ModelSidecar::default(), &inputs, &outputs);
         assert_eq!(found.unwrap().extra["ratio"].to_string(), expected);
@@ -281,8 +238,5 @@ fn differences_from_the_authors_model_are_reported() {
     assert!(found.contains("outputs of 3, 3 channels"), "{found}");
     let found = differences("sci", &[("x", 3), ("ratio", 0)], &three[..1]).unwrap();
     assert!(found.contains("inputs differ"), "{found}");
-    assert_eq!(
-        differences("kind", &[("x", 3), ("ratio", 1)], &three[..1]),
-        None
-    );
+    assert_eq!(differences("kind", &[("x", 3), ("ratio", 1)], &three[..1]), None);
 }

@@ -51,12 +51,7 @@ fn only_image_is_chosen_whatever_its_name() {
         vec![port("758", &[])],
     ];
     for outputs in cases {
-        assert_eq!(
-            choose(&outputs),
-            Ok("758".into()),
-            "{}",
-            format_ports(&outputs)
-        );
+        assert_eq!(choose(&outputs), Ok("758".into()), "{}", format_ports(&outputs));
     }
 }
 
@@ -119,11 +114,9 @@ fn stated_output_is_chosen_if_it_can_be_an_image() {
         let found = infer_with(&inputs, outputs, line).unwrap();
         assert_eq!(found.outputs[0].port.name, name, "{line}");
     }
-    for (line, part) in [
-        ("output = 3", "does not exist"),
-        ("output = \"x\"", "does not exist"),
-        ("output = 2", "is not an image"),
-    ] {
+    for (line, part) in
+        [("output = 3", "does not exist"), ("output = \"x\"", "does not exist"), ("output = 2", "is not an image")]
+    {
         let message = infer_with(&inputs, &outputs, line).unwrap_err();
         assert!(message.contains(part), "{message}");
     }
@@ -132,11 +125,7 @@ fn stated_output_is_chosen_if_it_can_be_an_image() {
 #[test]
 fn fixed_sizes_of_input_and_output_must_agree() {
     let fixed = port("in", &[1, 3, 96, 128]);
-    let found = signature(
-        std::slice::from_ref(&fixed),
-        &[port("out", &[1, 3, 0, 128])],
-    )
-    .unwrap();
+    let found = signature(std::slice::from_ref(&fixed), &[port("out", &[1, 3, 0, 128])]).unwrap();
     assert_eq!((found.height, found.width), (Some(96), Some(128)));
     let half = signature(&[port("in", &[1, 3, 0, 128])], &[image("out")]).unwrap();
     assert_eq!((half.height, half.width), (None, Some(128)));
@@ -153,20 +142,10 @@ fn layouts_are_inferred_for_each_element_type() {
         (&[3, 0, 0], TensorLayout::Chw),
         (&[48, 64, 3], TensorLayout::Hwc),
     ] {
-        for element in [
-            ElementType::Float32,
-            ElementType::Float16,
-            ElementType::Uint8,
-        ] {
-            let input = Port {
-                element,
-                ..port("x", dims)
-            };
+        for element in [ElementType::Float32, ElementType::Float16, ElementType::Uint8] {
+            let input = Port { element, ..port("x", dims) };
             let found = signature(&[input], &[port("y", &[])]).unwrap();
-            assert_eq!(
-                (found.input.layout, found.outputs[0].layout),
-                (layout, None)
-            );
+            assert_eq!((found.input.layout, found.outputs[0].layout), (layout, None));
         }
     }
     let out = signature(&[image("x")], &[port("y", &[0, 0, 3])]).unwrap();
@@ -197,28 +176,16 @@ fn further_inputs_need_values() {
     // The message proposes a value if a preset states one for this name.
     let known = [image("x"), port("exposure", &[])];
     let message = signature(&known, &[image("y")]).unwrap_err();
-    assert!(
-        message.contains("`exposure = 0.2` (as in preset pairlie)"),
-        "{message}"
-    );
+    assert!(message.contains("`exposure = 0.2` (as in preset pairlie)"), "{message}");
     let switch = [image("x"), typed(ElementType::Bool, port("on", &[1]))];
     let message = signature(&switch, &[image("y")]).unwrap_err();
     assert!(message.contains("`on = true` or `on = false`"), "{message}");
     let found = infer_with(&inputs, &[image("y")], "[extra]\nstrength = 0.25").unwrap();
-    assert_eq!(
-        found.extras[0].value,
-        ExtraValue::Number(Number::Float(0.25))
-    );
+    assert_eq!(found.extras[0].value, ExtraValue::Number(Number::Float(0.25)));
     for (text, part) in [
         ("[extra]\ngamma = 1", "its value is unknown"),
-        (
-            "[extra]\nstrength = 1\ngamma = 1",
-            "\"gamma\" under [extra], which is not an input",
-        ),
-        (
-            "[extra]\nstrength = 1\nmean = [0, 0, 0]",
-            "move that line above [extra] if it is another key",
-        ),
+        ("[extra]\nstrength = 1\ngamma = 1", "\"gamma\" under [extra], which is not an input"),
+        ("[extra]\nstrength = 1\nmean = [0, 0, 0]", "move that line above [extra] if it is another key"),
     ] {
         let message = infer_with(&inputs, &[image("y")], text).unwrap_err();
         assert!(message.contains(part), "{message}");
@@ -234,21 +201,9 @@ fn values_must_fit_further_inputs() {
         (typed(ElementType::Int32, port("a", &[1])), "3", None),
         (typed(ElementType::Int32, port("a", &[])), "3", None),
         (typed(ElementType::Int32, port("a", &[0])), "3", None),
-        (
-            typed(ElementType::Int32, port("a", &[1])),
-            "3.5",
-            Some("3.5 does not fit its type int32"),
-        ),
-        (
-            typed(ElementType::Bool, port("a", &[])),
-            "1",
-            Some("type bool"),
-        ),
-        (
-            port("a", &[1]),
-            "{ map = 1 }",
-            Some("single number: `a = NUMBER`"),
-        ),
+        (typed(ElementType::Int32, port("a", &[1])), "3.5", Some("3.5 does not fit its type int32")),
+        (typed(ElementType::Bool, port("a", &[])), "1", Some("type bool")),
+        (port("a", &[1]), "{ map = 1 }", Some("single number: `a = NUMBER`")),
         (plane.clone(), "0.5", Some("`a = { map = 0.5 }`")),
         (plane.clone(), "{ map = 0.5 }", None),
         (port("a", &[1, 7, 0, 0]), "{ map = 0.5 }", None),
@@ -259,16 +214,8 @@ fn values_must_fit_further_inputs() {
         (plane.clone(), "{ from = \"max(image)\" }", None),
         (plane, "{ from = \"1 - image\" }", Some("mean(…) or max(…)")),
         (port("a", &[1, 3, 0, 0]), "{ from = \"1 - image\" }", None),
-        (
-            port("a", &[1, 4, 0, 0]),
-            "{ from = \"image\" }",
-            Some("4 channels"),
-        ),
-        (
-            port("a", &[5, 1, 0, 0]),
-            "{ map = 1 }",
-            Some("dimension of 5"),
-        ),
+        (port("a", &[1, 4, 0, 0]), "{ from = \"image\" }", Some("4 channels")),
+        (port("a", &[5, 1, 0, 0]), "{ map = 1 }", Some("dimension of 5")),
     ];
     for (further, value, problem) in rows {
         let inputs = [image("x"), further];
@@ -286,20 +233,11 @@ fn values_must_fit_further_inputs() {
 fn shape_and_name_decide_the_proposed_value_of_a_further_input() {
     for (further, part) in [
         (port("ratio", &[1, 1, 0, 0]), "`ratio = { map = 5.0 }`"),
-        (
-            port("z", &[1, 1, 0, 0]),
-            "`z = { noise = \"normal\", std = NUMBER, seed = 0 }`",
-        ),
+        (port("z", &[1, 1, 0, 0]), "`z = { noise = \"normal\", std = NUMBER, seed = 0 }`"),
         (port("second", &[1, 3, 0, 0]), "of three channels"),
-        (
-            image("attention"),
-            "`attention = { from = \"1 - max(image)\" }`",
-        ),
+        (image("attention"), "`attention = { from = \"1 - max(image)\" }`"),
         (port("gray.1", &[1, 1, 0, 0]), "`\"gray.1\" = { from ="),
-        (
-            typed(ElementType::Other("string".into()), port("s", &[])),
-            "an unsupported type",
-        ),
+        (typed(ElementType::Other("string".into()), port("s", &[])), "an unsupported type"),
     ] {
         let name = further.to_string();
         let message = signature(&[image("x"), further], &[image("y")]).unwrap_err();
@@ -315,16 +253,9 @@ fn shape_and_name_decide_the_proposed_value_of_a_further_input() {
 fn expression_of_the_image_names_outputs() {
     let inputs = [image("x")];
     let outputs = [port("L", &[1, 1, 0, 0]), image("R"), curves("c")];
-    for (line, expected) in [
-        ("image = \"L ^ 0.2 * R\"", &["L", "R"][..]),
-        ("image = \"R + 0 * input\"", &["R"]),
-    ] {
+    for (line, expected) in [("image = \"L ^ 0.2 * R\"", &["L", "R"][..]), ("image = \"R + 0 * input\"", &["R"])] {
         let found = infer_with(&inputs, &outputs, line).unwrap();
-        let names: Vec<&str> = found
-            .outputs
-            .iter()
-            .map(|output| output.port.name.as_str())
-            .collect();
+        let names: Vec<&str> = found.outputs.iter().map(|output| output.port.name.as_str()).collect();
         assert_eq!(names, expected, "{line}");
     }
     for (line, part) in [
@@ -356,18 +287,12 @@ fn single_channel_must_be_stated_to_be_the_luma() {
 fn unsupported_inputs_are_named() {
     let double = typed(ElementType::Float64, image("double"));
     let cases = [
-        (
-            vec![],
-            "no input that can be an image; export it with an input of [1, 3, height, width]; inputs: none",
-        ),
+        (vec![], "no input that can be an image; export it with an input of [1, 3, height, width]; inputs: none"),
         (vec![image("a"), image("b")], "\"b\" (float32 [1, 3, n, n])"),
         (vec![double], "float64"),
         (vec![port("a", &[2, 3, 0, 0])], "several images"),
         (vec![port("a", &[])], "without a shape"),
-        (
-            vec![port("a", &[1, 4, 0, 0])],
-            "4 channels, but an image has 3",
-        ),
+        (vec![port("a", &[1, 4, 0, 0])], "4 channels, but an image has 3"),
         (vec![port("a", &[1, 2, 3, 64, 64])], "several frames"),
         (vec![port("a", &[1, 85])], "a vector"),
     ];
@@ -381,9 +306,6 @@ fn unsupported_inputs_are_named() {
 fn model_without_an_image_output_is_refused() {
     let outputs = [port("758", &[1, 85, 22, 22]), port("flat", &[1, 3])];
     let message = choose(&outputs).unwrap_err();
-    assert!(
-        message.contains("\"758\" (float32 [1, 85, 22, 22])"),
-        "{message}"
-    );
+    assert!(message.contains("\"758\" (float32 [1, 85, 22, 22])"), "{message}");
     assert!(choose(&[]).unwrap_err().ends_with("outputs: none"));
 }

@@ -111,11 +111,9 @@ fn other_files_and_processors_are_refused() {
         let problem = check(format, &text).unwrap_err();
         assert!(problem.contains("not a dynamic library"), "{problem}");
     }
-    for (format, library) in [
-        (LibraryFormat::Elf, elf(ENTRY)),
-        (LibraryFormat::MachO, mach_o()),
-        (LibraryFormat::Pe, pe()),
-    ] {
+    for (format, library) in
+        [(LibraryFormat::Elf, elf(ENTRY)), (LibraryFormat::MachO, mach_o()), (LibraryFormat::Pe, pe())]
+    {
         let size = library.len() as u64;
         let checked = format.check_content(&mut Cursor::new(&library), size, "aarch64");
         assert!(checked.unwrap_err().contains("another processor"));

@@ -32,11 +32,7 @@ pub(super) struct Proposal {
 
 impl Proposal {
     fn without_lines(conclusion: String) -> Self {
-        Self {
-            lines: Vec::new(),
-            conclusion,
-            settled: Settled::No,
-        }
+        Self { lines: Vec::new(), conclusion, settled: Settled::No }
     }
 
     /// No lines, because the stated ranges are plausible.
@@ -44,10 +40,7 @@ impl Proposal {
         let conclusion = format!(
             "With {pair}, as set by MODEL.onnx.toml, the preset or the element types, its images are plausible."
         );
-        Self {
-            settled: Settled::Yes,
-            ..Self::without_lines(conclusion)
-        }
+        Self { settled: Settled::Yes, ..Self::without_lines(conclusion) }
     }
 
     /// No lines, because several outputs could be the image: `first`, which is read, and `others`, which are plausible.
@@ -59,11 +52,7 @@ impl Proposal {
         plausible.extend(others.iter().map(String::as_str));
         Self::without_lines(format!(
             "It is unknown which output is the image; plausible: {}. Choose one in MODEL.onnx.toml next to it, `output = \"NAME\"`, or name its preset (PRESET:FILE).",
-            if plausible.is_empty() {
-                "none".to_owned()
-            } else {
-                plausible.join("; ")
-            }
+            if plausible.is_empty() { "none".to_owned() } else { plausible.join("; ") }
         ))
     }
 
@@ -78,34 +67,19 @@ impl Proposal {
     /// Lines that state a pair of ranges.
     fn for_ranges(pair: RangePair, conclusion: String) -> Self {
         let reason = "with these value ranges its images are plausible";
-        let lines = pair.lines().into_iter().map(|line| ProposedLine {
-            line,
-            reason: reason.to_owned(),
-        });
-        Self {
-            lines: lines.collect(),
-            conclusion,
-            settled: Settled::Yes,
-        }
+        let lines = pair.lines().into_iter().map(|line| ProposedLine { line, reason: reason.to_owned() });
+        Self { lines: lines.collect(), conclusion, settled: Settled::Yes }
     }
 }
 
-/// Proposes the only plausible pair of ranges. `swapped` is the probe with the output in the other channel order, `order`. It is used if no
-/// pair is plausible in the present order and swapped colours are the flaw; if several of its pairs are plausible, the `stated` one is
-/// proposed.
-pub(super) fn propose(
-    probe: &Probe,
-    stated: Option<RangePair>,
-    swapped: &Probe,
-    order: ChannelOrder,
-) -> Proposal {
+/// Proposes the only plausible pair of ranges. `swapped` is the probe with the output in the other channel order,
+/// `order`. It is used if no pair is plausible in the present order and swapped colours are the flaw; if several of its
+/// pairs are plausible, the `stated` one is proposed.
+pub(super) fn propose(probe: &Probe, stated: Option<RangePair>, swapped: &Probe, order: ChannelOrder) -> Proposal {
     match probe.plausible().as_slice() {
         several @ [_, _, ..] if stated.is_none() && probe.conclusion() == Conclusion::Assumed => {
-            let others: Vec<String> = several
-                .iter()
-                .filter(|pair| **pair != probe.usual)
-                .map(ToString::to_string)
-                .collect();
+            let others: Vec<String> =
+                several.iter().filter(|pair| **pair != probe.usual).map(ToString::to_string).collect();
             return Proposal::without_lines(format!(
                 "With {} its images are plausible; a run assumes these usual ranges and warns. They are with {}, too; compare the page with the model's own examples.",
                 probe.usual,
@@ -113,11 +87,8 @@ pub(super) fn propose(
             ));
         }
         [pair] => {
-            let stated = stated.map_or_else(String::new, |stated| {
-                format!(" With {stated}, as set, they are not.")
-            });
-            let conclusion =
-                format!("With {pair}, and with no other ranges, its images are plausible.{stated}");
+            let stated = stated.map_or_else(String::new, |stated| format!(" With {stated}, as set, they are not."));
+            let conclusion = format!("With {pair}, and with no other ranges, its images are plausible.{stated}");
             return Proposal::for_ranges(*pair, conclusion);
         }
         [] => {}
@@ -130,9 +101,7 @@ pub(super) fn propose(
                 );
                 return Proposal::for_ranges(pair, conclusion);
             }
-            let stated = stated.map_or_else(String::new, |pair| {
-                format!(" {pair}, as set, is not one of them.")
-            });
+            let stated = stated.map_or_else(String::new, |pair| format!(" {pair}, as set, is not one of them."));
             return Proposal::without_lines(format!(
                 "Its images are plausible with several value ranges: {}.{stated} Compare the page with the model's own examples, and set the ranges of its code.",
                 list.join("; ")
@@ -140,10 +109,7 @@ pub(super) fn propose(
         }
     }
     let is_hue = probe.pairs.iter().any(|pair| {
-        pair.ranges == probe.usual
-            && pair
-                .verdict()
-                .is_some_and(|verdict| verdict.example.flaw == Flaw::Hue)
+        pair.ranges == probe.usual && pair.verdict().is_some_and(|verdict| verdict.example.flaw == Flaw::Hue)
     });
     let plausible = swapped.plausible();
     let pair = match &plausible[..] {

@@ -1,6 +1,7 @@
 use super::*;
 
-/// A dark image with structure and colour, in codes: squares of different light on a ramp, most of them warm, some blue.
+/// A dark image with structure and colour, in codes: squares of different light on a ramp, most of them warm, some
+/// blue.
 fn dark() -> UnclampedImage {
     let (height, width) = (96_u32, 144_u32);
     let pixels = (0..height).flat_map(|y| {
@@ -21,10 +22,7 @@ fn dark() -> UnclampedImage {
 }
 
 fn each(codes: &UnclampedImage, change: impl Fn(f32) -> f32) -> UnclampedImage {
-    UnclampedImage {
-        samples: codes.samples.iter().map(|code| change(*code)).collect(),
-        ..codes.clone()
-    }
+    UnclampedImage { samples: codes.samples.iter().map(|code| change(*code)).collect(), ..codes.clone() }
 }
 
 /// Output of a good enhancer: four times the light.
@@ -40,10 +38,7 @@ fn flaw(made: &UnclampedImage) -> Option<Flaw> {
 fn an_enhanced_image_has_no_flaw() {
     assert_eq!(flaw(&good()), None);
     // A curve, an offset and noise are no flaws.
-    assert_eq!(
-        flaw(&each(&dark(), |code| 255.0 * (code / 255.0).powf(0.4))),
-        None
-    );
+    assert_eq!(flaw(&each(&dark(), |code| 255.0 * (code / 255.0).powf(0.4))), None);
     let mut state = 1_u32;
     let mut noisy = good();
     for sample in &mut noisy.samples {
@@ -58,17 +53,12 @@ fn each_wrong_decoding_has_its_flaw() {
     let good = good();
     let swapped = {
         let mut made = good.clone();
-        made.samples
-            .chunks_exact_mut(3)
-            .for_each(|pixel| pixel.swap(0, 2));
+        made.samples.chunks_exact_mut(3).for_each(|pixel| pixel.swap(0, 2));
         made
     };
     let planes_as_pixels = {
         let planes = (0..3).flat_map(|channel| good.samples.iter().skip(channel).step_by(3));
-        UnclampedImage {
-            samples: planes.copied().collect(),
-            ..good.clone()
-        }
+        UnclampedImage { samples: planes.copied().collect(), ..good.clone() }
     };
     let mut grey = good.clone();
     for pixel in grey.samples.chunks_exact_mut(3) {
@@ -82,10 +72,7 @@ fn each_wrong_decoding_has_its_flaw() {
         (each(&good, |_| 90.0), Flaw::Flat),
         (dark(), Flaw::Unlit),
         (each(&dark(), |code| code / 255.0), Flaw::Flat),
-        (
-            each(&good, |code| if code > 14.0 { 255.0 } else { 0.0 }),
-            Flaw::White,
-        ),
+        (each(&good, |code| if code > 14.0 { 255.0 } else { 0.0 }), Flaw::White),
         (each(&good, |code| 255.0 - code), Flaw::Inverted),
         (planes_as_pixels, Flaw::Shuffled),
         (swapped, Flaw::Hue),
@@ -111,10 +98,9 @@ fn a_pale_room_is_no_haze() {
 
 #[test]
 fn black_output_is_impossible_and_unlit_output_doubtful() {
-    for (output, gravity) in [
-        (each(&dark(), |code| 0.4 * code), Gravity::Impossible),
-        (each(&dark(), |code| code + 1.0), Gravity::Doubtful),
-    ] {
+    for (output, gravity) in
+        [(each(&dark(), |code| 0.4 * code), Gravity::Impossible), (each(&dark(), |code| code + 1.0), Gravity::Doubtful)]
+    {
         assert_eq!(judge(&dark(), &output).unwrap().gravity, gravity);
     }
 }
@@ -122,11 +108,7 @@ fn black_output_is_impossible_and_unlit_output_doubtful() {
 #[test]
 fn images_smaller_than_a_block_are_judged_too() {
     for (height, width) in [(1, 1), (3, 200), (200, 3), (4, 4)] {
-        let image = UnclampedImage {
-            height,
-            width,
-            samples: vec![3.0; height * width * 3],
-        };
+        let image = UnclampedImage { height, width, samples: vec![3.0; height * width * 3] };
         assert_eq!(judge(&image, &image).unwrap().flaw, Flaw::Flat);
         let mut made = image.clone();
         for (place, sample) in made.samples.iter_mut().enumerate() {

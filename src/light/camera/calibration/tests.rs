@@ -32,17 +32,9 @@ fn fits_give_the_calibrated_medians() {
 
 #[test]
 fn the_nearest_step_is_used() {
-    for (gain, step) in [
-        (0.01, 0),
-        (0.1, 0),
-        (0.1328, 0),
-        (0.1329, 1),
-        (0.7746, 3),
-        (4.2, 5),
-        (4.3, 6),
-        (6.0, 6),
-        (100.0, 6),
-    ] {
+    for (gain, step) in
+        [(0.01, 0), (0.1, 0), (0.1328, 0), (0.1329, 1), (0.7746, 3), (4.2, 5), (4.3, 6), (6.0, 6), (100.0, 6)]
+    {
         assert_eq!(sony().nearest_step(gain), step, "K = {gain}");
     }
     for (gain, shape) in [(0.1, 0.1143), (0.7746, -0.0429), (6.0, -0.1143)] {
@@ -69,24 +61,14 @@ fn steps_with_their_own_gains_need_not_be_doublings() {
     let text = bare.clone() + &[0.1, 0.3, 1.2].map(step_toml).concat();
     let camera = Calibration::parse(&text, "my.toml").unwrap();
     // The middles between the steps are √(0.1 · 0.3) = 0.1732 and √(0.3 · 1.2) = 0.6.
-    for (gain, expected) in [
-        (0.01, 0.1),
-        (0.173, 0.1),
-        (0.174, 0.3),
-        (0.599, 0.3),
-        (0.601, 1.2),
-        (90.0, 1.2),
-    ] {
+    for (gain, expected) in [(0.01, 0.1), (0.173, 0.1), (0.174, 0.3), (0.599, 0.3), (0.601, 1.2), (90.0, 1.2)] {
         let shape = camera.noise_at(gain, [0.0; 2], [0.0; 2]).read_shape;
         assert!((shape - expected).abs() < 1e-15, "K = {gain}: {shape}");
     }
     let text = toml::to_string(&camera).unwrap();
     assert_eq!(Calibration::parse(&text, "again").unwrap(), camera);
     // As with first-gain, steps above the range of K are not used.
-    let low_gains = Calibration {
-        gain: [0.1, 0.3],
-        ..camera
-    };
+    let low_gains = Calibration { gain: [0.1, 0.3], ..camera };
     assert!((low_gains.noise_at(1.2, [0.0; 2], [0.0; 2]).read_shape - 0.3).abs() < 1e-15);
     let (low, high) = (step_toml(0.1), step_toml(0.3));
     let without = high.replace("gain = 0.3\n", "");
@@ -94,19 +76,11 @@ fn steps_with_their_own_gains_need_not_be_doublings() {
         (bare.clone() + &low + &without, "step 2, gain: missing"),
         (head.to_owned() + &low, "first-gain: every [[step]]"),
         (bare.clone() + &without, "first-gain: missing"),
-        (
-            bare.clone() + &high + &low,
-            "step 2, gain: 0.1 is not above 0.3",
-        ),
+        (bare.clone() + &high + &low, "step 2, gain: 0.1 is not above 0.3"),
         (bare + &step_toml(200.0), "step 1, gain: 200"),
     ] {
-        let error = Calibration::parse(&text, "my.toml")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.starts_with("my.toml") && error.contains(part),
-            "{error}"
-        );
+        let error = Calibration::parse(&text, "my.toml").unwrap_err().to_string();
+        assert!(error.starts_with("my.toml") && error.contains(part), "{error}");
     }
 }
 
@@ -123,11 +97,7 @@ fn a_preset_is_written_without_keys_that_it_lacks() {
 fn offsets_reach_their_planes() {
     let bias = sony().noise_at(6.0, [0.0; 2], [0.0; 2]).bias;
     let expected = [-1.5595009, -1.5976678, -1.3571521, -1.3204409];
-    assert!(
-        bias.iter()
-            .zip(expected)
-            .all(|(a, b)| (a - b).abs() < 1e-15)
-    );
+    assert!(bias.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15));
 }
 
 #[test]
@@ -142,21 +112,12 @@ fn errors_name_the_key_of_an_invalid_calibration() {
         ("[read-scale]", "[read-scale]\nshape = 3", "shape"),
         ("name = ", "nmae = ", "nmae"),
         ("adu-range = 15871.0\n", "", "adu-range"),
-        (
-            "[[step]]\nshape = [0.1142",
-            "[[step]]\nshape = [9.1142",
-            "step 1, shape: 9.1",
-        ),
+        ("[[step]]\nshape = [0.1142", "[[step]]\nshape = [9.1142", "step 1, shape: 9.1"),
     ] {
         assert!(good.contains(from), "{from}");
         let text = good.replacen(from, to, 1);
-        let error = Calibration::parse(&text, "my.toml")
-            .unwrap_err()
-            .to_string();
-        assert!(
-            error.starts_with("my.toml") && error.contains(part),
-            "{error}"
-        );
+        let error = Calibration::parse(&text, "my.toml").unwrap_err().to_string();
+        assert!(error.starts_with("my.toml") && error.contains(part), "{error}");
     }
     let bare = good.split("[[step]]").next().unwrap();
     let error = Calibration::parse(bare, "my.toml").unwrap_err().to_string();

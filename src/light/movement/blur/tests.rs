@@ -75,10 +75,7 @@ fn light_is_the_weighted_mean_of_the_path() {
             let codes = blurred_codes(&clean, streak(length, angle));
             for (code, light) in codes.samples().iter().zip(&expected) {
                 let exact = 255.0 * libm::pow(*light, 1.0 / 2.2);
-                assert!(
-                    (f64::from(*code) - exact).abs() < 0.501,
-                    "{length} at {angle}"
-                );
+                assert!((f64::from(*code) - exact).abs() < 0.501, "{length} at {angle}");
             }
         }
     }
@@ -112,10 +109,7 @@ fn still_and_uniform_images_are_unchanged() {
 #[test]
 fn threads_and_instructions_change_nothing() {
     let clean = picture(40, 150);
-    let light = clean
-        .samples()
-        .iter()
-        .map(|code| display_light()[usize::from(*code)]);
+    let light = clean.samples().iter().map(|code| display_light()[usize::from(*code)]);
     let light = Light::new(40, 150, light.collect()).unwrap();
     for (length, angle) in PATHS {
         let path = streak(length, angle);

@@ -6,8 +6,8 @@ use crate::colour::curve::{ToneCurve, interpolate};
 use crate::colour::primaries::{D50, IDENTITY, Matrix, times, xyz_to_srgb};
 use crate::colour::srgb::EIGHT;
 
-/// Table of colours on a grid of ink amounts, with a curve per ink before the grid, and a curve per value after it (ICC.1:2022, sections
-/// 10.10 to 10.12). Between grid points, colours are interpolated linearly along each ink.
+/// Table of colours on a grid of ink amounts, with a curve per ink before the grid, and a curve per value after it
+/// (ICC.1:2022, sections 10.10 to 10.12). Between grid points, colours are interpolated linearly along each ink.
 #[derive(Debug)]
 pub(super) struct InkTable {
     /// Grid position of the 256 amounts of each ink: the point below, and the fraction of the way to the next point.
@@ -29,10 +29,7 @@ enum AfterGrid {
     /// One curve per value, with equally spaced entries.
     Tables([Vec<f64>; 3]),
     /// Optional first curves with a matrix and an offset, then the last curves.
-    Curves {
-        first: Option<([ToneCurve; 3], Matrix, [f64; 3])>,
-        last: [ToneCurve; 3],
-    },
+    Curves { first: Option<([ToneCurve; 3], Matrix, [f64; 3])>, last: [ToneCurve; 3] },
 }
 
 /// Encoding of a colour as three values in [0, 1] (ICC.1:2022, section 6.3.4).
@@ -97,11 +94,7 @@ impl InkTable {
         };
         let last = tone_curves::<3>(&table.b_curves)?;
         let after = AfterGrid::Curves { first, last };
-        let encoding = if is_lab {
-            ValueEncoding::Lab
-        } else {
-            ValueEncoding::Xyz
-        };
+        let encoding = if is_lab { ValueEncoding::Lab } else { ValueEncoding::Xyz };
         Self::build(points, positions, table.clut.as_ref()?, after, encoding)
     }
 
@@ -115,18 +108,11 @@ impl InkTable {
     ) -> Option<Self> {
         let values = unit_values(grid);
         let (grid, rest) = values.as_chunks::<3>();
-        let count = points
-            .iter()
-            .try_fold(1_usize, |all, points| all.checked_mul(*points))?;
+        let count = points.iter().try_fold(1_usize, |all, points| all.checked_mul(*points))?;
         (grid.len() == count && rest.is_empty()).then(|| Self {
             positions,
             grid: grid.to_vec(),
-            strides: [
-                points[1] * points[2] * points[3],
-                points[2] * points[3],
-                points[3],
-                1,
-            ],
+            strides: [points[1] * points[2] * points[3], points[2] * points[3], points[3], 1],
             after_grid,
             encoding,
             to_srgb: xyz_to_srgb(IDENTITY),
@@ -139,18 +125,12 @@ impl InkTable {
         let xyz = match self.encoding {
             // The value 1 means XYZ of 1 + 32767/32768.
             ValueEncoding::Xyz => values.map(|value| value * 65_535.0 / 32_768.0),
-            ValueEncoding::Lab => xyz_from_lab([
-                values[0] * 100.0,
-                values[1] * 255.0 - 128.0,
-                values[2] * 255.0 - 128.0,
-            ]),
+            ValueEncoding::Lab => {
+                xyz_from_lab([values[0] * 100.0, values[1] * 255.0 - 128.0, values[2] * 255.0 - 128.0])
+            }
             ValueEncoding::LegacyLab => {
                 let codes = values.map(|value| value * 65_535.0);
-                xyz_from_lab([
-                    codes[0] / 652.8,
-                    codes[1] / 256.0 - 128.0,
-                    codes[2] / 256.0 - 128.0,
-                ])
+                xyz_from_lab([codes[0] / 652.8, codes[1] / 256.0 - 128.0, codes[2] / 256.0 - 128.0])
             }
         };
         times(self.to_srgb, xyz).map(|light| EIGHT.encode(light) as u8)
@@ -165,11 +145,7 @@ impl InkTable {
             for (ink, (below, fraction)) in positions.iter().enumerate() {
                 let is_above = corner >> ink & 1;
                 index += (below + is_above) * self.strides[ink];
-                weight *= if is_above == 1 {
-                    *fraction
-                } else {
-                    1.0 - fraction
-                };
+                weight *= if is_above == 1 { *fraction } else { 1.0 - fraction };
             }
             if weight > 0.0 {
                 let value = self.grid[index];
@@ -198,10 +174,7 @@ impl InkTable {
 fn unit_values(table: &LutStore) -> Vec<f64> {
     match table {
         LutStore::Store8(codes) => codes.iter().map(|code| f64::from(*code) / 255.0).collect(),
-        LutStore::Store16(codes) => codes
-            .iter()
-            .map(|code| f64::from(*code) / 65_535.0)
-            .collect(),
+        LutStore::Store16(codes) => codes.iter().map(|code| f64::from(*code) / 65_535.0).collect(),
     }
 }
 
@@ -211,31 +184,17 @@ fn split_channels<const N: usize>(values: &[f64]) -> Option<[Vec<f64>; N]> {
     if length < 2 || !values.len().is_multiple_of(N) {
         return None;
     }
-    values
-        .chunks_exact(length)
-        .map(<[f64]>::to_vec)
-        .collect::<Vec<Vec<f64>>>()
-        .try_into()
-        .ok()
+    values.chunks_exact(length).map(<[f64]>::to_vec).collect::<Vec<Vec<f64>>>().try_into().ok()
 }
 
 /// Converts `N` curves; `None` for another number of curves, or if a parameter is not finite.
 fn tone_curves<const N: usize>(curves: &[moxcms::ToneReprCurve]) -> Option<[ToneCurve; N]> {
-    curves
-        .iter()
-        .map(ToneCurve::from_profile)
-        .collect::<Result<Vec<ToneCurve>, _>>()
-        .ok()?
-        .try_into()
-        .ok()
+    curves.iter().map(ToneCurve::from_profile).collect::<Result<Vec<ToneCurve>, _>>().ok()?.try_into().ok()
 }
 
-/// The grid positions of the 256 amounts of each ink. `points` is the number of grid points per ink, `before` the curve per ink. `None` if
-/// an ink has fewer than two points.
-fn grid_positions(
-    points: [usize; 4],
-    before: impl Fn(usize, f64) -> f64,
-) -> Option<[Vec<(usize, f64)>; 4]> {
+/// The grid positions of the 256 amounts of each ink. `points` is the number of grid points per ink, `before` the curve
+/// per ink. `None` if an ink has fewer than two points.
+fn grid_positions(points: [usize; 4], before: impl Fn(usize, f64) -> f64) -> Option<[Vec<(usize, f64)>; 4]> {
     if points.iter().any(|points| *points < 2) {
         return None;
     }
@@ -257,11 +216,7 @@ fn xyz_from_lab([lightness, a, b]: [f64; 3]) -> [f64; 3] {
     let roots = [y + a / 500.0, y, y - b / 200.0];
     [0, 1, 2].map(|i| {
         let root = roots[i];
-        let relative = if root > 6.0 / 29.0 {
-            root * root * root
-        } else {
-            (root - 4.0 / 29.0) * 108.0 / 841.0
-        };
+        let relative = if root > 6.0 / 29.0 { root * root * root } else { (root - 4.0 / 29.0) * 108.0 / 841.0 };
         relative * D50[i]
     })
 }
@@ -271,11 +226,7 @@ mod tests {
     use super::*;
 
     fn lut_store(codes: Vec<u16>, is_16: bool) -> LutStore {
-        if is_16 {
-            LutStore::Store16(codes)
-        } else {
-            LutStore::Store8(codes.iter().map(|code| *code as u8).collect())
-        }
+        if is_16 { LutStore::Store16(codes) } else { LutStore::Store8(codes.iter().map(|code| *code as u8).collect()) }
     }
 
     /// A table with two points per ink, whose lightness falls by a quarter for each full ink, and whose a and b are 0.
@@ -298,11 +249,7 @@ mod tests {
             input_table: lut_store(identity.repeat(4), is_16),
             clut_table: lut_store(clut, is_16),
             output_table: lut_store(identity.repeat(3), is_16),
-            lut_type: if is_16 {
-                moxcms::LutType::Lut16
-            } else {
-                moxcms::LutType::Lut8
-            },
+            lut_type: if is_16 { moxcms::LutType::Lut16 } else { moxcms::LutType::Lut8 },
         }
     }
 
@@ -312,12 +259,9 @@ mod tests {
             let table = LutWarehouse::Lut(grey_table(is_16));
             let table = InkTable::new(&table, DataColorSpace::Lab).unwrap();
             // Codes of L* 100, 75, 50 (CSS Color 4: lab(50 0 0) is rgb(119 119 119), lab(75 0 0) is rgb(185 185 185)).
-            for (inks, code) in [
-                ([0, 0, 0, 0], 255_u8),
-                ([0, 0, 0, 255], 185),
-                ([255, 0, 255, 0], 119),
-                ([128, 128, 128, 128], 119),
-            ] {
+            for (inks, code) in
+                [([0, 0, 0, 0], 255_u8), ([0, 0, 0, 255], 185), ([255, 0, 255, 0], 119), ([128, 128, 128, 128], 119)]
+            {
                 for found in table.srgb(inks) {
                     assert!(found.abs_diff(code) <= 1, "{inks:?}: {found}, not {code}");
                 }
@@ -327,18 +271,9 @@ mod tests {
 
     #[test]
     fn broken_tables_are_refused() {
-        let truncated = LutDataType {
-            clut_table: LutStore::Store16(vec![0; 47]),
-            ..grey_table(true)
-        };
-        let for_rgb = LutDataType {
-            num_input_channels: 3,
-            ..grey_table(true)
-        };
-        let without_curves = LutDataType {
-            input_table: LutStore::Store16(Vec::new()),
-            ..grey_table(true)
-        };
+        let truncated = LutDataType { clut_table: LutStore::Store16(vec![0; 47]), ..grey_table(true) };
+        let for_rgb = LutDataType { num_input_channels: 3, ..grey_table(true) };
+        let without_curves = LutDataType { input_table: LutStore::Store16(Vec::new()), ..grey_table(true) };
         for table in [truncated, for_rgb, without_curves] {
             let table = LutWarehouse::Lut(table);
             assert!(InkTable::new(&table, DataColorSpace::Lab).is_err());

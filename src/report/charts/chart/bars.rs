@@ -1,4 +1,5 @@
-//! Bar charts ([`BarChart`]), for shares that have no place on an axis of levels, such as those of photographs in the dark.
+//! Bar charts ([`BarChart`]), for shares that have no place on an axis of levels, such as those of photographs in the
+//! dark.
 
 use super::LineStyle;
 use darkqa_score::estimate::Estimate;

@@ -8,7 +8,8 @@ use crate::report::text::script::to_script_json;
 use crate::report::text::words::{percent, with_interval};
 use crate::types::degradations::Axis;
 
-/// A line chart as data. Shares are between 0 and 1. Texts are formatted as in tables, so that the script rounds nothing.
+/// A line chart as data. Shares are between 0 and 1. Texts are formatted as in tables, so that the script rounds
+/// nothing.
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct ChartData {
     measure: &'static str,
@@ -79,10 +80,7 @@ impl ChartData {
     }
 
     fn new(chart: &Chart) -> Self {
-        Self {
-            measure: chart.measure,
-            panels: chart.panels.iter().map(panel_data).collect(),
-        }
+        Self { measure: chart.measure, panels: chart.panels.iter().map(panel_data).collect() }
     }
 }
 
@@ -94,13 +92,7 @@ fn panel_data(panel: &Panel) -> PanelData {
         model: panel.model.clone(),
         axis: panel.axis_title(),
         unit: axis.unwrap_or(Axis::LIGHT).unit,
-        levels: levels
-            .iter()
-            .map(|level| LevelData {
-                name: level.to_string(),
-                value: level.value(),
-            })
-            .collect(),
+        levels: levels.iter().map(|level| LevelData { name: level.to_string(), value: level.value() }).collect(),
         end: panel.axis_end(),
         lines: panel.lines.iter().map(line_data).collect(),
     }
@@ -108,10 +100,7 @@ fn panel_data(panel: &Panel) -> PanelData {
 
 fn line_data(line: &PlotLine) -> LineData {
     let content = match &line.content {
-        LineContent::Flat(share) => ContentData::Flat {
-            share: *share,
-            text: percent(*share),
-        },
+        LineContent::Flat(share) => ContentData::Flat { share: *share, text: percent(*share) },
         LineContent::Curve(points) => ContentData::Curve {
             points: points
                 .iter()

@@ -16,17 +16,9 @@ pub(crate) struct Scale {
 
 impl Scale {
     pub(crate) fn for_axis(axis: Axis) -> Self {
-        let (end, step, title) = if axis == Axis::MOTION {
-            (140.0, 20, "threshold of motion blur")
-        } else {
-            (9.0, 1, "darkness threshold")
-        };
-        Self {
-            end,
-            step,
-            title,
-            unit: axis.unit,
-        }
+        let (end, step, title) =
+            if axis == Axis::MOTION { (140.0, 20, "threshold of motion blur") } else { (9.0, 1, "darkness threshold") };
+        Self { end, step, title, unit: axis.unit }
     }
 }
 

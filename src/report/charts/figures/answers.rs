@@ -15,12 +15,8 @@ impl FigureBuilder<'_> {
             return None;
         }
         let panels = vec![
-            self.hallucination_panel(&variant, "“yes” where nothing is", |rates| {
-                rates.false_positive
-            }),
-            self.hallucination_panel(&variant, "“no” where it is", |rates| {
-                rates.false_negative
-            }),
+            self.hallucination_panel(&variant, "“yes” where nothing is", |rates| rates.false_positive),
+            self.hallucination_panel(&variant, "“no” where it is", |rates| rates.false_negative),
         ];
         let caption = format!(
             "Object recognition: false positives (left) and false negatives (right) by level, {}.",
@@ -43,11 +39,7 @@ impl FigureBuilder<'_> {
             LineContent::Curve(points) => points.first().map(|(_, rate)| rate.n),
             LineContent::Flat(_) | LineContent::Marks(_) => None,
         });
-        Panel {
-            title: format!("{title}, n {}", n.unwrap_or(0)),
-            lines,
-            model: None,
-        }
+        Panel { title: format!("{title}, n {}", n.unwrap_or(0)), lines, model: None }
     }
 
     /// Share of the most frequent answer by level, against the share of the most frequent true answer.
@@ -62,8 +54,7 @@ impl FigureBuilder<'_> {
             self.condition_text(&variant, None)
         );
         let (caption, mut chart) = self.chart("share of replies in %", panels, 2, &caption)?;
-        "shares of all replies, strict parsing; what the answers are is in collapse.csv"
-            .clone_into(&mut chart.note);
+        "shares of all replies, strict parsing; what the answers are is in collapse.csv".clone_into(&mut chart.note);
         Some((caption, chart))
     }
 
@@ -71,10 +62,11 @@ impl FigureBuilder<'_> {
     fn collapse_panel(&self, variant: &Variant, family: &Family) -> Option<Panel> {
         let mut truth = None;
         let mut lines = self.lines(variant, |subject| {
-            let confusion =
-                self.findings.confusions.iter().find(|confusion| {
-                    confusion.family == *family && confusion.subject == *subject
-                })?;
+            let confusion = self
+                .findings
+                .confusions
+                .iter()
+                .find(|confusion| confusion.family == *family && confusion.subject == *subject)?;
             truth = truth.or_else(|| commonest_truth(confusion));
             let share = confusion.collapse.as_ref()?.share;
             Some(Estimate::exact(share.value, share.n))
@@ -88,10 +80,7 @@ impl FigureBuilder<'_> {
             items: None,
         });
         Some(Panel {
-            title: format!(
-                "{}, n {n}",
-                self.names.display_name(family_name(Some(family)))
-            ),
+            title: format!("{}, n {n}", self.names.display_name(family_name(Some(family)))),
             lines,
             model: None,
         })
@@ -100,9 +89,7 @@ impl FigureBuilder<'_> {
 
 /// Share of the most frequent true answer, and the number of replies.
 fn commonest_truth(confusion: &Confusion) -> Option<(f64, usize)> {
-    let (all, highest) = confusion
-        .shares()
-        .into_iter()
-        .fold((0, 0), |(all, highest), (_, n)| (all + n, highest.max(n)));
+    let (all, highest) =
+        confusion.shares().into_iter().fold((0, 0), |(all, highest), (_, n)| (all + n, highest.max(n)));
     (all > 0).then(|| (highest as f64 / all as f64, all))
 }

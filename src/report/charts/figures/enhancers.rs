@@ -14,9 +14,7 @@ impl FigureBuilder<'_> {
                 for (index, enhancer) in self.raw_and_enhanced().enumerate() {
                     let points = self.accuracy_points(model, &variant, enhancer);
                     // A single level makes no line, except L0 enhanced, which is drawn as a point.
-                    let has_clean = points
-                        .first()
-                        .is_some_and(|(level, _)| *level == AxisLevel::L0);
+                    let has_clean = points.first().is_some_and(|(level, _)| *level == AxisLevel::L0);
                     if points.len() > 1 || has_clean {
                         lines.push(PlotLine {
                             name: self.enhancer_line_name(enhancer),
@@ -28,14 +26,9 @@ impl FigureBuilder<'_> {
                     }
                 }
                 if lines.len() > 1 {
-                    let (name, light) =
-                        (self.curve_name(model), self.condition_text(&variant, None));
+                    let (name, light) = (self.curve_name(model), self.condition_text(&variant, None));
                     let title = format!("{name}, {light}, n {}", self.item_count(None));
-                    panels.push(Panel {
-                        title,
-                        lines,
-                        model: Some((*model).to_owned()),
-                    });
+                    panels.push(Panel { title, lines, model: Some((*model).to_owned()) });
                 }
             }
         }

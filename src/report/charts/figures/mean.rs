@@ -5,16 +5,14 @@ use std::collections::BTreeSet;
 use crate::types::AxisLevel;
 use darkqa_score::estimate::Estimate;
 
-/// Mean of curves at the levels that all of them have, with the curves' range as interval. A single curve is returned unchanged.
+/// Mean of curves at the levels that all of them have, with the curves' range as interval. A single curve is returned
+/// unchanged.
 pub(super) fn mean(curves: &[Vec<(AxisLevel, Estimate)>]) -> Vec<(AxisLevel, Estimate)> {
     if let [single] = curves {
         return single.clone();
     }
     let levels: BTreeSet<AxisLevel> = curves.iter().flatten().map(|(level, _)| *level).collect();
-    levels
-        .into_iter()
-        .filter_map(|level| Some((level, mean_at(curves, level)?)))
-        .collect()
+    levels.into_iter().filter_map(|level| Some((level, mean_at(curves, level)?))).collect()
 }
 
 /// Mean of curves at one level, with their range; `None` if a curve has no point there.

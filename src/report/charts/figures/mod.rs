@@ -15,21 +15,15 @@ mod thresholds;
 use std::collections::BTreeSet;
 
 use crate::report::charts::chart::figure_chart::FigureChart;
-use crate::report::charts::chart::{
-    Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine,
-};
-use crate::report::text::words::{
-    family as family_name, light_with, marked_reference, names_enhancer,
-};
+use crate::report::charts::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine};
+use crate::report::text::words::{family as family_name, light_with, marked_reference, names_enhancer};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::text::counted;
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::model_in_condition::{
-    CHANCE, ModelInCondition, models_under_test, pooled_models,
-};
+use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, models_under_test, pooled_models};
 
 use mean::mean;
 pub(crate) use names::{KnownNames, Names};
@@ -80,11 +74,7 @@ pub(crate) fn figure_specs(findings: &Findings<'_>, names: &Names) -> Vec<Figure
         .filter_map(|(name, chart)| {
             let (caption, chart) = chart?;
             let chart = FigureChart::Lines(chart);
-            Some(FigureSpec {
-                name,
-                caption,
-                chart,
-            })
+            Some(FigureSpec { name, caption, chart })
         })
         .collect();
     figures.extend(builder.photographed());
@@ -106,8 +96,8 @@ struct FigureBuilder<'a> {
     names: Names,
 }
 
-/// Caption sentence that explains the horizontal lines; empty without any. It calls them horizontal because curves may be broken or
-/// dotted, too.
+/// Caption sentence that explains the horizontal lines; empty without any. It calls them horizontal because curves may
+/// be broken or dotted, too.
 fn horizontal_lines_note<'l>(lines: impl IntoIterator<Item = &'l PlotLine>) -> &'static str {
     let (chance, blind): (Vec<&PlotLine>, Vec<&PlotLine>) = lines
         .into_iter()
@@ -135,10 +125,7 @@ impl<'a> FigureBuilder<'a> {
         // References come last, so that the other models look the same with and without them.
         let under_test = models_under_test(models.iter().copied());
         models.sort_by_key(|model| !under_test.contains(model));
-        let enhancers: BTreeSet<&EnhancerName> = subjects
-            .iter()
-            .filter_map(|s| s.enhancer.as_ref())
-            .collect();
+        let enhancers: BTreeSet<&EnhancerName> = subjects.iter().filter_map(|s| s.enhancer.as_ref()).collect();
         let mut enhancers: Vec<&EnhancerName> = enhancers.into_iter().collect();
         names.sort(&mut enhancers, |name| name.as_str());
         Self {
@@ -151,8 +138,8 @@ impl<'a> FigureBuilder<'a> {
         }
     }
 
-    /// Values of a model by level, in one variant, raw or enhanced. L0 is the clean frame, enhanced if that was asked, else raw. Empty if
-    /// no level was asked with the enhancer.
+    /// Values of a model by level, in one variant, raw or enhanced. L0 is the clean frame, enhanced if that was asked,
+    /// else raw. Empty if no level was asked with the enhancer.
     fn points(
         &self,
         model: &str,
@@ -174,10 +161,7 @@ impl<'a> FigureBuilder<'a> {
         if points.iter().all(|(used, ..)| *used != enhancer) {
             return Vec::new();
         }
-        points
-            .into_iter()
-            .map(|(_, level, value)| (level, value))
-            .collect()
+        points.into_iter().map(|(_, level, value)| (level, value)).collect()
     }
 
     /// A model with images in one condition; `None` if it was not asked.
@@ -189,9 +173,7 @@ impl<'a> FigureBuilder<'a> {
         enhancer: Option<&EnhancerName>,
     ) -> Option<&ModelInCondition> {
         let grid = &self.findings.grid;
-        let index = grid.find_up_to_group(&ModelInCondition::with_images(
-            model, level, variant, enhancer,
-        ))?;
+        let index = grid.find_up_to_group(&ModelInCondition::with_images(model, level, variant, enhancer))?;
         Some(&grid.subjects[index])
     }
 
@@ -202,10 +184,7 @@ impl<'a> FigureBuilder<'a> {
 
     /// Accuracy of a model in a condition on a family, or on all (`None`), by strict parsing.
     fn accuracy_of(&self, subject: &ModelInCondition, family: Option<&Family>) -> Option<Estimate> {
-        let cell = self
-            .findings
-            .summary
-            .cell(subject, family, ParsingMode::Strict)?;
+        let cell = self.findings.summary.cell(subject, family, ParsingMode::Strict)?;
         cell.accuracy
     }
 
@@ -234,7 +213,8 @@ impl<'a> FigureBuilder<'a> {
             .collect()
     }
 
-    /// The models over which means are taken: no people; built-in models and the black reference model only if there are no others.
+    /// The models over which means are taken: no people; built-in models and the black reference model only if there
+    /// are no others.
     fn averaged_models(&self) -> Vec<&'a str> {
         let listing = &self.findings.grid.listing;
         let black = self.names.black.as_deref();
@@ -286,11 +266,7 @@ impl<'a> FigureBuilder<'a> {
     }
 
     /// One line for each model, in one variant, without enhancement.
-    fn lines(
-        &self,
-        variant: &Variant,
-        mut value: impl FnMut(&ModelInCondition) -> Option<Estimate>,
-    ) -> Vec<PlotLine> {
+    fn lines(&self, variant: &Variant, mut value: impl FnMut(&ModelInCondition) -> Option<Estimate>) -> Vec<PlotLine> {
         self.models
             .iter()
             .map(|model| PlotLine {
@@ -361,10 +337,7 @@ impl<'a> FigureBuilder<'a> {
             .listing
             .trainings()
             .filter(|(enhancer, _)| {
-                panels
-                    .iter()
-                    .flat_map(|panel| &panel.lines)
-                    .any(|line| names_enhancer(&line.name, enhancer))
+                panels.iter().flat_map(|panel| &panel.lines).any(|line| names_enhancer(&line.name, enhancer))
             })
             .map(|(enhancer, training)| format!("; {enhancer}: {training}"))
             .collect()
@@ -380,12 +353,7 @@ impl<'a> FigureBuilder<'a> {
 
     /// Number of items in a family, or in all.
     fn item_count(&self, family: Option<&Family>) -> usize {
-        self.findings
-            .grid
-            .items
-            .iter()
-            .filter(|item| item.is_in_family(family))
-            .count()
+        self.findings.grid.items.iter().filter(|item| item.is_in_family(family)).count()
     }
 
     /// Accuracy of each model by level: one panel for each variant.
@@ -399,11 +367,7 @@ impl<'a> FigureBuilder<'a> {
                     lines.extend(self.photograph_marks());
                 }
                 Panel {
-                    title: format!(
-                        "{}, n {}",
-                        self.condition_text(variant, None),
-                        self.item_count(None)
-                    ),
+                    title: format!("{}, n {}", self.condition_text(variant, None), self.item_count(None)),
                     lines,
                     model: None,
                 }
@@ -414,50 +378,34 @@ impl<'a> FigureBuilder<'a> {
             let mut lines = self.accuracy_lines(&Variant::NONE, None);
             lines.append(&mut marks);
             let title = format!("photographed in the dark, n {}", self.item_count(None));
-            panels.push(Panel {
-                title,
-                lines,
-                model: None,
-            });
+            panels.push(Panel { title, lines, model: None });
         }
         let mut caption = format!(
             "Accuracy of each model by level, without enhancement.{}",
             horizontal_lines_note(panels.iter().flat_map(|panel| &panel.lines))
         );
         if !self.findings.pairs.is_empty() {
-            caption += " Hollow: photographed in the dark, at the median exposure drop, with a bar from quartile to quartile.";
+            caption +=
+                " Hollow: photographed in the dark, at the median exposure drop, with a bar from quartile to quartile.";
         }
         self.chart(ACCURACY, panels, 2, &caption)
     }
 
-    /// Mean accuracy over the models for each variant, with the models' range: one panel for each axis with several variants.
+    /// Mean accuracy over the models for each variant, with the models' range: one panel for each axis with several
+    /// variants.
     fn variants(&self) -> Option<(String, Chart)> {
         let models = self.averaged_models();
         let title = match &*models {
-            [single] => format!(
-                "{}, n {}",
-                self.names.display_name(single),
-                self.item_count(None)
-            ),
-            several => format!(
-                "mean of {} models, n {} each",
-                several.len(),
-                self.item_count(None)
-            ),
+            [single] => format!("{}, n {}", self.names.display_name(single), self.item_count(None)),
+            several => format!("mean of {} models, n {} each", several.len(), self.item_count(None)),
         };
         let all = self.tested_variants();
         let mut panels = Vec::new();
         for axis in Axis::ALL {
-            let variants: Vec<&Variant> = all
-                .iter()
-                .filter(|variant| variant.kind.map(Kind::axis) == Some(axis))
-                .collect();
+            let variants: Vec<&Variant> =
+                all.iter().filter(|variant| variant.kind.map(Kind::axis) == Some(axis)).collect();
             if variants.len() > 1 {
-                panels.push(Panel {
-                    title: title.clone(),
-                    lines: self.variant_lines(&variants, &models),
-                    model: None,
-                });
+                panels.push(Panel { title: title.clone(), lines: self.variant_lines(&variants, &models), model: None });
             }
         }
         let is_auto = all.iter().any(|variant| variant.kind == Some(Kind::Auto));
@@ -468,10 +416,7 @@ impl<'a> FigureBuilder<'a> {
         };
         let (caption, mut chart) = self.chart(ACCURACY, panels, 1, caption)?;
         if models.len() > 1 {
-            chart.note = format!(
-                "bands are the range of the {} models, not intervals; strict parsing",
-                models.len()
-            );
+            chart.note = format!("bands are the range of the {} models, not intervals; strict parsing", models.len());
         }
         Some((caption, chart))
     }
@@ -499,10 +444,8 @@ impl<'a> FigureBuilder<'a> {
         variant: &Variant,
         enhancer: Option<&EnhancerName>,
     ) -> Vec<(AxisLevel, Estimate)> {
-        let curves: Vec<Vec<(AxisLevel, Estimate)>> = models
-            .iter()
-            .map(|model| self.accuracy_points(model, variant, enhancer))
-            .collect();
+        let curves: Vec<Vec<(AxisLevel, Estimate)>> =
+            models.iter().map(|model| self.accuracy_points(model, variant, enhancer)).collect();
         mean(&curves)
     }
 
@@ -513,24 +456,17 @@ impl<'a> FigureBuilder<'a> {
         variant: &Variant,
         enhancer: Option<&EnhancerName>,
     ) -> Vec<(AxisLevel, Estimate)> {
-        self.points(model, variant, enhancer, |subject| {
-            self.accuracy_of(subject, None)
-        })
+        self.points(model, variant, enhancer, |subject| self.accuracy_of(subject, None))
     }
 
     /// Chance over all families, as a horizontal line.
     fn chance_line(&self) -> impl Iterator<Item = PlotLine> {
-        self.flat_lines(None)
-            .into_iter()
-            .filter(|line| line.name == CHANCE)
+        self.flat_lines(None).into_iter().filter(|line| line.name == CHANCE)
     }
 
     /// Name of a line in figures of enhancers.
     fn enhancer_line_name(&self, enhancer: Option<&EnhancerName>) -> String {
-        enhancer.map_or_else(
-            || "raw".to_owned(),
-            |name| self.names.display_name(name.as_str()),
-        )
+        enhancer.map_or_else(|| "raw".to_owned(), |name| self.names.display_name(name.as_str()))
     }
 
     /// Accuracy of each model by level in the main variant: one panel for each family.
@@ -542,10 +478,7 @@ impl<'a> FigureBuilder<'a> {
             .map(|family| {
                 let n = self.item_count(Some(family));
                 Panel {
-                    title: format!(
-                        "{}, n {n}",
-                        self.names.display_name(family_name(Some(family)))
-                    ),
+                    title: format!("{}, n {n}", self.names.display_name(family_name(Some(family)))),
                     lines: self.accuracy_lines(variant, Some(family)),
                     model: None,
                 }
@@ -570,12 +503,7 @@ impl<'a> FigureBuilder<'a> {
         if panels.is_empty() || self.models.is_empty() {
             return None;
         }
-        let chart = Chart {
-            measure,
-            note: self.note() + &self.training_note(&panels),
-            panels: split(panels),
-            columns,
-        };
+        let chart = Chart { measure, note: self.note() + &self.training_note(&panels), panels: split(panels), columns };
         Some((caption.to_owned(), chart))
     }
 }

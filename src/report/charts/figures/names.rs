@@ -41,12 +41,7 @@ impl KnownNames {
                 .filter_map(|subject| subject.enhancer.as_ref())
                 .map(ToString::to_string)
                 .collect(),
-            families: findings
-                .grid
-                .families()
-                .into_iter()
-                .map(|family| family_name(Some(family)).to_owned())
-                .collect(),
+            families: findings.grid.families().into_iter().map(|family| family_name(Some(family)).to_owned()).collect(),
         }
     }
 }
@@ -58,12 +53,8 @@ fn short_form(name: &str) -> &str {
         Some((_, last)) if !last.is_empty() => last,
         _ => bare,
     };
-    let without_ending = bare
-        .strip_suffix(".jsonl")
-        .or_else(|| bare.strip_suffix(".json"));
-    without_ending
-        .filter(|name| !name.is_empty())
-        .unwrap_or(bare)
+    let without_ending = bare.strip_suffix(".jsonl").or_else(|| bare.strip_suffix(".json"));
+    without_ending.filter(|name| !name.is_empty()).unwrap_or(bare)
 }
 
 /// Checks that a name that was given by a flag occurs in one of the sets.
@@ -71,18 +62,14 @@ fn check_known(flag: &str, name: &str, sets: &[&BTreeSet<String>]) -> Result<()>
     if sets.iter().any(|set| set.contains(name)) {
         return Ok(());
     }
-    let known: Vec<String> = sets
-        .iter()
-        .flat_map(|set| set.iter())
-        .map(|name| format!("{name:?}"))
-        .collect();
+    let known: Vec<String> = sets.iter().flat_map(|set| set.iter()).map(|name| format!("{name:?}")).collect();
     let problem = format!("the runs have no {name:?}; they have {}", known.join(", "));
     Err(Error::usage(flag, problem))
 }
 
 impl Names {
-    /// Renames by `labels` (old and new name), puts the names of `order` first, and draws the model `black` in black. A model without a
-    /// label gets its short form unless another name has it.
+    /// Renames by `labels` (old and new name), puts the names of `order` first, and draws the model `black` in black. A
+    /// model without a label gets its short form unless another name has it.
     ///
     /// # Errors
     /// If the runs lack a given name, if a name has two labels, or if two names would become the same.
@@ -93,11 +80,7 @@ impl Names {
         known: &KnownNames,
     ) -> Result<Self> {
         let all = [&known.models, &known.enhancers, &known.families];
-        let mut names = Self {
-            order: order.to_vec(),
-            black: black.cloned(),
-            ..Self::default()
-        };
+        let mut names = Self { order: order.to_vec(), black: black.cloned(), ..Self::default() };
         for (old, new) in labels {
             check_known("--label", old, &all)?;
             if names.labels.insert(old.clone(), new.clone()).is_some() {
@@ -149,11 +132,8 @@ impl Names {
 
     /// Sentence that explains the short names of models; empty without any.
     pub(crate) fn short_names_note(&self) -> String {
-        let forms: Vec<String> = self
-            .shortened
-            .iter()
-            .map(|model| format!("{} is {model}", self.display_name(model)))
-            .collect();
+        let forms: Vec<String> =
+            self.shortened.iter().map(|model| format!("{} is {model}", self.display_name(model))).collect();
         match &*forms {
             [] => String::new(),
             _ => format!("Short names: {}.", forms.join(", ")),
@@ -162,18 +142,11 @@ impl Names {
 
     /// Display name for a recorded name.
     pub(super) fn display_name(&self, name: &str) -> String {
-        self.labels
-            .get(name)
-            .map_or(name, String::as_str)
-            .to_owned()
+        self.labels.get(name).map_or(name, String::as_str).to_owned()
     }
 
     /// Sorts items by the order that was given; items without a place in it follow, their order unchanged.
-    pub(super) fn sort<'n, T: ?Sized + 'n>(
-        &self,
-        items: &mut [&'n T],
-        name: impl Fn(&'n T) -> &'n str,
-    ) {
+    pub(super) fn sort<'n, T: ?Sized + 'n>(&self, items: &mut [&'n T], name: impl Fn(&'n T) -> &'n str) {
         items.sort_by_key(|item| {
             let place = self.order.iter().position(|known| known == name(item));
             place.unwrap_or(self.order.len())
@@ -192,14 +165,7 @@ mod tests {
     #[test]
     fn models_have_unambiguous_short_names() {
         let known = KnownNames {
-            models: set(&[
-                "script:sim-A.jsonl",
-                "org/vlm-7b",
-                "a/same",
-                "b/same",
-                "x/lift",
-                "folder/",
-            ]),
+            models: set(&["script:sim-A.jsonl", "org/vlm-7b", "a/same", "b/same", "x/lift", "folder/"]),
             enhancers: set(&["lift"]),
             families: BTreeSet::new(),
         };
@@ -209,16 +175,10 @@ mod tests {
         for name in ["a/same", "b/same", "x/lift", "folder/"] {
             assert_eq!(names.display_name(name), name);
         }
-        assert_eq!(
-            names.short_names_note(),
-            "Short names: vlm-7b is org/vlm-7b, sim-A is script:sim-A.jsonl."
-        );
+        assert_eq!(names.short_names_note(), "Short names: vlm-7b is org/vlm-7b, sim-A is script:sim-A.jsonl.");
         let labels = [("org/vlm-7b".to_owned(), "sim-A".to_owned())];
         let names = Names::new(&labels, &[], None, &known).unwrap();
-        assert_eq!(
-            names.display_name("script:sim-A.jsonl"),
-            "script:sim-A.jsonl"
-        );
+        assert_eq!(names.display_name("script:sim-A.jsonl"), "script:sim-A.jsonl");
         assert_eq!(Names::default().short_names_note(), "");
     }
 }

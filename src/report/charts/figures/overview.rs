@@ -25,7 +25,8 @@ pub(crate) struct OverviewPanels {
     pub note: String,
 }
 
-/// Panels of a run: accuracy of each model, mean over the models by variant, and mean over the models raw and with each enhancer.
+/// Panels of a run: accuracy of each model, mean over the models by variant, and mean over the models raw and with each
+/// enhancer.
 pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels {
     let builder = FigureBuilder::new(findings, names);
     let variant = builder.main_variant();
@@ -34,28 +35,19 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
         ((*name).clone(), display_name)
     });
     let variants: Vec<Variant> = builder.tested_variants();
-    let variants: Vec<&Variant> = variants
-        .iter()
-        .filter(|variant| variant.kind.map(Kind::axis) == Some(Axis::LIGHT))
-        .collect();
+    let variants: Vec<&Variant> =
+        variants.iter().filter(|variant| variant.kind.map(Kind::axis) == Some(Axis::LIGHT)).collect();
     let models = builder.averaged_models();
-    let by_model = variant
-        .as_ref()
-        .map(|variant| builder.each_model(variant))
-        .ok_or("no dark image was asked");
+    let by_model = variant.as_ref().map(|variant| builder.each_model(variant)).ok_or("no dark image was asked");
     let by_variant = match variants.len() {
         0 | 1 => Err("only one variant of the light was asked"),
-        _ => builder
-            .mean_by_variant(&variants, &models)
-            .ok_or("the same models were not asked in two variants"),
+        _ => builder.mean_by_variant(&variants, &models).ok_or("the same models were not asked in two variants"),
     };
     let by_enhancer = match &variant {
         Some(variant) => builder.mean_by_enhancer(variant, &models),
         None => None,
     };
-    let training = by_enhancer.as_ref().map_or_else(String::new, |(_, chart)| {
-        builder.training_note(&chart.panels)
-    });
+    let training = by_enhancer.as_ref().map_or_else(String::new, |(_, chart)| builder.training_note(&chart.panels));
     OverviewPanels {
         charts: vec![
             ("models", by_model),
@@ -72,25 +64,13 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels
         variant,
         enhancer,
         // The caption of each panel explains its bands.
-        note: format!(
-            "n = {}; strict parsing{training}",
-            builder.item_count_text()
-        ),
+        note: format!("n = {}; strict parsing{training}", builder.item_count_text()),
     }
 }
 
 impl FigureBuilder<'_> {
     fn single_panel_chart(title: String, lines: Vec<PlotLine>) -> Chart {
-        Chart {
-            measure: ACCURACY,
-            panels: vec![Panel {
-                title,
-                lines,
-                model: None,
-            }],
-            columns: 1,
-            note: String::new(),
-        }
+        Chart { measure: ACCURACY, panels: vec![Panel { title, lines, model: None }], columns: 1, note: String::new() }
     }
 
     /// Title of a mean: "mean of 6 models", or the name of a single model.
@@ -105,10 +85,7 @@ impl FigureBuilder<'_> {
     fn bands_note(&self, models: &[&str]) -> String {
         match models {
             [_] => format!("Bands: 95 % intervals by {}.", self.findings.unit),
-            several => format!(
-                "Bands: from the lowest to the highest of the {} models, not intervals.",
-                several.len()
-            ),
+            several => format!("Bands: from the lowest to the highest of the {} models, not intervals.", several.len()),
         }
     }
 
@@ -122,16 +99,9 @@ impl FigureBuilder<'_> {
             horizontal_lines_note(&lines)
         );
         if !not_asked.is_empty() {
-            let _ = write!(
-                caption,
-                " Not asked in this light: {}.",
-                not_asked.join(", ")
-            );
+            let _ = write!(caption, " Not asked in this light: {}.", not_asked.join(", "));
         }
-        (
-            caption,
-            Self::single_panel_chart(format!("each model, {light}"), lines),
-        )
+        (caption, Self::single_panel_chart(format!("each model, {light}"), lines))
     }
 
     /// Mean over the models by variant; `None` unless all of them were asked in two variants.
@@ -150,25 +120,14 @@ impl FigureBuilder<'_> {
             horizontal_lines_note(&lines)
         );
         if !not_asked.is_empty() {
-            let _ = write!(
-                caption,
-                " Not asked of all of them: {}.",
-                not_asked.join(", ")
-            );
+            let _ = write!(caption, " Not asked of all of them: {}.", not_asked.join(", "));
         }
-        Some((
-            caption,
-            Self::single_panel_chart(format!("{who}, raw"), lines),
-        ))
+        Some((caption, Self::single_panel_chart(format!("{who}, raw"), lines)))
     }
 
     /// Lines to compare a mean with, other than chance: each model without images, and the black model on raw images.
     fn comparison_lines(&self, variant: &Variant) -> Vec<PlotLine> {
-        let mut lines: Vec<PlotLine> = self
-            .flat_lines(None)
-            .into_iter()
-            .filter(|line| line.name != CHANCE)
-            .collect();
+        let mut lines: Vec<PlotLine> = self.flat_lines(None).into_iter().filter(|line| line.name != CHANCE).collect();
         let black = self.names.black.as_deref();
         if let Some(model) = black.filter(|model| self.models.contains(model)) {
             lines.push(PlotLine {
@@ -208,19 +167,15 @@ impl FigureBuilder<'_> {
             self.bands_note(models),
             horizontal_lines_note(&lines)
         );
-        Some((
-            caption,
-            Self::single_panel_chart(format!("{who}, {light}"), lines),
-        ))
+        Some((caption, Self::single_panel_chart(format!("{who}, {light}"), lines)))
     }
 }
 
 /// Leaves out curves without a dark level; returns the other lines and the names of the omitted curves.
 fn with_dark_levels(lines: Vec<PlotLine>) -> (Vec<PlotLine>, Vec<String>) {
-    let (omitted, lines): (Vec<PlotLine>, Vec<PlotLine>) =
-        lines.into_iter().partition(|line| match &line.content {
-            LineContent::Curve(points) => points.iter().all(|(level, _)| *level == AxisLevel::L0),
-            _ => false,
-        });
+    let (omitted, lines): (Vec<PlotLine>, Vec<PlotLine>) = lines.into_iter().partition(|line| match &line.content {
+        LineContent::Curve(points) => points.iter().all(|(level, _)| *level == AxisLevel::L0),
+        _ => false,
+    });
     (lines, omitted.into_iter().map(|line| line.name).collect())
 }

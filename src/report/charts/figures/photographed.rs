@@ -8,8 +8,8 @@ use crate::types::{SetLight, View};
 use darkqa_score::choice::ParsingMode;
 
 impl FigureBuilder<'_> {
-    /// Accuracy of each model on the photographs, raw and with each enhancer; `None` for data sets photographed in good light, which have
-    /// curves over levels instead.
+    /// Accuracy of each model on the photographs, raw and with each enhancer; `None` for data sets photographed in good
+    /// light, which have curves over levels instead.
     pub(super) fn photographed(&self) -> Option<FigureSpec> {
         let findings = self.findings;
         if findings.set.light == SetLight::Lit || self.models.is_empty() {
@@ -21,20 +21,13 @@ impl FigureBuilder<'_> {
             .filter(|cell| cell.subject.view.is_none())
             .find_map(|cell| Some(cell.accuracy?.value));
         let panels = self.models.iter().map(|model| BarPanel {
-            title: format!(
-                "{}: accuracy in %, n {}",
-                self.names.display_name(model),
-                self.item_count(None)
-            ),
+            title: format!("{}: accuracy in %, n {}", self.names.display_name(model), self.item_count(None)),
             bars: self.photograph_bars(model),
             chance,
         });
         let chart = BarChart {
             panels: panels.filter(|panel| !panel.bars.is_empty()).collect(),
-            note: format!(
-                "lines are 95 % intervals by {}; strict parsing",
-                findings.unit
-            ),
+            note: format!("lines are 95 % intervals by {}; strict parsing", findings.unit),
         };
         if chart.panels.is_empty() {
             return None;
@@ -54,9 +47,7 @@ impl FigureBuilder<'_> {
             .subjects
             .iter()
             .filter(|subject| {
-                subject.model == *model
-                    && subject.view == Some(View::Image)
-                    && !subject.variant.is_degraded()
+                subject.model == *model && subject.view == Some(View::Image) && !subject.variant.is_degraded()
             })
             .filter_map(|subject| {
                 let name = match &subject.enhancer {
@@ -66,10 +57,7 @@ impl FigureBuilder<'_> {
                         format!("{name}{}", subject.variant.group_suffix())
                     }
                 };
-                let index = self
-                    .enhancers
-                    .iter()
-                    .position(|known| Some(*known) == subject.enhancer.as_ref());
+                let index = self.enhancers.iter().position(|known| Some(*known) == subject.enhancer.as_ref());
                 Some(Bar {
                     name,
                     style: LineStyle(index.map_or(0, |index| index + 1)),

@@ -30,8 +30,7 @@ pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
     for model in &builder.models {
         for enhancer in builder.raw_and_enhanced() {
             let points = builder.accuracy_points(model, &variant, enhancer);
-            let name =
-                enhancer.map_or_else(|| (*model).to_owned(), |name| format!("{model} + {name}"));
+            let name = enhancer.map_or_else(|| (*model).to_owned(), |name| format!("{model} + {name}"));
             // A single level makes no line.
             if points.len() > 1 {
                 lines.push(PlotLine {

@@ -17,19 +17,13 @@ use darkqa_score::significance::Significance;
 /// Caption sentence about the mark ↓.
 const BELOW: &str = "↓: detected to be below the answers without images.";
 
-/// All tables that have data: accuracy by level, accuracy by family at L0 and at the darkest level, and a table for each enhancer.
+/// All tables that have data: accuracy by level, accuracy by family at L0 and at the darkest level, and a table for
+/// each enhancer.
 pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<Table> {
     let builder = FigureBuilder::new(findings, names);
     let variants = builder.tested_variants();
-    let mut tables: Vec<Table> = variants
-        .iter()
-        .map(|variant| builder.by_level(variant))
-        .collect();
-    tables.extend(
-        builder
-            .main_variant()
-            .map(|variant| builder.by_family(&variant)),
-    );
+    let mut tables: Vec<Table> = variants.iter().map(|variant| builder.by_level(variant)).collect();
+    tables.extend(builder.main_variant().map(|variant| builder.by_family(&variant)));
     for variant in &variants {
         for enhancer in &builder.enhancers {
             tables.extend(builder.by_enhancer(variant, enhancer));
@@ -41,32 +35,16 @@ pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<Table>
 
 /// Table whose first column has the row names; `heads` are the names of the other columns.
 fn table(caption: String, heads: impl IntoIterator<Item = String>, rows: Vec<TableRow>) -> Table {
-    let names = Column {
-        kind: ColumnKind::Text,
-        heads: ColumnHeads::default(),
-    };
+    let names = Column { kind: ColumnKind::Text, heads: ColumnHeads::default() };
     let numbers = heads.into_iter().map(|head| Column {
         kind: ColumnKind::Accuracy,
-        heads: ColumnHeads {
-            page: Some(head),
-            ..ColumnHeads::default()
-        },
+        heads: ColumnHeads { page: Some(head), ..ColumnHeads::default() },
     });
-    Table {
-        name: "paper",
-        caption,
-        columns: std::iter::once(names).chain(numbers).collect(),
-        rows,
-        ..Table::default()
-    }
+    Table { name: "paper", caption, columns: std::iter::once(names).chain(numbers).collect(), rows, ..Table::default() }
 }
 
 /// Table row below the heading of its group.
-fn row(
-    name: String,
-    group: Option<&str>,
-    numbers: impl IntoIterator<Item = TableCell>,
-) -> TableRow {
+fn row(name: String, group: Option<&str>, numbers: impl IntoIterator<Item = TableCell>) -> TableRow {
     TableRow {
         cells: std::iter::once(name.into()).chain(numbers).collect(),
         group: group.map(str::to_owned),
@@ -76,11 +54,7 @@ fn row(
 
 /// Cell with an accuracy, marked if it is below the accuracy without images.
 fn accuracy_cell(accuracy: Estimate, is_below_blind: bool) -> TableCell {
-    if is_below_blind {
-        TableCell::Below(accuracy)
-    } else {
-        TableCell::Estimate(accuracy)
-    }
+    if is_below_blind { TableCell::Below(accuracy) } else { TableCell::Estimate(accuracy) }
 }
 
 impl FigureBuilder<'_> {
@@ -110,9 +84,7 @@ impl FigureBuilder<'_> {
                 });
                 let cells = points
                     .into_iter()
-                    .map(|(level, accuracy)| {
-                        (level, accuracy_cell(accuracy, below.contains(&level)))
-                    })
+                    .map(|(level, accuracy)| (level, accuracy_cell(accuracy, below.contains(&level))))
                     .collect();
                 (*model, cells)
             })
@@ -127,20 +99,12 @@ impl FigureBuilder<'_> {
         let rows = rows
             .into_iter()
             .map(|(model, mut cells)| {
-                let numbers = levels
-                    .iter()
-                    .map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
-                TableRow {
-                    is_best: self.is_best(model, variant),
-                    ..row(self.curve_name(model), None, numbers)
-                }
+                let numbers = levels.iter().map(|level| cells.remove(level).unwrap_or(TableCell::Blank));
+                TableRow { is_best: self.is_best(model, variant), ..row(self.curve_name(model), None, numbers) }
             })
             .chain(self.without_images(levels.len()))
             .collect();
-        let values: Vec<String> = levels
-            .iter()
-            .map(|level| format!("{level} {}", level.value()))
-            .collect();
+        let values: Vec<String> = levels.iter().map(|level| format!("{level} {}", level.value())).collect();
         let caption = format!(
             "Accuracy in % by level, {} ({} in {}: {}). {} {BELOW} Bold: detected to be better than every other model in the dark.",
             self.condition_text(variant, None),
@@ -152,7 +116,8 @@ impl FigureBuilder<'_> {
         table(caption, levels.iter().map(ToString::to_string), rows)
     }
 
-    /// Rows of models without images, and of chance: the accuracy in the first column, the other `columns` − 1 cells blank.
+    /// Rows of models without images, and of chance: the accuracy in the first column, the other `columns` − 1 cells
+    /// blank.
     fn without_images(&self, columns: usize) -> impl Iterator<Item = TableRow> {
         self.findings
             .summary
@@ -192,9 +157,7 @@ impl FigureBuilder<'_> {
             .into_iter()
             .flat_map(|level| self.models.iter().map(move |model| (level, *model)))
             .map(|(level, model)| {
-                let numbers = families
-                    .iter()
-                    .map(|family| self.family_cell(model, level, variant, family));
+                let numbers = families.iter().map(|family| self.family_cell(model, level, variant, family));
                 row(self.curve_name(model), Some(&level.to_string()), numbers)
             })
             .collect();
@@ -205,20 +168,12 @@ impl FigureBuilder<'_> {
             self.condition_text(variant, None),
             self.basis()
         );
-        let heads = families
-            .iter()
-            .map(|family| self.names.display_name(family_name(Some(family))));
+        let heads = families.iter().map(|family| self.names.display_name(family_name(Some(family))));
         table(caption, heads, rows)
     }
 
     /// Accuracy of a model on a family at a level.
-    fn family_cell(
-        &self,
-        model: &str,
-        level: AxisLevel,
-        variant: &Variant,
-        family: &Family,
-    ) -> TableCell {
+    fn family_cell(&self, model: &str, level: AxisLevel, variant: &Variant, family: &Family) -> TableCell {
         let Some(subject) = self.subject(model, level, variant, None) else {
             return TableCell::Blank;
         };
@@ -229,7 +184,8 @@ impl FigureBuilder<'_> {
         accuracy_cell(accuracy, !below.is_empty())
     }
 
-    /// Effect of an enhancer over all models, then the accuracy of each model with it; `None` if it was not asked in the variant.
+    /// Effect of an enhancer over all models, then the accuracy of each model with it; `None` if it was not asked in
+    /// the variant.
     fn by_enhancer(&self, variant: &Variant, enhancer: &EnhancerName) -> Option<Table> {
         let pooled: Vec<_> = self
             .findings
@@ -276,18 +232,13 @@ impl FigureBuilder<'_> {
             })
         });
         let effect_row = row(name, None, effects);
-        let model_rows =
-            rows.iter()
-                .filter(|(_, points)| !points.is_empty())
-                .map(|(model, points)| {
-                    let numbers = levels.iter().map(|level| {
-                        let point = points.iter().find(|(other, _)| other == level);
-                        point.map_or(TableCell::Blank, |(_, accuracy)| {
-                            TableCell::Estimate(*accuracy)
-                        })
-                    });
-                    row(self.curve_name(model), Some(""), numbers)
-                });
+        let model_rows = rows.iter().filter(|(_, points)| !points.is_empty()).map(|(model, points)| {
+            let numbers = levels.iter().map(|level| {
+                let point = points.iter().find(|(other, _)| other == level);
+                point.map_or(TableCell::Blank, |(_, accuracy)| TableCell::Estimate(*accuracy))
+            });
+            row(self.curve_name(model), Some(""), numbers)
+        });
         let rows = std::iter::once(effect_row).chain(model_rows).collect();
         let caption = format!(
             "Effect of {} in points, and accuracy with it in %, {}. {} Bold: a difference that is detected (p < 0.05 after one correction over all tests of the report).",

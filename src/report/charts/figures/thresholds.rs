@@ -12,12 +12,10 @@ use darkqa_score::accuracies::Curve;
 use darkqa_score::findings::Findings;
 
 /// Name and axis of each figure.
-const NAMES: [(&str, Axis); 2] = [
-    ("thresholds", Axis::LIGHT),
-    ("blur_thresholds", Axis::MOTION),
-];
+const NAMES: [(&str, Axis); 2] = [("thresholds", Axis::LIGHT), ("blur_thresholds", Axis::MOTION)];
 
-/// Message that a threshold figure is missing because no curve has a threshold, with the reasons; `None` if that is not the cause.
+/// Message that a threshold figure is missing because no curve has a threshold, with the reasons; `None` if that is not
+/// the cause.
 pub(crate) fn missing_threshold_message(findings: &Findings<'_>, figure: &str) -> Option<String> {
     let (_, axis) = NAMES.into_iter().find(|(name, _)| *name == figure)?;
     let reasons: BTreeSet<String> = curves_on(findings, axis)
@@ -30,19 +28,13 @@ pub(crate) fn missing_threshold_message(findings: &Findings<'_>, figure: &str) -
 
 /// Curves on an axis that are over all families together.
 fn curves_on<'f>(findings: &'f Findings<'_>, axis: Axis) -> impl Iterator<Item = &'f Curve> {
-    findings
-        .curves
-        .iter()
-        .filter(move |curve| curve.family.is_none() && curve.axis() == axis)
+    findings.curves.iter().filter(move |curve| curve.family.is_none() && curve.axis() == axis)
 }
 
 impl FigureBuilder<'_> {
     /// One figure for each axis on which a curve has a threshold.
     pub(super) fn thresholds(&self) -> Vec<FigureSpec> {
-        Axis::ALL
-            .into_iter()
-            .filter_map(|axis| self.thresholds_on(axis))
-            .collect()
+        Axis::ALL.into_iter().filter_map(|axis| self.thresholds_on(axis)).collect()
     }
 
     /// One row for each curve on an axis, with its threshold and interval; `None` if no curve has a threshold.

@@ -25,15 +25,7 @@ const INDENT: f64 = 0.035;
 impl Axes {
     /// Axes of a panel whose plot area has its upper left corner at a point.
     pub(super) fn new(panel: &Panel, [left, top]: Point, [width, height]: [f64; 2]) -> Self {
-        Self {
-            left,
-            top,
-            width,
-            height,
-            levels: panel.levels(),
-            end: panel.axis_end(),
-            title: panel.axis_title(),
-        }
+        Self { left, top, width, height, levels: panel.levels(), end: panel.axis_end(), title: panel.axis_title() }
     }
 
     /// Width of the tick labels left of the axis, in points.
@@ -48,11 +40,7 @@ impl Axes {
 
     /// Horizontal position of a value in the unit of the levels.
     pub(super) fn x(&self, value: f64) -> f64 {
-        let share = if self.end > 0.0 {
-            value / self.end
-        } else {
-            0.5
-        };
+        let share = if self.end > 0.0 { value / self.end } else { 0.5 };
         self.left + self.width * (INDENT + (1.0 - 2.0 * INDENT) * share)
     }
 
@@ -61,22 +49,17 @@ impl Axes {
         self.top + self.height * (1.0 - share.clamp(0.0, 1.0))
     }
 
-    /// Draws grid, levels and titles. `measure` is the title of the vertical axis; it is empty if the panel to the left has the title.
+    /// Draws grid, levels and titles. `measure` is the title of the vertical axis; it is empty if the panel to the left
+    /// has the title.
     pub(super) fn draw(&self, sheet: &mut Sheet, look: &Look, measure: &str) {
         let (right, bottom) = (self.left + self.width, self.top + self.height);
         let small = look.tick_font_size();
         draw_percent_grid(sheet, look, [self.left, right], |share| self.y(share));
-        sheet.line(
-            &[[self.left, bottom], [right, bottom]],
-            &look.thin_stroke(INK),
-        );
+        sheet.line(&[[self.left, bottom], [right, bottom]], &look.thin_stroke(INK));
         let labelled = self.labelled_levels(look);
         for level in &self.levels {
             let x = self.x(level.value());
-            sheet.line(
-                &[[x, bottom], [x, bottom + 0.25 * small]],
-                &look.thin_stroke(INK),
-            );
+            sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin_stroke(INK));
             if labelled.contains(level) {
                 let position = [x, bottom + 1.15 * small];
                 sheet.label(&level.to_string(), position, small, Anchor::Middle);
@@ -88,17 +71,8 @@ impl Axes {
         let title = Font::bundled().shortened(&self.title, look.font_size, self.width * 1.15);
         let position = [middle, bottom + 2.35 * small + 0.95 * look.font_size];
         sheet.label(&title, position, look.font_size, Anchor::Middle);
-        let position = [
-            self.left - Self::numbers_width(look) - 0.35 * look.font_size,
-            self.top + self.height / 2.0,
-        ];
-        sheet.rotated_label(
-            measure,
-            position,
-            look.font_size,
-            Anchor::Middle,
-            TextDirection::Up,
-        );
+        let position = [self.left - Self::numbers_width(look) - 0.35 * look.font_size, self.top + self.height / 2.0];
+        sheet.rotated_label(measure, position, look.font_size, Anchor::Middle, TextDirection::Up);
     }
 
     /// Levels that get a label, from L0: a label that would touch the one before is left out.
@@ -106,9 +80,9 @@ impl Axes {
         let mut labelled: Vec<AxisLevel> = Vec::new();
         for level in &self.levels {
             let start = self.x(level.value()) - half_label_width(*level, look);
-            let end = labelled.last().map(|last| {
-                self.x(last.value()) + half_label_width(*last, look) + 0.2 * look.tick_font_size()
-            });
+            let end = labelled
+                .last()
+                .map(|last| self.x(last.value()) + half_label_width(*last, look) + 0.2 * look.tick_font_size());
             if end.is_none_or(|end| end < start) {
                 labelled.push(*level);
             }
@@ -125,12 +99,7 @@ fn half_label_width(level: AxisLevel, look: &Look) -> f64 {
 }
 
 /// Draws horizontal grid lines with labels from 0 to 100 percent. `y` returns the vertical position of a share.
-pub(super) fn draw_percent_grid(
-    sheet: &mut Sheet,
-    look: &Look,
-    [left, right]: [f64; 2],
-    y: impl Fn(f64) -> f64,
-) {
+pub(super) fn draw_percent_grid(sheet: &mut Sheet, look: &Look, [left, right]: [f64; 2], y: impl Fn(f64) -> f64) {
     let small = look.tick_font_size();
     for step in 0..=5 {
         let y = y(f64::from(step) / 5.0);
@@ -150,11 +119,7 @@ mod tests {
     /// Names of the labelled levels on an axis of L0 and the given exposure drops, in hundredths of an EV.
     fn labelled(drops: impl IntoIterator<Item = u16>) -> Vec<String> {
         let levels: Vec<AxisLevel> = std::iter::once(AxisLevel::L0)
-            .chain(
-                drops
-                    .into_iter()
-                    .map(|drop| AxisLevel::new(Kind::Sensor, Severity::from_hundredths(drop))),
-            )
+            .chain(drops.into_iter().map(|drop| AxisLevel::new(Kind::Sensor, Severity::from_hundredths(drop))))
             .collect();
         let axes = Axes {
             left: 0.0,
@@ -165,15 +130,8 @@ mod tests {
             levels,
             title: String::new(),
         };
-        let look = Look {
-            width: 252.0,
-            font_size: 8.0,
-            palette: Palette::Colour,
-        };
-        axes.labelled_levels(&look)
-            .iter()
-            .map(ToString::to_string)
-            .collect()
+        let look = Look { width: 252.0, font_size: 8.0, palette: Palette::Colour };
+        axes.labelled_levels(&look).iter().map(ToString::to_string).collect()
     }
 
     #[test]
@@ -181,10 +139,7 @@ mod tests {
         let paper_levels = [200, 400, 600, 750, 900];
         assert_eq!(labelled(paper_levels), ["L0", "L1", "L2", "L3", "L4", "L5"]);
         let half_stops = labelled((1..=20).map(|step| 50 * step));
-        assert!(
-            half_stops.len() > 5 && half_stops.len() < 15,
-            "{half_stops:?}"
-        );
+        assert!(half_stops.len() > 5 && half_stops.len() < 15, "{half_stops:?}");
         assert_eq!(labelled([1, 900]), ["L0", "L5"]);
     }
 }

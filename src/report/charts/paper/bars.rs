@@ -35,13 +35,8 @@ fn share_y(look: &Look, bottom: f64, share: f64) -> f64 {
 }
 
 fn draw_panel(sheet: &mut Sheet, look: &Look, panel: &BarPanel, [left, top]: Point) {
-    let (right, bottom) = (
-        look.width - 0.4 * look.font_size,
-        top + HEIGHT * look.font_size,
-    );
-    draw_percent_grid(sheet, look, [left, right], |share| {
-        share_y(look, bottom, share)
-    });
+    let (right, bottom) = (look.width - 0.4 * look.font_size, top + HEIGHT * look.font_size);
+    draw_percent_grid(sheet, look, [left, right], |share| share_y(look, bottom, share));
     let title = Title::new(&panel.title, look, right - left);
     title.draw(sheet, look, [left, top - 0.5 * look.font_size]);
     let step = (right - left) / panel.bars.len().max(1) as f64;
@@ -71,17 +66,7 @@ fn draw_bar(sheet: &mut Sheet, look: &Look, bar: &Bar, [middle, bottom]: Point, 
     sheet.line(&ends, &look.pen(bar.style).stroke);
     let small = look.tick_font_size();
     let share = format!("{:.1}", 100.0 * bar.share.value);
-    sheet.label(
-        &share,
-        [middle, bottom + 1.1 * small],
-        small,
-        Anchor::Middle,
-    );
+    sheet.label(&share, [middle, bottom + 1.1 * small], small, Anchor::Middle);
     let name = Font::bundled().shortened(&bar.name, small, 0.95 * step);
-    sheet.label(
-        &name,
-        [middle, bottom + 2.25 * small],
-        small,
-        Anchor::Middle,
-    );
+    sheet.label(&name, [middle, bottom + 2.25 * small], small, Anchor::Middle);
 }

@@ -34,23 +34,13 @@ fn draw_panel(panel: &CountPanel, look: &Look) -> Sheet {
     let (font, small, row) = (Font::bundled(), look.tick_font_size(), ROW * look.font_size);
     let total: u64 = panel.bars.iter().map(|(_, count)| count).sum();
     let highest = panel.bars.iter().map(|(_, count)| *count).max();
-    let names = panel
-        .bars
-        .iter()
-        .map(|(name, _)| font.width(name, small))
-        .fold(0.0, f64::max)
-        .min(NAMES * look.width);
+    let names = panel.bars.iter().map(|(name, _)| font.width(name, small)).fold(0.0, f64::max).min(NAMES * look.width);
     let left = names + 0.6 * small;
     let widest_label = count_label(highest.unwrap_or(0), total);
     let labels = font.width(&widest_label, small) + 0.6 * small;
     let longest = look.width - left - labels;
     let mut sheet = Sheet::default();
-    sheet.label(
-        &panel.title,
-        [0.0, look.font_size],
-        look.font_size,
-        Anchor::Start,
-    );
+    sheet.label(&panel.title, [0.0, look.font_size], look.font_size, Anchor::Start);
     let mut top = row;
     for (name, count) in &panel.bars {
         let base = top + row / 2.0 + 0.35 * small;
@@ -60,12 +50,7 @@ fn draw_panel(panel: &CountPanel, look: &Look) -> Sheet {
         let (above, below) = (top + 0.15 * row, top + 0.85 * row);
         let corners = vec![[left, above], [end, above], [end, below], [left, below]];
         sheet.area(corners, look.colour(LineStyle(0)), 0.55);
-        sheet.label(
-            &count_label(*count, total),
-            [end + 0.4 * small, base],
-            small,
-            Anchor::Start,
-        );
+        sheet.label(&count_label(*count, total), [end + 0.4 * small, base], small, Anchor::Start);
         top += row;
     }
     if panel.bars.is_empty() {
@@ -90,17 +75,10 @@ mod tests {
 
     #[test]
     fn bar_lengths_are_proportional_to_counts() {
-        let look = Look {
-            width: 510.0,
-            font_size: 8.5,
-            palette: Palette::Colour,
-        };
+        let look = Look { width: 510.0, font_size: 8.5, palette: Palette::Colour };
         let many = (0..40_u64).map(|number| (format!("class {number:02}"), number + 1));
         let panels = [
-            CountPanel::from_counts(
-                "two",
-                [("a".to_owned(), 3), ("b".to_owned(), 1)].into_iter(),
-            ),
+            CountPanel::from_counts("two", [("a".to_owned(), 3), ("b".to_owned(), 1)].into_iter()),
             CountPanel::from_counts("many", many),
             CountPanel::from_counts("empty", [("c".to_owned(), 0)].into_iter()),
         ];
@@ -116,10 +94,8 @@ mod tests {
         assert_eq!(lengths.len(), 2 + 24);
         assert!((lengths[0] / lengths[1] - 3.0).abs() < 1e-9, "{lengths:?}");
         for text in ["3 (75.0 %)", "17 others", "none"] {
-            let is_written = sheet
-                .shapes
-                .iter()
-                .any(|shape| matches!(shape, Shape::Label(label) if label.text == text));
+            let is_written =
+                sheet.shapes.iter().any(|shape| matches!(shape, Shape::Label(label) if label.text == text));
             assert!(is_written, "{text}");
         }
         for shape in &sheet.shapes {

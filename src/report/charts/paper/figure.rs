@@ -44,9 +44,7 @@ pub(crate) fn figure(name: &'static str, caption: &str, chart: &FigureChart) -> 
 pub(crate) fn point_figure(panels: &[PointPanel]) -> Result<String> {
     let columns = panels.len().max(1);
     let look = look(PANEL * columns as f64);
-    let panels = panels
-        .iter()
-        .map(|panel| points(panel, &column_look(columns, &look)));
+    let panels = panels.iter().map(|panel| points(panel, &column_look(columns, &look)));
     to_svg(arrange_in_rows(panels, columns, &look))
 }
 
@@ -59,16 +57,10 @@ pub(crate) fn count_figure(panels: &[CountPanel]) -> Result<String> {
 }
 
 fn look(width: f64) -> Look {
-    Look {
-        width,
-        font_size: FONT_SIZE,
-        palette: Palette::Colour,
-    }
+    Look { width, font_size: FONT_SIZE, palette: Palette::Colour }
 }
 
 /// SVG of a sheet without images, on a white background.
 fn to_svg(sheet: Sheet) -> Result<String> {
-    svg(&sheet.on_paper(), &|_| {
-        Err(Error::data("figure", "has no pictures"))
-    })
+    svg(&sheet.on_paper(), &|_| Err(Error::data("figure", "has no pictures")))
 }

@@ -1,7 +1,8 @@
 //! Bundled font of the figures: [`Font`].
 //!
-//! Arimo 1.33 (Steve Matteson, SIL Open Font License 1.1), reduced to Latin, Greek, punctuation and a few signs. Its glyphs have the same
-//! widths as Arial, Helvetica and Liberation Sans, so that an SVG looks the same with any of these fonts.
+//! Arimo 1.33 (Steve Matteson, SIL Open Font License 1.1), reduced to Latin, Greek, punctuation and a few signs. Its
+//! glyphs have the same widths as Arial, Helvetica and Liberation Sans, so that an SVG looks the same with any of these
+//! fonts.
 
 use ttf_parser::{Face, GlyphId};
 
@@ -49,10 +50,7 @@ impl Font {
             .map(|letter| {
                 let glyph = self.0.glyph_index(letter).unwrap_or(GlyphId(0));
                 let advance = self.0.glyph_hor_advance(glyph).unwrap_or(0);
-                Letter {
-                    glyph,
-                    advance: f32::from(advance) / units,
-                }
+                Letter { glyph, advance: f32::from(advance) / units }
             })
             .collect()
     }
@@ -61,8 +59,7 @@ impl Font {
     pub(super) fn metrics(&self) -> Metrics {
         let bounds = self.0.global_bounding_box();
         Metrics {
-            bounds: [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max]
-                .map(|units| self.thousandths(units)),
+            bounds: [bounds.x_min, bounds.y_min, bounds.x_max, bounds.y_max].map(|units| self.thousandths(units)),
             ascent: self.thousandths(self.0.ascender()),
             descent: self.thousandths(self.0.descender()),
             capital_height: self.thousandths(self.0.capital_height().unwrap_or(self.0.ascender())),
@@ -76,14 +73,11 @@ impl Font {
 
     /// Width in points of a text at a font size of `size` points.
     pub(super) fn width(&self, text: &str, size: f64) -> f64 {
-        self.letters(text)
-            .into_iter()
-            .map(|letter| f64::from(letter.advance))
-            .sum::<f64>()
-            * size
+        self.letters(text).into_iter().map(|letter| f64::from(letter.advance)).sum::<f64>() * size
     }
 
-    /// Shortens a text to at most `width` points by replacing its middle with "…". A text that fits is returned unchanged.
+    /// Shortens a text to at most `width` points by replacing its middle with "…". A text that fits is returned
+    /// unchanged.
     pub(super) fn shortened(&self, text: &str, size: f64, width: f64) -> String {
         if self.width(text, size) <= width {
             return text.to_owned();
@@ -91,8 +85,8 @@ impl Font {
         let letters: Vec<char> = text.chars().collect();
         let affix_widths = AffixWidths::new(&letters, &self.letters(text));
         let ellipsis = self.width("…", size);
-        // Names may be very long: estimate each width from the prefix sums, and build only a text that nearly fits. The tolerance covers
-        // rounding errors of the sums.
+        // Names may be very long: estimate each width from the prefix sums, and build only a text that nearly fits. The
+        // tolerance covers rounding errors of the sums.
         let tolerated = width * (1.0 + 1e-6) + 1e-6;
         for kept in (2..letters.len()).rev() {
             let (head, tail) = (kept.div_ceil(2), kept / 2);
@@ -135,10 +129,7 @@ struct AffixWidths {
 impl AffixWidths {
     fn new(characters: &[char], letters: &[Letter]) -> Self {
         let letters = characters.iter().zip(letters);
-        Self {
-            prefixes: trimmed_widths(letters.clone()),
-            suffixes: trimmed_widths(letters.rev()),
-        }
+        Self { prefixes: trimmed_widths(letters.clone()), suffixes: trimmed_widths(letters.rev()) }
     }
 
     /// Width of the first `head` and the last `tail` characters together.
@@ -184,23 +175,19 @@ mod tests {
         let short = font.shortened(long, 8.0, 60.0);
         assert!(font.width(&short, 8.0) <= 60.0 && short.contains('…') && short.starts_with("a-m"));
         assert_eq!(font.shortened("short", 8.0, 60.0), "short");
-        assert_eq!(
-            font.shortened("two    words and   more", 8.0, 50.0),
-            "two…more"
-        );
+        assert_eq!(font.shortened("two    words and   more", 8.0, 50.0), "two…more");
         let lines = font.wrapped("exposure drop with sensor noise, n 237", 8.0, 70.0);
         assert!(lines.len() > 1 && lines.iter().all(|line| font.width(line, 8.0) <= 70.0));
         assert_eq!(lines.join(" "), "exposure drop with sensor noise, n 237");
     }
 
-    /// Regression: a family name of 20,000 escape characters took a report 14 seconds, and the time grew with the square of the length.
+    /// Regression: a family name of 20,000 escape characters took a report 14 seconds, and the time grew with the
+    /// square of the length.
     #[test]
     fn a_very_long_name_is_shortened_at_once() {
         let font = Font::bundled();
         let long = "⟨U+001B⟩".repeat(100_000);
         let short = font.shortened(&long, 8.0, 60.0);
-        assert!(
-            font.width(&short, 8.0) <= 60.0 && short.starts_with("⟨U+") && short.ends_with('⟩')
-        );
+        assert!(font.width(&short, 8.0) <= 60.0 && short.starts_with("⟨U+") && short.ends_with('⟩'));
     }
 }

@@ -66,12 +66,8 @@ const START: f64 = 0.3;
 impl<'a> Legend<'a> {
     /// Legend of the lines in a line chart.
     pub(super) fn for_chart(chart: &'a Chart, look: &Look) -> Self {
-        let entries = chart
-            .panels
-            .iter()
-            .flat_map(|panel| &panel.lines)
-            .filter(|line| !line.is_empty())
-            .map(LegendEntry::from);
+        let entries =
+            chart.panels.iter().flat_map(|panel| &panel.lines).filter(|line| !line.is_empty()).map(LegendEntry::from);
         Self::new(entries, look)
     }
 
@@ -94,10 +90,7 @@ impl<'a> Legend<'a> {
             x += length + BETWEEN * font_size;
         }
         let height = if arranged.is_empty() { 0.0 } else { y + row };
-        Self {
-            entries: arranged,
-            height,
-        }
+        Self { entries: arranged, height }
     }
 
     /// Draws the entries, the first row starting at `top`.
@@ -127,7 +120,8 @@ impl<'a> Legend<'a> {
         }
     }
 
-    /// Stroke of a horizontal line. The lines of models without images differ in their dashes, by their order in the legend.
+    /// Stroke of a horizontal line. The lines of models without images differ in their dashes, by their order in the
+    /// legend.
     pub(super) fn flat_stroke(&self, entry: LegendEntry<'_>, look: &Look) -> Stroke {
         if !entry.is_without_images() {
             return look.dotted_stroke();

@@ -28,18 +28,14 @@ pub(crate) fn lines(chart: &Chart, look: &Look) -> Sheet {
     let fitting = (look.width / (MIN_WIDTH * look.font_size)) as usize;
     let columns = chart.columns.min(fitting).min(chart.panels.len()).max(1);
     let (first, next) = margins(look);
-    let margins =
-        first + (columns - 1) as f64 * (next + GAP * look.font_size) + 0.6 * look.font_size;
+    let margins = first + (columns - 1) as f64 * (next + GAP * look.font_size) + 0.6 * look.font_size;
     let width = (look.width - margins) / columns as f64;
     let [min_height, max_height] = HEIGHTS.map(|em| em * look.font_size);
     let height = (RATIO * width).clamp(min_height, max_height);
     let mut sheet = Sheet::default();
     let mut top = 0.0;
     for row in chart.panels.chunks(columns) {
-        let titles: Vec<Title> = row
-            .iter()
-            .map(|panel| Title::new(&panel.title, look, width))
-            .collect();
+        let titles: Vec<Title> = row.iter().map(|panel| Title::new(&panel.title, look, width)).collect();
         top += Title::max_height(&titles, look) + 0.65 * look.font_size;
         let mut left = first;
         for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
@@ -62,25 +58,10 @@ fn margins(look: &Look) -> (f64, f64) {
     (numbers + 1.35 * look.font_size, numbers)
 }
 
-fn draw_panel(
-    sheet: &mut Sheet,
-    look: &Look,
-    axes: &Axes,
-    panel: &Panel,
-    measure: &str,
-    legend: &Legend<'_>,
-) {
+fn draw_panel(sheet: &mut Sheet, look: &Look, axes: &Axes, panel: &Panel, measure: &str, legend: &Legend<'_>) {
     axes.draw(sheet, look, measure);
-    let curves = panel
-        .lines
-        .iter()
-        .filter(|line| matches!(line.content, LineContent::Curve(_)))
-        .count();
-    let intervals = if curves > MAX_BANDS {
-        Intervals::Bars
-    } else {
-        Intervals::Bands
-    };
+    let curves = panel.lines.iter().filter(|line| matches!(line.content, LineContent::Curve(_))).count();
+    let intervals = if curves > MAX_BANDS { Intervals::Bars } else { Intervals::Bands };
     for line in &panel.lines {
         match &line.content {
             LineContent::Curve(points) => {
@@ -125,13 +106,8 @@ fn draw_intervals(
     let colour = look.colour(style);
     match intervals {
         Intervals::Bands => {
-            let upper = points
-                .iter()
-                .map(|(level, share)| [axes.x(level.value()), axes.y(share.high)]);
-            let lower = points
-                .iter()
-                .rev()
-                .map(|(level, share)| [axes.x(level.value()), axes.y(share.low)]);
+            let upper = points.iter().map(|(level, share)| [axes.x(level.value()), axes.y(share.high)]);
+            let lower = points.iter().rev().map(|(level, share)| [axes.x(level.value()), axes.y(share.low)]);
             sheet.area(upper.chain(lower).collect(), colour, BAND);
         }
         Intervals::Bars => {
@@ -144,26 +120,18 @@ fn draw_intervals(
     }
 }
 
-fn draw_curve(
-    sheet: &mut Sheet,
-    axes: &Axes,
-    look: &Look,
-    style: LineStyle,
-    points: &[(AxisLevel, Estimate)],
-) {
+fn draw_curve(sheet: &mut Sheet, axes: &Axes, look: &Look, style: LineStyle, points: &[(AxisLevel, Estimate)]) {
     let pen = look.pen(style);
-    let positions: Vec<Point> = points
-        .iter()
-        .map(|(level, share)| [axes.x(level.value()), axes.y(share.value)])
-        .collect();
+    let positions: Vec<Point> =
+        points.iter().map(|(level, share)| [axes.x(level.value()), axes.y(share.value)]).collect();
     sheet.line(&positions, &pen.stroke);
     for position in positions {
         look.draw_marker(sheet, &pen, position);
     }
 }
 
-/// Draws the mark of photographs in the dark: a hollow marker at the median exposure drop, a horizontal bar from quartile to quartile, and
-/// a vertical bar for the interval of the share.
+/// Draws the mark of photographs in the dark: a hollow marker at the median exposure drop, a horizontal bar from
+/// quartile to quartile, and a vertical bar for the interval of the share.
 fn draw_photograph(sheet: &mut Sheet, look: &Look, axes: &Axes, style: LineStyle, mark: &DarkMark) {
     let [low, middle, high] = mark.ev.map(|ev| axes.x(ev.max(0.0)));
     let y = axes.y(mark.share.value);
@@ -196,21 +164,13 @@ mod tests {
     use crate::types::degradations::Kind;
 
     fn share(value: f64) -> Estimate {
-        Estimate {
-            value,
-            low: value - 0.05,
-            high: value + 0.03,
-            n: 40,
-        }
+        Estimate { value, low: value - 0.05, high: value + 0.03, n: 40 }
     }
 
     /// Chart of one panel with `curves` curves over L0, L1 and L5, and chance.
     fn chart(curves: usize) -> Chart {
-        let levels = [
-            AxisLevel::L0,
-            AxisLevel::new(Kind::Sensor, Severity::L1),
-            AxisLevel::new(Kind::Sensor, Severity::L5),
-        ];
+        let levels =
+            [AxisLevel::L0, AxisLevel::new(Kind::Sensor, Severity::L1), AxisLevel::new(Kind::Sensor, Severity::L5)];
         let mut lines: Vec<PlotLine> = (0..curves)
             .map(|line| PlotLine {
                 name: format!("model {line}"),
@@ -235,11 +195,7 @@ mod tests {
         });
         Chart {
             measure: "accuracy in %",
-            panels: vec![Panel {
-                title: "a panel".to_owned(),
-                lines,
-                model: None,
-            }],
+            panels: vec![Panel { title: "a panel".to_owned(), lines, model: None }],
             columns: 1,
             note: "a note".to_owned(),
         }
@@ -270,9 +226,7 @@ mod tests {
                 .shapes
                 .iter()
                 .filter_map(|shape| match shape {
-                    Shape::Line { points, .. } if points.len() == 3 => {
-                        Some(numbers(&sheet, points))
-                    }
+                    Shape::Line { points, .. } if points.len() == 3 => Some(numbers(&sheet, points)),
                     _ => None,
                 })
                 .collect();
@@ -291,9 +245,7 @@ mod tests {
                 .shapes
                 .iter()
                 .filter_map(|shape| match shape {
-                    Shape::Area { corners, .. } if corners.len() == 6 => {
-                        Some(numbers(&sheet, corners))
-                    }
+                    Shape::Area { corners, .. } if corners.len() == 6 => Some(numbers(&sheet, corners)),
                     _ => None,
                 })
                 .collect();
@@ -317,9 +269,7 @@ mod tests {
                 let Shape::Label(label) = shape else { continue };
                 let [x, y] = label.start;
                 let end = match label.direction {
-                    super::super::sheet::TextDirection::Right => {
-                        x + Font::bundled().width(&label.text, label.size)
-                    }
+                    super::super::sheet::TextDirection::Right => x + Font::bundled().width(&label.text, label.size),
                     super::super::sheet::TextDirection::Up => x,
                 };
                 let is_inside = x >= 0.0 && end <= width && y > 0.0 && y < sheet.size[1];

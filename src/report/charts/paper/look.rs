@@ -37,11 +37,7 @@ pub(crate) struct Look {
 /// Style of a figure as wide as a column of a paper.
 #[cfg(test)]
 pub(super) fn column_look() -> Look {
-    Look {
-        width: 252.0,
-        font_size: 8.0,
-        palette: Palette::Colour,
-    }
+    Look { width: 252.0, font_size: 8.0, palette: Palette::Colour }
 }
 
 /// Marker at each point of a line.
@@ -55,14 +51,8 @@ pub(super) enum Marker {
     Ring,
 }
 
-const MARKERS: [Marker; 6] = [
-    Marker::Disc,
-    Marker::Square,
-    Marker::Triangle,
-    Marker::Diamond,
-    Marker::Cross,
-    Marker::Ring,
-];
+const MARKERS: [Marker; 6] =
+    [Marker::Disc, Marker::Square, Marker::Triangle, Marker::Diamond, Marker::Cross, Marker::Ring];
 
 /// Stroke and marker of a line.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,16 +92,10 @@ impl Look {
             (DASHES[0], Marker::Ring)
         } else {
             let repeat = number / colours;
-            (
-                DASHES[(number + repeat) % DASHES.len()],
-                MARKERS[(number + 3 * repeat) % MARKERS.len()],
-            )
+            (DASHES[(number + repeat) % DASHES.len()], MARKERS[(number + 3 * repeat) % MARKERS.len()])
         };
         let width = 1.1 * self.line_scale();
-        Pen {
-            stroke: self.dashed(self.colour(style), width, dash),
-            marker,
-        }
+        Pen { stroke: self.dashed(self.colour(style), width, dash), marker }
     }
 
     /// Stroke for a model without images; `index` counts these models in the figure.
@@ -131,14 +115,7 @@ impl Look {
     }
 
     fn dashed(&self, colour: Colour, width: f64, dash: &[f64]) -> Stroke {
-        Stroke {
-            colour,
-            width,
-            dash: dash
-                .iter()
-                .map(|length| length * self.line_scale())
-                .collect(),
-        }
+        Stroke { colour, width, dash: dash.iter().map(|length| length * self.line_scale()).collect() }
     }
 
     /// Name of a pen's marker in pgfplots.
@@ -159,35 +136,20 @@ impl Look {
         let fill = pen.stroke.colour;
         let edge = Stroke::solid(fill, 0.8 * self.line_scale());
         match pen.marker {
-            Marker::Disc => sheet.shapes.push(Shape::Disc {
-                centre: [x, y],
-                radius: reach,
-                fill: Some(fill),
-                edge: None,
-            }),
-            Marker::Ring => sheet.shapes.push(Shape::Disc {
-                centre: [x, y],
-                radius: reach,
-                fill: Some(PAPER),
-                edge: Some(edge),
-            }),
+            Marker::Disc => {
+                sheet.shapes.push(Shape::Disc { centre: [x, y], radius: reach, fill: Some(fill), edge: None });
+            }
+            Marker::Ring => {
+                sheet.shapes.push(Shape::Disc { centre: [x, y], radius: reach, fill: Some(PAPER), edge: Some(edge) });
+            }
             Marker::Square => {
                 let side = reach * 0.9;
-                let corners = [
-                    [x - side, y - side],
-                    [x + side, y - side],
-                    [x + side, y + side],
-                    [x - side, y + side],
-                ];
+                let corners = [[x - side, y - side], [x + side, y - side], [x + side, y + side], [x - side, y + side]];
                 sheet.area(corners.to_vec(), fill, 1.0);
             }
             Marker::Triangle => {
                 let high = reach * 1.25;
-                let corners = [
-                    [x, y - high],
-                    [x + high, y + reach * 0.8],
-                    [x - high, y + reach * 0.8],
-                ];
+                let corners = [[x, y - high], [x + high, y + reach * 0.8], [x - high, y + reach * 0.8]];
                 sheet.area(corners.to_vec(), fill, 1.0);
             }
             Marker::Diamond => {
@@ -213,11 +175,7 @@ mod tests {
     fn contrast(colour: Colour) -> f64 {
         let linear = colour.map(|code| {
             let share = f64::from(code) / 255.0;
-            if share <= 0.04045 {
-                share / 12.92
-            } else {
-                ((share + 0.055) / 1.055).powf(2.4)
-            }
+            if share <= 0.04045 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
         });
         1.05 / (0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05)
     }
@@ -225,11 +183,7 @@ mod tests {
     #[test]
     fn lines_contrast_with_white_and_differ() {
         for palette in [Palette::Colour, Palette::Grey] {
-            let look = Look {
-                width: 252.0,
-                font_size: 8.0,
-                palette,
-            };
+            let look = Look { width: 252.0, font_size: 8.0, palette };
             let mut seen = BTreeSet::new();
             for number in 0..12 {
                 let pen = look.pen(LineStyle(number));

@@ -1,6 +1,7 @@
 //! Drawing of figures for reports and papers, as PDF, SVG and pgfplots, with one bundled font.
 //!
-//! A chart becomes a [`Sheet`] of shapes in points; PDF and SVG write the same shapes. Captions are separate texts, not part of a sheet.
+//! A chart becomes a [`Sheet`] of shapes in points; PDF and SVG write the same shapes. Captions are separate texts, not
+//! part of a sheet.
 
 mod axes;
 mod bars;

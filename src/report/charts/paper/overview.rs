@@ -25,7 +25,8 @@ pub(crate) struct OverviewSheet {
     pub charts: Vec<Chart>,
 }
 
-/// Draws up to four panels on one sheet, two in a row: the charts, then sample images. The panels that have data are lettered in order.
+/// Draws up to four panels on one sheet, two in a row: the charts, then sample images. The panels that have data are
+/// lettered in order.
 ///
 /// # Errors
 /// If a thumbnail that a run stored cannot be decoded.
@@ -55,11 +56,8 @@ pub(crate) fn overview_sheet(
         Ok(part) => parts.push(part),
         Err(why) => left_out.push(("samples", why.to_owned())),
     }
-    let captions: Vec<String> = parts
-        .iter()
-        .enumerate()
-        .map(|(index, (_, caption))| format!("({}) {caption}", letter(index)))
-        .collect();
+    let captions: Vec<String> =
+        parts.iter().enumerate().map(|(index, (_, caption))| format!("({}) {caption}", letter(index))).collect();
     Ok(OverviewSheet {
         caption: format!("{} ({}.)", captions.join(" "), panels.note),
         sheet: arrange_in_rows(parts.into_iter().map(|(sheet, _)| sheet), COLUMNS, look),

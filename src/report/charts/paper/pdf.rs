@@ -1,7 +1,7 @@
 //! Writer of a sheet as a PDF file: [`pdf`].
 //!
-//! The file has one page of the sheet's size. Text can be selected; the glyphs that occur are embedded. The same sheet always gives the
-//! same bytes, because the file has no date.
+//! The file has one page of the sheet's size. Text can be selected; the glyphs that occur are embedded. The same sheet
+//! always gives the same bytes, because the file has no date.
 
 use std::collections::BTreeMap;
 
@@ -14,7 +14,8 @@ use crate::error::{Error, Result};
 use crate::report::charts::chart::INK;
 use crate::types::Rgb;
 
-/// Distance of a control point from its end point, in radii, of a Bézier curve for a quarter of a circle: 4 (√2 − 1) / 3.
+/// Distance of a control point from its end point, in radii, of a Bézier curve for a quarter of a circle: 4 (√2 − 1) /
+/// 3.
 const HANDLE: f64 = 0.552_284_749_8;
 
 /// Resource name of the font.
@@ -27,10 +28,7 @@ const FONT: Name<'_> = Name(b"F");
 pub(crate) fn pdf(sheet: &Sheet, title: &str) -> Result<Vec<u8>> {
     let [width, height] = sheet.size.map(|length| length as f32);
     if !(width > 0.0 && height > 0.0) {
-        return Err(Error::data(
-            "figure as PDF",
-            format!("a figure of {width} × {height} points has no area"),
-        ));
+        return Err(Error::data("figure as PDF", format!("a figure of {width} × {height} points has no area")));
     }
     let mut page = Page::new(height);
     for shape in &sheet.shapes {
@@ -54,12 +52,7 @@ impl<'a> Page<'a> {
         let mut content = Content::new();
         content.transform([1.0, 0.0, 0.0, -1.0, 0.0, height]);
         content.set_line_join(LineJoinStyle::RoundJoin);
-        Self {
-            content,
-            font: EmbeddedFont::default(),
-            opacities: BTreeMap::new(),
-            pictures: Vec::new(),
-        }
+        Self { content, font: EmbeddedFont::default(), opacities: BTreeMap::new(), pictures: Vec::new() }
     }
 
     fn draw(&mut self, shape: &'a Shape) {
@@ -68,11 +61,7 @@ impl<'a> Page<'a> {
                 self.path(points);
                 self.paint(None, Some(stroke));
             }
-            Shape::Area {
-                corners,
-                fill,
-                opacity,
-            } => {
+            Shape::Area { corners, fill, opacity } => {
                 self.content.save_state();
                 self.set_opacity(*opacity);
                 self.path(corners);
@@ -80,28 +69,18 @@ impl<'a> Page<'a> {
                 self.paint(Some(*fill), None);
                 self.content.restore_state();
             }
-            Shape::Disc {
-                centre,
-                radius,
-                fill,
-                edge,
-            } => {
+            Shape::Disc { centre, radius, fill, edge } => {
                 self.circle(*centre, *radius);
                 self.paint(*fill, edge.as_ref());
             }
             Shape::Label(label) => self.write_label(label),
-            Shape::Picture {
-                corner: [x, y],
-                size: [width, height],
-                image,
-            } => {
+            Shape::Picture { corner: [x, y], size: [width, height], image } => {
                 let [x, y, width, height] = [x, y, width, height].map(|length| *length as f32);
                 let name = picture_name(self.pictures.len());
                 self.pictures.push(image);
                 self.content.save_state();
                 // PDF draws an image in the unit square, its first row at the top.
-                self.content
-                    .transform([width, 0.0, 0.0, -height, x, y + height]);
+                self.content.transform([width, 0.0, 0.0, -height, x, y + height]);
                 self.content.x_object(Name(name.as_bytes()));
                 self.content.restore_state();
             }
@@ -127,12 +106,9 @@ impl<'a> Page<'a> {
         let [start_x, start_y] = at(1.0, 0.0);
         self.content.move_to(start_x, start_y);
         // Unit vectors of the start and the end of each quarter.
-        for ([from_x, from_y], [to_x, to_y]) in [
-            ([1.0, 0.0], [0.0, 1.0]),
-            ([0.0, 1.0], [-1.0, 0.0]),
-            ([-1.0, 0.0], [0.0, -1.0]),
-            ([0.0, -1.0], [1.0, 0.0]),
-        ] {
+        for ([from_x, from_y], [to_x, to_y]) in
+            [([1.0, 0.0], [0.0, 1.0]), ([0.0, 1.0], [-1.0, 0.0]), ([-1.0, 0.0], [0.0, -1.0]), ([0.0, -1.0], [1.0, 0.0])]
+        {
             let [x1, y1] = at(from_x + HANDLE * to_x, from_y + HANDLE * to_y);
             let [x2, y2] = at(to_x + HANDLE * from_x, to_y + HANDLE * from_y);
             let [x3, y3] = at(to_x, to_y);
@@ -169,10 +145,7 @@ impl<'a> Page<'a> {
 
     fn set_opacity(&mut self, opacity: f64) {
         let thousandths = (opacity.clamp(0.0, 1.0) * 1000.0).round() as u16;
-        let name = self
-            .opacities
-            .entry(thousandths)
-            .or_insert_with(|| format!("G{thousandths}"));
+        let name = self.opacities.entry(thousandths).or_insert_with(|| format!("G{thousandths}"));
         self.content.set_parameters(Name(name.as_bytes()));
     }
 
@@ -185,12 +158,7 @@ impl<'a> Page<'a> {
         };
         let text = self.font.encode(&label.text);
         self.set_fill(INK);
-        self.content
-            .begin_text()
-            .set_font(FONT, label.size as f32)
-            .set_text_matrix(matrix)
-            .show(Str(&text))
-            .end_text();
+        self.content.begin_text().set_font(FONT, label.size as f32).set_text_matrix(matrix).show(Str(&text)).end_text();
     }
 
     /// Writes the whole file.
@@ -209,17 +177,11 @@ impl<'a> Page<'a> {
         pdf.stream(content, &packed).filter(Filter::FlateDecode);
 
         let font = self.font.write(&mut pdf, &mut next)?;
-        let pictures: Vec<Ref> = self
-            .pictures
-            .iter()
-            .map(|image| write_picture(&mut pdf, next.bump(), image))
-            .collect();
+        let pictures: Vec<Ref> =
+            self.pictures.iter().map(|image| write_picture(&mut pdf, next.bump(), image)).collect();
 
         let mut entry = pdf.page(page);
-        entry
-            .parent(pages)
-            .media_box(Rect::new(0.0, 0.0, width, height))
-            .contents(content);
+        entry.parent(pages).media_box(Rect::new(0.0, 0.0, width, height)).contents(content);
         let mut resources = entry.resources();
         if let Some(font) = font {
             resources.fonts().pair(FONT, font);
@@ -247,12 +209,7 @@ fn write_picture(pdf: &mut Pdf, id: Ref, image: &Rgb) -> Ref {
     let packed = deflate(image.samples());
     let mut object = pdf.image_xobject(id, &packed);
     object.filter(Filter::FlateDecode);
-    object
-        .width(image.width() as i32)
-        .height(image.height() as i32)
-        .bits_per_component(8)
-        .color_space()
-        .device_rgb();
+    object.width(image.width() as i32).height(image.height() as i32).bits_per_component(8).color_space().device_rgb();
     id
 }
 
@@ -275,24 +232,16 @@ mod tests {
     use crate::types::Rgb;
 
     fn sheet() -> Sheet {
-        let mut sheet = Sheet {
-            size: [100.0, 50.0],
-            ..Sheet::default()
-        };
+        let mut sheet = Sheet { size: [100.0, 50.0], ..Sheet::default() };
         sheet.label("accuracy −5 μ", [10.0, 20.0], 8.0, Anchor::Start);
         sheet.line(&[[0.0, 0.0], [50.0, 25.0]], &Stroke::solid(INK, 1.0));
         sheet.area(vec![[0.0, 0.0], [9.0, 0.0], [9.0, 9.0]], [1, 2, 3], 0.2);
-        sheet.shapes.push(Shape::Picture {
-            corner: [5.0, 5.0],
-            size: [20.0, 10.0],
-            image: Arc::new(Rgb::black(2, 4)),
-        });
+        sheet.shapes.push(Shape::Picture { corner: [5.0, 5.0], size: [20.0, 10.0], image: Arc::new(Rgb::black(2, 4)) });
         sheet
     }
 
     fn has(file: &[u8], label: &str) -> bool {
-        file.windows(label.len())
-            .any(|part| part == label.as_bytes())
+        file.windows(label.len()).any(|part| part == label.as_bytes())
     }
 
     #[test]
@@ -333,9 +282,6 @@ mod tests {
         assert!(sheet.check_characters().is_ok());
         sheet.label("模型", [0.0, 0.0], 8.0, Anchor::Start);
         let error = sheet.check_characters().unwrap_err().to_string();
-        assert!(
-            error.contains("模型") && error.contains("--label"),
-            "{error}"
-        );
+        assert!(error.contains("模型") && error.contains("--label"), "{error}");
     }
 }

@@ -16,11 +16,7 @@ use crate::error::{Error, Result};
 const NAME: Name<'_> = Name(b"DARKQA+Arimo");
 
 /// Character codes are glyph numbers of the subset (PDF 1.7, 9.7.5).
-const CODES: SystemInfo<'_> = SystemInfo {
-    registry: Str(b"Adobe"),
-    ordering: Str(b"Identity"),
-    supplement: 0,
-};
+const CODES: SystemInfo<'_> = SystemInfo { registry: Str(b"Adobe"), ordering: Str(b"Identity"), supplement: 0 };
 
 /// Thickness of vertical stems in thousandths of an em. The font file lacks it, so it is the value of Arial.
 const STEM: f32 = 80.0;
@@ -42,8 +38,7 @@ impl EmbeddedFont {
             .zip(text.chars())
             .flat_map(|(letter, character)| {
                 let code = self.glyphs.remap(letter.glyph.0);
-                self.letters
-                    .insert(code, (character, letter.advance * 1000.0));
+                self.letters.insert(code, (character, letter.advance * 1000.0));
                 code.to_be_bytes()
             })
             .collect()
@@ -112,8 +107,5 @@ impl EmbeddedFont {
 /// Compresses bytes for the PDF filter `FlateDecode`.
 pub(super) fn deflate(bytes: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    encoder
-        .write_all(bytes)
-        .and_then(|()| encoder.finish())
-        .expect("a vector takes every write")
+    encoder.write_all(bytes).and_then(|()| encoder.finish()).expect("a vector takes every write")
 }

@@ -20,19 +20,12 @@ pub(crate) fn points(panel: &PointPanel, look: &Look) -> Sheet {
     let (font_size, small) = (look.font_size, look.tick_font_size());
     let [horizontal, vertical] = [0, 1].map(|axis| Scale::new(panel.range(axis)));
     let font = Font::bundled();
-    let numbers = vertical
-        .ticks()
-        .map(|(_, text)| font.width(&text, small))
-        .fold(0.0, f64::max);
+    let numbers = vertical.ticks().map(|(_, text)| font.width(&text, small)).fold(0.0, f64::max);
     let left = numbers + 0.55 * small + 1.35 * font_size;
     let width = look.width - left - 0.6 * font_size;
     let title = Title::new(&panel.title, look, width);
     let top = Title::max_height(std::slice::from_ref(&title), look) + 0.65 * font_size;
-    let area = Area {
-        corner: [left, top],
-        size: [width, RATIO * width],
-        scales: [horizontal, vertical],
-    };
+    let area = Area { corner: [left, top], size: [width, RATIO * width], scales: [horizontal, vertical] };
     let mut sheet = Sheet::default();
     title.draw(&mut sheet, look, [left, top - 0.6 * font_size]);
     area.draw_axes(&mut sheet, look);
@@ -40,17 +33,8 @@ pub(crate) fn points(panel: &PointPanel, look: &Look) -> Sheet {
     let [x_title, y_title] = panel.axes;
     let position = [left + width / 2.0, bottom + 1.3 * small + 0.95 * font_size];
     sheet.label(x_title, position, font_size, Anchor::Middle);
-    let position = [
-        left - numbers - 0.55 * small - 0.35 * font_size,
-        f64::midpoint(top, bottom),
-    ];
-    sheet.rotated_label(
-        y_title,
-        position,
-        font_size,
-        Anchor::Middle,
-        TextDirection::Up,
-    );
+    let position = [left - numbers - 0.55 * small - 0.35 * font_size, f64::midpoint(top, bottom)];
+    sheet.rotated_label(y_title, position, font_size, Anchor::Middle, TextDirection::Up);
     for series in &panel.series {
         area.draw_series(&mut sheet, look, series);
     }
@@ -80,10 +64,7 @@ impl Area {
     /// Position of a pair of values on the sheet.
     fn position(&self, [x, y]: [f64; 2]) -> Point {
         let [horizontal, vertical] = &self.scales;
-        [
-            self.corner[0] + self.size[0] * horizontal.share(x),
-            self.corner[1] + self.size[1] * (1.0 - vertical.share(y)),
-        ]
+        [self.corner[0] + self.size[0] * horizontal.share(x), self.corner[1] + self.size[1] * (1.0 - vertical.share(y))]
     }
 
     fn draw_axes(&self, sheet: &mut Sheet, look: &Look) {
@@ -99,10 +80,7 @@ impl Area {
         }
         for (value, text) in horizontal.ticks() {
             let [x, _] = self.position([value, vertical.low]);
-            sheet.line(
-                &[[x, bottom], [x, bottom + 0.25 * small]],
-                &look.thin_stroke(INK),
-            );
+            sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin_stroke(INK));
             sheet.label(&text, [x, bottom + 1.15 * small], small, Anchor::Middle);
         }
         let axes = [[left, self.corner[1]], [left, bottom], [right, bottom]];
@@ -129,27 +107,16 @@ struct Scale {
 }
 
 impl Scale {
-    /// Scale of a range with margins; from 0 to 1 with margins if there is no range. The ticks are at multiples of 1, 2 or 5 times a power
-    /// of ten.
+    /// Scale of a range with margins; from 0 to 1 with margins if there is no range. The ticks are at multiples of 1, 2
+    /// or 5 times a power of ten.
     fn new(range: Option<[f64; 2]>) -> Self {
         let [low, high] = range.unwrap_or([0.0, 1.0]);
-        let margin = if high > low {
-            MARGIN * (high - low)
-        } else {
-            1.0
-        };
+        let margin = if high > low { MARGIN * (high - low) } else { 1.0 };
         let (low, high) = (low - margin, high + margin);
         let min_step = (high - low) / MAX_STEPS;
         let power = libm::pow(10.0, libm::log10(min_step).floor());
-        let step = [1.0, 2.0, 5.0]
-            .map(|factor| factor * power)
-            .into_iter()
-            .find(|step| *step >= min_step);
-        Self {
-            low,
-            high,
-            step: step.unwrap_or(10.0 * power),
-        }
+        let step = [1.0, 2.0, 5.0].map(|factor| factor * power).into_iter().find(|step| *step >= min_step);
+        Self { low, high, step: step.unwrap_or(10.0 * power) }
     }
 
     /// Position of a value between the ends of the axis, from 0 to 1.
@@ -177,11 +144,7 @@ mod tests {
     use crate::report::charts::paper::sheet::Shape;
 
     fn panel(series: Vec<PointSeries>) -> PointPanel {
-        PointPanel {
-            title: "a panel".to_owned(),
-            axes: ["ln K", "ln σ"],
-            series,
-        }
+        PointPanel { title: "a panel".to_owned(), axes: ["ln K", "ln σ"], series }
     }
 
     #[test]
@@ -200,9 +163,7 @@ mod tests {
             .shapes
             .iter()
             .filter_map(|shape| match shape {
-                Shape::Line { points, stroke } if points.len() == 3 && stroke.colour != INK => {
-                    Some(points)
-                }
+                Shape::Line { points, stroke } if points.len() == 3 && stroke.colour != INK => Some(points),
                 _ => None,
             })
             .collect();
@@ -226,10 +187,7 @@ mod tests {
             (None, ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"].as_slice()),
             (Some([3.0, 3.0]), &["2.0", "2.5", "3.0", "3.5", "4.0"]),
             (Some([-7.0, 0.0]), &["−6", "−4", "−2", "0"]),
-            (
-                Some([0.001, 0.002]),
-                &["0.0010", "0.0012", "0.0014", "0.0016", "0.0018", "0.0020"],
-            ),
+            (Some([0.001, 0.002]), &["0.0010", "0.0012", "0.0014", "0.0016", "0.0018", "0.0020"]),
         ] {
             let ticks: Vec<String> = Scale::new(range).ticks().map(|(_, text)| text).collect();
             assert_eq!(ticks, texts, "{range:?}");

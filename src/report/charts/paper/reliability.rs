@@ -24,10 +24,7 @@ pub(super) fn reliability(chart: &ReliabilityChart, look: &Look) -> Sheet {
     let mut sheet = Sheet::default();
     let mut top = 0.0;
     for row in chart.panels.chunks(columns) {
-        let titles: Vec<Title> = row
-            .iter()
-            .map(|panel| Title::new(&panel.title, look, side))
-            .collect();
+        let titles: Vec<Title> = row.iter().map(|panel| Title::new(&panel.title, look, side)).collect();
         top += Title::max_height(&titles, look) + 0.65 * look.font_size;
         for (index, (panel, title)) in row.iter().zip(&titles).enumerate() {
             let corner = [index as f64 * column_width + left, top];
@@ -60,22 +57,15 @@ impl Square {
 
 fn draw_panel(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: Square) {
     draw_axes(sheet, look, square);
-    sheet.line(
-        &[square.position(0.0, 0.0), square.position(1.0, 1.0)],
-        &look.dotted_stroke(),
-    );
+    sheet.line(&[square.position(0.0, 0.0), square.position(1.0, 1.0)], &look.dotted_stroke());
     for line in &panel.lines {
         let pen = look.pen(line.style);
         for (confidence, accuracy) in &line.bins {
-            let interval =
-                [accuracy.low, accuracy.high].map(|share| square.position(*confidence, share));
+            let interval = [accuracy.low, accuracy.high].map(|share| square.position(*confidence, share));
             sheet.line(&interval, &look.thin_stroke(pen.stroke.colour));
         }
-        let points: Vec<Point> = line
-            .bins
-            .iter()
-            .map(|(confidence, accuracy)| square.position(*confidence, accuracy.value))
-            .collect();
+        let points: Vec<Point> =
+            line.bins.iter().map(|(confidence, accuracy)| square.position(*confidence, accuracy.value)).collect();
         sheet.line(&points, &pen.stroke);
         for position in points {
             look.draw_marker(sheet, &pen, position);
@@ -86,15 +76,10 @@ fn draw_panel(sheet: &mut Sheet, look: &Look, panel: &ReliabilityPanel, square: 
 fn draw_axes(sheet: &mut Sheet, look: &Look, square: Square) {
     let small = look.tick_font_size();
     let x_axis = [square.position(0.0, 0.0), square.position(1.0, 0.0)];
-    draw_percent_grid(sheet, look, x_axis.map(|[x, _]| x), |share| {
-        square.position(0.0, share)[1]
-    });
+    draw_percent_grid(sheet, look, x_axis.map(|[x, _]| x), |share| square.position(0.0, share)[1]);
     for tick in 0..=5 {
         let [x, bottom] = square.position(f64::from(tick) / 5.0, 0.0);
-        sheet.line(
-            &[[x, bottom], [x, bottom + 0.25 * small]],
-            &look.thin_stroke(INK),
-        );
+        sheet.line(&[[x, bottom], [x, bottom + 0.25 * small]], &look.thin_stroke(INK));
         let position = [x, bottom + 1.15 * small];
         sheet.label(&(tick * 20).to_string(), position, small, Anchor::Middle);
     }
@@ -105,26 +90,16 @@ fn draw_axes(sheet: &mut Sheet, look: &Look, square: Square) {
     let [left, middle] = square.position(0.0, 0.5);
     let numbers = Font::bundled().width("100", small) + 0.9 * look.font_size;
     let y_label = [left - numbers, middle];
-    sheet.rotated_label(
-        "accuracy in %",
-        y_label,
-        look.font_size,
-        Anchor::Middle,
-        TextDirection::Up,
-    );
+    sheet.rotated_label("accuracy in %", y_label, look.font_size, Anchor::Middle, TextDirection::Up);
 }
 
 /// Legend of the lines in all panels.
 fn legend<'a>(chart: &'a ReliabilityChart, look: &Look) -> Legend<'a> {
-    let entries = chart
-        .panels
-        .iter()
-        .flat_map(|panel| &panel.lines)
-        .map(|line| LegendEntry {
-            name: &line.name,
-            style: line.style,
-            sample: LegendSample::Curve,
-        });
+    let entries = chart.panels.iter().flat_map(|panel| &panel.lines).map(|line| LegendEntry {
+        name: &line.name,
+        style: line.style,
+        sample: LegendSample::Curve,
+    });
     Legend::new(entries, look)
 }
 
@@ -138,12 +113,7 @@ mod tests {
     use darkqa_score::estimate::Estimate;
 
     fn share(value: f64) -> Estimate {
-        Estimate {
-            value,
-            low: value - 0.2,
-            high: value + 0.1,
-            n: 40,
-        }
+        Estimate { value, low: value - 0.2, high: value + 0.1, n: 40 }
     }
 
     #[test]
@@ -158,17 +128,10 @@ mod tests {
             })
             .collect();
         let chart = ReliabilityChart {
-            panels: vec![ReliabilityPanel {
-                title: "a model".to_owned(),
-                lines,
-            }],
+            panels: vec![ReliabilityPanel { title: "a model".to_owned(), lines }],
             note: String::new(),
         };
-        let look = Look {
-            width: 252.0,
-            font_size: 8.0,
-            palette: Palette::Colour,
-        };
+        let look = Look { width: 252.0, font_size: 8.0, palette: Palette::Colour };
         let sheet = reliability(&chart, &look);
         let curves: Vec<&Vec<Point>> = sheet
             .shapes
@@ -187,10 +150,7 @@ mod tests {
         assert!(((second[1] - last[1]) / 0.2 - scale).abs() < 1e-9);
         let interval = sheet.shapes.iter().find_map(|shape| match shape {
             Shape::Line { points, .. }
-                if points.len() == 2
-                    && points
-                        .iter()
-                        .all(|position| (position[0] - first[0]).abs() < 1e-9) =>
+                if points.len() == 2 && points.iter().all(|position| (position[0] - first[0]).abs() < 1e-9) =>
             {
                 Some(points.clone())
             }
@@ -199,11 +159,8 @@ mod tests {
         let interval = interval.expect("the first bin has an interval");
         assert!(((interval[0][1] - interval[1][1]) / 0.3 - scale).abs() < 1e-9);
         for name in ["L0", "L5", "a model"] {
-            let count = sheet
-                .shapes
-                .iter()
-                .filter(|shape| matches!(shape, Shape::Label(label) if label.text == name))
-                .count();
+            let count =
+                sheet.shapes.iter().filter(|shape| matches!(shape, Shape::Label(label) if label.text == name)).count();
             assert_eq!(count, 1, "{name}");
         }
     }

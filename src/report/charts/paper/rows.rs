@@ -14,11 +14,7 @@ pub(super) fn column_look(columns: usize, look: &Look) -> Look {
 }
 
 /// Arranges sheets of the width of a column (see [`column_look`]) in rows.
-pub(super) fn arrange_in_rows(
-    parts: impl IntoIterator<Item = Sheet>,
-    columns: usize,
-    look: &Look,
-) -> Sheet {
+pub(super) fn arrange_in_rows(parts: impl IntoIterator<Item = Sheet>, columns: usize, look: &Look) -> Sheet {
     let gap = GAP * look.font_size;
     let step = (look.width + gap) / columns as f64;
     let mut sheet = Sheet::default();

@@ -21,8 +21,8 @@ pub(crate) type Pixels<'a> = &'a dyn Fn(&str) -> Result<Rgb>;
 /// Sheet of one frame with its caption, or the reason why there is none.
 type Samples = std::result::Result<(Sheet, String), &'static str>;
 
-/// Draws the levels of one frame in columns, raw above enhanced. The right half of a dark tile is the middle of the image, brightened by
-/// the exposure drop of its level; the gain is written above it.
+/// Draws the levels of one frame in columns, raw above enhanced. The right half of a dark tile is the middle of the
+/// image, brightened by the exposure drop of its level; the gain is written above it.
 ///
 /// # Errors
 /// If a thumbnail cannot be decoded.
@@ -37,31 +37,18 @@ pub(super) fn samples(
         return Ok(Err("no dark image was asked"));
     };
     let enhancer = panels.enhancer.as_ref();
-    let stored = VariantThumbnails {
-        thumbnails,
-        variant,
-    };
+    let stored = VariantThumbnails { thumbnails, variant };
     let Some((frame, levels)) = stored.best_frame(enhancer.map(|(name, _)| name)) else {
         return Ok(Err("the runs stored no small copies of dark images"));
     };
-    let mut rows = vec![TileRow {
-        name: "raw".to_owned(),
-        tiles: stored.row(frame, &levels, None),
-    }];
+    let mut rows = vec![TileRow { name: "raw".to_owned(), tiles: stored.row(frame, &levels, None) }];
     if let Some((name, display_name)) = enhancer {
         let tiles = stored.row(frame, &levels, Some(name));
         if tiles.iter().any(Option::is_some) {
-            rows.push(TileRow {
-                name: display_name.clone(),
-                tiles,
-            });
+            rows.push(TileRow { name: display_name.clone(), tiles });
         }
     }
-    let title = format!(
-        "({letter}) samples, {}{}",
-        variant.title(),
-        variant.group_suffix()
-    );
+    let title = format!("({letter}) samples, {}{}", variant.title(), variant.group_suffix());
     let sheet = draw_rows(&rows, &levels, look, pixels, &title)?;
     let processing = match rows.get(1) {
         Some(enhanced) => format!("raw and with {}", enhanced.name),
@@ -88,14 +75,10 @@ struct VariantThumbnails<'a> {
 }
 
 impl<'a> VariantThumbnails<'a> {
-    /// The frame with the most thumbnails, and the levels to draw: [`LEVELS`], or up to four from the first to the last. The first such
-    /// frame is used; `None` without a dark image.
+    /// The frame with the most thumbnails, and the levels to draw: [`LEVELS`], or up to four from the first to the
+    /// last. The first such frame is used; `None` without a dark image.
     fn best_frame(&self, enhancer: Option<&EnhancerName>) -> Option<(&'a FrameId, Vec<AxisLevel>)> {
-        let frames: BTreeSet<&FrameId> = self
-            .thumbnails
-            .iter()
-            .map(|thumbnail| &thumbnail.frame)
-            .collect();
+        let frames: BTreeSet<&FrameId> = self.thumbnails.iter().map(|thumbnail| &thumbnail.frame).collect();
         let mut best: Option<(usize, &FrameId, Vec<AxisLevel>)> = None;
         for frame in frames {
             let levels: BTreeSet<AxisLevel> = self
@@ -105,15 +88,13 @@ impl<'a> VariantThumbnails<'a> {
                 .map(|thumbnail| &thumbnail.condition)
                 .filter(|condition| {
                     condition.enhancer.is_none()
-                        && (condition.variant() == *self.variant
-                            || condition.level() == AxisLevel::L0)
+                        && (condition.variant() == *self.variant || condition.level() == AxisLevel::L0)
                 })
                 .map(Condition::level)
                 .collect();
             let is_dark = levels.iter().any(|level| *level != AxisLevel::L0);
-            let enhanced = levels
-                .iter()
-                .filter(|level| enhancer.is_some() && self.at(frame, **level, enhancer).is_some());
+            let enhanced =
+                levels.iter().filter(|level| enhancer.is_some() && self.at(frame, **level, enhancer).is_some());
             let number = levels.len() + enhanced.count();
             if is_dark && best.as_ref().is_none_or(|(most, ..)| number > *most) {
                 best = Some((number, frame, select_levels(&levels)));
@@ -129,19 +110,11 @@ impl<'a> VariantThumbnails<'a> {
         levels: &[AxisLevel],
         enhancer: Option<&EnhancerName>,
     ) -> Vec<Option<&'a Thumbnail>> {
-        levels
-            .iter()
-            .map(|level| self.at(frame, *level, enhancer))
-            .collect()
+        levels.iter().map(|level| self.at(frame, *level, enhancer)).collect()
     }
 
     /// Thumbnail of a frame at a level; at L0 without an enhancer, the clean frame.
-    fn at(
-        &self,
-        frame: &FrameId,
-        level: AxisLevel,
-        enhancer: Option<&EnhancerName>,
-    ) -> Option<&'a Thumbnail> {
+    fn at(&self, frame: &FrameId, level: AxisLevel, enhancer: Option<&EnhancerName>) -> Option<&'a Thumbnail> {
         self.thumbnails.iter().find(|thumbnail| {
             let condition = &thumbnail.condition;
             thumbnail.frame == *frame
@@ -155,11 +128,7 @@ impl<'a> VariantThumbnails<'a> {
 /// Selects [`LEVELS`] if all of them occur, else up to four levels evenly from the first to the last.
 fn select_levels(levels: &BTreeSet<AxisLevel>) -> Vec<AxisLevel> {
     let all: Vec<AxisLevel> = levels.iter().copied().collect();
-    let named: Vec<AxisLevel> = all
-        .iter()
-        .copied()
-        .filter(|level| LEVELS.contains(&&*level.to_string()))
-        .collect();
+    let named: Vec<AxisLevel> = all.iter().copied().filter(|level| LEVELS.contains(&&*level.to_string())).collect();
     if named.len() == LEVELS.len() {
         return named;
     }
@@ -167,18 +136,10 @@ fn select_levels(levels: &BTreeSet<AxisLevel>) -> Vec<AxisLevel> {
         return all;
     }
     let last = LEVELS.len() - 1;
-    (0..LEVELS.len())
-        .map(|index| all[index * (all.len() - 1) / last])
-        .collect()
+    (0..LEVELS.len()).map(|index| all[index * (all.len() - 1) / last]).collect()
 }
 
-fn draw_rows(
-    rows: &[TileRow<'_>],
-    levels: &[AxisLevel],
-    look: &Look,
-    pixels: Pixels,
-    title: &str,
-) -> Result<Sheet> {
+fn draw_rows(rows: &[TileRow<'_>], levels: &[AxisLevel], look: &Look, pixels: Pixels, title: &str) -> Result<Sheet> {
     let (font_size, small) = (look.font_size, look.tick_font_size());
     let left = 1.3 * small;
     let width = (look.width - left + GAP) / levels.len() as f64 - GAP;
@@ -192,20 +153,10 @@ fn draw_rows(
         let y = top - 0.3 * small;
         if gain > 0.0 {
             let gain = format!("+{} EV", (f64::from(gain) * 100.0).round() / 100.0);
-            sheet.label(
-                &level.to_string(),
-                [x + width / 4.0, y],
-                small,
-                Anchor::Middle,
-            );
+            sheet.label(&level.to_string(), [x + width / 4.0, y], small, Anchor::Middle);
             sheet.label(&gain, [x + width * 0.75, y], small, Anchor::Middle);
         } else {
-            sheet.label(
-                &level.to_string(),
-                [x + width / 2.0, y],
-                small,
-                Anchor::Middle,
-            );
+            sheet.label(&level.to_string(), [x + width / 2.0, y], small, Anchor::Middle);
         }
     }
     for row in rows {
@@ -224,15 +175,9 @@ fn draw_rows(
     Ok(sheet)
 }
 
-/// Draws a tile `width` points wide and returns its height. A tile with a gain is split: the left half of the image, and its brightened
-/// middle.
-fn draw_tile(
-    sheet: &mut Sheet,
-    tile: &Thumbnail,
-    pixels: Pixels,
-    [x, y]: Point,
-    width: f64,
-) -> Result<f64> {
+/// Draws a tile `width` points wide and returns its height. A tile with a gain is split: the left half of the image,
+/// and its brightened middle.
+fn draw_tile(sheet: &mut Sheet, tile: &Thumbnail, pixels: Pixels, [x, y]: Point, width: f64) -> Result<f64> {
     let whole = decode(tile, &tile.small, pixels)?;
     let height = width * whole.height() as f64 / whole.width() as f64;
     if tile.stops <= 0.0 {
@@ -243,32 +188,20 @@ fn draw_tile(
     let middle = decode(tile, &tile.crop, pixels)?;
     // Crop to the aspect ratio of half a tile.
     let ratio = width / 2.0 / height;
-    let crop_height = middle
-        .height()
-        .min((middle.width() as f64 / ratio) as usize);
+    let crop_height = middle.height().min((middle.width() as f64 / ratio) as usize);
     let crop_width = ((crop_height as f64 * ratio).round() as usize).clamp(1, middle.width());
     let crop_height = crop_height.max(1);
-    let corner = [
-        (middle.width() - crop_width) / 2,
-        (middle.height() - crop_height) / 2,
-    ];
+    let corner = [(middle.width() - crop_width) / 2, (middle.height() - crop_height) / 2];
     let right = crop_image(&middle, corner, [crop_width, crop_height])?;
     push_picture(sheet, left, [x, y], [width / 2.0, height]);
     push_picture(sheet, right, [x + width / 2.0, y], [width / 2.0, height]);
     let middle = x + width / 2.0;
-    sheet.line(
-        &[[middle, y], [middle, y + height]],
-        &Stroke::solid(PAPER, 0.6),
-    );
+    sheet.line(&[[middle, y], [middle, y + height]], &Stroke::solid(PAPER, 0.6));
     Ok(height)
 }
 
 fn push_picture(sheet: &mut Sheet, image: Rgb, corner: Point, size: [f64; 2]) {
-    sheet.shapes.push(Shape::Picture {
-        corner,
-        size,
-        image: Arc::new(image),
-    });
+    sheet.shapes.push(Shape::Picture { corner, size, image: Arc::new(image) });
 }
 
 /// Cuts a rectangle out of an image: upper left corner and size (width, height) in pixels.

@@ -39,11 +39,7 @@ pub(crate) struct Stroke {
 impl Stroke {
     /// Stroke without dashes; `width` is in points.
     pub(super) fn solid(colour: Colour, width: f64) -> Self {
-        Self {
-            colour,
-            width,
-            dash: Vec::new(),
-        }
+        Self { colour, width, dash: Vec::new() }
     }
 }
 
@@ -125,18 +121,11 @@ impl Sheet {
 
 impl Sheet {
     pub(super) fn line(&mut self, points: &[Point], stroke: &Stroke) {
-        self.shapes.push(Shape::Line {
-            points: points.to_vec(),
-            stroke: stroke.clone(),
-        });
+        self.shapes.push(Shape::Line { points: points.to_vec(), stroke: stroke.clone() });
     }
 
     pub(super) fn area(&mut self, corners: Vec<Point>, fill: Colour, opacity: f64) {
-        self.shapes.push(Shape::Area {
-            corners,
-            fill,
-            opacity,
-        });
+        self.shapes.push(Shape::Area { corners, fill, opacity });
     }
 
     /// Adds a horizontal text whose anchor is at a position.
@@ -166,12 +155,7 @@ impl Sheet {
             TextDirection::Right => [x - offset, y],
             TextDirection::Up => [x, y + offset],
         };
-        self.shapes.push(Shape::Label(Label {
-            text: text.to_owned(),
-            start,
-            size,
-            direction,
-        }));
+        self.shapes.push(Shape::Label(Label { text: text.to_owned(), start, size, direction }));
     }
 
     /// Adds a white background, for viewers with a dark one.
@@ -189,46 +173,15 @@ impl Sheet {
     /// Adds the shapes of another sheet, with its upper left corner at a position.
     pub(super) fn insert(&mut self, other: Sheet, [left, top]: Point) {
         let moved = |[x, y]: Point| [x + left, y + top];
-        self.shapes
-            .extend(other.shapes.into_iter().map(|shape| match shape {
-                Shape::Line { points, stroke } => Shape::Line {
-                    points: points.into_iter().map(moved).collect(),
-                    stroke,
-                },
-                Shape::Area {
-                    corners,
-                    fill,
-                    opacity,
-                } => Shape::Area {
-                    corners: corners.into_iter().map(moved).collect(),
-                    fill,
-                    opacity,
-                },
-                Shape::Disc {
-                    centre,
-                    radius,
-                    fill,
-                    edge,
-                } => Shape::Disc {
-                    centre: moved(centre),
-                    radius,
-                    fill,
-                    edge,
-                },
-                Shape::Label(label) => Shape::Label(Label {
-                    start: moved(label.start),
-                    ..label
-                }),
-                Shape::Picture {
-                    corner,
-                    size,
-                    image,
-                } => Shape::Picture {
-                    corner: moved(corner),
-                    size,
-                    image,
-                },
-            }));
+        self.shapes.extend(other.shapes.into_iter().map(|shape| match shape {
+            Shape::Line { points, stroke } => Shape::Line { points: points.into_iter().map(moved).collect(), stroke },
+            Shape::Area { corners, fill, opacity } => {
+                Shape::Area { corners: corners.into_iter().map(moved).collect(), fill, opacity }
+            }
+            Shape::Disc { centre, radius, fill, edge } => Shape::Disc { centre: moved(centre), radius, fill, edge },
+            Shape::Label(label) => Shape::Label(Label { start: moved(label.start), ..label }),
+            Shape::Picture { corner, size, image } => Shape::Picture { corner: moved(corner), size, image },
+        }));
     }
 
     /// Checks that the bundled font has all characters of the sheet.

@@ -50,10 +50,7 @@ fn hex([red, green, blue]: Colour) -> String {
 }
 
 fn point_list(points: &[Point]) -> String {
-    let points: Vec<String> = points
-        .iter()
-        .map(|[x, y]| format!("{},{}", number(*x), number(*y)))
-        .collect();
+    let points: Vec<String> = points.iter().map(|[x, y]| format!("{},{}", number(*x), number(*y))).collect();
     points.join(" ")
 }
 
@@ -72,27 +69,16 @@ fn stroke_attributes(stroke: &Stroke) -> String {
 
 fn element(shape: &Shape, png: Png) -> Result<String> {
     Ok(match shape {
-        Shape::Line { points, stroke } => format!(
-            "<polyline points=\"{}\" fill=\"none\"{}/>",
-            point_list(points),
-            stroke_attributes(stroke)
-        ),
-        Shape::Area {
-            corners,
-            fill,
-            opacity,
-        } => format!(
+        Shape::Line { points, stroke } => {
+            format!("<polyline points=\"{}\" fill=\"none\"{}/>", point_list(points), stroke_attributes(stroke))
+        }
+        Shape::Area { corners, fill, opacity } => format!(
             "<polygon points=\"{}\" fill=\"{}\" fill-opacity=\"{}\"/>",
             point_list(corners),
             hex(*fill),
             number(*opacity)
         ),
-        Shape::Disc {
-            centre: [x, y],
-            radius,
-            fill,
-            edge,
-        } => format!(
+        Shape::Disc { centre: [x, y], radius, fill, edge } => format!(
             "<circle cx=\"{}\" cy=\"{}\" r=\"{}\" fill=\"{}\"{}/>",
             number(*x),
             number(*y),
@@ -101,11 +87,7 @@ fn element(shape: &Shape, png: Png) -> Result<String> {
             edge.as_ref().map(stroke_attributes).unwrap_or_default()
         ),
         Shape::Label(label) => text_element(label),
-        Shape::Picture {
-            corner: [x, y],
-            size: [width, height],
-            image,
-        } => format!(
+        Shape::Picture { corner: [x, y], size: [width, height], image } => format!(
             "<image x=\"{}\" y=\"{}\" width=\"{}\" height=\"{}\" preserveAspectRatio=\"none\" href=\"data:image/png;base64,{}\"/>",
             number(*x),
             number(*y),
@@ -140,7 +122,5 @@ fn text_element(label: &Label) -> String {
 
 /// Escapes the special characters of XML.
 fn escape_xml(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

@@ -1,8 +1,8 @@
 //! LaTeX tables that fit the columns of a paper: [`tables`].
 //!
-//! A table is set at 8 pt, its intervals at 5 pt. Widths are estimated with the bundled font, which is wider than Times, the font of these
-//! papers. The first layout that fits is used: intervals with one decimal, intervals without decimals, names on several lines, and last
-//! the columns in several parts below one another.
+//! A table is set at 8 pt, its intervals at 5 pt. Widths are estimated with the bundled font, which is wider than
+//! Times, the font of these papers. The first layout that fits is used: intervals with one decimal, intervals without
+//! decimals, names on several lines, and last the columns in several parts below one another.
 
 use std::fmt::Write;
 use std::ops::Range;
@@ -18,8 +18,8 @@ use darkqa_score::estimate::Estimate;
 const FONT_SIZE: f64 = 8.0;
 /// Font size of intervals in points.
 const INTERVAL_FONT_SIZE: f64 = 5.0;
-/// Maximum width of a text relative to Arial, at the font size of tables. Digits of Computer Modern are 0.531 em wide at 8 points and
-/// 0.681 em at 5 points, digits of Arial 0.556 em; Times is narrower than both.
+/// Maximum width of a text relative to Arial, at the font size of tables. Digits of Computer Modern are 0.531 em wide
+/// at 8 points and 0.681 em at 5 points, digits of Arial 0.556 em; Times is narrower than both.
 const WIDER: f64 = 1.08;
 /// Maximum width of a text relative to Arial, at the font size of intervals.
 const TINY_WIDER: f64 = 1.23;
@@ -30,7 +30,8 @@ const MIN_NAME_WIDTH: f64 = 45.0;
 /// Minimum width of the column of names in points if intervals have a decimal (chosen).
 const MIN_NAME_WIDTH_WITH_DECIMALS: f64 = 60.0;
 
-/// Definitions of the commands in the tables: a number above its interval, a name on several lines, and a head on several lines.
+/// Definitions of the commands in the tables: a number above its interval, a name on several lines, and a head on
+/// several lines.
 const COMMANDS: &str = "\
 \\providecommand{\\dqci}[2]{\\begin{tabular}[t]{@{}r@{}}#1\\\\[-3.5pt]{\\fontsize{5}{5.5}\\selectfont #2}\\end{tabular}}
 \\providecommand{\\dqname}[1]{\\begin{tabular}[t]{@{}l@{}}#1\\end{tabular}}
@@ -54,14 +55,12 @@ struct Layout {
     parts: Vec<Range<usize>>,
 }
 
-/// Writes the tables as files, by name, and returns the number of long tables: `tables.tex`, and `tables-full.tex` if some tables have
-/// more than forty rows.
+/// Writes the tables as files, by name, and returns the number of long tables: `tables.tex`, and `tables-full.tex` if
+/// some tables have more than forty rows.
 pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String, Vec<u8>)>, usize) {
-    let (long, short): (Vec<&Table>, Vec<&Table>) =
-        all.iter().partition(|table| table.rows.len() > MAX_ROWS);
+    let (long, short): (Vec<&Table>, Vec<&Table>) = all.iter().partition(|table| table.rows.len() > MAX_ROWS);
     let float = if is_wide { "table*" } else { "table" };
-    let mut text =
-        format!("% Tables of darkqa-eval. In the preamble: \\usepackage{{booktabs}}\n{COMMANDS}");
+    let mut text = format!("% Tables of darkqa-eval. In the preamble: \\usepackage{{booktabs}}\n{COMMANDS}");
     for table in &short {
         text += &float_table(table, float, look.width);
     }
@@ -82,11 +81,7 @@ pub(crate) fn tables(all: &[Table], look: &Look, is_wide: bool) -> (Vec<(String,
 fn interval_text(cell: &TableCell, precision: Precision) -> Option<String> {
     let Estimate { low, high, .. } = interval(ColumnKind::Accuracy, cell)?;
     // A dash next to minus signs would be confusing.
-    let separator = if value_text(cell).contains(['+', '−']) {
-        ", "
-    } else {
-        "–"
-    };
+    let separator = if value_text(cell).contains(['+', '−']) { ", " } else { "–" };
     let [low, high] = [low, high].map(|share| percent_text(share, precision));
     Some(format!("{low}{separator}{high}"))
 }
@@ -131,9 +126,7 @@ fn column_width(table: &Table, column: usize, precision: Precision) -> f64 {
         };
         let value = font.width(&value_text(cell), FONT_SIZE) * WIDER + arrow;
         let interval = interval_text(cell, precision);
-        value.max(interval.map_or(0.0, |text| {
-            font.width(&text, INTERVAL_FONT_SIZE) * TINY_WIDER
-        }))
+        value.max(interval.map_or(0.0, |text| font.width(&text, INTERVAL_FONT_SIZE) * TINY_WIDER))
     });
     head.chain(cells).fold(0.0, f64::max)
 }
@@ -141,19 +134,12 @@ fn column_width(table: &Table, column: usize, precision: Precision) -> f64 {
 /// Width in points of the widest name, each on one line.
 fn names_width(table: &Table) -> f64 {
     let font = Font::bundled();
-    table
-        .rows
-        .iter()
-        .map(|row| font.width(&row_name(row), FONT_SIZE) * WIDER)
-        .fold(0.0, f64::max)
+    table.rows.iter().map(|row| font.width(&row_name(row), FONT_SIZE) * WIDER).fold(0.0, f64::max)
 }
 
 /// Width in points that some columns of numbers leave for the names in a table of `width` points.
 fn width_for_names(table: &Table, width: f64, precision: Precision, columns: &Range<usize>) -> f64 {
-    let numbers: f64 = columns
-        .clone()
-        .map(|column| column_width(table, column, precision) + 2.0 * TABCOLSEP)
-        .sum();
+    let numbers: f64 = columns.clone().map(|column| column_width(table, column, precision) + 2.0 * TABCOLSEP).sum();
     width - numbers
 }
 
@@ -162,27 +148,20 @@ fn layout(table: &Table, width: f64) -> Layout {
     let columns = table.columns.len();
     let names = names_width(table);
     // Prefer breaking a long name over dropping the decimals of all intervals.
-    for (precision, min_width) in [
-        (Precision::Tenths, names.min(MIN_NAME_WIDTH_WITH_DECIMALS)),
-        (Precision::Whole, names.min(MIN_NAME_WIDTH)),
-    ] {
+    for (precision, min_width) in
+        [(Precision::Tenths, names.min(MIN_NAME_WIDTH_WITH_DECIMALS)), (Precision::Whole, names.min(MIN_NAME_WIDTH))]
+    {
         let all = 1..columns;
         let available = width_for_names(table, width, precision, &all);
         if available >= min_width {
-            return Layout {
-                precision,
-                name_width: available.min(names),
-                parts: vec![all],
-            };
+            return Layout { precision, name_width: available.min(names), parts: vec![all] };
         }
     }
     let min_width = names.min(MIN_NAME_WIDTH);
     for number in 2..columns.max(3) {
         let part_columns = (columns - 1).div_ceil(number).max(1);
-        let parts: Vec<Range<usize>> = (1..columns)
-            .step_by(part_columns)
-            .map(|start| start..(start + part_columns).min(columns))
-            .collect();
+        let parts: Vec<Range<usize>> =
+            (1..columns).step_by(part_columns).map(|start| start..(start + part_columns).min(columns)).collect();
         let available = parts
             .iter()
             .map(|part| width_for_names(table, width, Precision::Whole, part))
@@ -195,11 +174,7 @@ fn layout(table: &Table, width: f64) -> Layout {
             };
         }
     }
-    Layout {
-        precision: Precision::Whole,
-        name_width: min_width,
-        parts: std::iter::once(1..columns).collect(),
-    }
+    Layout { precision: Precision::Whole, name_width: min_width, parts: std::iter::once(1..columns).collect() }
 }
 
 /// True if a text, without white space at its end, is at most `width` points wide.
@@ -207,7 +182,8 @@ fn fits(font: &Font, text: &str, width: f64) -> bool {
     font.width(text.trim_end(), FONT_SIZE) * WIDER <= width
 }
 
-/// Breaks a name into lines of at most `width` points: after "-", "/", "_", ":" or a space, and within a piece only if it is too wide.
+/// Breaks a name into lines of at most `width` points: after "-", "/", "_", ":" or a space, and within a piece only if
+/// it is too wide.
 fn name_lines(name: &str, width: f64) -> Vec<String> {
     let font = Font::bundled();
     let mut lines = vec![String::new()];
@@ -226,11 +202,7 @@ fn name_lines(name: &str, width: f64) -> Vec<String> {
             }
         }
     }
-    lines
-        .into_iter()
-        .map(|line| line.trim().to_owned())
-        .filter(|line| !line.is_empty())
-        .collect()
+    lines.into_iter().map(|line| line.trim().to_owned()).filter(|line| !line.is_empty()).collect()
 }
 
 /// LaTeX of a row's name, broken into lines and bold if the row is the best.
@@ -239,11 +211,7 @@ fn name_latex(row: &TableRow, width: f64) -> String {
         .iter()
         .map(|line| {
             let line = latex(line);
-            if row.is_best {
-                format!("\\textbf{{{line}}}")
-            } else {
-                line
-            }
+            if row.is_best { format!("\\textbf{{{line}}}") } else { line }
         })
         .collect();
     match &*lines {
@@ -254,9 +222,7 @@ fn name_latex(row: &TableRow, width: f64) -> String {
 
 /// Escapes a text for LaTeX.
 fn latex(plain: &str) -> String {
-    escape(plain)
-        .replace('–', "--")
-        .replace('↓', "$\\downarrow$")
+    escape(plain).replace('–', "--").replace('↓', "$\\downarrow$")
 }
 
 /// LaTeX of a number above its interval.
@@ -301,10 +267,8 @@ fn body(table: &Table, layout: &Layout, part: &Range<usize>, after_heads: &str) 
                 latex(heading)
             );
         }
-        let cells: Vec<String> = row.cells[part.clone()]
-            .iter()
-            .map(|cell| cell_latex(cell, layout.precision))
-            .collect();
+        let cells: Vec<String> =
+            row.cells[part.clone()].iter().map(|cell| cell_latex(cell, layout.precision)).collect();
         let name = name_latex(row, layout.name_width);
         let _ = writeln!(body, "    {name} & {} \\\\", cells.join(" & "));
     }
@@ -323,11 +287,8 @@ fn float_table(table: &Table, float: &str, width: f64) -> String {
             all += "\n  \\medskip\n";
         }
         let columns = format!("@{{}}l*{{{}}}{{r}}@{{}}", part.len());
-        let _ = write!(
-            all,
-            "  \\begin{{tabular}}{{{columns}}}\n{}  \\end{{tabular}}\n",
-            body(table, &layout, part, "")
-        );
+        let _ =
+            write!(all, "  \\begin{{tabular}}{{{columns}}}\n{}  \\end{{tabular}}\n", body(table, &layout, part, ""));
     }
     all + &format!("\\end{{{float}}}\n")
 }
@@ -335,8 +296,7 @@ fn float_table(table: &Table, float: &str, width: f64) -> String {
 /// LaTeX of a table that can break across pages.
 fn long_table(table: &Table, width: f64) -> String {
     let layout = layout(table, width);
-    let mut all =
-        String::from("\n{\\fontsize{8}{9.5}\\selectfont\\setlength{\\tabcolsep}{2.6pt}\n");
+    let mut all = String::from("\n{\\fontsize{8}{9.5}\\selectfont\\setlength{\\tabcolsep}{2.6pt}\n");
     for part in &layout.parts {
         let columns = format!("@{{}}l*{{{}}}{{r}}@{{}}", part.len());
         let _ = write!(
@@ -356,17 +316,10 @@ mod tests {
     use crate::report::text::table::ColumnHeads;
 
     fn table(names: &[&str], columns: usize) -> Table {
-        let cell = TableCell::Below(Estimate {
-            value: 1.0,
-            low: 0.788,
-            high: 1.0,
-            n: 40,
-        });
+        let cell = TableCell::Below(Estimate { value: 1.0, low: 0.788, high: 1.0, n: 40 });
         let heads = (0..columns).map(|level| format!("L{level}"));
         let rows = names.iter().map(|name| TableRow {
-            cells: std::iter::once(TableCell::from(*name))
-                .chain(vec![cell.clone(); columns])
-                .collect(),
+            cells: std::iter::once(TableCell::from(*name)).chain(vec![cell.clone(); columns]).collect(),
             group: Some("raw".to_owned()),
             is_best: *name == names[0],
             ..TableRow::default()
@@ -377,10 +330,7 @@ mod tests {
                 .chain(heads)
                 .map(|head| Column {
                     kind: ColumnKind::Accuracy,
-                    heads: ColumnHeads {
-                        page: Some(head),
-                        ..ColumnHeads::default()
-                    },
+                    heads: ColumnHeads { page: Some(head), ..ColumnHeads::default() },
                 })
                 .collect(),
             rows: rows.collect(),
@@ -397,10 +347,8 @@ mod tests {
             .flat_map(|row| name_lines(&row_name(row), layout.name_width))
             .map(|line| font.width(&line, FONT_SIZE))
             .fold(0.0, f64::max);
-        let columns: f64 = part
-            .clone()
-            .map(|column| column_width(table, column, layout.precision) + 2.0 * TABCOLSEP)
-            .sum();
+        let columns: f64 =
+            part.clone().map(|column| column_width(table, column, layout.precision) + 2.0 * TABCOLSEP).sum();
         names + columns
     }
 
@@ -415,10 +363,7 @@ mod tests {
                     let layout = layout(&table, max_width);
                     for part in &layout.parts {
                         let width = width(&table, &layout, part);
-                        assert!(
-                            width <= max_width + 1e-9,
-                            "{names:?} {columns} {max_width}: {layout:?} {width}"
-                        );
+                        assert!(width <= max_width + 1e-9, "{names:?} {columns} {max_width}: {layout:?} {width}");
                     }
                     let all: usize = layout.parts.iter().map(Range::len).sum();
                     assert_eq!(all, columns);
@@ -429,19 +374,12 @@ mod tests {
         }
         // A table that fits is not divided and keeps its decimals.
         let narrow = layout(&table(&["sim-A"], 6), 516.0);
-        assert_eq!(
-            (narrow.precision, narrow.parts.len()),
-            (Precision::Tenths, 1)
-        );
+        assert_eq!((narrow.precision, narrow.parts.len()), (Precision::Tenths, 1));
         assert!(layout(&table(&[long], 12), 219.1).parts.len() > 1);
     }
 
     fn look(width: f64) -> Look {
-        Look {
-            width,
-            font_size: 8.0,
-            palette: Palette::Colour,
-        }
+        Look { width, font_size: 8.0, palette: Palette::Colour }
     }
 
     #[test]
@@ -464,10 +402,6 @@ mod tests {
         assert_eq!((files.len(), long), (2, 1));
         let full = String::from_utf8(files[1].1.clone()).unwrap();
         assert!(full.contains("\\begin{longtable}") && full.contains("\\endhead"));
-        assert!(
-            !String::from_utf8(files[0].1.clone())
-                .unwrap()
-                .contains("\\begin{table")
-        );
+        assert!(!String::from_utf8(files[0].1.clone()).unwrap().contains("\\begin{table"));
     }
 }

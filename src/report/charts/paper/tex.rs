@@ -62,16 +62,8 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
             let _ = write!(text, ", legend to name={{darkqa-{name}}}");
         }
         text += "]\n";
-        let curves = panel
-            .lines
-            .iter()
-            .filter(|line| matches!(line.content, LineContent::Curve(_)));
-        let source = PanelSource {
-            look,
-            legend: &legend,
-            data: &data,
-            has_bands: curves.count() <= MAX_BANDS,
-        };
+        let curves = panel.lines.iter().filter(|line| matches!(line.content, LineContent::Curve(_)));
+        let source = PanelSource { look, legend: &legend, data: &data, has_bands: curves.count() <= MAX_BANDS };
         for (index, line) in panel.lines.iter().enumerate() {
             if line.is_empty() {
                 continue;
@@ -87,10 +79,7 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
         }
         files.push((data, data_file(panel).into_bytes()));
     }
-    let _ = write!(
-        text,
-        "\\end{{groupplot}}\n\\end{{tikzpicture}}\n\n\\pgfplotslegendfromname{{darkqa-{name}}}\n"
-    );
+    let _ = write!(text, "\\end{{groupplot}}\n\\end{{tikzpicture}}\n\n\\pgfplotslegendfromname{{darkqa-{name}}}\n");
     files.insert(0, (format!("{name}.tex"), text.into_bytes()));
     files
 }
@@ -98,12 +87,8 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
 /// Space between two rows of axes in points: tick labels, axis title, and the lines of the longest panel title.
 fn row_spacing(chart: &Chart, look: &Look, width: f64) -> f64 {
     let font = Font::bundled();
-    let lines = chart
-        .panels
-        .iter()
-        .map(|panel| font.wrapped(&panel.title, look.font_size, width).len())
-        .max()
-        .unwrap_or(1);
+    let lines =
+        chart.panels.iter().map(|panel| font.wrapped(&panel.title, look.font_size, width).len()).max().unwrap_or(1);
     (6.3 + 1.25 * lines as f64) * look.font_size
 }
 
@@ -123,14 +108,8 @@ fn legend_columns(chart: &Chart, look: &Look) -> usize {
 /// Start of a panel: its options without the closing bracket.
 fn axes_options(panel: &Panel, measure: &str) -> String {
     let levels = panel.levels();
-    let ticks: Vec<String> = levels
-        .iter()
-        .map(|level| level.value().to_string())
-        .collect();
-    let labels: Vec<String> = levels
-        .iter()
-        .map(|level| format!("{{{level}\\\\{}}}", level.value()))
-        .collect();
+    let ticks: Vec<String> = levels.iter().map(|level| level.value().to_string()).collect();
+    let labels: Vec<String> = levels.iter().map(|level| format!("{{{level}\\\\{}}}", level.value())).collect();
     format!(
         "\\nextgroupplot[title={{{}}}, xlabel={{{}}}, ylabel={{{}}}, xmin={}, xmax={},\n  xtick={{{}}}, xticklabels={{{}}}, \
          xticklabel style={{align=center}}",
@@ -150,11 +129,7 @@ fn rgb([red, green, blue]: Colour) -> String {
 
 /// Options of a stroke: colour, width and dashes.
 fn stroke_options(stroke: &Stroke) -> String {
-    let mut text = format!(
-        "color={}, line width={:.2}pt",
-        rgb(stroke.colour),
-        stroke.width
-    );
+    let mut text = format!("color={}, line width={:.2}pt", rgb(stroke.colour), stroke.width);
     if !stroke.dash.is_empty() {
         let pattern: Vec<String> = stroke
             .dash
@@ -234,7 +209,8 @@ impl PanelSource<'_> {
     }
 }
 
-/// Data of a panel: one row for each level; for each curve its value and both ends of its interval in percent, `nan` without a point.
+/// Data of a panel: one row for each level; for each curve its value and both ends of its interval in percent, `nan`
+/// without a point.
 fn data_file(panel: &Panel) -> String {
     let mut text = String::new();
     let curves: Vec<_> = panel
@@ -249,10 +225,7 @@ fn data_file(panel: &Panel) -> String {
     for (number, line, _) in &curves {
         let name = line.name.replace(['\n', '\r'], " ");
         let name = escape_hidden(&name);
-        let _ = writeln!(
-            text,
-            "# y{number}, low{number}, high{number}: {name}, in percent"
-        );
+        let _ = writeln!(text, "# y{number}, low{number}, high{number}: {name}, in percent");
     }
     text += "level x";
     for (number, ..) in &curves {
@@ -264,8 +237,7 @@ fn data_file(panel: &Panel) -> String {
         for (.., points) in &curves {
             match points.iter().find(|(other, _)| *other == level) {
                 Some((_, share)) => {
-                    let [value, low, high] =
-                        [share.value, share.low, share.high].map(|share| 100.0 * share);
+                    let [value, low, high] = [share.value, share.low, share.high].map(|share| 100.0 * share);
                     let _ = write!(text, " {value} {low} {high}");
                 }
                 None => text += " nan nan nan",

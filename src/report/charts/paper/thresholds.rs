@@ -32,33 +32,19 @@ pub(crate) fn thresholds(chart: &ThresholdChart, look: &Look) -> Sheet {
     for tick in (0..=scale.end as i32).step_by(scale.step as usize) {
         let at = x(f64::from(tick));
         sheet.line(&[[at, 0.0], [at, bottom]], &look.thin_stroke(GRID));
-        sheet.label(
-            &tick.to_string(),
-            [at, bottom + 1.1 * small],
-            small,
-            Anchor::Middle,
-        );
+        sheet.label(&tick.to_string(), [at, bottom + 1.1 * small], small, Anchor::Middle);
     }
     let colour = look.colour(LineStyle(0));
     for (index, row) in chart.rows.iter().enumerate() {
         let y = 0.3 * look.font_size + row_height * (index as f64 + 0.5);
         let name = font.shortened(&row.name, small, names);
-        sheet.label(
-            &name,
-            [left - 0.8 * small, y + 0.35 * small],
-            small,
-            Anchor::End,
-        );
+        sheet.label(&name, [left - 0.8 * small, y + 0.35 * small], small, Anchor::End);
         let ends = [[x(row.threshold.low), y], [x(row.threshold.high), y]];
         sheet.line(&ends, &Stroke::solid(colour, 1.1 * look.line_scale()));
         if row.threshold.high.is_infinite() {
             // An arrow marks an interval that goes beyond the axis.
             let (end, tip) = (x(scale.end), 2.2 * look.line_scale());
-            sheet.area(
-                vec![[end + 1.6 * tip, y], [end, y - tip], [end, y + tip]],
-                colour,
-                1.0,
-            );
+            sheet.area(vec![[end + 1.6 * tip, y], [end, y - tip], [end, y + tip]], colour, 1.0);
         }
         if row.threshold.value.is_finite() {
             sheet.shapes.push(Shape::Disc {
@@ -68,18 +54,10 @@ pub(crate) fn thresholds(chart: &ThresholdChart, look: &Look) -> Sheet {
                 edge: None,
             });
         }
-        sheet.label(
-            &row.text,
-            [right + 1.2 * small, y + 0.35 * small],
-            small,
-            Anchor::Start,
-        );
+        sheet.label(&row.text, [right + 1.2 * small, y + 0.35 * small], small, Anchor::Start);
     }
     let title = format!("{} in {}", scale.title, scale.unit);
-    let position = [
-        f64::midpoint(left, right),
-        bottom + 1.2 * small + look.font_size,
-    ];
+    let position = [f64::midpoint(left, right), bottom + 1.2 * small + look.font_size];
     sheet.label(&title, position, look.font_size, Anchor::Middle);
     sheet.size = [look.width, bottom + 1.6 * small + look.font_size];
     sheet

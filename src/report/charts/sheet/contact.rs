@@ -20,20 +20,12 @@ pub(crate) fn contact(columns: &[ContactColumn<'_>]) -> Rgb {
         .iter()
         .flat_map(|column| &column.images)
         .map(|image| fitted_size(image))
-        .fold([0, COLUMN], |[height, width], size| {
-            [height.max(size[0]), width.max(size[1])]
-        });
+        .fold([0, COLUMN], |[height, width], size| [height.max(size[0]), width.max(size[1])]);
     let rows = columns.iter().map(|column| column.images.len()).max();
-    let labels: Vec<Vec<String>> = columns
-        .iter()
-        .map(|column| lines(&column.label, width))
-        .collect();
+    let labels: Vec<Vec<String>> = columns.iter().map(|column| lines(&column.label, width)).collect();
     let label_lines = labels.iter().map(Vec::len).max().unwrap_or(0);
     let head = 2 * GAP + label_lines * LINE;
-    let mut sheet = SheetCanvas::new(
-        head + rows.unwrap_or(0) * (height + GAP),
-        GAP + columns.len() * (width + GAP),
-    );
+    let mut sheet = SheetCanvas::new(head + rows.unwrap_or(0) * (height + GAP), GAP + columns.len() * (width + GAP));
     for (index, (column, label)) in columns.iter().zip(&labels).enumerate() {
         let left = GAP + index * (width + GAP);
         for (line, text) in label.iter().enumerate() {
@@ -52,10 +44,7 @@ mod tests {
     use super::*;
 
     fn column<'a>(label: &str, images: Vec<&'a Rgb>) -> ContactColumn<'a> {
-        ContactColumn {
-            label: label.to_owned(),
-            images,
-        }
+        ContactColumn { label: label.to_owned(), images }
     }
 
     /// Red code of a pixel.
@@ -65,8 +54,7 @@ mod tests {
 
     #[test]
     fn images_are_in_their_rows_and_columns() {
-        let [one, two, three] =
-            [50, 100, 150].map(|code| Rgb::new(10, 20, vec![code; 600]).unwrap());
+        let [one, two, three] = [50, 100, 150].map(|code| Rgb::new(10, 20, vec![code; 600]).unwrap());
         let sheet = contact(&[column("a", vec![&one, &two]), column("b", vec![&three])]);
         let top = 2 * GAP + LINE;
         assert_eq!(red(&sheet, top, GAP), 50);

@@ -19,10 +19,7 @@ pub(crate) struct CropRow<'a> {
 pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
     let height = CELL * 2 / 3;
     let step = [LINE + height + GAP, CELL + GAP];
-    let mut sheet = SheetCanvas::new(
-        GAP + LINE + rows.len() * step[0],
-        GAP + columns.len().max(1) * step[1],
-    );
+    let mut sheet = SheetCanvas::new(GAP + LINE + rows.len() * step[0], GAP + columns.len().max(1) * step[1]);
     for (index, name) in columns.iter().enumerate() {
         sheet.write([GAP, GAP + index * step[1]], CELL, name, [0; 3]);
     }
@@ -34,10 +31,7 @@ pub(crate) fn crops(columns: &[&str], rows: &[CropRow<'_>]) -> Rgb {
         let scale = libm::pow(row.gain.max(0.0), 1.0 / 2.2);
         for (column, image) in row.images.iter().enumerate() {
             let size = [image.height().min(height), image.width().min(CELL)];
-            let first = [
-                (image.height() - size[0]) / 2,
-                (image.width() - size[1]) / 2,
-            ];
+            let first = [(image.height() - size[0]) / 2, (image.width() - size[1]) / 2];
             let corner = [top + LINE, GAP + column * step[1]];
             sheet.fill(corner, size, |y, x| {
                 let index = ((first[0] + y) * image.width() + first[1] + x) * 3;
@@ -58,17 +52,9 @@ mod tests {
     #[test]
     fn crops_are_brightened() {
         let image = Rgb::new(3, 500, vec![10; 4500]).unwrap();
-        let rows = [CropRow {
-            name: "a".to_owned(),
-            images: vec![&image, &image],
-            gain: 4.0,
-        }];
+        let rows = [CropRow { name: "a".to_owned(), images: vec![&image, &image], gain: 4.0 }];
         let sheet = crops(&["real", "made"], &rows);
-        let brightened = sheet
-            .samples()
-            .chunks(3)
-            .filter(|pixel| **pixel == [19; 3])
-            .count();
+        let brightened = sheet.samples().chunks(3).filter(|pixel| **pixel == [19; 3]).count();
         assert!(brightened >= 2 * 3 * CELL);
         assert!(crops(&[], &[]).width() > 0);
     }

@@ -33,21 +33,19 @@ pub(crate) struct LevelImage {
 /// Minimum number of characters for which the column of names has space; the paper's names fit.
 const MIN_NAME_LETTERS: usize = 6;
 
-/// Draws the frame and its levels, with one row for each kind of degradation, like Fig. 3 of the DarkQA paper. `foot` is written below.
+/// Draws the frame and its levels, with one row for each kind of degradation, like Fig. 3 of the DarkQA paper. `foot`
+/// is written below.
 ///
-/// Images are scaled down by averaging pixels. As in the paper, the lower right corner of L3, L4 and L5 has an inset: the middle of the
-/// image (half of each side, a quarter of the area), brightened by a factor of 10, 20 or 50. Pixels of insets are picked, not averaged, so
-/// that the noise keeps its strength. The paper writes "pixel intensities amplified". Multiplying the codes would make a bright room white,
-/// so we brighten linear light, and state that below the images.
+/// Images are scaled down by averaging pixels. As in the paper, the lower right corner of L3, L4 and L5 has an inset:
+/// the middle of the image (half of each side, a quarter of the area), brightened by a factor of 10, 20 or 50. Pixels
+/// of insets are picked, not averaged, so that the noise keeps its strength. The paper writes "pixel intensities
+/// amplified". Multiplying the codes would make a bright room white, so we brighten linear light, and state that below
+/// the images.
 #[must_use]
 pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     let size = fitted_size(clean);
     let [height, width] = size;
-    let letters = blocks
-        .iter()
-        .flat_map(|block| &block.rows)
-        .map(|row| row.name.chars().count())
-        .max();
+    let letters = blocks.iter().flat_map(|block| &block.rows).map(|row| row.name.chars().count()).max();
     // A gap on both sides of a long name.
     let longest = letters.unwrap_or_default() * letter_width() + 2 * GAP;
     let margin = longest.max(MIN_NAME_LETTERS * letter_width() + GAP);
@@ -55,10 +53,7 @@ pub(crate) fn levels(clean: &Rgb, blocks: &[LevelBlock], foot: &str) -> Rgb {
     let cell = width.max(CELL / 2);
     let columns = blocks.iter().map(|block| block.levels.len()).max();
     let row_height = GAP + height.max(LINE);
-    let blocks_height: usize = blocks
-        .iter()
-        .map(|block| GAP + LINE + block.rows.len() * row_height)
-        .sum();
+    let blocks_height: usize = blocks.iter().map(|block| GAP + LINE + block.rows.len() * row_height).sum();
     let sheet_width = margin + (columns.unwrap_or_default() + 1) * (cell + GAP);
     let foot: Vec<String> = [foot.to_owned(), insets_note(blocks)]
         .iter()
@@ -110,10 +105,7 @@ fn insets_note(blocks: &[LevelBlock]) -> String {
         return String::new();
     }
     let gains: Vec<String> = gains.iter().map(|factor| format!("×{factor}")).collect();
-    format!(
-        "Insets: the middle of the image, linear light {}",
-        gains.join(", ")
-    )
+    format!("Insets: the middle of the image, linear light {}", gains.join(", "))
 }
 
 /// Label of a level's column, as in `L3 -6 EV` or `T33.33 ms`.
@@ -137,21 +129,13 @@ fn inset_gain(dark_ev: f64) -> Option<u16> {
 }
 
 /// Draws the brightened middle of an image in the lower right corner of a cell, with a white edge and its gain.
-fn draw_inset(
-    sheet: &mut SheetCanvas,
-    [top, left]: [usize; 2],
-    size: [usize; 2],
-    image: &Rgb,
-    gain: u16,
-) {
+fn draw_inset(sheet: &mut SheetCanvas, [top, left]: [usize; 2], size: [usize; 2], image: &Rgb, gain: u16) {
     let [height, width] = size.map(|side| side / 2);
     if height < 4 || width < 4 {
         return;
     }
     let (top, left) = (top + size[0] - height, left + size[1] - width);
-    sheet.fill([top - 1, left - 1], [height + 1, width + 1], |_, _| {
-        [255; 3]
-    });
+    sheet.fill([top - 1, left - 1], [height + 1, width + 1], |_, _| [255; 3]);
     let brightened = brightened_codes(gain);
     sheet.fill([top, left], [height, width], |row, column| {
         let y = inset_source(row, height, image.height());
@@ -167,8 +151,8 @@ fn draw_inset(
     }
 }
 
-/// Row or column of an image that an inset's row or column is taken from. `inset_side` and `image_side` are lengths in pixels; the inset
-/// has the middle half of each side.
+/// Row or column of an image that an inset's row or column is taken from. `inset_side` and `image_side` are lengths in
+/// pixels; the inset has the middle half of each side.
 fn inset_source(index: usize, inset_side: usize, image_side: usize) -> usize {
     image_side / 4 + index * (image_side / 2) / inset_side
 }
@@ -195,17 +179,11 @@ mod tests {
             name: code.to_string(),
             images: severities
                 .iter()
-                .map(|severity| LevelImage {
-                    image: grey(height, width, code),
-                    dark_ev: severity.value(),
-                })
+                .map(|severity| LevelImage { image: grey(height, width, code), dark_ev: severity.value() })
                 .collect(),
         });
         let block = LevelBlock {
-            levels: severities
-                .iter()
-                .map(|severity| AxisLevel::new(Kind::Exposure, *severity))
-                .collect(),
+            levels: severities.iter().map(|severity| AxisLevel::new(Kind::Exposure, *severity)).collect(),
             rows: rows.to_vec(),
         };
         levels(&grey(height, width, 100), &[block], "paper: K 0.77")
@@ -213,10 +191,7 @@ mod tests {
 
     /// Number of grey pixels of a code.
     fn count(samples: &[u8], code: u8) -> usize {
-        samples
-            .chunks(3)
-            .filter(|pixel| **pixel == [code; 3])
-            .count()
+        samples.chunks(3).filter(|pixel| **pixel == [code; 3]).count()
     }
 
     #[test]
@@ -234,42 +209,25 @@ mod tests {
             levels: vec![AxisLevel::new(kind, kind.ladder()[2])],
             rows: vec![LevelRow {
                 name: kind.word().to_owned(),
-                images: vec![LevelImage {
-                    image: grey(50, 80, code),
-                    dark_ev: 0.0,
-                }],
+                images: vec![LevelImage { image: grey(50, 80, code), dark_ev: 0.0 }],
             }],
         }
     }
 
     #[test]
     fn blocks_are_below_each_other() {
-        let both = levels(
-            &grey(50, 80, 100),
-            &[block(Kind::Auto, 7), block(Kind::Motion, 9)],
-            "",
-        );
+        let both = levels(&grey(50, 80, 100), &[block(Kind::Auto, 7), block(Kind::Motion, 9)], "");
         let one = levels(&grey(50, 80, 100), &[block(Kind::Auto, 7)], "");
         assert_eq!(both.height() - GAP, 2 * (one.height() - GAP));
-        let [auto_top, motion_top] = [7, 9].map(|code| {
-            both.samples()
-                .chunks(3 * both.width())
-                .position(|row| count(row, code) == 80)
-                .unwrap()
-        });
+        let [auto_top, motion_top] =
+            [7, 9].map(|code| both.samples().chunks(3 * both.width()).position(|row| count(row, code) == 80).unwrap());
         assert!(auto_top + 50 < motion_top);
     }
 
     #[test]
     fn labels_name_level_and_severity() {
-        assert_eq!(
-            level_label(AxisLevel::new(Kind::Motion, Severity::TIMES[2])),
-            "T33.33 ms"
-        );
-        assert_eq!(
-            level_label(AxisLevel::new(Kind::Auto, Severity::L3)),
-            "L3 -6 EV"
-        );
+        assert_eq!(level_label(AxisLevel::new(Kind::Motion, Severity::TIMES[2])), "T33.33 ms");
+        assert_eq!(level_label(AxisLevel::new(Kind::Auto, Severity::L3)), "L3 -6 EV");
     }
 
     #[test]
@@ -278,19 +236,13 @@ mod tests {
             levels: vec![AxisLevel::new(Kind::Sensor, Severity::L5)],
             rows: vec![LevelRow {
                 name: "noise@physical".to_owned(),
-                images: vec![LevelImage {
-                    image: grey(60, 80, 3),
-                    dark_ev: 0.0,
-                }],
+                images: vec![LevelImage { image: grey(60, 80, 3), dark_ev: 0.0 }],
             }],
         };
         let sheet = levels(&grey(60, 80, 100), &[block], "");
         let mut frame_rows = 0;
         for row in sheet.samples().chunks(3 * sheet.width()) {
-            let frame_left = row
-                .windows(3 * 80)
-                .step_by(3)
-                .position(|run| run.iter().all(|sample| *sample == 100));
+            let frame_left = row.windows(3 * 80).step_by(3).position(|run| run.iter().all(|sample| *sample == 100));
             let Some(left) = frame_left else { continue };
             let gap = &row[3 * (left - GAP)..3 * left];
             assert!(gap.iter().all(|sample| *sample == 255));

@@ -38,11 +38,7 @@ struct SheetCanvas {
 
 impl SheetCanvas {
     fn new(height: usize, width: usize) -> Self {
-        Self {
-            height,
-            width,
-            samples: vec![255; height * width * 3],
-        }
+        Self { height, width, samples: vec![255; height * width * 3] }
     }
 
     /// Sets a pixel; pixels outside the sheet are ignored.
@@ -59,12 +55,7 @@ impl SheetCanvas {
     }
 
     /// Fills a rectangle. `colour` is called with the row and column within the rectangle.
-    fn fill(
-        &mut self,
-        [top, left]: [usize; 2],
-        [height, width]: [usize; 2],
-        colour: impl Fn(usize, usize) -> [u8; 3],
-    ) {
+    fn fill(&mut self, [top, left]: [usize; 2], [height, width]: [usize; 2], colour: impl Fn(usize, usize) -> [u8; 3]) {
         for row in 0..height {
             for column in 0..width {
                 self.set(top + row, left + column, colour(row, column));
@@ -153,7 +144,8 @@ fn mean_colour(image: &Rgb, [height, width]: [usize; 2], row: usize, column: usi
     sums.map(|sum| ((sum + n / 2) / n) as u8)
 }
 
-/// Rows or columns of the original that one row or column covers if a side is scaled from `original` to `scaled` pixels; at least one.
+/// Rows or columns of the original that one row or column covers if a side is scaled from `original` to `scaled`
+/// pixels; at least one.
 fn covered_pixels(index: usize, scaled: usize, original: usize) -> Range<usize> {
     let begin = index * original / scaled;
     begin..((index + 1) * original / scaled).max(begin + 1)
@@ -167,9 +159,8 @@ mod tests {
     fn text_is_cut_at_its_width() {
         let mut canvas = SheetCanvas::new(LINE, 100);
         canvas.write([0, 0], 50, "MMMMMMMMMMMM", [0, 0, 0]);
-        let [has_text, has_text_beyond] = [0..50, 50..100].map(|mut columns| {
-            columns.any(|column| (0..LINE).any(|row| canvas.pixel(row, column) != [255; 3]))
-        });
+        let [has_text, has_text_beyond] = [0..50, 50..100]
+            .map(|mut columns| columns.any(|column| (0..LINE).any(|row| canvas.pixel(row, column) != [255; 3])));
         assert!(has_text && !has_text_beyond);
     }
 

@@ -16,8 +16,8 @@ pub(crate) struct Signal {
 
 /// Draws the middle of each signal at full resolution, with the mean and standard deviation of the whole signal.
 ///
-/// Each signal has its own grey scale: black is three standard deviations below its mean and white three above, written in ADU above the
-/// image. `foot` is written below all images.
+/// Each signal has its own grey scale: black is three standard deviations below its mean and white three above, written
+/// in ADU above the image. `foot` is written below all images.
 #[must_use]
 pub(crate) fn noise(signals: &[Signal], foot: &str) -> Rgb {
     const COLUMNS: usize = 3;
@@ -42,10 +42,7 @@ pub(crate) fn noise(signals: &[Signal], foot: &str) -> Rgb {
         let reach = 3.0 * deviation;
         let ends = format!("black {:.3}, white {:.3} ADU", mean - reach, mean + reach);
         sheet.write([top + 2 * LINE, left], CELL, &ends, [90; 3]);
-        let first = [
-            (signal.adu.nrows() - height) / 2,
-            (signal.adu.ncols() - width) / 2,
-        ];
+        let first = [(signal.adu.nrows() - height) / 2, (signal.adu.ncols() - width) / 2];
         let scale = if deviation > 0.0 { 127.5 / reach } else { 0.0 };
         sheet.fill([top + 3 * LINE, left], [height, width], |row, column| {
             let value = f64::from(signal.adu[[first[0] + row, first[1] + column]]);
@@ -62,11 +59,7 @@ pub(crate) fn noise(signals: &[Signal], foot: &str) -> Rgb {
 fn moments(adu: &Array2<f32>) -> [f64; 2] {
     let n = adu.len().max(1) as f64;
     let mean = adu.iter().map(|x| f64::from(*x)).sum::<f64>() / n;
-    let variance = adu
-        .iter()
-        .map(|x| (f64::from(*x) - mean).powi(2))
-        .sum::<f64>()
-        / n;
+    let variance = adu.iter().map(|x| (f64::from(*x) - mean).powi(2)).sum::<f64>() / n;
     [mean, variance.sqrt()]
 }
 

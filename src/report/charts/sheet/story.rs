@@ -1,4 +1,5 @@
-//! Image that summarizes a run ([`story`]): one item at each level, raw above enhanced, and accuracy curves over all items.
+//! Image that summarizes a run ([`story`]): one item at each level, raw above enhanced, and accuracy curves over all
+//! items.
 
 use super::levels::level_label;
 use super::{CELL, GAP, LINE, SheetCanvas, letter_width, mean_colour};
@@ -30,10 +31,7 @@ impl StoryMark {
     fn paths(self) -> (&'static [&'static [[f64; 2]]], [u8; 3]) {
         match self {
             Self::Right => (&[&[[2.0, 11.0], [6.0, 15.0], [14.0, 5.0]]], GREEN),
-            Self::Wrong => (
-                &[&[[3.0, 5.0], [13.0, 15.0]], &[[13.0, 5.0], [3.0, 15.0]]],
-                RED,
-            ),
+            Self::Wrong => (&[&[[3.0, 5.0], [13.0, 15.0]], &[[13.0, 5.0], [3.0, 15.0]]], RED),
             Self::None => (&[&[[3.0, 10.0], [13.0, 10.0]]], GREY),
         }
     }
@@ -88,12 +86,7 @@ pub(crate) fn story(story: &Story) -> Rgb {
     }
     top += LINE + 2;
     for row in &story.rows {
-        sheet.write(
-            [top + (layout.cell[0].saturating_sub(LINE)) / 2, GAP],
-            layout.margins[0],
-            &row.name,
-            INK,
-        );
+        sheet.write([top + (layout.cell[0].saturating_sub(LINE)) / 2, GAP], layout.margins[0], &row.name, INK);
         for (index, cell) in row.cells.iter().enumerate() {
             if let Some(cell) = cell {
                 draw_cell(&mut sheet, &layout, [top, layout.left(index)], cell);
@@ -103,12 +96,7 @@ pub(crate) fn story(story: &Story) -> Rgb {
     }
     draw_curves(&mut sheet, &layout, top + GAP, story);
     let note = format!("accuracy in %, {}", story.note);
-    sheet.write(
-        [layout.height - LINE - GAP / 2, GAP],
-        layout.width - 2 * GAP,
-        &note,
-        GREY,
-    );
+    sheet.write([layout.height - LINE - GAP / 2, GAP], layout.width - 2 * GAP, &note, GREY);
     sheet.finish()
 }
 
@@ -139,10 +127,7 @@ impl Layout {
         let columns = story.levels.len().max(1);
         let free = WIDTH.saturating_sub(margins[0] + margins[1] + columns * GAP);
         let width = (free / columns).clamp(CELL / 4, CELL);
-        let first_cell = story
-            .rows
-            .iter()
-            .find_map(|row| row.cells.iter().flatten().next());
+        let first_cell = story.rows.iter().find_map(|row| row.cells.iter().flatten().next());
         let [height, marks] = first_cell.map_or([width, 0], |cell| {
             let height = cell.image.height() * width / cell.image.width().max(1);
             [height.max(1), cell.marks.len()]
@@ -165,25 +150,15 @@ impl Layout {
 }
 
 fn draw_cell(sheet: &mut SheetCanvas, layout: &Layout, [top, left]: [usize; 2], cell: &StoryCell) {
-    sheet.fill([top, left], layout.cell, |row, column| {
-        mean_colour(&cell.image, layout.cell, row, column)
-    });
+    sheet.fill([top, left], layout.cell, |row, column| mean_colour(&cell.image, layout.cell, row, column));
     for (index, (model, mark)) in cell.marks.iter().enumerate() {
         let top = top + layout.cell[0] + index * LINE;
         let (paths, colour) = mark.paths();
         for path in paths {
-            let path: Vec<[f64; 2]> = path
-                .iter()
-                .map(|[x, y]| [left as f64 + x, top as f64 + y])
-                .collect();
+            let path: Vec<[f64; 2]> = path.iter().map(|[x, y]| [left as f64 + x, top as f64 + y]).collect();
             sheet.path(&path, None, 2.5, colour);
         }
-        sheet.write(
-            [top, left + 20],
-            layout.cell[1].saturating_sub(20),
-            model,
-            INK,
-        );
+        sheet.write([top, left + 20], layout.cell[1].saturating_sub(20), model, INK);
     }
 }
 
@@ -196,12 +171,7 @@ fn draw_curves(sheet: &mut SheetCanvas, layout: &Layout, top: usize, story: &Sto
         sheet.path(&[[ends[0], y], [ends[1], y]], None, 1.0, GRID);
         let label = format!("{:>3}", step * 20);
         let left = layout.margins[0].saturating_sub(3 * letter_width() + GAP);
-        sheet.write(
-            [y as usize - LINE / 2, left],
-            layout.margins[0],
-            &label,
-            INK,
-        );
+        sheet.write([y as usize - LINE / 2, left], layout.margins[0], &label, INK);
     }
     let mut labels = Vec::new();
     for line in &story.lines {
@@ -223,15 +193,9 @@ fn draw_curves(sheet: &mut SheetCanvas, layout: &Layout, top: usize, story: &Sto
                         Some((x, share))
                     })
                     .collect();
-                let band: Vec<[f64; 3]> = points
-                    .iter()
-                    .map(|(x, share)| [*x, y(share.high), y(share.low)])
-                    .collect();
+                let band: Vec<[f64; 3]> = points.iter().map(|(x, share)| [*x, y(share.high), y(share.low)]).collect();
                 sheet.band(&band, colour, 0.14);
-                let path: Vec<[f64; 2]> = points
-                    .iter()
-                    .map(|(x, share)| [*x, y(share.value)])
-                    .collect();
+                let path: Vec<[f64; 2]> = points.iter().map(|(x, share)| [*x, y(share.value)]).collect();
                 sheet.path(&path, dashes(line.style), 3.0, colour);
                 for point in &path {
                     sheet.line([*point, *point], 9.0, colour);
@@ -251,13 +215,9 @@ fn dashes(LineStyle(number): LineStyle) -> Option<[f64; 2]> {
     DASHES[(number + number / COLOURS.len()) % DASHES.len()]
 }
 
-/// Writes the name of each line right of its end. Labels are vertical position, name and colour; they are moved down if they would
-/// overlap.
-fn write_labels(
-    sheet: &mut SheetCanvas,
-    layout: &Layout,
-    mut labels: Vec<(f64, &String, [u8; 3])>,
-) {
+/// Writes the name of each line right of its end. Labels are vertical position, name and colour; they are moved down if
+/// they would overlap.
+fn write_labels(sheet: &mut SheetCanvas, layout: &Layout, mut labels: Vec<(f64, &String, [u8; 3])>) {
     labels.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut next_free = 0;
     for (y, name, colour) in labels {
@@ -286,22 +246,14 @@ mod tests {
                 image: Rgb::new(height, width, vec![90; height * width * 3]).unwrap(),
                 marks: vec![("observer".to_owned(), mark)],
             };
-            StoryRow {
-                name: name.to_owned(),
-                cells: vec![Some(cell); levels.len()],
-            }
+            StoryRow { name: name.to_owned(), cells: vec![Some(cell); levels.len()] }
         });
         let curve = levels
             .iter()
             .enumerate()
             .map(|(index, level)| {
                 let value = 0.9 - index as f64 / 10.0;
-                let share = Estimate {
-                    value,
-                    low: value - 0.1,
-                    high: value + 0.1,
-                    n: 9,
-                };
+                let share = Estimate { value, low: value - 0.1, high: value + 0.1, n: 9 };
                 (*level, share)
             })
             .collect();
@@ -330,11 +282,7 @@ mod tests {
     }
 
     fn count_pixels(image: &Rgb, colour: [u8; 3]) -> usize {
-        image
-            .samples()
-            .chunks(3)
-            .filter(|pixel| **pixel == colour)
-            .count()
+        image.samples().chunks(3).filter(|pixel| **pixel == colour).count()
     }
 
     #[test]
@@ -352,9 +300,7 @@ mod tests {
 
     #[test]
     fn every_image_size_can_be_drawn() {
-        let all: Vec<AxisLevel> = std::iter::once(AxisLevel::L0)
-            .chain(Severity::LADDER.map(level))
-            .collect();
+        let all: Vec<AxisLevel> = std::iter::once(AxisLevel::L0).chain(Severity::LADDER.map(level)).collect();
         for size in [[1, 1], [3, 500], [500, 3], [720, 1280]] {
             for levels in [&all[..1], &all] {
                 let sheet = story(&story_of_grey_images(size, levels));

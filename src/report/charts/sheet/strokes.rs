@@ -18,7 +18,8 @@ impl SheetCanvas {
         self.set(row, column, blended);
     }
 
-    /// Draws a straight line. The opacity of a pixel falls with the distance of its centre from the line, which smooths the edges.
+    /// Draws a straight line. The opacity of a pixel falls with the distance of its centre from the line, which smooths
+    /// the edges.
     pub(super) fn line(&mut self, ends: [[f64; 2]; 2], width: f64, colour: [u8; 3]) {
         let [from, to] = ends;
         let reach = width / 2.0 + 1.0;
@@ -31,24 +32,13 @@ impl SheetCanvas {
                 let part = part.clamp(0.0, 1.0);
                 let nearest = [from[0] + part * along[0], from[1] + part * along[1]];
                 let distance = (x - nearest[0]).hypot(y - nearest[1]);
-                self.blend(
-                    row,
-                    column,
-                    colour,
-                    (width / 2.0 + 0.5 - distance).clamp(0.0, 1.0),
-                );
+                self.blend(row, column, colour, (width / 2.0 + 0.5 - distance).clamp(0.0, 1.0));
             }
         }
     }
 
     /// Draws a line through points. `dash` is the length of dashes and gaps in pixels; `None` draws a solid line.
-    pub(super) fn path(
-        &mut self,
-        points: &[[f64; 2]],
-        dash: Option<[f64; 2]>,
-        width: f64,
-        colour: [u8; 3],
-    ) {
+    pub(super) fn path(&mut self, points: &[[f64; 2]], dash: Option<[f64; 2]>, width: f64, colour: [u8; 3]) {
         let Some([drawn, gap]) = dash else {
             for ends in points.windows(2) {
                 self.line([ends[0], ends[1]], width, colour);
@@ -81,8 +71,7 @@ impl SheetCanvas {
             let [from, to] = [ends[0], ends[1]];
             for column in from[0].round() as usize..to[0].round() as usize {
                 let part = (column as f64 + 0.5 - from[0]) / (to[0] - from[0]).max(1e-9);
-                let [upper, lower] =
-                    [1, 2].map(|i| (from[i] + part * (to[i] - from[i])).round() as usize);
+                let [upper, lower] = [1, 2].map(|i| (from[i] + part * (to[i] - from[i])).round() as usize);
                 for row in upper..lower {
                     self.blend(row, column, colour, opacity);
                 }
@@ -102,11 +91,7 @@ mod tests {
     use super::*;
 
     fn count_drawn_pixels(canvas: &SheetCanvas) -> usize {
-        canvas
-            .samples
-            .chunks(3)
-            .filter(|pixel| **pixel != [255; 3])
-            .count()
+        canvas.samples.chunks(3).filter(|pixel| **pixel != [255; 3]).count()
     }
 
     #[test]
@@ -127,10 +112,7 @@ mod tests {
             canvas.path(&points, dash, 2.0, [0; 3]);
             count_drawn_pixels(&canvas)
         });
-        assert!(
-            dashed > solid / 3 && dashed < solid * 4 / 5,
-            "{dashed} of {solid}"
-        );
+        assert!(dashed > solid / 3 && dashed < solid * 4 / 5, "{dashed} of {solid}");
     }
 
     #[test]

@@ -25,25 +25,13 @@ struct PanelSpec {
 }
 
 const PANELS: [PanelSpec; 3] = [
-    PanelSpec {
-        title: "SSIM of the images",
-        quantity: |row| without_interval(row.means[1]?),
-        chance: None,
-    },
-    PanelSpec {
-        title: "share of right answers",
-        quantity: |row| without_interval(row.accuracy),
-        chance: None,
-    },
-    PanelSpec {
-        title: "AUC of PSNR",
-        quantity: |row| Some(row.predicts[0]?.auc.estimate),
-        chance: Some(0.5),
-    },
+    PanelSpec { title: "SSIM of the images", quantity: |row| without_interval(row.means[1]?), chance: None },
+    PanelSpec { title: "share of right answers", quantity: |row| without_interval(row.accuracy), chance: None },
+    PanelSpec { title: "AUC of PSNR", quantity: |row| Some(row.predicts[0]?.auc.estimate), chance: Some(0.5) },
 ];
 
-/// Image similarity, accuracy, and how well similarity predicts right answers, by level: a row of panels for each axis, and a line for
-/// each variant and enhancer. `None` if no image was measured.
+/// Image similarity, accuracy, and how well similarity predicts right answers, by level: a row of panels for each axis,
+/// and a line for each variant and enhancer. `None` if no image was measured.
 pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let fidelity = findings.fidelity.as_ref()?;
     let mut lights = BTreeMap::<Light<'_>, Vec<&ConditionFidelity>>::new();
@@ -70,10 +58,7 @@ pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
         measure: "× 100",
         panels,
         columns: 3,
-        note: format!(
-            "{models}; the band of an AUC is its 95 % interval by {}; strict parsing",
-            findings.unit
-        ),
+        note: format!("{models}; the band of an AUC is its 95 % interval by {}; strict parsing", findings.unit),
     };
     Some(FigureSpec {
         name: "fidelity",
@@ -88,20 +73,13 @@ fn is_curve(line: &PlotLine) -> bool {
     matches!(line.content, LineContent::Curve(_))
 }
 
-fn panel(
-    lights: &BTreeMap<Light<'_>, Vec<&ConditionFidelity>>,
-    axis: Axis,
-    spec: &PanelSpec,
-) -> Panel {
+fn panel(lights: &BTreeMap<Light<'_>, Vec<&ConditionFidelity>>, axis: Axis, spec: &PanelSpec) -> Panel {
     let mut lines = Vec::new();
     for (style, ((variant, enhancer), rows)) in lights.iter().enumerate() {
         if variant.kind.map(Kind::axis) != Some(axis) {
             continue;
         }
-        let points: Vec<_> = rows
-            .iter()
-            .filter_map(|row| Some((row.level, (spec.quantity)(row)?)))
-            .collect();
+        let points: Vec<_> = rows.iter().filter_map(|row| Some((row.level, (spec.quantity)(row)?))).collect();
         if !points.is_empty() {
             lines.push(PlotLine {
                 name: light(variant, *enhancer),
@@ -119,19 +97,10 @@ fn panel(
         model: None,
         items: None,
     }));
-    Panel {
-        title: spec.title.to_owned(),
-        lines,
-        model: None,
-    }
+    Panel { title: spec.title.to_owned(), lines, model: None }
 }
 
 /// A number without an interval.
 fn without_interval(value: impl Into<Option<f64>>) -> Option<Estimate> {
-    value.into().map(|value| Estimate {
-        value,
-        low: value,
-        high: value,
-        n: 0,
-    })
+    value.into().map(|value| Estimate { value, low: value, high: value, n: 0 })
 }

@@ -10,8 +10,8 @@ use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::photographs::pair_darkness::PairDarkness;
 
-/// Accuracy of each model at L0, on photographs in the dark, on synthetic images that are as dark, and on enhanced photographs; `None` if
-/// no scene was photographed in the dark.
+/// Accuracy of each model at L0, on photographs in the dark, on synthetic images that are as dark, and on enhanced
+/// photographs; `None` if no scene was photographed in the dark.
 pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let chance = findings
         .summary
@@ -38,13 +38,7 @@ pub(super) fn figure_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     if panels.is_empty() {
         return None;
     }
-    let chart = BarChart {
-        panels,
-        note: format!(
-            "lines are 95 % intervals by {}; strict parsing",
-            findings.unit
-        ),
-    };
+    let chart = BarChart { panels, note: format!("lines are 95 % intervals by {}; strict parsing", findings.unit) };
     Some(FigureSpec {
         name: "real",
         caption: "Real against synthetic darkness: accuracy in the light (L0), on photographs in the dark, on synthetic images \
@@ -62,12 +56,7 @@ fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<Bar> {
         let is_compared = row.family.is_none()
             && row.first.model == model
             && row.first.variant.photograph() == Some(&pair.name)
-            && matches!(
-                row.kind,
-                ComparisonKind::Level
-                    | ComparisonKind::RealSynthetic
-                    | ComparisonKind::RealEnhanced
-            );
+            && matches!(row.kind, ComparisonKind::Level | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced);
         if !is_compared {
             continue;
         }
@@ -78,11 +67,7 @@ fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<Bar> {
             subjects.push(subject);
             let cell = findings.summary.cell(subject, None, ParsingMode::Strict);
             if let Some(share) = cell.and_then(|cell| cell.accuracy) {
-                bars.push(Bar {
-                    name: subject.condition(),
-                    style: LineStyle(bars.len()),
-                    share,
-                });
+                bars.push(Bar { name: subject.condition(), style: LineStyle(bars.len()), share });
             }
         }
     }

@@ -1,5 +1,5 @@
-//! Alerts about requests that were changed because a server refused or did not answer the first, by the program ([`adaptation_alerts`]) and
-//! by the user ([`change_alerts`]).
+//! Alerts about requests that were changed because a server refused or did not answer the first, by the program
+//! ([`adaptation_alerts`]) and by the user ([`change_alerts`]).
 
 use serde_json::Value;
 
@@ -21,12 +21,7 @@ pub(super) fn adaptation_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
             let Some(model) = field.strip_prefix(ADAPTED_FOR) else {
                 continue;
             };
-            let changes: Vec<&str> = changes
-                .as_array()
-                .into_iter()
-                .flatten()
-                .filter_map(Value::as_str)
-                .collect();
+            let changes: Vec<&str> = changes.as_array().into_iter().flatten().filter_map(Value::as_str).collect();
             let place = match runs {
                 [_] => String::new(),
                 _ => format!(" in {}", run.name),
@@ -41,7 +36,8 @@ pub(super) fn adaptation_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     alerts
 }
 
-/// One alert for each setting of a model or judge that changed within a run. Token limits are in the records, whose alert names them.
+/// One alert for each setting of a model or judge that changed within a run. Token limits are in the records, whose
+/// alert names them.
 pub(super) fn change_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut alerts = Vec::new();
     for run in runs {
@@ -64,23 +60,12 @@ pub(super) fn change_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
 
 /// Sentence about a setting that changed within a run.
 fn change_sentence(model: &str, is_judge: bool, place: &str, change: &ChangedSetting) -> String {
-    let ChangedSetting {
-        flag,
-        first,
-        now,
-        after,
-    } = change;
-    let (judge, flag) = if is_judge {
-        ("the judge ", judge_flag(flag))
-    } else {
-        ("", flag.clone())
-    };
+    let ChangedSetting { flag, first, now, after } = change;
+    let (judge, flag) = if is_judge { ("the judge ", judge_flag(flag)) } else { ("", flag.clone()) };
     let flag = setting_spelling(&flag);
     let [first, now] = [first, now].map(value_words);
     if *after == 0 {
-        return format!(
-            "The {flag} of {judge}{model} is {now} in all replies{place}; the run began with {first}."
-        );
+        return format!("The {flag} of {judge}{model} is {now} in all replies{place}; the run began with {first}.");
     }
     format!(
         "The {flag} of {judge}{model} has two values{place}, because the server refused the first: {first} in {}, then {now}.",
@@ -105,12 +90,8 @@ mod tests {
 
     #[test]
     fn changes_are_sentences() {
-        let change = |after| ChangedSetting {
-            flag: "--temperature".into(),
-            first: json!("auto"),
-            now: json!("default"),
-            after,
-        };
+        let change =
+            |after| ChangedSetting { flag: "--temperature".into(), first: json!("auto"), now: json!("default"), after };
         assert_eq!(
             change_sentence("m", false, "", &change(5)),
             "The --temperature of m has two values, because the server refused the first: auto in 5 replies, then default."

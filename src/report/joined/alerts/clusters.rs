@@ -12,19 +12,15 @@ use darkqa_score::findings::Findings;
 use darkqa_score::significance::Significance;
 use darkqa_score::suggested_scenes::SuggestedScenes;
 
-/// Share of the questions from which on a scene is large (chosen). Simulated intervals of 20 and 42 scenes of which one had nine tenths of
-/// the replies held the truth in 89 to 98 %.
+/// Share of the questions from which on a scene is large (chosen). Simulated intervals of 20 and 42 scenes of which one
+/// had nine tenths of the replies held the truth in 89 to 98 %.
 const LARGE_SHARE: f64 = 0.5;
 /// Number of scenes from which on one of ten is missed in less than 5 % of samples.
 const ENOUGH_FOR_RARE: usize = 30;
 
-/// Alerts about few clusters, copies of a picture, a single frame or scene, missing scenes, and a large one. Without replies, the number of clusters is
-/// 0 and gets no alert.
-pub(super) fn cluster_alerts(
-    combined: &Combined,
-    clusters: usize,
-    unit: ClusterUnit,
-) -> Vec<Alert> {
+/// Alerts about few clusters, copies of a picture, a single frame or scene, missing scenes, and a large one. Without
+/// replies, the number of clusters is 0 and gets no alert.
+pub(super) fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
     let few_clusters = if clusters == 0 {
         None
@@ -48,7 +44,8 @@ pub(super) fn cluster_alerts(
         .collect()
 }
 
-/// Sentence about frames that show the same picture; `None` if all pictures differ. A frame without a known digest counts as a picture.
+/// Sentence about frames that show the same picture; `None` if all pictures differ. A frame without a known digest
+/// counts as a picture.
 fn copies(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
     let digests = frame_ties(&combined.questions).digests;
     let pictures: BTreeSet<&Digest> = digests.values().collect();
@@ -62,15 +59,11 @@ fn copies(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
     })
 }
 
-/// Sentence about scenes: if no question has one, but the frame names suggest some; if only some frames have one; or if all frames have the
-/// same one.
+/// Sentence about scenes: if no question has one, but the frame names suggest some; if only some frames have one; or if
+/// all frames have the same one.
 fn named_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
-    let scenes: BTreeMap<&FrameId, &String> = combined
-        .questions
-        .iter()
-        .filter(|one| !one.scene.is_empty())
-        .map(|one| (&one.frame, &one.scene))
-        .collect();
+    let scenes: BTreeMap<&FrameId, &String> =
+        combined.questions.iter().filter(|one| !one.scene.is_empty()).map(|one| (&one.frame, &one.scene)).collect();
     if scenes.is_empty() {
         let suggested = SuggestedScenes::new(frames.iter().copied())?;
         return Some(format!(
@@ -80,11 +73,7 @@ fn named_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<Stri
     }
     let without = frames.len() - scenes.len();
     if without > 0 {
-        let count = if without == 1 {
-            "counts as a scene"
-        } else {
-            "count as scenes"
-        };
+        let count = if without == 1 { "counts as a scene" } else { "count as scenes" };
         return Some(format!(
             "{without} of {} have no scene and {count} of their own.",
             counted(frames.len(), "frame")
@@ -141,19 +130,14 @@ pub(super) fn rare_loss_alert(findings: &Findings<'_>) -> Option<Alert> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{
-        ChoiceDetail, Condition, Family, ParsedAnswer, QuestionId, Record, TrialOutcome,
-    };
+    use crate::types::{ChoiceDetail, Condition, Family, ParsedAnswer, QuestionId, Record, TrialOutcome};
     use darkqa_score::cluster::FrameTies;
 
     /// The record of an answer to a question whose first choice is true.
     fn record(item: usize, condition: &str, is_right: bool) -> Record {
         let condition: Condition = condition.parse().unwrap();
         let key = Digest::from_bytes(format!("{item} {condition}").as_bytes()).into();
-        let answer = Some(ParsedAnswer {
-            chosen: Some(usize::from(!is_right)),
-            why: None,
-        });
+        let answer = Some(ParsedAnswer { chosen: Some(usize::from(!is_right)), why: None });
         let detail = ChoiceDetail {
             frame: FrameId(format!("f{:02}", item / 4)),
             family: Family::Color,
@@ -162,11 +146,7 @@ mod tests {
             repeat: 0,
             strict: answer,
             lenient: answer,
-            outcome: if is_right {
-                TrialOutcome::Right
-            } else {
-                TrialOutcome::Wrong
-            },
+            outcome: if is_right { TrialOutcome::Right } else { TrialOutcome::Wrong },
             image: None,
             more_images: Vec::new(),
             shown_frame: None,

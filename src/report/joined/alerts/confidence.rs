@@ -17,16 +17,8 @@ pub(super) fn confidence_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail
         .filter(|(_, content)| content["--probabilities"] == Value::Bool(true))
         .map(|(name, _)| name)
         .collect();
-    let stated: BTreeSet<&str> = trials
-        .iter()
-        .filter(|trial| trial.options().is_some())
-        .map(TrialRef::model)
-        .collect();
-    let replied: BTreeSet<&str> = trials
-        .iter()
-        .filter(|trial| !trial.failed())
-        .map(TrialRef::model)
-        .collect();
+    let stated: BTreeSet<&str> = trials.iter().filter(|trial| trial.options().is_some()).map(TrialRef::model).collect();
+    let replied: BTreeSet<&str> = trials.iter().filter(|trial| !trial.failed()).map(TrialRef::model).collect();
     asked
         .into_iter()
         .filter(|name| replied.contains(&***name) && !stated.contains(&***name)).map(|name| {

@@ -7,8 +7,8 @@ use crate::report::text::alert::{Alert, AlertKind};
 use crate::types::text::plural;
 use crate::types::{ChoiceDetail, Trials};
 
-/// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that follows the
-/// constraint is stored as a single letter.
+/// One alert for each model that was asked with `--request constrain` and has replies of another form. A reply that
+/// follows the constraint is stored as a single letter.
 pub(super) fn constraint_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
     let constrained: BTreeMap<&String, &str> = runs
         .iter()

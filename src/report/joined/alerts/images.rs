@@ -1,5 +1,5 @@
-//! Alerts about models whose replies do not depend on the image ([`image_alerts`]), and about servers that shrink images
-//! ([`shrunk_alerts`]).
+//! Alerts about models whose replies do not depend on the image ([`image_alerts`]), and about servers that shrink
+//! images ([`shrunk_alerts`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -11,17 +11,14 @@ use crate::types::{Digest, QuestionId, RunQuestion, SetLight};
 use darkqa_score::answers::{Independence, LitReply};
 use darkqa_score::model_in_condition::without_run;
 
-/// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Returns none for photographs
-/// taken in the dark, where a model may see nothing.
+/// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Returns
+/// none for photographs taken in the dark, where a model may see nothing.
 pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
     if combined.photographed_set().light == SetLight::Dark {
         return Vec::new();
     }
-    let questions: HashMap<&QuestionId, &RunQuestion> = combined
-        .questions
-        .iter()
-        .map(|question| (&question.id, question))
-        .collect();
+    let questions: HashMap<&QuestionId, &RunQuestion> =
+        combined.questions.iter().map(|question| (&question.id, question)).collect();
     let mut replies = BTreeMap::<&str, Vec<LitReply>>::new();
     let built_in = built_in_models(combined);
     for trial in combined.trials.iter() {
@@ -32,9 +29,7 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
             continue;
         }
         let words = std::iter::once(&question.text).chain(trial.choices());
-        if let Some(reply) =
-            LitReply::from_trial(trial, || Digest::from_parts(words.map(String::as_bytes)))
-        {
+        if let Some(reply) = LitReply::from_trial(trial, || Digest::from_parts(words.map(String::as_bytes))) {
             replies.entry(trial.model()).or_default().push(reply);
         }
     }
@@ -47,11 +42,8 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
 
 /// One alert for each model whose server counts far fewer tokens an image than the rule of the model's family.
 pub(super) fn shrunk_alerts(combined: &Combined) -> Vec<Alert> {
-    let questions: HashMap<&QuestionId, usize> = combined
-        .questions
-        .iter()
-        .map(|question| (&question.id, question.text.chars().count()))
-        .collect();
+    let questions: HashMap<&QuestionId, usize> =
+        combined.questions.iter().map(|question| (&question.id, question.text.chars().count())).collect();
     let mut settings = HashMap::new();
     let mut checks = BTreeMap::<&str, ImageTokenCheck>::new();
     for trial in combined.trials.iter().filter(|trial| trial.has_reply()) {
@@ -60,20 +52,14 @@ pub(super) fn shrunk_alerts(combined: &Combined) -> Vec<Alert> {
             continue;
         };
         let model = trial.model();
-        let (id, detail, system) = settings
-            .entry(model)
-            .or_insert_with(|| asked_as(combined, model));
+        let (id, detail, system) = settings.entry(model).or_insert_with(|| asked_as(combined, model));
         let [width, height] = images.size.map(u64::from);
         let Some(expected) = scaling_image_tokens(id, *detail, width, height) else {
             continue;
         };
         let question = questions.get(trial.question()).copied().unwrap_or(0);
         let choices: usize = trial.choices().iter().map(|one| one.chars().count()).sum();
-        checks.entry(model).or_default().add(
-            charged,
-            *system + question + choices,
-            &vec![expected; images.count()],
-        );
+        checks.entry(model).or_default().add(charged, *system + question + choices, &vec![expected; images.count()]);
     }
     checks
         .into_iter()
@@ -105,11 +91,6 @@ fn built_in_models(combined: &Combined) -> BTreeSet<&str> {
         .into_iter()
         .flatten()
         .map(|(model, _)| model)
-        .filter(|model| {
-            combined
-                .runs
-                .iter()
-                .any(|run| run.manifest.is_built_in(without_run(model)))
-        })
+        .filter(|model| combined.runs.iter().any(|run| run.manifest.is_built_in(without_run(model))))
         .collect()
 }

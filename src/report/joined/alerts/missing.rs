@@ -25,8 +25,8 @@ pub(super) fn counts(health: &[Health]) -> Vec<MissingCounts<'_>> {
         .collect()
 }
 
-/// One alert for each model with more than 2 % of its replies missing in a condition. It names the condition with the largest share, and
-/// the share at L0. `noun` is what is missing.
+/// One alert for each model with more than 2 % of its replies missing in a condition. It names the condition with the
+/// largest share, and the share at L0. `noun` is what is missing.
 pub(crate) fn missing_alerts(counts: &[MissingCounts<'_>], noun: &str) -> Vec<Alert> {
     let mut models = BTreeMap::<&str, Vec<&MissingCounts<'_>>>::new();
     for one in counts.iter().filter(|(_, [_, all])| *all > 0) {
@@ -78,11 +78,8 @@ mod tests {
             .map(|name| ModelInCondition::new("m", Some(&name.parse().unwrap())))
             .collect();
         let failed = [1, failed_at_dark / 2, failed_at_dark];
-        let counts: Vec<MissingCounts<'_>> = subjects
-            .iter()
-            .zip(failed)
-            .map(|(subject, failed)| (subject, [failed, 200]))
-            .collect();
+        let counts: Vec<MissingCounts<'_>> =
+            subjects.iter().zip(failed).map(|(subject, failed)| (subject, [failed, 200])).collect();
         let alerts = missing_alerts(&counts, "Replies");
         alerts.into_iter().map(|alert| alert.text).collect()
     }

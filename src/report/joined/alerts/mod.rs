@@ -1,4 +1,5 @@
-//! Alerts at the top of a report: problems of its runs, differences between them, and limitations of its numbers ([`alerts`]).
+//! Alerts at the top of a report: problems of its runs, differences between them, and limitations of its numbers
+//! ([`alerts`]).
 
 mod adapted;
 mod clusters;
@@ -42,10 +43,7 @@ use darkqa_score::photographs::pair_darkness::PairDarkness;
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
-    alerts.extend(missing_alerts(
-        &missing::counts(&findings.health),
-        "Replies",
-    ));
+    alerts.extend(missing_alerts(&missing::counts(&findings.health), "Replies"));
     alerts.extend(replies::reply_alerts(&findings.health, "count as wrong"));
     alerts.extend(unread_early_ends(combined, "count as wrong"));
     alerts.extend(replies::empty_choice_alerts(combined));
@@ -54,62 +52,35 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(images::image_alerts(combined));
     alerts.extend(images::shrunk_alerts(combined));
     alerts.extend(parsing::parsing_alerts(combined));
-    alerts.extend(confidence::confidence_alerts(
-        &combined.runs,
-        &combined.trials,
-    ));
-    alerts.extend(constraints::constraint_alerts(
-        &combined.runs,
-        &combined.trials,
-    ));
+    alerts.extend(confidence::confidence_alerts(&combined.runs, &combined.trials));
+    alerts.extend(constraints::constraint_alerts(&combined.runs, &combined.trials));
     alerts.extend(questions::repeat_alert(combined));
     alerts.extend(questions::item_alerts(findings));
     alerts.extend(questions::balance_alert(findings));
-    alerts.extend(clusters::cluster_alerts(
-        combined,
-        findings.grid.clusters,
-        findings.unit,
-    ));
+    alerts.extend(clusters::cluster_alerts(combined, findings.grid.clusters, findings.unit));
     alerts.extend(clusters::rare_loss_alert(findings));
     alerts.extend(dark_photographs_alert(findings.set));
     alerts.extend(many_models_alert(findings));
     alerts.extend(many_enhancers_alert(findings));
-    alerts.extend(
-        findings
-            .pairs
-            .iter()
-            .flat_map(PairDarkness::warnings)
-            .map(|text| Alert::new(AlertKind::Pairs, text)),
-    );
+    alerts
+        .extend(findings.pairs.iter().flat_map(PairDarkness::warnings).map(|text| Alert::new(AlertKind::Pairs, text)));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
 }
 
-/// All alerts of a report on questions without ground-truth answers, ordered by kind. Such a report measures self-agreement.
-pub(super) fn alerts_without_truths(
-    combined: &Combined,
-    agreement: &SelfAgreement<'_>,
-) -> Vec<Alert> {
+/// All alerts of a report on questions without ground-truth answers, ordered by kind. Such a report measures
+/// self-agreement.
+pub(super) fn alerts_without_truths(combined: &Combined, agreement: &SelfAgreement<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
-    alerts.extend(missing_alerts(
-        &missing::counts(&agreement.health),
-        "Replies",
-    ));
+    alerts.extend(missing_alerts(&missing::counts(&agreement.health), "Replies"));
     alerts.extend(replies::reply_alerts(&agreement.health, "do not agree"));
     alerts.extend(unread_early_ends(combined, "do not agree"));
     alerts.extend(replies::empty_choice_alerts(combined));
     alerts.extend(replies::broken_off_alert(combined));
     alerts.extend(parsing::parsing_alerts(combined));
-    alerts.extend(constraints::constraint_alerts(
-        &combined.runs,
-        &combined.trials,
-    ));
-    alerts.extend(clusters::cluster_alerts(
-        combined,
-        agreement.grid.clusters,
-        agreement.unit,
-    ));
+    alerts.extend(constraints::constraint_alerts(&combined.runs, &combined.trials));
+    alerts.extend(clusters::cluster_alerts(combined, agreement.grid.clusters, agreement.unit));
     alerts.extend(dark_photographs_alert(agreement.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
@@ -152,7 +123,8 @@ fn dark_photographs_alert(set: PhotographedSet) -> Option<Alert> {
     set.notice().map(|text| Alert::new(AlertKind::Pairs, text))
 }
 
-/// Alerts about the runs themselves, for multiple-choice and open-ended questions: from manifests, questions and trials, not from scores.
+/// Alerts about the runs themselves, for multiple-choice and open-ended questions: from manifests, questions and
+/// trials, not from scores.
 pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = progress_alerts(&joined.runs);
     alerts.extend(cost_alerts(&joined.runs));
@@ -188,7 +160,8 @@ fn cost_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
         .collect()
 }
 
-/// Alerts about combining the runs: models under several names, omitted models, and runs whose replies are all in other runs.
+/// Alerts about combining the runs: models under several names, omitted models, and runs whose replies are all in other
+/// runs.
 pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts: Vec<Alert> = joined
         .runs
@@ -208,7 +181,8 @@ pub(super) fn joining_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     alerts
 }
 
-/// Alerts about folders that were given more than once on the command line. `folders` has each name with its number of occurrences.
+/// Alerts about folders that were given more than once on the command line. `folders` has each name with its number of
+/// occurrences.
 pub(super) fn duplicate_folder_alerts(folders: &[(String, usize)]) -> Vec<Alert> {
     folders
         .iter()
@@ -262,10 +236,7 @@ fn progress_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
                     Status::Incomplete => ", but shards are missing.",
                     _ => ". The same command completes the run.",
                 };
-                format!(
-                    "{}: {status}: all {} trials are answered{rest}",
-                    run.name, counts.trials
-                )
+                format!("{}: {status}: all {} trials are answered{rest}", run.name, counts.trials)
             };
             Alert::new(AlertKind::NotComplete, text)
         })

@@ -10,11 +10,7 @@ use crate::report::text::alert::{Alert, AlertKind};
 use darkqa_score::answers::record::Detail;
 
 /// Manifest fields of a built-in model, and their names in a sentence.
-const FIELDS: [(&str, &str); 3] = [
-    ("random", "its seed"),
-    ("script", "its file"),
-    (DIGEST, "its digest"),
-];
+const FIELDS: [(&str, &str); 3] = [("random", "its seed"), ("script", "its file"), (DIGEST, "its digest")];
 
 /// The field that holds the digest of everything that decides the replies of a built-in model.
 const DIGEST: &str = "digest";
@@ -24,15 +20,8 @@ pub(super) fn model_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let runs = run_names(&joined.runs);
     let mut by_reason = BTreeMap::<(String, Vec<&str>), Vec<&SplitModel>>::new();
     for split in &joined.model_names.split {
-        let suffixes = split
-            .names
-            .iter()
-            .map(|name| &name[split.model.len()..])
-            .collect();
-        by_reason
-            .entry((reason(split, &runs), suffixes))
-            .or_default()
-            .push(split);
+        let suffixes = split.names.iter().map(|name| &name[split.model.len()..]).collect();
+        by_reason.entry((reason(split, &runs), suffixes)).or_default().push(split);
     }
     by_reason
         .into_iter()
@@ -71,10 +60,8 @@ fn stand_apart(models: &[&SplitModel]) -> String {
 
 /// The reason why a model is split: the settings that differ, and the replies or trials that do.
 fn reason(split: &SplitModel, runs: &[String]) -> String {
-    let mut reasons: Vec<String> = named_settings(&split.differences)
-        .iter()
-        .map(|setting| setting.words(runs))
-        .collect();
+    let mut reasons: Vec<String> =
+        named_settings(&split.differences).iter().map(|setting| setting.words(runs)).collect();
     let overlap = split.overlap();
     let up_to = if split.names.len() > 2 { "up to " } else { "" };
     if overlap.other_replies > 0 {
@@ -97,8 +84,8 @@ fn reason(split: &SplitModel, runs: &[String]) -> String {
     reasons.join("; ")
 }
 
-/// The settings that differ, with manifest fields replaced by their names in a sentence. The digest is left out if other settings
-/// explain it.
+/// The settings that differ, with manifest fields replaced by their names in a sentence. The digest is left out if
+/// other settings explain it.
 fn named_settings(differences: &[Setting]) -> Vec<Setting> {
     let is_explained = differences.iter().any(|setting| setting.flag != DIGEST);
     differences

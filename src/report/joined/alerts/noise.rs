@@ -1,5 +1,5 @@
-//! Alerts about noise profiles with the same signal-to-noise ratio at every level ([`noise_alerts`]), and about levels that leave too few
-//! 8-bit codes ([`rounding_alert`]).
+//! Alerts about noise profiles with the same signal-to-noise ratio at every level ([`noise_alerts`]), and about levels
+//! that leave too few 8-bit codes ([`rounding_alert`]).
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
@@ -11,10 +11,12 @@ use crate::types::degradations::Kind;
 use crate::types::{Condition, Degradation, Severity, TrialRef};
 use darkqa_score::answers::record::Detail;
 
-/// The exposure drop, in hundredths of EV, above which an image has at most nine codes: white gets code 255 · 2^(−EV/2.2) = 8.
+/// The exposure drop, in hundredths of EV, above which an image has at most nine codes: white gets code 255 ·
+/// 2^(−EV/2.2) = 8.
 const FEW_CODES: u16 = 1100;
 
-/// Alerts about noise profiles whose levels all have the same signal-to-noise ratio, for runs with several levels with noise.
+/// Alerts about noise profiles whose levels all have the same signal-to-noise ratio, for runs with several levels with
+/// noise.
 pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut profiles_by_reason = BTreeMap::<&str, BTreeSet<&str>>::new();
     for run in &joined.runs {
@@ -32,10 +34,7 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         for (profile, content) in contents {
             let several = levels.get(profile).is_some_and(|levels| levels.len() > 1);
             if several && content["--coupling"] == "independent" {
-                profiles_by_reason
-                    .entry(same_noise(content))
-                    .or_default()
-                    .insert(profile);
+                profiles_by_reason.entry(same_noise(content)).or_default().insert(profile);
             }
         }
     }
@@ -49,7 +48,8 @@ pub(super) fn noise_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     }).collect()
 }
 
-/// The reason why all levels of a noise profile have the same signal-to-noise ratio, if its light ratio r does not depend on the level.
+/// The reason why all levels of a noise profile have the same signal-to-noise ratio, if its light ratio r does not
+/// depend on the level.
 fn same_noise(profile: &Value) -> &'static str {
     if profile["--draws"] == "shared" {
         "the levels are one noisy image at several brightnesses"
@@ -72,10 +72,7 @@ pub(super) fn rounding_alert<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
     if levels.is_empty() {
         return None;
     }
-    let names: Vec<String> = levels
-        .iter()
-        .map(|level| format!("{} EV", level.value()))
-        .collect();
+    let names: Vec<String> = levels.iter().map(|level| format!("{} EV", level.value())).collect();
     let text = format!(
         "Above 11 EV an image has at most nine codes ({}): such levels test the rounding to 8 bits more than the model.",
         names.join(", ")
@@ -84,8 +81,6 @@ pub(super) fn rounding_alert<D: Detail>(joined: &Joined<D>) -> Option<Alert> {
 }
 
 /// The distinct conditions of trials.
-fn conditions<'t, D: Detail + 't>(
-    trials: impl Iterator<Item = TrialRef<'t, D>>,
-) -> HashSet<&'t Condition> {
+fn conditions<'t, D: Detail + 't>(trials: impl Iterator<Item = TrialRef<'t, D>>) -> HashSet<&'t Condition> {
     trials.filter_map(TrialRef::condition).collect()
 }

@@ -15,17 +15,11 @@ pub(super) fn parsing_alerts(combined: &Combined) -> Vec<Alert> {
             if change.is_current() {
                 return None;
             }
-            let records = combined
-                .trials_of(run)
-                .map(TrialRef::text)
-                .map(|place| combined.texts[place.log()].record(place));
+            let records =
+                combined.trials_of(run).map(TrialRef::text).map(|place| combined.texts[place.log()].record(place));
             let text = match change.with_records(records) {
                 Ok(change) if change.has_changed() => {
-                    format!(
-                        "{}: {}. --rescore stores what it reads now.",
-                        run.name,
-                        change.words()
-                    )
+                    format!("{}: {}. --rescore stores what it reads now.", run.name, change.words())
                 }
                 Ok(_) => return None,
                 Err(error) => format!("{}: its replies cannot be read again: {error}", run.name),

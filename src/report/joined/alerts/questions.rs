@@ -19,13 +19,9 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut asked = Vec::<BTreeMap<&QuestionId, Option<&RunQuestion>>>::new();
     for run in &joined.runs {
         // A control gets its own choice of frames, and in a shard other frames than the models.
-        let ids: HashSet<&QuestionId> = joined
-            .trials_of(run)
-            .filter(|trial| !is_control(trial.model()))
-            .map(TrialRef::question)
-            .collect();
-        let mut ids: BTreeMap<&QuestionId, Option<&RunQuestion>> =
-            ids.into_iter().map(|id| (id, None)).collect();
+        let ids: HashSet<&QuestionId> =
+            joined.trials_of(run).filter(|trial| !is_control(trial.model())).map(TrialRef::question).collect();
+        let mut ids: BTreeMap<&QuestionId, Option<&RunQuestion>> = ids.into_iter().map(|id| (id, None)).collect();
         for question in &run.questions {
             if let Some(place) = ids.get_mut(&question.id) {
                 *place = Some(question);
@@ -34,22 +30,13 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         asked.push(ids);
     }
     let mut alerts = Vec::new();
-    let shared: Vec<&&QuestionId> = asked[0]
-        .keys()
-        .filter(|id| asked.iter().all(|ids| ids.contains_key(*id)))
-        .collect();
+    let shared: Vec<&&QuestionId> =
+        asked[0].keys().filter(|id| asked.iter().all(|ids| ids.contains_key(*id))).collect();
     if asked.iter().any(|ids| ids.len() != shared.len()) {
-        let counts: Vec<String> = joined
-            .runs
-            .iter()
-            .zip(&asked)
-            .map(|(run, ids)| format!("{} of {}", ids.len(), run.name))
-            .collect();
-        let text = format!(
-            "The questions differ: {} share {}.",
-            joined_with_and(&counts),
-            counted(shared.len(), "question")
-        );
+        let counts: Vec<String> =
+            joined.runs.iter().zip(&asked).map(|(run, ids)| format!("{} of {}", ids.len(), run.name)).collect();
+        let text =
+            format!("The questions differ: {} share {}.", joined_with_and(&counts), counted(shared.len(), "question"));
         alerts.push(Alert::new(AlertKind::Questions, text));
     }
     // Each question is compared with the same one in the first run that has it.
@@ -66,11 +53,8 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         }
     }
     let count = |differs: &dyn Fn(&RunQuestion, &RunQuestion) -> bool| {
-        let ids: BTreeSet<&QuestionId> = pairs
-            .iter()
-            .filter(|(_, one, other)| differs(one, other))
-            .map(|(id, ..)| *id)
-            .collect();
+        let ids: BTreeSet<&QuestionId> =
+            pairs.iter().filter(|(_, one, other)| differs(one, other)).map(|(id, ..)| *id).collect();
         ids.len()
     };
     let words = count(&|one, other| one.text != other.text);
@@ -80,10 +64,7 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     }
     let files = count(&|one, other| one.image.zip(other.image).is_some_and(|(a, b)| a != b));
     if files > 0 {
-        let text = format!(
-            "The frames of {} are other files under the same names.",
-            counted(files, "shared question")
-        );
+        let text = format!("The frames of {} are other files under the same names.", counted(files, "shared question"));
         alerts.push(Alert::new(AlertKind::Data, text));
     }
     let groups = count(&|one, other| {
@@ -107,41 +88,24 @@ pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
         .iter()
         .filter(|run| !has_human_answers(&run.manifest))
         .map(|run| {
-            let times = combined
-                .trials_of(run)
-                .map(|trial| trial.repeat().saturating_add(1))
-                .max();
+            let times = combined.trials_of(run).map(|trial| trial.repeat().saturating_add(1)).max();
             (&run.name, times.unwrap_or(1))
         })
         .collect();
-    let differs = times
-        .iter()
-        .any(|(_, times_here)| *times_here != times[0].1);
+    let differs = times.iter().any(|(_, times_here)| *times_here != times[0].1);
     differs.then(|| {
-        let times: Vec<String> = times
-            .iter()
-            .map(|(run, times)| format!("{times} in {run}"))
-            .collect();
-        let text = format!(
-            "Questions were asked a different number of times: --repeats is {}.",
-            joined_with_and(&times)
-        );
+        let times: Vec<String> = times.iter().map(|(run, times)| format!("{times} in {run}")).collect();
+        let text =
+            format!("Questions were asked a different number of times: --repeats is {}.", joined_with_and(&times));
         Alert::new(AlertKind::Questions, text)
     })
 }
 
 /// The alert about families of which one answer is true so often that a constant reply scores well.
 pub(super) fn balance_alert(findings: &Findings<'_>) -> Option<Alert> {
-    let has_blind = findings
-        .grid
-        .subjects
-        .iter()
-        .any(|subject| subject.view == Some(View::Blind));
-    let remedy = if has_blind {
-        "Compare with the accuracy without images"
-    } else {
-        "Ask without images too (--blind)"
-    };
+    let has_blind = findings.grid.subjects.iter().any(|subject| subject.view == Some(View::Blind));
+    let remedy =
+        if has_blind { "Compare with the accuracy without images" } else { "Ask without images too (--blind)" };
     let families: Vec<String> = findings
         .summary
         .unbalanced
@@ -174,11 +138,7 @@ pub(super) fn item_alerts(findings: &Findings<'_>) -> Vec<Alert> {
         .filter(|asked| asked.questions < common.questions)
         .enumerate()
         .map(|(place, asked)| {
-            let blind = if asked.is_blind {
-                " without images"
-            } else {
-                ""
-            };
+            let blind = if asked.is_blind { " without images" } else { "" };
             let of = match place {
                 0 => format!(" of {} questions", common.questions),
                 _ => String::new(),

@@ -1,5 +1,5 @@
-//! Alerts about replies that are not scored, or are scored as wrong: [`reply_alerts`], [`ended_early_alerts`], [`broken_off_alert`],
-//! [`people_alerts`].
+//! Alerts about replies that are not scored, or are scored as wrong: [`reply_alerts`], [`ended_early_alerts`],
+//! [`broken_off_alert`], [`people_alerts`].
 
 use std::cmp::Reverse;
 use std::collections::BTreeMap;
@@ -11,13 +11,11 @@ use crate::report::text::alert::{Alert, AlertKind, MAX_UNREAD};
 use crate::report::text::outcome_words::failure_reason;
 use crate::types::degradations::AxisLevel;
 use crate::types::text::counted;
-use crate::types::{
-    Condition, FailureKind, Finish, OpenDetail, Record, StoredDetail, TrialRef, UnreadReason, Usage,
-};
+use crate::types::{Condition, FailureKind, Finish, OpenDetail, Record, StoredDetail, TrialRef, UnreadReason, Usage};
 use darkqa_score::accuracies::Health;
 
-/// Alerts about replies that could not be parsed and about failed trials. `unread_as` completes the sentence about the former, for example
-/// with "count as wrong".
+/// Alerts about replies that could not be parsed and about failed trials. `unread_as` completes the sentence about the
+/// former, for example with "count as wrong".
 pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, [usize; 3]>::new();
     for health in health {
@@ -30,15 +28,11 @@ pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
     for (model, [replies, unread, failed]) in counts {
         if unread as f64 > MAX_UNREAD * replies as f64 {
             let share = 100.0 * unread as f64 / replies as f64;
-            let text = format!(
-                "{unread} of {replies} replies of {model} ({share:.1} %) could not be read, and {unread_as}."
-            );
+            let text =
+                format!("{unread} of {replies} replies of {model} ({share:.1} %) could not be read, and {unread_as}.");
             alerts.push(Alert::new(AlertKind::Unread, text));
         } else if let Some(worst) = worst_condition(health, model) {
-            alerts.push(Alert::new(
-                AlertKind::Unread,
-                unread_in_condition(worst, unread_as),
-            ));
+            alerts.push(Alert::new(AlertKind::Unread, unread_in_condition(worst, unread_as)));
         }
         if failed > 0 {
             let trials = counted(failed, "trial");
@@ -54,10 +48,7 @@ pub(super) fn reply_alerts(health: &[Health], unread_as: &str) -> Vec<Alert> {
 /// The reasons why trials of a model failed, the commonest first, with their numbers if there are several.
 fn failure_reasons(health: &[Health], model: &str) -> String {
     let mut counts = BTreeMap::<FailureKind, usize>::new();
-    for (kind, count) in health
-        .iter()
-        .filter(|health| health.subject.model == model)
-        .flat_map(|health| &health.failed)
+    for (kind, count) in health.iter().filter(|health| health.subject.model == model).flat_map(|health| &health.failed)
     {
         *counts.entry(*kind).or_default() += count;
     }
@@ -73,7 +64,8 @@ fn failure_reasons(health: &[Health], model: &str) -> String {
         .join(", ")
 }
 
-/// The condition of a model with the largest share of replies that could not be parsed, if the share is above [`MAX_UNREAD`].
+/// The condition of a model with the largest share of replies that could not be parsed, if the share is above
+/// [`MAX_UNREAD`].
 fn worst_condition<'h>(health: &'h [Health], model: &str) -> Option<&'h Health> {
     health
         .iter()
@@ -86,7 +78,8 @@ fn unreadable_share(health: &Health) -> f64 {
     health.unreadable() as f64 / health.replies as f64
 }
 
-/// The sentence about the replies of a condition that could not be parsed, with the number that the lenient parsing accepts.
+/// The sentence about the replies of a condition that could not be parsed, with the number that the lenient parsing
+/// accepts.
 fn unread_in_condition(health: &Health, unread_as: &str) -> String {
     let unread = health.unreadable();
     let share = 100.0 * unread as f64 / health.replies as f64;
@@ -106,8 +99,9 @@ fn unread_in_condition(health: &Health, unread_as: &str) -> String {
 /// Numbers of trials by level.
 type ByLevel = BTreeMap<Option<AxisLevel>, usize>;
 
-/// One alert for each model whose replies the server ended early, with the number for each of its words at each level: a filter or a loop
-/// may depend on the light. `counts` is true for the replies without an answer; `unread_as` completes the sentence about them.
+/// One alert for each model whose replies the server ended early, with the number for each of its words at each level:
+/// a filter or a loop may depend on the light. `counts` is true for the replies without an answer; `unread_as`
+/// completes the sentence about them.
 pub(super) fn ended_early_alerts<'t, D: StoredDetail + 't>(
     trials: impl Iterator<Item = TrialRef<'t, D>>,
     counts: impl Fn(TrialRef<'t, D>) -> bool,
@@ -128,16 +122,10 @@ pub(super) fn ended_early_alerts<'t, D: StoredDetail + 't>(
         .map(|(model, (replies, words))| {
             let count: usize = words.values().flat_map(BTreeMap::values).sum();
             let all: usize = replies.values().sum();
-            let listed: Vec<String> = words
-                .iter()
-                .map(|(word, at)| format!("{word} {}", counts_by_level(at, &replies)))
-                .collect();
+            let listed: Vec<String> =
+                words.iter().map(|(word, at)| format!("{word} {}", counts_by_level(at, &replies))).collect();
             let is_cut = words.keys().all(|word| *word == "length");
-            let ended = if is_cut {
-                "were cut at the token limit"
-            } else {
-                "ended early"
-            };
+            let ended = if is_cut { "were cut at the token limit" } else { "ended early" };
             let text = format!(
                 "{count} of {all} replies of {model} {ended} without an answer, and {unread_as}: {}.{}",
                 listed.join("; "),
@@ -180,10 +168,8 @@ pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
     for word in combined.trials.iter().filter_map(TrialRef::broken_off) {
         *counts.entry(word).or_default() += 1;
     }
-    let words: Vec<String> = counts
-        .iter()
-        .map(|(word, count)| format!("{word} ({})", counted(*count, "trial")))
-        .collect();
+    let words: Vec<String> =
+        counts.iter().map(|(word, count)| format!("{word} ({})", counted(*count, "trial"))).collect();
     let text = format!(
         "The server ended replies without finishing them, with the finish_reason {}: they are not scored.",
         words.join(", ")
@@ -193,36 +179,25 @@ pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
 
 /// One alert for each model of a multiple-choice run with empty replies ([`empty_alerts`]).
 pub(super) fn empty_choice_alerts(combined: &Combined) -> Vec<Alert> {
-    empty_alerts(
-        combined
-            .trials
-            .iter()
-            .filter(|trial| !trial.failed())
-            .map(|trial| {
-                let why = trial.strict().and_then(|strict| strict.why);
-                let is_empty = why == Some(UnreadReason::Empty);
-                (trial.model(), is_empty && is_charged(trial.usage()))
-            }),
-    )
+    empty_alerts(combined.trials.iter().filter(|trial| !trial.failed()).map(|trial| {
+        let why = trial.strict().and_then(|strict| strict.why);
+        let is_empty = why == Some(UnreadReason::Empty);
+        (trial.model(), is_empty && is_charged(trial.usage()))
+    }))
 }
 
 /// One alert for each model with empty answers to open questions ([`empty_alerts`]).
 pub(crate) fn empty_answer_alerts(records: &[Record<OpenDetail>]) -> Vec<Alert> {
-    empty_alerts(
-        records
-            .iter()
-            .filter(|record| !record.failed())
-            .filter_map(|record| {
-                let reply = record.reply.as_deref()?;
-                let is_whole = record.finish == Some(Finish::Stop) && record.refusal.is_none();
-                let is_empty = is_whole && reply.trim().is_empty();
-                Some((&*record.model, is_empty && is_charged(record.usage)))
-            }),
-    )
+    empty_alerts(records.iter().filter(|record| !record.failed()).filter_map(|record| {
+        let reply = record.reply.as_deref()?;
+        let is_whole = record.finish == Some(Finish::Stop) && record.refusal.is_none();
+        let is_empty = is_whole && reply.trim().is_empty();
+        Some((&*record.model, is_empty && is_charged(record.usage)))
+    }))
 }
 
-/// One alert for each model with more than [`MAX_UNREAD`] complete replies that are empty although the server charged tokens for them.
-/// `replies` has the model of each reply, and whether it is one of these.
+/// One alert for each model with more than [`MAX_UNREAD`] complete replies that are empty although the server charged
+/// tokens for them. `replies` has the model of each reply, and whether it is one of these.
 fn empty_alerts<'a>(replies: impl Iterator<Item = (&'a str, bool)>) -> Vec<Alert> {
     let mut counts = BTreeMap::<&str, [usize; 2]>::new();
     for (model, is_empty) in replies {
@@ -301,19 +276,15 @@ mod tests {
 
     #[test]
     fn reasons_of_failures_are_counted() {
-        let failed = |counts: &[(FailureKind, usize)]| Health {
-            failed: counts.iter().copied().collect(),
-            ..health("L0", 100)
-        };
+        let failed =
+            |counts: &[(FailureKind, usize)]| Health { failed: counts.iter().copied().collect(), ..health("L0", 100) };
         let one = [failed(&[(FailureKind::Timeout, 1)])];
         assert_eq!(
             reply_alerts(&one, "count as wrong")[0].text,
             "1 trial of m failed and is not scored: no whole reply in time."
         );
-        let several = [
-            failed(&[(FailureKind::Timeout, 1)]),
-            failed(&[(FailureKind::Timeout, 1), (FailureKind::Server, 5)]),
-        ];
+        let several =
+            [failed(&[(FailureKind::Timeout, 1)]), failed(&[(FailureKind::Timeout, 1), (FailureKind::Server, 5)])];
         assert_eq!(
             reply_alerts(&several, "count as wrong")[0].text,
             "7 trials of m failed and are not scored: the server failed (5), no whole reply in time (2)."

@@ -10,21 +10,14 @@ use crate::types::text::plural;
 use darkqa_score::answers::record::Detail;
 use darkqa_score::model_in_condition::without_run;
 
-/// Alerts about models with several names in the replies of one run, with the number of replies of each name at each level, and about
-/// models whose only name is evidently that of another model.
+/// Alerts about models with several names in the replies of one run, with the number of replies of each name at each
+/// level, and about models whose only name is evidently that of another model.
 pub(super) fn served_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut served = BTreeMap::<&str, BTreeSet<&str>>::new();
     let mut mixed = BTreeSet::new();
-    for run in joined
-        .runs
-        .iter()
-        .filter(|run| !has_human_answers(&run.manifest))
-    {
+    for run in joined.runs.iter().filter(|run| !has_human_answers(&run.manifest)) {
         for (model, names) in &run.served {
-            served
-                .entry(model)
-                .or_default()
-                .extend(names.iter().map(String::as_str));
+            served.entry(model).or_default().extend(names.iter().map(String::as_str));
             if has_several(names) {
                 mixed.insert(without_run(model));
             }
@@ -39,17 +32,12 @@ pub(super) fn served_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         })
     });
     let mixed = mixed_names(joined, &mixed);
-    other
-        .chain(mixed)
-        .map(|text| Alert::new(AlertKind::Served, text))
-        .collect()
+    other.chain(mixed).map(|text| Alert::new(AlertKind::Served, text)).collect()
 }
 
 /// True if names differ in more than case and path.
 pub(super) fn has_several(names: &BTreeSet<String>) -> bool {
-    names
-        .first()
-        .is_some_and(|first| names.iter().any(|name| !is_same_name(first, name)))
+    names.first().is_some_and(|first| names.iter().any(|name| !is_same_name(first, name)))
 }
 
 /// The id of a model at its endpoint, or its name in tables if no run states it.
@@ -66,21 +54,12 @@ fn asked_id<'a>(runs: &'a [JoinedRun], model: &'a str) -> &'a str {
 fn mixed_names<D: Detail>(joined: &Joined<D>, models: &BTreeSet<&str>) -> Vec<String> {
     let mut counts = BTreeMap::<&str, BTreeMap<&str, BTreeMap<String, usize>>>::new();
     for trial in joined.trials.iter() {
-        let Some(name) = trial
-            .served_model()
-            .filter(|_| models.contains(without_run(trial.model())))
-        else {
+        let Some(name) = trial.served_model().filter(|_| models.contains(without_run(trial.model()))) else {
             continue;
         };
-        let level = trial.condition().map_or_else(
-            || "without images".to_owned(),
-            |condition| format!("at {condition}"),
-        );
-        let levels = counts
-            .entry(trial.model())
-            .or_default()
-            .entry(name)
-            .or_default();
+        let level =
+            trial.condition().map_or_else(|| "without images".to_owned(), |condition| format!("at {condition}"));
+        let levels = counts.entry(trial.model()).or_default().entry(name).or_default();
         *levels.entry(level).or_default() += 1;
     }
     counts

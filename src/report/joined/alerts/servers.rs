@@ -5,9 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::served::has_several;
 use super::words::{difference_sentence, run_names};
 use crate::report::joined::join::Joined;
-use crate::report::joined::settings::{
-    Settings, base_url, differing_settings, has_human_answers, joined_with_and,
-};
+use crate::report::joined::settings::{Settings, base_url, differing_settings, has_human_answers, joined_with_and};
 use crate::report::text::alert::{Alert, AlertKind};
 use darkqa_score::answers::record::Detail;
 
@@ -15,12 +13,7 @@ use darkqa_score::answers::record::Detail;
 pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let run_names = run_names(&joined.runs);
     let mut served = BTreeMap::<&str, BTreeMap<usize, &BTreeSet<String>>>::new();
-    for (index, run) in joined
-        .runs
-        .iter()
-        .enumerate()
-        .filter(|(_, run)| !has_human_answers(&run.manifest))
-    {
+    for (index, run) in joined.runs.iter().enumerate().filter(|(_, run)| !has_human_answers(&run.manifest)) {
         for (model, names) in &run.served {
             served.entry(model).or_default().insert(index, names);
         }
@@ -42,12 +35,8 @@ pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
             alerts.push(Alert::new(AlertKind::Served, text));
         }
     }
-    let models: BTreeSet<&String> = joined
-        .runs
-        .iter()
-        .filter_map(|run| run.manifest.columns.get("model"))
-        .flat_map(BTreeMap::keys)
-        .collect();
+    let models: BTreeSet<&String> =
+        joined.runs.iter().filter_map(|run| run.manifest.columns.get("model")).flat_map(BTreeMap::keys).collect();
     for model in models {
         let base_urls: Vec<Option<Settings>> = joined
             .runs
@@ -60,10 +49,7 @@ pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         let differences = differing_settings(&base_urls);
         if !differences.is_empty() {
             let what = format!("{model} was asked at several addresses");
-            alerts.push(Alert::new(
-                AlertKind::Served,
-                difference_sentence(&what, &differences, &run_names),
-            ));
+            alerts.push(Alert::new(AlertKind::Served, difference_sentence(&what, &differences, &run_names)));
         }
     }
     alerts

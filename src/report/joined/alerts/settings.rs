@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use super::words::{difference_sentence, run_names};
 use crate::report::joined::join::Joined;
 use crate::report::joined::settings::{
-    ENCODING, Setting, Settings, differing_settings, identity_fields, joined_with_and,
-    light_settings, remote_model_settings, without_explained,
+    ENCODING, Setting, Settings, differing_settings, identity_fields, joined_with_and, light_settings,
+    remote_model_settings, without_explained,
 };
 use crate::report::text::alert::{Alert, AlertKind};
 use crate::types::manifests::RunManifest;
@@ -33,48 +33,18 @@ pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     });
     let rows = [
         (AlertKind::Data, "The data differ", flags(&["--data"])),
-        (
-            AlertKind::Questions,
-            "The rules of the questions differ",
-            flags(&["--rules"]),
-        ),
-        (
-            AlertKind::Questions,
-            "The orders of choices differ",
-            flags(&ORDERS),
-        ),
-        (
-            AlertKind::Images,
-            "The size or encoding of images differs",
-            flags(&ENCODING),
-        ),
-        (
-            AlertKind::Prompts,
-            "The prompts differ",
-            flags(&["--prompts"]),
-        ),
-        (
-            AlertKind::Parameters,
-            "The parameters of models differ",
-            parameters,
-        ),
-        (
-            AlertKind::Constrain,
-            "Replies are constrained differently",
-            constraints,
-        ),
-        (
-            AlertKind::Version,
-            "The versions of this program differ",
-            version,
-        ),
+        (AlertKind::Questions, "The rules of the questions differ", flags(&["--rules"])),
+        (AlertKind::Questions, "The orders of choices differ", flags(&ORDERS)),
+        (AlertKind::Images, "The size or encoding of images differs", flags(&ENCODING)),
+        (AlertKind::Prompts, "The prompts differ", flags(&["--prompts"])),
+        (AlertKind::Parameters, "The parameters of models differ", parameters),
+        (AlertKind::Constrain, "Replies are constrained differently", constraints),
+        (AlertKind::Version, "The versions of this program differ", version),
     ];
     let mut alerts: Vec<Alert> = rows
         .into_iter()
         .filter(|(_, _, settings)| !settings.is_empty())
-        .map(|(kind, what, settings)| {
-            Alert::new(kind, difference_sentence(what, &settings, &names))
-        })
+        .map(|(kind, what, settings)| Alert::new(kind, difference_sentence(what, &settings, &names)))
         .collect();
     let light = without_explained(differing(&|run| Some(light_settings(run, &manifests))));
     alerts.extend(light_alerts(joined, &light, &names));
@@ -103,21 +73,13 @@ fn light_alerts<D: Detail>(joined: &Joined<D>, light: &[Setting], names: &[Strin
         };
         let stand = if curves.len() == 1 { "stands" } else { "stand" };
         let curves = joined_with_and(&curves);
-        sentences.push(format!(
-            "{curves} {stand} apart as {}: {why}.",
-            joined_with_and(&groups)
-        ));
+        sentences.push(format!("{curves} {stand} apart as {}: {why}.", joined_with_and(&groups)));
     }
     if !sentences.is_empty() {
         alerts.push(Alert::new(AlertKind::Light, sentences.join(" ")));
     }
     if !joined.image_groups.undigested.is_empty() {
-        let runs: Vec<&String> = joined
-            .image_groups
-            .undigested
-            .iter()
-            .map(|run| &names[*run])
-            .collect();
+        let runs: Vec<&String> = joined.image_groups.undigested.iter().map(|run| &names[*run]).collect();
         let text = format!(
             "The records of {} hold no digests of images: the settings in the manifests decide what was shown.",
             joined_with_and(&runs)

@@ -10,9 +10,6 @@ pub(super) fn run_names(runs: &[JoinedRun]) -> Vec<String> {
 
 /// The sentence about a difference, with the settings that cause it: `The light differs: --seed is 0 in a and 1 in b.`
 pub(super) fn difference_sentence(what: &str, settings: &[Setting], names: &[String]) -> String {
-    let settings: Vec<String> = settings
-        .iter()
-        .map(|setting| setting.words(names))
-        .collect();
+    let settings: Vec<String> = settings.iter().map(|setting| setting.words(names)).collect();
     format!("{what}: {}.", settings.join("; "))
 }

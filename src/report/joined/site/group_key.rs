@@ -103,11 +103,8 @@ impl GroupKey {
                 images.entry(place).or_default().extend(trial.sent_digest());
             }
         }
-        let [judge, protocol] = [JUDGE, PROTOCOL].map(|name| {
-            text_setting(&run.manifest, name)
-                .unwrap_or("none")
-                .to_owned()
-        });
+        let [judge, protocol] =
+            [JUDGE, PROTOCOL].map(|name| text_setting(&run.manifest, name).unwrap_or("none").to_owned());
         let key = Self {
             title: String::new(),
             digests: GroupDigests::default(),
@@ -125,7 +122,8 @@ impl GroupKey {
         )
     }
 
-    /// Adds further settings, then sets title, digests and shared settings. `title_end` follows the questions and the data in the title.
+    /// Adds further settings, then sets title, digests and shared settings. `title_end` follows the questions and the
+    /// data in the title.
     fn with_title(
         mut self,
         manifest: &RunManifest,
@@ -134,8 +132,7 @@ impl GroupKey {
         title_end: &str,
     ) -> Result<Self> {
         for (name, value) in more {
-            self.settings
-                .insert((*name).to_owned(), (*value).to_owned());
+            self.settings.insert((*name).to_owned(), (*value).to_owned());
         }
         let light = light_settings(manifest);
         let light = Digest::canonical("darkqa.site-light/1", &light)?.to_string();
@@ -185,9 +182,7 @@ impl GroupKey {
         });
         match differing.count() {
             0 => None,
-            count => Some(format!(
-                "questions with other choices or another true choice: {count}"
-            )),
+            count => Some(format!("questions with other choices or another true choice: {count}")),
         }
     }
 
@@ -195,13 +190,8 @@ impl GroupKey {
     pub(super) fn difference(&self, first: &Self, number: usize) -> GroupDifference {
         let names = [format!("table {number}"), "this one".to_owned()];
         let settings = [Some(first.settings.clone()), Some(self.settings.clone())];
-        let lines = differing_settings(&settings)
-            .into_iter()
-            .map(|setting| setting.words(&names));
-        GroupDifference {
-            from: number,
-            lines: lines.chain(self.data_difference(first)).collect(),
-        }
+        let lines = differing_settings(&settings).into_iter().map(|setting| setting.words(&names));
+        GroupDifference { from: number, lines: lines.chain(self.data_difference(first)).collect() }
     }
 }
 
@@ -210,9 +200,7 @@ pub(super) fn group_members<M>(members: Vec<M>, key: impl Fn(&M) -> &GroupKey) -
     let mut groups: Vec<Vec<M>> = Vec::new();
     for member in members {
         let own = key(&member);
-        let group = groups
-            .iter_mut()
-            .find(|group| group.iter().all(|other| key(other).is_same(own)));
+        let group = groups.iter_mut().find(|group| group.iter().all(|other| key(other).is_same(own)));
         match group {
             Some(group) => group.push(member),
             None => groups.push(vec![member]),
@@ -222,11 +210,7 @@ pub(super) fn group_members<M>(members: Vec<M>, key: impl Fn(&M) -> &GroupKey) -
 }
 
 /// Settings that must be equal: questions, light, prompts and levels.
-fn settings(
-    manifest: &RunManifest,
-    questions: &[RunQuestion],
-    levels: &BTreeSet<AxisLevel>,
-) -> Result<Settings> {
+fn settings(manifest: &RunManifest, questions: &[RunQuestion], levels: &BTreeSet<AxisLevel>) -> Result<Settings> {
     let asked: BTreeMap<&String, (&String, BTreeSet<&String>)> = questions
         .iter()
         .map(|question| {
@@ -244,11 +228,8 @@ fn settings(
 
 /// Settings that determine raw images.
 fn light_settings(manifest: &RunManifest) -> Settings {
-    let parts = [
-        pixel_settings(manifest),
-        identity_fields(manifest, &ENCODING),
-        profile_and_variant_settings(manifest),
-    ];
+    let parts =
+        [pixel_settings(manifest), identity_fields(manifest, &ENCODING), profile_and_variant_settings(manifest)];
     let mut light: Settings = parts.into_iter().flatten().collect();
     light.remove(ENHANCEMENT);
     if let Some(taken) = text_setting(manifest, SET_LIGHT) {
@@ -258,11 +239,7 @@ fn light_settings(manifest: &RunManifest) -> Settings {
 }
 
 fn level_list(levels: &BTreeSet<AxisLevel>) -> String {
-    levels
-        .iter()
-        .map(ToString::to_string)
-        .collect::<Vec<_>>()
-        .join(", ")
+    levels.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -270,9 +247,7 @@ mod tests {
     use super::*;
 
     fn key(settings: &[(&str, &str)], image: &[u8], truth: &str) -> GroupKey {
-        let settings = settings
-            .iter()
-            .map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+        let settings = settings.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
         let choices = BTreeSet::from(["red".to_owned(), "blue".to_owned()]);
         GroupKey {
             title: String::new(),
@@ -296,18 +271,9 @@ mod tests {
             key(&[("--prompts", "a")], b"one", "blue"),
             key(&[("--prompts", "a")], b"one", "red"),
         ];
-        assert_eq!(
-            keys[1].difference(&keys[0], 1).lines,
-            ["--prompts is a in table 1 and b in this one"]
-        );
-        assert_eq!(
-            keys[2].difference(&keys[0], 1).lines,
-            ["1 of 1 images differ"]
-        );
-        assert_eq!(
-            keys[3].difference(&keys[0], 1).lines,
-            ["questions with other choices or another true choice: 1"]
-        );
+        assert_eq!(keys[1].difference(&keys[0], 1).lines, ["--prompts is a in table 1 and b in this one"]);
+        assert_eq!(keys[2].difference(&keys[0], 1).lines, ["1 of 1 images differ"]);
+        assert_eq!(keys[3].difference(&keys[0], 1).lines, ["questions with other choices or another true choice: 1"]);
         assert!(keys[4].difference(&keys[0], 1).lines.is_empty());
         let numbered = keys.into_iter().enumerate().collect();
         let groups: Vec<Vec<usize>> = group_members(numbered, |(_, key)| key)

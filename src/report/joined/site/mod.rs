@@ -1,4 +1,5 @@
-//! A site about many runs: [`site`]. Each run has the page of its report, and rows in a table with the runs that it can be compared with.
+//! A site about many runs: [`site`]. Each run has the page of its report, and rows in a table with the runs that it can
+//! be compared with.
 
 mod choice_member;
 mod group_key;
@@ -35,11 +36,7 @@ struct OpenMember {
 /// # Errors
 /// If a run has no records or a record is broken.
 pub(crate) fn site(runs: Vec<AnyRun>) -> Result<Site> {
-    let mut site = Site {
-        groups: Vec::new(),
-        others: Vec::new(),
-        pages: Vec::new(),
-    };
+    let mut site = Site { groups: Vec::new(), others: Vec::new(), pages: Vec::new() };
     let (mut choices, mut open) = (Vec::new(), Vec::new());
     let mut pages = BTreeSet::new();
     for run in runs {
@@ -83,17 +80,10 @@ fn add_groups<M>(
         .filter_map(|members| {
             let own = key(members.first()?);
             let differs = first.map(|first| own.difference(key(first), first_number));
-            Some((
-                own.title.clone(),
-                own.digests.clone(),
-                own.shared.clone(),
-                differs,
-            ))
+            Some((own.title.clone(), own.digests.clone(), own.shared.clone(), differs))
         })
         .collect();
-    for (index, (members, (title, digests, shared, differs))) in
-        groups.into_iter().zip(heads).enumerate()
-    {
+    for (index, (members, (title, digests, shared, differs))) in groups.into_iter().zip(heads).enumerate() {
         site.groups.push(SiteGroup {
             title,
             digests,
@@ -105,11 +95,7 @@ fn add_groups<M>(
 }
 
 /// Adds the page of a run. Returns `None` for a run without rows, and then adds it to the other runs with the reason.
-fn add_choices(
-    run: StoredRun<ChoiceDetail>,
-    link: RunLink,
-    site: &mut Site,
-) -> Result<Option<ChoiceMember>> {
+fn add_choices(run: StoredRun<ChoiceDetail>, link: RunLink, site: &mut Site) -> Result<Option<ChoiceMember>> {
     let combined = combine(vec![without_hidden_models(run)?])?;
     if combined.truths() == Truths::Unknown {
         let page = page_of(own_answers::whole_report(&combined)?.files)?;
@@ -119,8 +105,8 @@ fn add_choices(
         return Ok(None);
     }
     let findings = combined.findings();
-    let report = ChoiceReport::new(&findings, alerts(&combined, &findings))
-        .with_enhancers(&enhancers::rows(&combined.runs));
+    let report =
+        ChoiceReport::new(&findings, alerts(&combined, &findings)).with_enhancers(&enhancers::rows(&combined.runs));
     let page = page_of(products(&report, &combined.page_inputs())?)?;
     let variant = findings.shown().grid.main_variant();
     let variant = variant.unwrap_or(Variant::NONE);
@@ -177,19 +163,11 @@ fn page_of(files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
         .ok_or_else(|| Error::data(PAGE, "the report of the run has no page"))
 }
 
-/// The link to the page of a run. The file is named after the run, with characters that are safe in URLs, and numbered if the name is
-/// already in `taken`.
+/// The link to the page of a run. The file is named after the run, with characters that are safe in URLs, and numbered
+/// if the name is already in `taken`.
 fn link(name: &str, manifest: &RunManifest, taken: &mut BTreeSet<String>) -> RunLink {
-    let stem: String = name
-        .chars()
-        .map(|c| {
-            if c.is_ascii_alphanumeric() || "-_.".contains(c) {
-                c
-            } else {
-                '_'
-            }
-        })
-        .collect();
+    let stem: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' }).collect();
     let stem = stem.trim_start_matches('.');
     let stem = if stem.is_empty() { "run" } else { stem };
     let mut page = format!("{stem}.html");
@@ -199,10 +177,5 @@ fn link(name: &str, manifest: &RunManifest, taken: &mut BTreeSet<String>) -> Run
         number += 1;
     }
     let day = manifest.updated.split('T').next().unwrap_or_default();
-    RunLink {
-        name: name.to_owned(),
-        page,
-        date: day.to_owned(),
-        version: manifest.version.clone(),
-    }
+    RunLink { name: name.to_owned(), page, date: day.to_owned(), version: manifest.version.clone() }
 }

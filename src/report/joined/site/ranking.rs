@@ -12,15 +12,14 @@ use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};
 use darkqa_score::grid::Grid;
 
-/// The rows of runs that can be compared, in the order of their ranks. As in the report, models are ranked by mean accuracy in the dark on
-/// the items that all of them answered at all levels. References get no rank.
+/// The rows of runs that can be compared, in the order of their ranks. As in the report, models are ranked by mean
+/// accuracy in the dark on the items that all of them answered at all levels. References get no rank.
 pub(super) fn ranked_rows(members: Vec<ChoiceMember>) -> GroupRows {
     let names = distinct_names(&members);
     let (mut trials, mut questions, mut rows) = (Trials::default(), Vec::new(), Vec::new());
     for member in members {
         let name = |model: &str| names[&(member.run.page.clone(), model.to_owned())].clone();
-        let is_named =
-            |model: &str| names.contains_key(&(member.run.page.clone(), model.to_owned()));
+        let is_named = |model: &str| names.contains_key(&(member.run.page.clone(), model.to_owned()));
         let mut own = member.trials;
         own.retain(|trial| is_named(trial.model()));
         own.rename(|model| is_named(model).then(|| name(model)));
@@ -51,7 +50,8 @@ pub(super) fn ranked_rows(members: Vec<ChoiceMember>) -> GroupRows {
     GroupRows::Choices(rows, Ranking { words })
 }
 
-/// A distinct name of each model of each run, by page and model: followed by the page if another run has a model of this name.
+/// A distinct name of each model of each run, by page and model: followed by the page if another run has a model of
+/// this name.
 fn distinct_names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String> {
     let mut times = BTreeMap::<&str, usize>::new();
     for row in members.iter().flat_map(|member| &member.rows) {
@@ -71,16 +71,10 @@ fn distinct_names(members: &[ChoiceMember]) -> BTreeMap<(String, String), String
 }
 
 /// The comparison of all models, and the unit treated as independent.
-fn best(
-    trials: &Trials<ChoiceDetail>,
-    questions: &[RunQuestion],
-) -> (Option<BestInTheDark>, String) {
+fn best(trials: &Trials<ChoiceDetail>, questions: &[RunQuestion]) -> (Option<BestInTheDark>, String) {
     let clusters = clusters(trials, questions);
     let grid = Grid::for_models(trials, &clusters, &ModelListing::default(), |_| true);
-    (
-        best_in_the_dark(&grid, ParsingMode::Strict),
-        clusters.unit().to_string(),
-    )
+    (best_in_the_dark(&grid, ParsingMode::Strict), clusters.unit().to_string())
 }
 
 /// The paragraph about the basis of the ranks, or the reason why there are none.
@@ -89,7 +83,8 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
         return match models {
             0 => "No model is ranked: random and the observer stand for comparison.".to_owned(),
             1 => "One model: there is no other to rank it with.".to_owned(),
-            _ => "The models are not ranked: no two of them answered the same questions at L0 and at a darker level.".to_owned(),
+            _ => "The models are not ranked: no two of them answered the same questions at L0 and at a darker level."
+                .to_owned(),
         };
     };
     let levels = best.levels.iter().map(ToString::to_string);
@@ -109,24 +104,14 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
         },
     );
     if best.dropped > 0 {
-        let _ = write!(
-            words,
-            " {} more items are left out, because a model has no reply to them.",
-            best.dropped
-        );
+        let _ = write!(words, " {} more items are left out, because a model has no reply to them.", best.dropped);
     }
     if !best.without.is_empty() {
         let models = plural(best.without.len(), "model is", "models are");
-        let _ = write!(
-            words,
-            " {models} not ranked: fewer answers at these levels."
-        );
+        let _ = write!(words, " {models} not ranked: fewer answers at these levels.");
     }
     if !best.is_possible() {
-        let _ = write!(
-            words,
-            " With so few {unit}s no model can be shown to be better than another."
-        );
+        let _ = write!(words, " With so few {unit}s no model can be shown to be better than another.");
     }
     words
 }

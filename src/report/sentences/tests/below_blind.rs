@@ -6,9 +6,7 @@ use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, Severity, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::paired::{PairedComparison, Spread};
-use darkqa_score::comparisons::{
-    Comparison, ComparisonKind, PooledFinding, PooledKind, TestedComparison,
-};
+use darkqa_score::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, TestedComparison};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
@@ -23,10 +21,7 @@ fn against_blind(
     significance: Significance,
 ) -> Comparison {
     let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]);
-    let variant = Variant {
-        kind: Some(Kind::Sensor),
-        ..Variant::NONE
-    };
+    let variant = Variant { kind: Some(Kind::Sensor), ..Variant::NONE };
     Comparison {
         kind: ComparisonKind::Blind,
         first: ModelInCondition::with_images(model, level, &variant, None),
@@ -43,12 +38,7 @@ fn tested(difference: f64, significance: Significance) -> TestedComparison {
         paired: PairedComparison {
             first: 0.3,
             second: 0.3 - difference,
-            difference: Estimate {
-                value: difference,
-                low: difference - 0.1,
-                high: difference + 0.1,
-                n: 45,
-            },
+            difference: Estimate { value: difference, low: difference - 0.1, high: difference + 0.1, n: 45 },
             gained: 1,
             lost: 9,
             clusters: 24,
@@ -56,10 +46,7 @@ fn tested(difference: f64, significance: Significance) -> TestedComparison {
             p: 0.001,
             p_if_answered: 0.001,
             missing: 0,
-            spread: Spread {
-                error: 0.05,
-                degrees: 23.0,
-            },
+            spread: Spread { error: 0.05, degrees: 23.0 },
         },
         holm: 0.0123,
         significance,
@@ -81,15 +68,10 @@ fn family_below_blind_is_reported_once() {
         family_sentence(&one, &[]).unwrap(),
         "− Object colour: sim-F is less often right than without images at L4–L5. (sim-F at L5: −30.0 [−40.0, −20.0], p = 0.012; n = 45 in 24 scenes)"
     );
-    let two = [
-        &one[..],
-        &[against_blind("sim-B", "sim-B", color, 5, -0.2, Worse)],
-    ];
+    let two = [&one[..], &[against_blind("sim-B", "sim-B", color, 5, -0.2, Worse)]];
     let said = family_sentence(&two.concat(), &[]).unwrap();
     assert!(
-        said.starts_with(
-            "− Object colour: 2 of 3 models are less often right than without images. (sim-F at L5: "
-        ),
+        said.starts_with("− Object colour: 2 of 3 models are less often right than without images. (sim-F at L5: "),
         "{said}"
     );
     // A model without blind replies of its own.
@@ -120,26 +102,10 @@ fn family_sentence(all: &[Comparison], pooled: &[&PooledFinding]) -> Option<Stri
 #[test]
 fn blind_side_is_named() {
     let rows: [(&[&str], &[&str], &str); 4] = [
-        (
-            &["a"],
-            &["a"],
-            "In the dark a is less often right than without images at L5.",
-        ),
-        (
-            &["a"],
-            &["random"],
-            "In the dark a is less often right than random without images at L5.",
-        ),
-        (
-            &["a", "b"],
-            &["b"],
-            "In the dark the models are less often right than without images at L5.",
-        ),
-        (
-            &["a", "b"],
-            &["c", "d"],
-            "In the dark the models are less often right than the models without images at L5.",
-        ),
+        (&["a"], &["a"], "In the dark a is less often right than without images at L5."),
+        (&["a"], &["random"], "In the dark a is less often right than random without images at L5."),
+        (&["a", "b"], &["b"], "In the dark the models are less often right than without images at L5."),
+        (&["a", "b"], &["c", "d"], "In the dark the models are less often right than the models without images at L5."),
     ];
     for (models, blind, expected) in rows {
         assert_eq!(pooled_text(models, blind), expected);

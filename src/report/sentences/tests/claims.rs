@@ -40,7 +40,8 @@ impl Claimed {
             .count()
     }
 
-    /// Draws the records. Items and frames have random difficulties, and conditions differ by a new draw of 30 % of the answers.
+    /// Draws the records. Items and frames have random difficulties, and conditions differ by a new draw of 30 % of the
+    /// answers.
     fn records(&self, random: &mut StdRng) -> Vec<Record> {
         let choices = ["red", "green", "blue", "white"];
         let items = self.frames * self.families;
@@ -51,19 +52,14 @@ impl Claimed {
             let fixed: Vec<f64> = (0..items).map(|_| random.random_range(0.0..1.0)).collect();
             let mut without_images = Vec::new();
             for name in ["", "L0", "L1-ev", "L2-ev", "L3-ev", "L4-ev", "L5-ev"] {
-                let condition: Option<Condition> =
-                    (!name.is_empty()).then(|| name.parse().unwrap());
+                let condition: Option<Condition> = (!name.is_empty()).then(|| name.parse().unwrap());
                 let is_dark = ["L3-ev", "L4-ev", "L5-ev"].contains(&name);
                 for item in 0..items {
                     let (frame, family) = (item / self.families, item % self.families);
                     let share = (self.accuracy)(model, name, family);
                     let logit = (share / (1.0 - share)).ln() + frames[frame] + difficulties[item];
                     let p = 1.0 / (1.0 + (-logit).exp());
-                    let drawn = if random.random_bool(0.3) {
-                        random.random_range(0.0..1.0)
-                    } else {
-                        fixed[item]
-                    };
+                    let drawn = if random.random_bool(0.3) { random.random_range(0.0..1.0) } else { fixed[item] };
                     let family = Family::Other(format!("family {family:02}"));
                     let mut detail = unanswered(format!("f{frame:03}"), family, &choices);
                     if self.is_blind_in_the_dark && index == 0 && is_dark {
@@ -140,21 +136,13 @@ fn equal_losses(_: &str, condition: &str, _: usize) -> f64 {
 /// Accuracy of a model that loses 20 points more in the first family.
 fn one_loses_more(model: &str, condition: &str, family: usize) -> f64 {
     let share = equal_losses(model, condition, family);
-    if condition == "L5-ev" && family == 0 {
-        share - 0.2
-    } else {
-        share
-    }
+    if condition == "L5-ev" && family == 0 { share - 0.2 } else { share }
 }
 
 /// True if a sentence attributes L1, L2, L3 or L4 to one of two leaders.
 fn names_a_level_between(sentence: &Sentence) -> bool {
     let attributed = sentence.text.split("; not told apart").next();
-    let is_range = |text: &str| {
-        ["L1", "L2", "L3", "L4", "–"]
-            .iter()
-            .any(|at| text.contains(at))
-    };
+    let is_range = |text: &str| ["L1", "L2", "L3", "L4", "–"].iter().any(|at| text.contains(at));
     is_crossing(sentence) && attributed.is_some_and(is_range)
 }
 
@@ -186,11 +174,7 @@ fn claimed_runs() -> Vec<Claimed> {
         claims: names_a_level_between,
     };
     vec![
-        Claimed {
-            name: "true: two leaders, 25 and 35 points apart at L0 and L5",
-            claims: is_crossing,
-            ..two
-        },
+        Claimed { name: "true: two leaders, 25 and 35 points apart at L0 and L5", claims: is_crossing, ..two },
         Claimed {
             name: "dark replies are those without images: it sees best",
             accuracy: better_by_habit,

@@ -10,12 +10,7 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
 
 fn around(value: f64) -> Estimate {
-    Estimate {
-        value,
-        low: value - 0.05,
-        high: value + 0.05,
-        n: 1200,
-    }
+    Estimate { value, low: value - 0.05, high: value + 0.05, n: 1200 }
 }
 
 /// A tested number, detected if it is more than 5 points from 0.
@@ -43,12 +38,7 @@ fn calibration(confidence: f64, accuracy: f64) -> Calibration {
         brier: zero,
         skill: zero,
         nll: zero,
-        risk: RiskCoverage {
-            at_100: 0.0,
-            at_80: 0.0,
-            at_50: 0.0,
-            area: 0.0,
-        },
+        risk: RiskCoverage { at_100: 0.0, at_80: 0.0, at_50: 0.0, area: 0.0 },
         auroc: None,
         blind_shift: None,
         over_orders: None,
@@ -60,54 +50,31 @@ fn calibration(confidence: f64, accuracy: f64) -> Calibration {
 #[test]
 fn overconfidence_in_the_dark_is_reported() {
     let clean = calibration(0.9, 0.88);
-    let (blind, modest, always) = (
-        calibration(0.85, 0.4),
-        calibration(0.42, 0.4),
-        calibration(0.95, 0.88),
-    );
+    let (blind, modest, always) = (calibration(0.85, 0.4), calibration(0.42, 0.4), calibration(0.95, 0.88));
     assert_eq!(
         confidence_sentence(&[("a", &blind, Some(&clean))]).unwrap(),
         "− a does not know how little it sees at L5: its mean confidence is 85.0 %, and 40.0 % of its replies are right. \
          (confidence less accuracy: +45.0 [+40.0, +50.0] points, p < 0.001, +2.0 [−3.0, +7.0] at L0; n = 1,200 replies with probabilities)"
     );
     // The most overconfident model is named, with the number of overconfident models.
-    let several = confidence_sentence(&[
-        ("b", &modest, Some(&clean)),
-        ("a", &blind, Some(&clean)),
-        ("c", &modest, None),
-    ]);
+    let several =
+        confidence_sentence(&[("b", &modest, Some(&clean)), ("a", &blind, Some(&clean)), ("c", &modest, None)]);
     let several = several.unwrap();
-    assert!(
-        several.starts_with("− a does not know") && several.contains("shown of 1 of 3 models"),
-        "{several}"
-    );
+    assert!(several.starts_with("− a does not know") && several.contains("shown of 1 of 3 models"), "{several}");
     // If overconfidence is not larger than at L0, or L0 was not asked, the sentence does not blame the dark.
     for clean in [Some(&clean), None] {
         let said = confidence_sentence(&[("a", &always, clean)]).unwrap();
-        assert!(
-            said.starts_with("− At L5 a is surer than it is right: its mean confidence is 95.0 %"),
-            "{said}"
-        );
+        assert!(said.starts_with("− At L5 a is surer than it is right: its mean confidence is 95.0 %"), "{said}");
     }
     let said = confidence_sentence(&[("b", &modest, Some(&clean))]).unwrap();
-    assert!(
-        said.starts_with("· b was not detected to be surer than it is right at L5"),
-        "{said}"
-    );
+    assert!(said.starts_with("· b was not detected to be surer than it is right at L5"), "{said}");
     assert_eq!(confidence_sentence(&[]), None);
 }
 
 fn confidence_sentence(models: &[(&str, &Calibration, Option<&Calibration>)]) -> Option<String> {
     let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[4]);
-    let all: Vec<Confidence<'_>> = models
-        .iter()
-        .map(|&(model, dark, clean)| Confidence {
-            model,
-            level,
-            dark,
-            clean,
-        })
-        .collect();
+    let all: Vec<Confidence<'_>> =
+        models.iter().map(|&(model, dark, clean)| Confidence { model, level, dark, clean }).collect();
     let sentence = confidence(&all, ClusterUnit::Scene);
     sentence.as_ref().map(checked)
 }

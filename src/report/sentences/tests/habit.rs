@@ -28,13 +28,7 @@ struct Design {
 impl Design {
     fn records(self, random: &mut StdRng) -> Vec<Record> {
         let truths: Vec<usize> = (0..FRAMES * QUESTIONS)
-            .map(|_| {
-                if random.random_bool(COMMON) {
-                    0
-                } else {
-                    random.random_range(1..4)
-                }
-            })
+            .map(|_| if random.random_bool(COMMON) { 0 } else { random.random_range(1..4) })
             .collect();
         let levels = (0..6).map(Some).chain(self.is_asked_blind.then_some(None));
         let mut records = Vec::new();
@@ -52,17 +46,10 @@ impl Design {
                 };
                 let frame = format!("f{:02}", item / QUESTIONS);
                 let mut detail = unanswered(frame, Family::RoomType, &ROOMS);
-                let parsed = Some(ParsedAnswer {
-                    chosen: Some(chosen),
-                    why: None,
-                });
+                let parsed = Some(ParsedAnswer { chosen: Some(chosen), why: None });
                 (detail.strict, detail.lenient) = (parsed, parsed);
                 detail.truth = Some(*truth);
-                detail.outcome = if chosen == *truth {
-                    TrialOutcome::Right
-                } else {
-                    TrialOutcome::Wrong
-                };
+                detail.outcome = if chosen == *truth { TrialOutcome::Right } else { TrialOutcome::Wrong };
                 records.push(record(item, "m", condition.clone(), detail));
             }
         }
@@ -90,9 +77,7 @@ fn simulate(design: Design, runs: usize) -> Counts {
         let trials = design.records(&mut random).into_iter().collect();
         let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
         let said = sentences(&findings);
-        let is_clear = said
-            .iter()
-            .any(|one| one.kind == "darkness" && one.text.starts_with("No loss"));
+        let is_clear = said.iter().any(|one| one.kind == "darkness" && one.text.starts_with("No loss"));
         counts.no_loss += usize::from(is_clear);
         let threshold = findings.curves[0].summary.threshold;
         counts.beyond += usize::from(threshold.is_ok_and(|one| one.value.is_infinite()));
@@ -102,29 +87,17 @@ fn simulate(design: Design, runs: usize) -> Counts {
     counts
 }
 
-const HABIT: Design = Design {
-    sees_to: 0,
-    is_asked_blind: true,
-};
+const HABIT: Design = Design { sees_to: 0, is_asked_blind: true };
 
 #[test]
 fn a_habit_that_is_often_right_is_no_sight() {
     for is_asked_blind in [true, false] {
-        let counts = simulate(
-            Design {
-                is_asked_blind,
-                ..HABIT
-            },
-            40,
-        );
+        let counts = simulate(Design { is_asked_blind, ..HABIT }, 40);
         assert_eq!((counts.beyond, counts.named), (0, 40), "{counts:?}");
         assert!(counts.early > 35, "{counts:?}");
     }
     // Control: a model that sees to the end.
-    let seeing = Design {
-        sees_to: 5,
-        ..HABIT
-    };
+    let seeing = Design { sees_to: 5, ..HABIT };
     let counts = simulate(seeing, 20);
     assert_eq!((counts.beyond, counts.early), (20, 0), "{counts:?}");
 }
@@ -133,23 +106,13 @@ fn a_habit_that_is_often_right_is_no_sight() {
 #[ignore = "takes minutes; prints a table of src/docs/numbers.md"]
 #[expect(clippy::print_stdout, reason = "the table")]
 fn habits_are_no_sight() {
-    println!(
-        "| sees to | asked without images | beyond 9 EV | before L1 | no loss | habit named |"
-    );
+    println!("| sees to | asked without images | beyond 9 EV | before L1 | no loss | habit named |");
     for sees_to in [0, 2, 5] {
         for is_asked_blind in [true, false] {
-            let counts = simulate(
-                Design {
-                    sees_to,
-                    is_asked_blind,
-                },
-                runs(),
-            );
+            let counts = simulate(Design { sees_to, is_asked_blind }, runs());
             let cells = [counts.beyond, counts.early, counts.no_loss, counts.named];
             let [beyond, early, no_loss, named] = cells.map(|count| percent(count, runs()));
-            println!(
-                "| L{sees_to} | {is_asked_blind} | {beyond} | {early} | {no_loss} | {named} |"
-            );
+            println!("| L{sees_to} | {is_asked_blind} | {beyond} | {early} | {no_loss} | {named} |");
         }
     }
 }

@@ -14,12 +14,7 @@ use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
 #[test]
 fn detected_increases_of_false_answers_are_reported() {
     // A growing rate is worse; the darkest level is not detected here.
-    let grown = [
-        (0.1, NotShown),
-        (0.4, Worse),
-        (0.84, Worse),
-        (0.9, NotShown),
-    ];
+    let grown = [(0.1, NotShown), (0.4, Worse), (0.84, Worse), (0.9, NotShown)];
     assert_eq!(
         false_answer_sentence(FalseAnswer::No, &grown).unwrap(),
         "− At L3 “no” is answered to 89.0 % of the objects that are there (5.0 % at L0). (mean of these 2 models: +84.0 [+80.0, +88.0], \
@@ -27,19 +22,11 @@ fn detected_increases_of_false_answers_are_reported() {
     );
     let said = false_answer_sentence(FalseAnswer::Yes, &[(0.4, Worse)]).unwrap();
     assert!(
-        said.starts_with(
-            "− At L1 “yes” is answered to 45.0 % of the objects that are not there (5.0 % at L0). ("
-        ),
+        said.starts_with("− At L1 “yes” is answered to 45.0 % of the objects that are not there (5.0 % at L0). ("),
         "{said}"
     );
-    assert_eq!(
-        false_answer_sentence(FalseAnswer::No, &[(0.5, NotShown)]),
-        None
-    );
-    assert_eq!(
-        false_answer_sentence(FalseAnswer::No, &[(-0.03, Better)]),
-        None
-    );
+    assert_eq!(false_answer_sentence(FalseAnswer::No, &[(0.5, NotShown)]), None);
+    assert_eq!(false_answer_sentence(FalseAnswer::No, &[(-0.03, Better)]), None);
     assert_eq!(false_answer_sentence(FalseAnswer::No, &[]), None);
 }
 
@@ -59,12 +46,7 @@ fn false_answer_sentence(answer: FalseAnswer, levels: &[(f64, Significance)]) ->
 fn collapse(share: f64, truth: f64, guess: f64) -> Collapse {
     Collapse {
         top: "living room".to_owned(),
-        share: Estimate {
-            value: share,
-            low: share - 0.1,
-            high: share + 0.1,
-            n: 45,
-        },
+        share: Estimate { value: share, low: share - 0.1, high: share + 0.1, n: 45 },
         truth,
         guess,
         entropy: 1.0,
@@ -85,12 +67,7 @@ fn at_clean(share: f64) -> PairedComparison {
     PairedComparison {
         first: share,
         second: 0.305,
-        difference: Estimate {
-            value: difference,
-            low: difference - 0.1,
-            high: difference + 0.1,
-            n: 45,
-        },
+        difference: Estimate { value: difference, low: difference - 0.1, high: difference + 0.1, n: 45 },
         gained: 20,
         lost: 3,
         clusters: 24,
@@ -98,10 +75,7 @@ fn at_clean(share: f64) -> PairedComparison {
         p: 0.001,
         p_if_answered: 0.001,
         missing: 0,
-        spread: Spread {
-            error: 0.05,
-            degrees: 23.0,
-        },
+        spread: Spread { error: 0.05, degrees: 23.0 },
     }
 }
 
@@ -133,11 +107,7 @@ fn collapsed_models_are_named_or_counted() {
         ),
         "{said}"
     );
-    let two = [
-        ("sim-A", seeing.clone()),
-        ("sim-B", collapse(0.6, 0.32, 0.25)),
-        ("sim-F", blind.clone()),
-    ];
+    let two = [("sim-A", seeing.clone()), ("sim-B", collapse(0.6, 0.32, 0.25)), ("sim-F", blind.clone())];
     // The models of the family with the largest excess are counted.
     let color = [("sim-A", collapse(0.5, 0.29, 0.25))];
     let said = collapse_sentence(&[(&Family::Color, &color), (&room, &two)]).unwrap();
@@ -148,25 +118,13 @@ fn collapsed_models_are_named_or_counted() {
         ),
         "{said}"
     );
-    assert!(
-        said.ends_with("in 24 scenes; also in object colour)"),
-        "{said}"
-    );
+    assert!(said.ends_with("in 24 scenes; also in object colour)"), "{said}");
     // An excess of 19 points; an interval that contains the true share; a random choice of two words; too few clusters.
     for not_shown in [
         collapse(0.51, 0.32, 0.25),
-        Collapse {
-            share: Estimate {
-                low: 0.3,
-                ..blind.share
-            },
-            ..blind.clone()
-        },
+        Collapse { share: Estimate { low: 0.3, ..blind.share }, ..blind.clone() },
         collapse(0.55, 0.2, 0.5),
-        Collapse {
-            clusters: 7,
-            ..blind.clone()
-        },
+        Collapse { clusters: 7, ..blind.clone() },
     ] {
         assert_eq!(collapse_sentence(&[(&room, &[("sim-F", not_shown)])]), None);
     }
@@ -180,12 +138,7 @@ fn collapse_sentence(families: &[(&Family, &[(&str, Collapse)])]) -> Option<Stri
     let answers: Vec<TopAnswer<'_>> = families
         .iter()
         .flat_map(|(family, models)| {
-            models.iter().map(move |(model, collapse)| TopAnswer {
-                model,
-                family,
-                level,
-                collapse,
-            })
+            models.iter().map(move |(model, collapse)| TopAnswer { model, family, level, collapse })
         })
         .collect();
     let sentence = hallucination::collapse(&answers, ClusterUnit::Scene);

@@ -44,21 +44,14 @@ const REFUSING: Design = Design {
 };
 
 /// Refuses in the dark what it would get right; darkness costs nothing.
-const REFUSING_RIGHT: Design = Design {
-    missing: Missing::Right,
-    right: [0.8; 6],
-    missing_shares: [0.0, 0.0, 0.0, 0.0, 0.2, 0.4],
-};
+const REFUSING_RIGHT: Design =
+    Design { missing: Missing::Right, right: [0.8; 6], missing_shares: [0.0, 0.0, 0.0, 0.0, 0.2, 0.4] };
 
 impl Design {
     fn records(&self, random: &mut StdRng) -> Vec<Record> {
         let mut records = Vec::new();
         for level in 0..6 {
-            let name = if level == 0 {
-                "L0".to_owned()
-            } else {
-                format!("L{level}-ev")
-            };
+            let name = if level == 0 { "L0".to_owned() } else { format!("L{level}-ev") };
             let condition: Option<Condition> = Some(name.parse().unwrap());
             let (right, missing) = (self.right[level], self.missing_shares[level]);
             for item in 0..FRAMES * QUESTIONS {
@@ -75,16 +68,9 @@ impl Design {
                     detail.outcome = TrialOutcome::Failed;
                 } else {
                     let chosen = usize::from(!is_right) * random.random_range(1..4);
-                    let parsed = Some(ParsedAnswer {
-                        chosen: Some(chosen),
-                        why: None,
-                    });
+                    let parsed = Some(ParsedAnswer { chosen: Some(chosen), why: None });
                     (detail.strict, detail.lenient) = (parsed, parsed);
-                    detail.outcome = if is_right {
-                        TrialOutcome::Right
-                    } else {
-                        TrialOutcome::Wrong
-                    };
+                    detail.outcome = if is_right { TrialOutcome::Right } else { TrialOutcome::Wrong };
                 }
                 records.push(record(item, "m", condition.clone(), detail));
             }
@@ -115,18 +101,13 @@ fn simulate(design: &Design, runs: usize) -> Counts {
         let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
         let said = sentences(&findings);
         let darkness: Vec<_> = said.iter().filter(|one| one.kind == "darkness").collect();
-        counts.misleading += usize::from(
-            darkness
-                .iter()
-                .any(|one| one.tone == Tone::Better || one.text.starts_with("No loss")),
-        );
+        counts.misleading +=
+            usize::from(darkness.iter().any(|one| one.tone == Tone::Better || one.text.starts_with("No loss")));
         counts.lost += usize::from(darkness.iter().any(|one| one.tone == Tone::Worse));
         let whole = &findings.curves[0].summary;
         counts.beyond += usize::from(whole.threshold.is_ok_and(|one| one.value.is_infinite()));
-        let darkest = findings
-            .pooled
-            .iter()
-            .rfind(|finding| finding.kind == PooledKind::Darkness && finding.family.is_none());
+        let darkest =
+            findings.pooled.iter().rfind(|finding| finding.kind == PooledKind::Darkness && finding.family.is_none());
         let difference = darkest.unwrap().strict.difference;
         counts.covered += usize::from((difference.low..=difference.high).contains(&truth));
     }
@@ -139,10 +120,7 @@ fn refusals_of_wrong_answers_are_no_sight() {
     assert_eq!((counts.misleading, counts.beyond), (0, 0), "{counts:?}");
     assert!(counts.covered >= 55, "{counts:?}");
     // Control: with all replies, the same model shows its loss.
-    let whole = Design {
-        missing_shares: [0.0; 6],
-        ..REFUSING
-    };
+    let whole = Design { missing_shares: [0.0; 6], ..REFUSING };
     let counts = simulate(&whole, 20);
     assert_eq!((counts.misleading, counts.lost), (0, 20), "{counts:?}");
 }
@@ -156,24 +134,13 @@ fn refusals_of_right_answers_are_no_loss() {
 
 #[test]
 fn a_level_without_replies_has_no_verdict() {
-    let design = Design {
-        missing_shares: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
-        missing: Missing::Random,
-        right: [0.9; 6],
-    };
+    let design = Design { missing_shares: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0], missing: Missing::Random, right: [0.9; 6] };
     let mut random = StdRng::seed_from_u64(3);
     let trials = design.records(&mut random).into_iter().collect();
     let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     let said = sentences(&findings);
-    let darkness: Vec<&str> = said
-        .iter()
-        .filter(|one| one.kind == "darkness")
-        .map(|one| &*one.text)
-        .collect();
-    assert_eq!(
-        darkness,
-        ["No verdict on darkness is possible at L5: no question has all replies at L5."]
-    );
+    let darkness: Vec<&str> = said.iter().filter(|one| one.kind == "darkness").map(|one| &*one.text).collect();
+    assert_eq!(darkness, ["No verdict on darkness is possible at L5: no question has all replies at L5."]);
 }
 
 #[test]
@@ -193,14 +160,8 @@ fn undecided_thresholds_name_their_lower_end() {
 #[ignore = "takes minutes; prints a table of src/docs/numbers.md"]
 #[expect(clippy::print_stdout, reason = "the table")]
 fn missing_replies_neither_hide_nor_make_a_loss() {
-    println!(
-        "| missing | misleading | threshold beyond 9 EV | interval holds the truth | loss detected |"
-    );
-    let none = Design {
-        missing: Missing::Random,
-        right: [0.9; 6],
-        missing_shares: [0.0; 6],
-    };
+    println!("| missing | misleading | threshold beyond 9 EV | interval holds the truth | loss detected |");
+    let none = Design { missing: Missing::Random, right: [0.9; 6], missing_shares: [0.0; 6] };
     let at_random = |loss: f64, missing: f64| Design {
         right: [0.9, 0.9, 0.9, 0.9, 0.9 - loss, 0.9 - loss],
         missing_shares: [missing; 6],
@@ -216,13 +177,8 @@ fn missing_replies_neither_hide_nor_make_a_loss() {
         ("loss of 20, 3 % at random", at_random(0.2, 0.03)),
     ] {
         let counts = simulate(&design, runs());
-        let [misleading, beyond, covered, lost] = [
-            counts.misleading,
-            counts.beyond,
-            counts.covered,
-            counts.lost,
-        ]
-        .map(|count| percent(count, runs()));
+        let [misleading, beyond, covered, lost] =
+            [counts.misleading, counts.beyond, counts.covered, counts.lost].map(|count| percent(count, runs()));
         println!("| {name} | {misleading} | {beyond} | {covered} | {lost} |");
     }
 }

@@ -25,30 +25,18 @@ use darkqa_score::significance::Significance::{self, Better, NotShown, TooFewClu
 use darkqa_score::significance::SwapMethod;
 
 /// A finding at one of the named levels, with an interval of ± 4 points.
-fn finding(
-    kind: PooledKind,
-    level: usize,
-    difference: f64,
-    verdict: Significance,
-) -> PooledFinding {
+fn finding(kind: PooledKind, level: usize, difference: f64, verdict: Significance) -> PooledFinding {
     let enhancer = (kind == PooledKind::Enhancer).then(|| EnhancerName::new("lift").unwrap());
     PooledFinding {
         kind,
         family: None,
-        variant: Variant {
-            kind: Some(Kind::Sensor),
-            ..Variant::NONE
-        },
+        variant: Variant { kind: Some(Kind::Sensor), ..Variant::NONE },
         enhancer,
         against: None,
         level: AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]),
         mean_over: Vec::new(),
         models: ["a", "b"].map(str::to_owned).to_vec(),
-        blind_models: if kind == PooledKind::Blind {
-            vec!["a".to_owned(), "b".to_owned()]
-        } else {
-            Vec::new()
-        },
+        blind_models: if kind == PooledKind::Blind { vec!["a".to_owned(), "b".to_owned()] } else { Vec::new() },
         strict: parsed(kind, difference, verdict),
         lenient: parsed(kind, difference, verdict),
         format: [1.0, 1.0],
@@ -67,19 +55,11 @@ fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDif
     let holm = if verdict == NotShown { 0.062 } else { 0.0004 };
     // A loss has a negative difference, except for rates of false answers, which are worse if they grow.
     let is_loss = matches!(kind, PooledKind::Hallucination(_)) == (difference > 0.0);
-    assert!(
-        verdict != Worse || is_loss || difference == 0.0,
-        "{kind:?} {difference}"
-    );
+    assert!(verdict != Worse || is_loss || difference == 0.0, "{kind:?} {difference}");
     PooledDifference {
         first: 0.5,
         second: 0.8637,
-        difference: Estimate {
-            value: difference,
-            low: difference - 0.04,
-            high: difference + 0.04,
-            n: 1237,
-        },
+        difference: Estimate { value: difference, low: difference - 0.04, high: difference + 0.04, n: 1237 },
         p: 0.0124,
         p_if_answered: 0.0124,
         p_by: SwapMethod::Counted,
@@ -90,10 +70,7 @@ fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDif
 }
 
 fn findings(kind: PooledKind, all: &[(f64, Significance)]) -> Vec<PooledFinding> {
-    all.iter()
-        .enumerate()
-        .map(|(i, (difference, verdict))| finding(kind, i + 1, *difference, *verdict))
-        .collect()
+    all.iter().enumerate().map(|(i, (difference, verdict))| finding(kind, i + 1, *difference, *verdict)).collect()
 }
 
 /// The numbers in a text, without those of level names.
@@ -107,12 +84,7 @@ fn numbers(text: &str) -> Vec<f64> {
 
 /// The sentence as one line. Panics if a number in it is not one of its values.
 fn checked(sentence: &Sentence) -> String {
-    let line = format!(
-        "{} {} ({})",
-        sentence.tone.sign(),
-        sentence.text,
-        sentence.detail
-    );
+    let line = format!("{} {} ({})", sentence.tone.sign(), sentence.text, sentence.detail);
     for number in numbers(&line) {
         let mut values = sentence.values.values();
         assert!(
@@ -127,10 +99,7 @@ fn checked(sentence: &Sentence) -> String {
 #[test]
 fn each_kind_and_verdict_has_a_sentence() {
     use PooledKind::{Blind, Darkness, Enhancer, Noise};
-    let said = level_sentences(
-        Darkness,
-        &[(-0.02, NotShown), (-0.1, Worse), (-0.449, Worse)],
-    );
+    let said = level_sentences(Darkness, &[(-0.02, NotShown), (-0.1, Worse), (-0.449, Worse)]);
     assert_eq!(
         said,
         [
@@ -149,14 +118,12 @@ fn each_kind_and_verdict_has_a_sentence() {
     let said = level_sentences(Darkness, &[(0.1, Better)]);
     assert!(said[0].starts_with("+ At L1 accuracy is 10.0 points higher than at L0. ("));
     let said = level_sentences(Noise, &[(-0.05, Worse), (-0.091, Worse), (0.01, NotShown)]);
-    assert!(said[0].starts_with(
-        "− With noise, accuracy is up to 9.1 points lower than by the exposure drop alone (L2). ("
-    ));
+    assert!(
+        said[0].starts_with("− With noise, accuracy is up to 9.1 points lower than by the exposure drop alone (L2). (")
+    );
     assert!(said[0].contains("; shown at L1–L2;"), "{said:?}");
     let said = level_sentences(Noise, &[(-0.05, Worse), (-0.02, NotShown)]);
-    assert!(said[0].starts_with(
-        "− With noise, accuracy is 5.0 points lower than by the exposure drop alone (L1). ("
-    ));
+    assert!(said[0].starts_with("− With noise, accuracy is 5.0 points lower than by the exposure drop alone (L1). ("));
     // Both verdicts are reported.
     let said = level_sentences(Noise, &[(-0.644, Worse), (0.0, NotShown), (0.644, Better)]);
     assert_eq!(said.len(), 2, "{said:?}");
@@ -166,18 +133,12 @@ fn each_kind_and_verdict_has_a_sentence() {
     assert!(level_sentences(Noise, &[(-0.5, TooFewClusters)]).is_empty());
     assert!(level_sentences(Darkness, &[(-1.0, TooFewClusters)]).is_empty());
     let said = level_sentences(Noise, &[(0.03, NotShown)]);
-    assert!(said[0].starts_with(
-        "· No difference in accuracy between noise and the exposure drop alone was detected. ("
-    ));
+    assert!(
+        said[0].starts_with("· No difference in accuracy between noise and the exposure drop alone was detected. (")
+    );
     let said = level_sentences(
         Enhancer,
-        &[
-            (-0.081, Worse),
-            (-0.06, Worse),
-            (-0.05, NotShown),
-            (0.056, Better),
-            (0.05, Better),
-        ],
+        &[(-0.081, Worse), (-0.06, Worse), (-0.05, NotShown), (0.056, Better), (0.05, Better)],
     );
     let starts = [
         "− lift harms at L1–L2, by up to 8.1 points. (mean of these 2 models: −8.1 [−12.1, −4.1], p < 0.001; at L1;",
@@ -189,25 +150,13 @@ fn each_kind_and_verdict_has_a_sentence() {
     for (said, start) in said.iter().zip(starts) {
         assert!(said.starts_with(start), "{said}");
     }
-    let said = level_sentences(
-        Enhancer,
-        &[
-            (-0.081, Worse),
-            (0.05, Better),
-            (0.0, NotShown),
-            (0.22, Better),
-            (0.2, Better),
-        ],
-    );
+    let said =
+        level_sentences(Enhancer, &[(-0.081, Worse), (0.05, Better), (0.0, NotShown), (0.22, Better), (0.2, Better)]);
     assert!(said[0].starts_with("− lift harms at L1, by 8.1 points. ("));
     assert!(said[1].starts_with("+ lift helps at L2, L4–L5, by up to 22.0 points. ("));
     assert!(level_sentences(Blind, &[(0.2, Better), (0.0, NotShown)]).is_empty());
     let said = level_sentences(Blind, &[(0.2, Better), (-0.1, Worse)]);
-    assert!(
-        said[0].starts_with(
-            "− In the dark the models are less often right than without images at L2. ("
-        )
-    );
+    assert!(said[0].starts_with("− In the dark the models are less often right than without images at L2. ("));
 }
 
 fn level_sentences(kind: PooledKind, levels: &[(f64, Significance)]) -> Vec<String> {
@@ -215,9 +164,7 @@ fn level_sentences(kind: PooledKind, levels: &[(f64, Significance)]) -> Vec<Stri
     let all: Vec<&PooledFinding> = all.iter().collect();
     let unit = ClusterUnit::Scene;
     let sentences: Vec<Sentence> = match kind {
-        PooledKind::Darkness => darkness::with_variant(&all, None, &[], None, unit)
-            .into_iter()
-            .collect(),
+        PooledKind::Darkness => darkness::with_variant(&all, None, &[], None, unit).into_iter().collect(),
         PooledKind::Noise => pooled::noise(&all, &[], unit),
         PooledKind::Enhancer => pooled::enhancers(&all, &[], unit),
         PooledKind::Blind => below::pooled(&all, unit).into_iter().collect(),
@@ -242,7 +189,9 @@ fn undetected_effects_may_be_unconfirmed() {
     let all: Vec<&PooledFinding> = all.iter().collect();
     let said = checked(&pooled::noise(&all, &[], unit)[0]);
     assert!(
-        said.starts_with("· With noise, accuracy is 5.0 points higher than by the exposure drop alone (L1), unconfirmed after"),
+        said.starts_with(
+            "· With noise, accuracy is 5.0 points higher than by the exposure drop alone (L1), unconfirmed after"
+        ),
         "{said}"
     );
 }
@@ -252,12 +201,7 @@ fn effects_of_strict_parsing_alone_are_named() {
     let mut found = finding(PooledKind::Enhancer, 1, 0.085, Better);
     found.lenient = parsed(PooledKind::Enhancer, 0.05, NotShown);
     let said = checked(&pooled::enhancers(&[&found], &[], ClusterUnit::Scene)[0]);
-    assert!(
-        said.starts_with(
-            "· lift at L1: accuracy 8.5 points higher, in the strict parsing alone. ("
-        ),
-        "{said}"
-    );
+    assert!(said.starts_with("· lift at L1: accuracy 8.5 points higher, in the strict parsing alone. ("), "{said}");
 }
 
 #[test]
@@ -269,9 +213,7 @@ fn unconfirmed_fidelity_names_its_direction() {
     );
     let none = fidelity_sentence([0.11, 0.02, 0.53]);
     assert!(
-        none.starts_with(
-            "· Within a condition, PSNR was not detected to tell right from wrong answers. ("
-        ),
+        none.starts_with("· Within a condition, PSNR was not detected to tell right from wrong answers. ("),
         "{none}"
     );
 }
@@ -280,12 +222,7 @@ fn unconfirmed_fidelity_names_its_direction() {
 fn fidelity_sentence([value, low, high]: [f64; 3]) -> String {
     let trials = Vec::new().into_iter().collect();
     let mut findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
-    let estimate = Estimate {
-        value,
-        low,
-        high,
-        n: 702,
-    };
+    let estimate = Estimate { value, low, high, n: 702 };
     findings.fidelity = Some(FidelityFindings {
         models: vec!["m".to_owned()],
         conditions: Vec::new(),
@@ -297,11 +234,7 @@ fn fidelity_sentence([value, low, high]: [f64; 3]) -> String {
 }
 
 /// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.
-fn detected_by_mean(
-    kind: PooledKind,
-    difference: f64,
-    verdict: Significance,
-) -> [Vec<PooledFinding>; 2] {
+fn detected_by_mean(kind: PooledKind, difference: f64, verdict: Significance) -> [Vec<PooledFinding>; 2] {
     let levels = findings(kind, &[(difference / 5.0, NotShown); 5]);
     let mean = PooledFinding {
         mean_over: levels[3..].iter().map(|finding| finding.level).collect(),
@@ -314,33 +247,27 @@ fn detected_by_mean(
 fn means_are_reported_without_a_detected_level() {
     let helps = mean_sentences(PooledKind::Enhancer, 0.05, Better);
     assert!(
-        helps[0].starts_with(
-            "+ lift helps at L4–L5, by 5.0 points on average. (mean of these 2 models: +5.0 ["
-        ) && helps[0].contains("; mean of L4–L5; at L1–L5: +1.0, +1.0, +1.0, +1.0, +1.0; n = "),
+        helps[0].starts_with("+ lift helps at L4–L5, by 5.0 points on average. (mean of these 2 models: +5.0 [")
+            && helps[0].contains("; mean of L4–L5; at L1–L5: +1.0, +1.0, +1.0, +1.0, +1.0; n = "),
         "{helps:?}"
     );
-    assert!(
-        helps[1].starts_with("· lift at L1–L3: no effect detected. ("),
-        "{helps:?}"
-    );
+    assert!(helps[1].starts_with("· lift at L1–L3: no effect detected. ("), "{helps:?}");
     let costs = mean_sentences(PooledKind::Darkness, -0.05, Worse);
     assert!(
-        costs.len() == 1
-            && costs[0].starts_with("− Darkness costs 5.0 points on average over L4–L5, from "),
+        costs.len() == 1 && costs[0].starts_with("− Darkness costs 5.0 points on average over L4–L5, from "),
         "{costs:?}"
     );
     let noise = mean_sentences(PooledKind::Noise, -0.05, Worse);
     assert!(
         noise.len() == 1
-            && noise[0].starts_with("− With noise, accuracy is 5.0 points lower on average than by the exposure drop alone (L4–L5). ("),
+            && noise[0].starts_with(
+                "− With noise, accuracy is 5.0 points lower on average than by the exposure drop alone (L4–L5). ("
+            ),
         "{noise:?}"
     );
     // A mean without a verdict changes nothing.
     let none = mean_sentences(PooledKind::Enhancer, 0.05, NotShown);
-    assert!(
-        none.len() == 1 && none[0].starts_with("· lift at L1–L5: no effect detected. ("),
-        "{none:?}"
-    );
+    assert!(none.len() == 1 && none[0].starts_with("· lift at L1–L5: no effect detected. ("), "{none:?}");
 }
 
 fn mean_sentences(kind: PooledKind, difference: f64, verdict: Significance) -> Vec<String> {
@@ -348,9 +275,7 @@ fn mean_sentences(kind: PooledKind, difference: f64, verdict: Significance) -> V
     let [levels, means] = [&levels, &means].map(|all| all.iter().collect::<Vec<&PooledFinding>>());
     let unit = ClusterUnit::Scene;
     let sentences: Vec<Sentence> = match kind {
-        PooledKind::Darkness => darkness::with_variant(&levels, Some(means[0]), &[], None, unit)
-            .into_iter()
-            .collect(),
+        PooledKind::Darkness => darkness::with_variant(&levels, Some(means[0]), &[], None, unit).into_iter().collect(),
         PooledKind::Noise => pooled::noise(&levels, &means, unit),
         _ => pooled::enhancers(&levels, &means, unit),
     };
@@ -361,16 +286,9 @@ fn mean_sentences(kind: PooledKind, difference: f64, verdict: Significance) -> V
 fn the_observer_confirms_less() {
     // In a report on several runs, the name contains the run.
     let said = enhancer_sentences("observer (a)", &[(-0.088, Worse), (-0.08, Worse)]);
-    assert!(
-        said[0]
-            .starts_with("− With lift the observer confirms less at L1–L2, by up to 8.8 points. ("),
-        "{said:?}"
-    );
+    assert!(said[0].starts_with("− With lift the observer confirms less at L1–L2, by up to 8.8 points. ("), "{said:?}");
     let said = enhancer_sentences("observer", &[(0.03, Better)]);
-    assert!(
-        said[0].starts_with("+ With lift the observer confirms more at L1, by 3.0 points. ("),
-        "{said:?}"
-    );
+    assert!(said[0].starts_with("+ With lift the observer confirms more at L1, by 3.0 points. ("), "{said:?}");
 }
 
 fn enhancer_sentences(model: &str, levels: &[(f64, Significance)]) -> Vec<String> {
@@ -379,10 +297,7 @@ fn enhancer_sentences(model: &str, levels: &[(f64, Significance)]) -> Vec<String
         finding.models = vec![model.to_owned()];
     }
     let all: Vec<&PooledFinding> = all.iter().collect();
-    pooled::enhancers(&all, &[], ClusterUnit::Scene)
-        .iter()
-        .map(checked)
-        .collect()
+    pooled::enhancers(&all, &[], ClusterUnit::Scene).iter().map(checked).collect()
 }
 
 #[test]
@@ -401,10 +316,7 @@ fn interval_widths_are_a_range() {
 }
 
 fn power_sentence(half_widths: &[f64]) -> Option<String> {
-    let mut all = findings(
-        PooledKind::Darkness,
-        &vec![(-0.129, Worse); half_widths.len()],
-    );
+    let mut all = findings(PooledKind::Darkness, &vec![(-0.129, Worse); half_widths.len()]);
     for (finding, half) in all.iter_mut().zip(half_widths) {
         let difference = &mut finding.strict.difference;
         (difference.low, difference.high) = (-0.129 - half, -0.129 + half);
@@ -418,8 +330,7 @@ fn one_model_and_lost_items_are_named() {
     let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
     one.models = vec!["gpt-4o".to_owned()];
     (one.dropped, one.strict.p_by, one.clusters) = (100, SwapMethod::Drawn(100_000), 1);
-    let said =
-        checked(&darkness::with_variant(&[&one], None, &[], None, ClusterUnit::Frame).unwrap());
+    let said = checked(&darkness::with_variant(&[&one], None, &[], None, ClusterUnit::Frame).unwrap());
     assert!(
         said.ends_with(
             "(gpt-4o: −30.0 [−34.0, −26.0], p < 0.001; a loss is shown at L5; n = 1,237 in 1 frame, 100 left out because a model has no \
@@ -449,13 +360,7 @@ fn sentences_never_claim_equality() {
         include_str!("../below_blind.rs"),
     ];
     for text in source {
-        for word in [
-            "no difference is",
-            "equal to",
-            "tied",
-            "the same as",
-            "significant",
-        ] {
+        for word in ["no difference is", "equal to", "tied", "the same as", "significant"] {
             assert!(!text.contains(&format!("{word} ")), "{word}");
         }
     }

@@ -29,10 +29,7 @@ fn unconfirmed_effects_on_photographs_are_stated() {
             "real darkness",
             "· Photographed in the dark (dark, 3.6 EV), accuracy of m is 5.0 points lower than in the light, unconfirmed after",
         ),
-        (
-            "real enhanced",
-            "· lift with dark: accuracy of m 5.0 points higher, unconfirmed after",
-        ),
+        ("real enhanced", "· lift with dark: accuracy of m 5.0 points higher, unconfirmed after"),
     ] {
         let of_kind = of_kind(&said, kind);
         assert!(of_kind[0].starts_with(text), "{of_kind:?}");

@@ -9,8 +9,7 @@ use rand_distr::{Distribution, StandardNormal};
 use super::records::{record, unanswered};
 use crate::report::sentences::{Sentence, Tone, sentences};
 use crate::types::{
-    ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, ParsedAnswer, QuestionId,
-    Record, TrialOutcome,
+    ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, ParsedAnswer, QuestionId, Record, TrialOutcome,
 };
 use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::{Clusters, FrameTies};
@@ -44,10 +43,7 @@ const QUESTIONS: [(Family, &[&str]); 4] = [
     (Family::Presence, &["yes", "no"]),
     (Family::Presence, &["no", "yes"]),
     (Family::Color, &["red", "green", "blue", "white"]),
-    (
-        Family::RoomType,
-        &["kitchen", "bedroom", "bathroom", "hall"],
-    ),
+    (Family::RoomType, &["kitchen", "bedroom", "bathroom", "hall"]),
 ];
 
 impl Design {
@@ -70,11 +66,7 @@ impl Design {
     fn effect(&self, condition: &str) -> f64 {
         let is_dark = condition.starts_with("L4-noise") || condition.starts_with("L5-noise");
         let loss = if is_dark { -self.loss } else { 0.0 };
-        let gain = if is_dark && condition.ends_with("+e0") {
-            self.gain
-        } else {
-            0.0
-        };
+        let gain = if is_dark && condition.ends_with("+e0") { self.gain } else { 0.0 };
         gain + loss
     }
 
@@ -84,8 +76,7 @@ impl Design {
         for model in 0..self.models {
             let model = format!("m{model:02}");
             for name in self.conditions() {
-                let condition: Option<Condition> =
-                    (!name.is_empty()).then(|| name.parse().unwrap());
+                let condition: Option<Condition> = (!name.is_empty()).then(|| name.parse().unwrap());
                 for item in 0..4 * self.frames {
                     let (family, choices) = &QUESTIONS[item % 4];
                     let detail = unanswered(format!("f{:03}", item / 4), family.clone(), choices);
@@ -96,19 +87,15 @@ impl Design {
         records
     }
 
-    /// Draws new answers for all records. Items, frames and models have random difficulties. Conditions differ by a random effect of each
-    /// frame and by a new draw for 30 % of the answers, and on average only by [`Design::effect`]. The confidence of a reply is the true
-    /// probability that it is right.
+    /// Draws new answers for all records. Items, frames and models have random difficulties. Conditions differ by a
+    /// random effect of each frame and by a new draw for 30 % of the answers, and on average only by
+    /// [`Design::effect`]. The confidence of a reply is the true probability that it is right.
     fn answer(&self, random: &mut StdRng, records: &mut [Record]) {
         let items = 4 * self.frames;
         let frames = normals(random, self.frames, 0.5);
         let difficulties = normals(random, items, 0.8);
         let conditions = self.conditions();
-        let different = if self.twins {
-            self.models / 2
-        } else {
-            self.models
-        };
+        let different = if self.twins { self.models / 2 } else { self.models };
         let models: Vec<(f64, Vec<f64>)> = (0..different)
             .map(|_| {
                 let skill = 1.2 + 0.3 * Distribution::<f64>::sample(&StandardNormal, random);
@@ -125,11 +112,7 @@ impl Design {
                     let logit = skill + frames[frame] + difficulties[item] + luck[frame];
                     let p = 1.0 / (1.0 + (-logit).exp());
                     let p = p.clamp(0.55, 0.98) + self.effect(name);
-                    let drawn = if random.random_bool(0.3) {
-                        random.random_range(0.0..1.0)
-                    } else {
-                        fixed[item]
-                    };
+                    let drawn = if random.random_bool(0.3) { random.random_range(0.0..1.0) } else { fixed[item] };
                     set_answer(&mut record.detail, p, drawn);
                 }
             }
@@ -139,43 +122,25 @@ impl Design {
 
 /// Normal random numbers with mean 0 and this standard deviation.
 pub(super) fn normals(random: &mut StdRng, count: usize, deviation: f64) -> Vec<f64> {
-    (0..count)
-        .map(|_| deviation * Distribution::<f64>::sample(&StandardNormal, random))
-        .collect()
+    (0..count).map(|_| deviation * Distribution::<f64>::sample(&StandardNormal, random)).collect()
 }
 
 /// Sets an answer that is right with probability `p`, by a draw between 0 and 1.
 pub(super) fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
     let choices = detail.choices.len();
     let is_right = drawn < p;
-    let chosen = if is_right {
-        0
-    } else {
-        1 + ((drawn - p) / (1.0 - p) * (choices - 1) as f64) as usize
-    };
+    let chosen = if is_right { 0 } else { 1 + ((drawn - p) / (1.0 - p) * (choices - 1) as f64) as usize };
     let chosen = chosen.min(choices - 1);
-    let reading = Some(ParsedAnswer {
-        chosen: Some(chosen),
-        why: None,
-    });
+    let reading = Some(ParsedAnswer { chosen: Some(chosen), why: None });
     (detail.strict, detail.lenient) = (reading, reading);
-    detail.outcome = if is_right {
-        TrialOutcome::Right
-    } else {
-        TrialOutcome::Wrong
-    };
+    detail.outcome = if is_right { TrialOutcome::Right } else { TrialOutcome::Wrong };
     // A model with less than half of the probability could have chosen another answer.
     let confidence = p.clamp(0.51, 0.99);
     let rest = (1.0 - confidence) / (choices - 1) as f64;
     let mut probabilities = vec![rest; choices];
     probabilities[chosen] = confidence;
-    detail.options = Some(OptionProbabilities {
-        p: probabilities,
-        mass: 1.0,
-        bound: 0.0,
-        token: String::new(),
-        reasoned: false,
-    });
+    detail.options =
+        Some(OptionProbabilities { p: probabilities, mass: 1.0, bound: 0.0, token: String::new(), reasoned: false });
 }
 
 /// True if a sentence claims an effect: by its sign, or in words.
@@ -218,45 +183,18 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
         for claim in &claims {
             *counts.kinds.entry(claim.kind).or_default() += 1;
         }
-        let whole = findings
-            .pooled
-            .iter()
-            .filter(|finding| finding.family.as_ref() == finding.kind.only_family());
-        counts.own += usize::from(
-            whole
-                .clone()
-                .any(|finding| finding.strict.verdict.is_shown()),
-        );
-        let is_decided = findings
-            .by_profile
-            .iter()
-            .any(|finding| finding.robustness.word() != "open");
+        let whole = findings.pooled.iter().filter(|finding| finding.family.as_ref() == finding.kind.only_family());
+        counts.own += usize::from(whole.clone().any(|finding| finding.strict.verdict.is_shown()));
+        let is_decided = findings.by_profile.iter().any(|finding| finding.robustness.word() != "open");
         counts.decided += usize::from(is_decided);
         for (kind, verdict, name, found) in [
-            (
-                PooledKind::Enhancer,
-                Significance::Better,
-                "enhancer",
-                &mut counts.helped,
-            ),
-            (
-                PooledKind::Darkness,
-                Significance::Worse,
-                "darkness",
-                &mut counts.lost,
-            ),
+            (PooledKind::Enhancer, Significance::Better, "enhancer", &mut counts.helped),
+            (PooledKind::Darkness, Significance::Worse, "darkness", &mut counts.lost),
         ] {
             let sign = Tone::from(verdict);
-            found[0] += usize::from(
-                claims
-                    .iter()
-                    .any(|claim| claim.kind == name && claim.tone == sign),
-            );
-            found[1] += usize::from(
-                whole
-                    .clone()
-                    .any(|finding| finding.kind == kind && finding.strict.verdict == verdict),
-            );
+            found[0] += usize::from(claims.iter().any(|claim| claim.kind == name && claim.tone == sign));
+            found[1] +=
+                usize::from(whole.clone().any(|finding| finding.kind == kind && finding.strict.verdict == verdict));
         }
     }
     counts
@@ -270,24 +208,14 @@ pub(super) fn percent(count: usize, runs: usize) -> String {
 }
 
 pub(super) fn runs() -> usize {
-    std::env::var("DARKQA_RUNS")
-        .ok()
-        .and_then(|runs| runs.parse().ok())
-        .unwrap_or(300)
+    std::env::var("DARKQA_RUNS").ok().and_then(|runs| runs.parse().ok()).unwrap_or(300)
 }
 
 /// The numbers of models to simulate: those in `DARKQA_MODELS`, separated by commas, or all.
 fn model_counts(all: &[usize]) -> Vec<usize> {
     let named = std::env::var("DARKQA_MODELS").unwrap_or_default();
-    let named: Vec<usize> = named
-        .split(',')
-        .filter_map(|count| count.parse().ok())
-        .collect();
-    if named.is_empty() {
-        all.to_vec()
-    } else {
-        named
-    }
+    let named: Vec<usize> = named.split(',').filter_map(|count| count.parse().ok()).collect();
+    if named.is_empty() { all.to_vec() } else { named }
 }
 
 #[test]
@@ -301,20 +229,8 @@ fn null_reports_have_no_sign() {
     for models in model_counts(&[1, 3, 6, 12]) {
         for profiles in [1, 4] {
             for enhancers in [0, 1, 4] {
-                let design = Design {
-                    models,
-                    profiles,
-                    enhancers,
-                    frames: 42,
-                    gain: 0.0,
-                    loss: 0.0,
-                    twins: false,
-                };
-                let counts = simulate(
-                    &design,
-                    runs(),
-                    (100 * models + 10 * profiles + enhancers) as u64,
-                );
+                let design = Design { models, profiles, enhancers, frames: 42, gain: 0.0, loss: 0.0, twins: false };
+                let counts = simulate(&design, runs(), (100 * models + 10 * profiles + enhancers) as u64);
                 all += counts.runs;
                 signed += counts.signed;
                 println!(
@@ -341,32 +257,16 @@ fn effects_are_found() {
     for models in model_counts(&[1, 6]) {
         for (profiles, enhancers) in [(1, 1), (1, 4), (4, 1)] {
             for effect in [0.05, 0.1] {
-                let design = Design {
-                    models,
-                    profiles,
-                    enhancers,
-                    frames: 42,
-                    gain: effect,
-                    loss: 0.0,
-                    twins: false,
-                };
+                let design = Design { models, profiles, enhancers, frames: 42, gain: effect, loss: 0.0, twins: false };
                 let seed = (100 * models + 10 * profiles + enhancers) as u64;
                 let helped = simulate(&design, runs(), seed).helped;
-                let design = Design {
-                    gain: 0.0,
-                    loss: effect,
-                    ..design
-                };
+                let design = Design { gain: 0.0, loss: effect, ..design };
                 let lost = simulate(&design, runs(), seed).lost;
                 let mut cells = String::new();
                 for count in helped.into_iter().chain(lost) {
                     let _ = write!(cells, " {} |", percent(count, runs()));
                 }
-                println!(
-                    "| {models} | {profiles} | {enhancers} | {} | {} |{cells}",
-                    100.0 * effect,
-                    runs()
-                );
+                println!("| {models} | {profiles} | {enhancers} | {} | {} |{cells}", 100.0 * effect, runs());
             }
         }
     }
@@ -374,54 +274,31 @@ fn effects_are_found() {
 
 /// Number of simulated comparisons of unchanged models in which a model is called worse than in the old run.
 fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
-    let design = Design {
-        models: 2 * models,
-        profiles: 1,
-        enhancers: 4,
-        frames: 42,
-        gain: 0.0,
-        loss: 0.0,
-        twins: true,
-    };
+    let design =
+        Design { models: 2 * models, profiles: 1, enhancers: 4, frames: 42, gain: 0.0, loss: 0.0, twins: true };
     let mut random = StdRng::seed_from_u64((100 * models + conditions) as u64);
     let mut records = design.records();
-    let kept: Vec<Option<Condition>> = design.conditions()[1..=conditions]
-        .iter()
-        .map(|name| Some(name.parse().unwrap()))
-        .collect();
+    let kept: Vec<Option<Condition>> =
+        design.conditions()[1..=conditions].iter().map(|name| Some(name.parse().unwrap())).collect();
     (0..runs)
         .filter(|_| {
             design.answer(&mut random, &mut records);
-            let trials = records
-                .iter()
-                .filter(|record| kept.contains(&record.condition))
-                .cloned()
-                .collect();
+            let trials = records.iter().filter(|record| kept.contains(&record.condition)).cloned().collect();
             let units = Clusters::new(asked_pairs(&records), &FrameTies::default());
             let grid = Grid::new(&trials, &units);
-            let pairs = grid
-                .subjects
-                .iter()
-                .enumerate()
-                .filter_map(|(index, subject)| {
-                    let number: usize = subject.model[1..].parse().ok()?;
-                    let old = ModelInCondition {
-                        model: format!("m{:02}", number + models),
-                        ..subject.clone()
-                    };
-                    Some((index, grid.find(&old)?))
-                });
+            let pairs = grid.subjects.iter().enumerate().filter_map(|(index, subject)| {
+                let number: usize = subject.model[1..].parse().ok()?;
+                let old = ModelInCondition { model: format!("m{:02}", number + models), ..subject.clone() };
+                Some((index, grid.find(&old)?))
+            });
             let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), |_| None);
-            rows.iter()
-                .any(|row| row.significance == Significance::Worse)
+            rows.iter().any(|row| row.significance == Significance::Worse)
         })
         .count()
 }
 
 fn asked_pairs(records: &[Record]) -> impl Iterator<Item = (&QuestionId, &FrameId)> {
-    records
-        .iter()
-        .map(|record| (&record.question, &record.detail.frame))
+    records.iter().map(|record| (&record.question, &record.detail.frame))
 }
 
 #[test]
@@ -430,10 +307,6 @@ fn asked_pairs(records: &[Record]) -> impl Iterator<Item = (&QuestionId, &FrameI
 fn unchanged_models_are_not_called_worse() {
     for (models, conditions) in [(1, 3), (1, 17), (6, 3), (6, 17), (12, 3), (12, 17)] {
         let alarms = false_alarms(models, conditions, runs());
-        println!(
-            "| {models} | {conditions} | {} | {} |",
-            runs(),
-            percent(alarms, runs())
-        );
+        println!("| {models} | {conditions} | {} | {} |", runs(), percent(alarms, runs()));
     }
 }

@@ -45,15 +45,11 @@ pub(super) struct TextTable {
 const WRAPPED: usize = 24;
 
 impl TextTable {
-    /// Formats the table in lines of at most `most` terminal columns, if its longest text allows that. A wider table is changed step by
-    /// step: names of models lose their middle, columns of zeros become a note below it, and finally it is split into several parts, each
-    /// with the texts that name its rows.
+    /// Formats the table in lines of at most `most` terminal columns, if its longest text allows that. A wider table is
+    /// changed step by step: names of models lose their middle, columns of zeros become a note below it, and finally it
+    /// is split into several parts, each with the texts that name its rows.
     pub(super) fn format_to(mut self, most: usize) -> String {
-        if self
-            .rows
-            .iter()
-            .all(|row| matches!(row, TextRow::Heading(_)))
-        {
+        if self.rows.iter().all(|row| matches!(row, TextRow::Heading(_))) {
             return String::new();
         }
         let mut note = String::new();
@@ -63,11 +59,7 @@ impl TextTable {
         if self.width() > most {
             note = self.remove_zeros();
         }
-        let parts: String = self
-            .parts(most)
-            .iter()
-            .map(|part| self.format_columns(part, most))
-            .collect();
+        let parts: String = self.parts(most).iter().map(|part| self.format_columns(part, most)).collect();
         parts + &note
     }
 
@@ -94,10 +86,7 @@ impl TextTable {
     }
 
     fn width(&self) -> usize {
-        (0..self.columns.len())
-            .map(|column| self.width_of(column))
-            .sum::<usize>()
-            .saturating_sub(1)
+        (0..self.columns.len()).map(|column| self.width_of(column)).sum::<usize>().saturating_sub(1)
     }
 
     /// Shortens the names of models until the table fits, but never so far that two of them become equal.
@@ -107,19 +96,12 @@ impl TextTable {
             if !MODELS.contains(&&*self.columns[column].head) || over == 0 {
                 continue;
             }
-            let names: BTreeSet<String> = self
-                .cells()
-                .filter_map(|cells| cells.get(column))
-                .cloned()
-                .collect();
+            let names: BTreeSet<String> = self.cells().filter_map(|cells| cells.get(column)).cloned().collect();
             let longest = names.iter().map(|name| name.width()).max().unwrap_or(0);
             let least = longest.saturating_sub(over).max(MIN_NAME);
             let length = (least..longest)
                 .find(|length| {
-                    let shortened: BTreeSet<String> = names
-                        .iter()
-                        .map(|name| shorten_middle(name, *length))
-                        .collect();
+                    let shortened: BTreeSet<String> = names.iter().map(|name| shorten_middle(name, *length)).collect();
                     shortened.len() == names.len()
                 })
                 .unwrap_or(longest);
@@ -138,9 +120,7 @@ impl TextTable {
         let mut names = Vec::new();
         for column in (0..self.columns.len()).rev() {
             let head = &self.columns[column].head;
-            let is_zero = self
-                .cells()
-                .all(|cells| cells.get(column).is_none_or(|cell| cell == "0"));
+            let is_zero = self.cells().all(|cells| cells.get(column).is_none_or(|cell| cell == "0"));
             if !ZEROS.contains(&&**head) || !is_zero {
                 continue;
             }
@@ -160,8 +140,8 @@ impl TextTable {
         }
     }
 
-    /// The columns of each part. The texts at the left, which name the rows, are repeated in every part; on a narrow terminal only as many
-    /// of them as leave room for another column. Longer texts are wrapped.
+    /// The columns of each part. The texts at the left, which name the rows, are repeated in every part; on a narrow
+    /// terminal only as many of them as leave room for another column. Longer texts are wrapped.
     fn parts(&self, most: usize) -> Vec<Vec<usize>> {
         // The last cell has no gap after it.
         let most = most + 1;
@@ -174,9 +154,7 @@ impl TextTable {
         let names = (1..=texts)
             .rev()
             .find(|names| {
-                let widest = (*names..self.columns.len())
-                    .map(|column| self.least_width_of(column))
-                    .max();
+                let widest = (*names..self.columns.len()).map(|column| self.least_width_of(column)).max();
                 self.width_of_first(*names) + widest.unwrap_or(0) <= most
             })
             .unwrap_or(texts.min(1));
@@ -185,9 +163,7 @@ impl TextTable {
         let mut width = 0;
         for column in names..self.columns.len() {
             let least = self.least_width_of(column);
-            let own = self
-                .width_of(column)
-                .min(most.saturating_sub(named).max(least));
+            let own = self.width_of(column).min(most.saturating_sub(named).max(least));
             match parts.last_mut() {
                 Some(part) if width + own <= most => part.push(column),
                 _ => {
@@ -218,9 +194,7 @@ impl TextTable {
     fn format_columns(&self, columns: &[usize], most: usize) -> String {
         let mut grid = comfy_table::Table::new();
         grid.load_style(UTF8_HORIZONTAL_ONLY.row_separator(LineStyle::none()));
-        let heads = columns
-            .iter()
-            .map(|column| self.columns[*column].head.clone());
+        let heads = columns.iter().map(|column| self.columns[*column].head.clone());
         grid.set_header(heads);
         for row in &self.rows {
             match row {
@@ -234,11 +208,7 @@ impl TextTable {
         for (place, column) in grid.column_iter_mut().zip(columns) {
             let is_number = matches!(
                 self.columns[*column].kind,
-                ColumnKind::Count
-                    | ColumnKind::Accuracy
-                    | ColumnKind::Points
-                    | ColumnKind::P
-                    | ColumnKind::Percent
+                ColumnKind::Count | ColumnKind::Accuracy | ColumnKind::Points | ColumnKind::P | ColumnKind::Percent
             );
             if is_number {
                 place.set_cell_alignment(CellAlignment::Right);
@@ -278,24 +248,15 @@ mod tests {
             ("unparsed", ColumnKind::Count),
             ("failed", ColumnKind::Count),
         ];
-        let columns = heads.into_iter().map(|(head, kind)| TextColumn {
-            head: head.to_owned(),
-            kind,
-        });
+        let columns = heads.into_iter().map(|(head, kind)| TextColumn { head: head.to_owned(), kind });
         let mut rows = vec![TextRow::Heading("a group".to_owned())];
         for model in 0..6 {
-            let mut cells = vec![
-                format!("a-model-with-30-letters-b72-{model:02}"),
-                "with noise + lift".to_owned(),
-            ];
+            let mut cells = vec![format!("a-model-with-30-letters-b72-{model:02}"), "with noise + lift".to_owned()];
             cells.extend((0..6).map(|level| format!("{}.{level}", 90 - model)));
             cells.extend(["9999", "0", "0"].map(str::to_owned));
             rows.push(TextRow::Cells(cells));
         }
-        TextTable {
-            columns: columns.collect(),
-            rows,
-        }
+        TextTable { columns: columns.collect(), rows }
     }
 
     #[test]
@@ -304,14 +265,7 @@ mod tests {
             let text = table().format_to(most);
             let widest = text.lines().map(UnicodeWidthStr::width).max().unwrap();
             assert!(widest <= most, "{most}: {widest}\n{text}");
-            for number in [
-                "90.0",
-                "85.5",
-                "9999",
-                "with noise + lift",
-                "-05",
-                "a group",
-            ] {
+            for number in ["90.0", "85.5", "9999", "with noise + lift", "-05", "a group"] {
                 assert!(text.contains(number), "{most}: {number}\n{text}");
             }
             // A column of zeros is named even if it is removed.
@@ -320,10 +274,7 @@ mod tests {
         let wide = table().format_to(140);
         assert!(wide.contains("a-model-with-30-letters-b72-03") && !wide.contains("in every row"));
         let narrow = table().format_to(80);
-        assert!(
-            narrow.contains("unparsed 0, failed 0 in every row"),
-            "{narrow}"
-        );
+        assert!(narrow.contains("unparsed 0, failed 0 in every row"), "{narrow}");
     }
 
     #[test]
@@ -333,20 +284,14 @@ mod tests {
             cells[9] = "7".to_owned();
         }
         let text = table.format_to(60);
-        assert!(
-            text.contains('7') && text.contains("failed 0 in every row"),
-            "{text}"
-        );
+        assert!(text.contains('7') && text.contains("failed 0 in every row"), "{text}");
         assert!(!text.contains("unparsed 0"), "{text}");
     }
 
     #[test]
     fn every_part_names_its_rows() {
         let mut table = table();
-        table.columns.push(TextColumn {
-            head: "reason".to_owned(),
-            kind: ColumnKind::Text,
-        });
+        table.columns.push(TextColumn { head: "reason".to_owned(), kind: ColumnKind::Text });
         for (number, row) in table.rows.iter_mut().enumerate() {
             if let TextRow::Cells(cells) = row {
                 cells[0] = "m".to_owned();
@@ -357,10 +302,7 @@ mod tests {
         let text = table.format_to(80);
         let widest = text.lines().map(UnicodeWidthStr::width).max().unwrap();
         assert!(widest <= 80, "{text}");
-        let reasons: Vec<&str> = text
-            .lines()
-            .filter(|line| line.contains("a reason"))
-            .collect();
+        let reasons: Vec<&str> = text.lines().filter(|line| line.contains("a reason")).collect();
         assert_eq!(reasons.len(), 6, "{text}");
         for (number, line) in (1..).zip(reasons) {
             assert!(line.contains(&format!("enhancer {number}")), "{text}");

@@ -1,9 +1,7 @@
 //! One column of a row group while it is written: [`Chunk`].
 
 use bytes::Bytes;
-use parquet::column::writer::{
-    ColumnCloseResult, ColumnWriter, ColumnWriterImpl, get_column_writer,
-};
+use parquet::column::writer::{ColumnCloseResult, ColumnWriter, ColumnWriterImpl, get_column_writer};
 use parquet::data_type::{ByteArray, DataType, FixedLenByteArray};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::properties::WriterPropertiesPtr;
@@ -53,18 +51,14 @@ impl Chunk {
                     other => Err(other),
                 })
             }
-            ColumnWriter::DoubleColumnWriter(writer) => {
-                write(writer, column, rows, |cell| match cell {
-                    Cell::Double(number) => Ok(Some(number)),
-                    other => Err(other),
-                })
-            }
-            ColumnWriter::BoolColumnWriter(writer) => {
-                write(writer, column, rows, |cell| match cell {
-                    Cell::Bool(value) => Ok(Some(value)),
-                    other => Err(other),
-                })
-            }
+            ColumnWriter::DoubleColumnWriter(writer) => write(writer, column, rows, |cell| match cell {
+                Cell::Double(number) => Ok(Some(number)),
+                other => Err(other),
+            }),
+            ColumnWriter::BoolColumnWriter(writer) => write(writer, column, rows, |cell| match cell {
+                Cell::Bool(value) => Ok(Some(value)),
+                other => Err(other),
+            }),
             ColumnWriter::ByteArrayColumnWriter(writer) => {
                 let (last, long_bytes) = (&mut self.last, &mut self.long_bytes);
                 write(writer, column, rows, |cell| match cell {
@@ -80,16 +74,11 @@ impl Chunk {
                     other => Err(other),
                 })
             }
-            ColumnWriter::FixedLenByteArrayColumnWriter(writer) => {
-                write(writer, column, rows, |cell| match cell {
-                    Cell::Bytes(bytes) => Ok(Some(FixedLenByteArray::from(bytes.to_vec()))),
-                    other => Err(other),
-                })
-            }
-            _ => Err(ParquetError::General(format!(
-                "no values of {} are written",
-                column.name
-            ))),
+            ColumnWriter::FixedLenByteArrayColumnWriter(writer) => write(writer, column, rows, |cell| match cell {
+                Cell::Bytes(bytes) => Ok(Some(FixedLenByteArray::from(bytes.to_vec()))),
+                other => Err(other),
+            }),
+            _ => Err(ParquetError::General(format!("no values of {} are written", column.name))),
         }
     }
 
@@ -100,8 +89,8 @@ impl Chunk {
     }
 }
 
-/// Writes the values of these rows. `read` converts a cell into a value, or `None` for null, and returns a cell of another type as an
-/// error.
+/// Writes the values of these rows. `read` converts a cell into a value, or `None` for null, and returns a cell of
+/// another type as an error.
 fn write<R, T: DataType>(
     writer: &mut ColumnWriterImpl<'_, T>,
     column: &Column<R>,

@@ -76,9 +76,7 @@ impl<'r> Cell<'r> {
 
     /// An integer; null for `None`.
     pub fn int<T: TryInto<i128>>(number: Option<T>) -> Self {
-        number
-            .and_then(|number| number.try_into().ok())
-            .map_or(Self::Null, Self::Int)
+        number.and_then(|number| number.try_into().ok()).map_or(Self::Null, Self::Int)
     }
 }
 

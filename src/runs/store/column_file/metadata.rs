@@ -35,10 +35,7 @@ impl FileMetadata {
         };
         let footer = guarded(|| {
             let mut reader = ParquetMetaDataReader::new();
-            reader
-                .try_parse(&file)
-                .and_then(|()| reader.finish())
-                .map_err(|e| e.to_string())
+            reader.try_parse(&file).and_then(|()| reader.finish()).map_err(|e| e.to_string())
         });
         let Ok(footer) = footer else {
             return Ok(None);
@@ -50,9 +47,6 @@ impl FileMetadata {
             .flatten()
             .filter_map(|pair| Some((pair.key.clone(), pair.value.clone()?)))
             .collect();
-        Ok(Some(Self {
-            created_by: footer.created_by().unwrap_or_default().to_owned(),
-            pairs,
-        }))
+        Ok(Some(Self { created_by: footer.created_by().unwrap_or_default().to_owned(), pairs }))
     }
 }

@@ -34,10 +34,7 @@ struct GroupLimits {
 }
 
 /// Limits of a row group: about a million rows, a common size, or 256 MiB of long texts; chosen.
-const LIMITS: GroupLimits = GroupLimits {
-    rows: 1 << 20,
-    long_bytes: 256 << 20,
-};
+const LIMITS: GroupLimits = GroupLimits { rows: 1 << 20, long_bytes: 256 << 20 };
 
 /// A writer of a table with rows of type `R`. The file has a temporary name until it is complete.
 pub struct ColumnFile<'c, R> {
@@ -65,14 +62,8 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
             .iter()
             .map(Column::field)
             .collect::<std::result::Result<Vec<_>, _>>()
-            .and_then(|fields| {
-                Type::group_type_builder("records")
-                    .with_fields(fields)
-                    .build()
-            })
-            .and_then(|schema| {
-                SerializedFileWriter::new(file, Arc::new(schema), Arc::clone(&properties))
-            })
+            .and_then(|fields| Type::group_type_builder("records").with_fields(fields).build())
+            .and_then(|schema| SerializedFileWriter::new(file, Arc::new(schema), Arc::clone(&properties)))
             .map_err(|e| unwritable(&part, e))?;
         Ok(Self {
             file,
@@ -103,12 +94,8 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
                     .collect();
             }
             let (now, later) = rows.split_at(rows.len().min(self.limits.rows - self.rows));
-            let appended: std::result::Result<(), ParquetError> = self
-                .group
-                .par_iter_mut()
-                .zip(self.columns)
-                .map(|(chunk, column)| chunk.append(column, now))
-                .collect();
+            let appended: std::result::Result<(), ParquetError> =
+                self.group.par_iter_mut().zip(self.columns).map(|(chunk, column)| chunk.append(column, now)).collect();
             appended.map_err(|e| unwritable(&self.part, e))?;
             self.rows += now.len();
             let long: usize = self.group.iter().map(|chunk| chunk.long_bytes).sum();
@@ -128,8 +115,7 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
                 *self.too_large.entry(column.name).or_default() += chunk.too_large;
             }
         }
-        let closed: std::result::Result<Vec<_>, _> =
-            chunks.into_par_iter().map(Chunk::close).collect();
+        let closed: std::result::Result<Vec<_>, _> = chunks.into_par_iter().map(Chunk::close).collect();
         let mut group = self.file.next_row_group()?;
         for (pages, closed) in closed? {
             group.append_column(&pages, closed)?;
@@ -137,31 +123,23 @@ impl<'c, R: Sync> ColumnFile<'c, R> {
         group.close().map(drop)
     }
 
-    /// Completes the file and renames it to its path. Returns the number of values that were too large for their column and are null, by
-    /// column.
+    /// Completes the file and renames it to its path. Returns the number of values that were too large for their column
+    /// and are null, by column.
     ///
     /// # Errors
     /// If it cannot be written.
     pub fn finish(mut self) -> Result<BTreeMap<&'static str, usize>> {
-        let ended = if self.group.is_empty() {
-            Ok(())
-        } else {
-            self.end_group()
-        };
-        ended
-            .and_then(|()| self.file.close())
-            .map_err(|e| unwritable(&self.part, e))?;
+        let ended = if self.group.is_empty() { Ok(()) } else { self.end_group() };
+        ended.and_then(|()| self.file.close()).map_err(|e| unwritable(&self.part, e))?;
         fs::rename(&self.part, &self.path).map_err(|e| Error::file(&self.path, "write", e))?;
         Ok(self.too_large)
     }
 }
 
-/// Writer settings: Snappy compression, which every reader supports, and dictionaries except for keys, which are unique.
+/// Writer settings: Snappy compression, which every reader supports, and dictionaries except for keys, which are
+/// unique.
 fn properties<R>(columns: &[Column<R>], metadata: &FileMetadata) -> WriterProperties {
-    let pairs = metadata
-        .pairs
-        .iter()
-        .map(|(key, value)| KeyValue::new(key.clone(), value.clone()));
+    let pairs = metadata.pairs.iter().map(|(key, value)| KeyValue::new(key.clone(), value.clone()));
     let mut properties = WriterProperties::builder()
         .set_compression(Compression::SNAPPY)
         .set_created_by(metadata.created_by.clone())

@@ -7,8 +7,8 @@ use parquet::column::page::{CompressedPage, PageWriteSpec, PageWriter};
 use parquet::errors::Result;
 use parquet::file::writer::{SerializedPageWriter, TrackedWrite};
 
-/// The compressed pages of a column, shared by its writer and the row group. They are kept in memory, because all columns of a row group
-/// grow at once, but the file contains one column after the other.
+/// The compressed pages of a column, shared by its writer and the row group. They are kept in memory, because all
+/// columns of a row group grow at once, but the file contains one column after the other.
 #[derive(Clone)]
 pub(super) struct Pages(Arc<Mutex<TrackedWrite<Vec<u8>>>>);
 

@@ -27,30 +27,17 @@ fn columns() -> Vec<Column<Values>> {
         presence: Presence,
         value: for<'r> fn(&'r Values) -> Cell<'r>,
     ) -> Column<Values> {
-        Column {
-            name,
-            kind,
-            presence,
-            value,
-        }
+        Column { name, kind, presence, value }
     }
     vec![
         column("key", Key, Always, |row| Cell::Bytes(&row.key)),
-        column("digest", Digest, MayBeNull, |row| {
-            row.digest.as_ref().map_or(Cell::Null, |d| Cell::Bytes(d))
-        }),
+        column("digest", Digest, MayBeNull, |row| row.digest.as_ref().map_or(Cell::Null, |d| Cell::Bytes(d))),
         column("name", Text, Always, |row| Cell::text(Some(row.name))),
-        column("long", LongText, MayBeNull, |row| {
-            Cell::text(row.long.as_deref())
-        }),
+        column("long", LongText, MayBeNull, |row| Cell::text(row.long.as_deref())),
         column("small", Int8, Always, |row| Cell::int(Some(row.small))),
         column("number", Int32, MayBeNull, |row| Cell::int(row.number)),
-        column("ev", Double, MayBeNull, |row| {
-            row.ev.map_or(Cell::Null, Cell::Double)
-        }),
-        column("right", Bool, MayBeNull, |row| {
-            row.right.map_or(Cell::Null, Cell::Bool)
-        }),
+        column("ev", Double, MayBeNull, |row| row.ev.map_or(Cell::Null, Cell::Double)),
+        column("right", Bool, MayBeNull, |row| row.right.map_or(Cell::Null, Cell::Bool)),
     ]
 }
 
@@ -71,10 +58,7 @@ fn row(index: u64) -> Values {
 }
 
 fn metadata() -> FileMetadata {
-    FileMetadata {
-        created_by: CREATED_BY.to_owned(),
-        pairs: [("darkqa.schema".to_owned(), "a/1".to_owned())].into(),
-    }
+    FileMetadata { created_by: CREATED_BY.to_owned(), pairs: [("darkqa.schema".to_owned(), "a/1".to_owned())].into() }
 }
 
 fn write(path: &Path, rows: &[Values], at_once: usize, limits: GroupLimits) {
@@ -94,12 +78,7 @@ fn read(path: &Path) -> (Vec<serde_json::Value>, usize) {
     let rows = reader
         .get_row_iter(None)
         .unwrap()
-        .map(|row| {
-            row.unwrap()
-                .get_column_iter()
-                .map(|(name, field)| (name.clone(), value(field)))
-                .collect()
-        })
+        .map(|row| row.unwrap().get_column_iter().map(|(name, field)| (name.clone(), value(field))).collect())
         .map(serde_json::Value::Object)
         .collect();
     (rows, reader.num_row_groups())
@@ -142,11 +121,7 @@ fn values_and_nulls_are_read_back() {
         panic!("{:?}", group.column(5));
     };
     assert_eq!(
-        (
-            numbers.min_opt(),
-            numbers.max_opt(),
-            numbers.null_count_opt()
-        ),
+        (numbers.min_opt(), numbers.max_opt(), numbers.null_count_opt()),
         (Some(&0), Some(&49_998), Some(25_000))
     );
     // A text that many rows share is stored once.
@@ -158,22 +133,15 @@ fn values_and_nulls_are_read_back() {
 #[test]
 fn row_groups_have_limits_and_files_are_reproducible() {
     let folder = tempfile::tempdir().unwrap();
-    let [one, two, three, empty] =
-        ["one", "two", "three", "empty"].map(|name| folder.path().join(name));
+    let [one, two, three, empty] = ["one", "two", "three", "empty"].map(|name| folder.path().join(name));
     let rows: Vec<Values> = (0..5_000).map(row).collect();
-    let by_rows = GroupLimits {
-        rows: 2_048,
-        long_bytes: usize::MAX,
-    };
+    let by_rows = GroupLimits { rows: 2_048, long_bytes: usize::MAX };
     write(&one, &rows, 1_024, by_rows);
     write(&two, &rows, 1_024, by_rows);
     assert_eq!(fs::read(&one).unwrap(), fs::read(&two).unwrap());
     let (all, groups) = read(&one);
     assert_eq!((all.len(), groups), (5_000, 3));
-    let by_bytes = GroupLimits {
-        rows: usize::MAX,
-        long_bytes: 20_000,
-    };
+    let by_bytes = GroupLimits { rows: usize::MAX, long_bytes: 20_000 };
     write(&three, &rows, 100, by_bytes);
     let (same, groups) = read(&three);
     assert_eq!(same, all);
@@ -189,21 +157,14 @@ fn misfits_are_null_or_errors() {
     let columns = columns();
     let mut file = ColumnFile::create(&path, &columns, &metadata()).unwrap();
     let number = Some(u64::MAX);
-    file.append(&[Values { number, ..row(0) }, row(1), row(2)])
-        .unwrap();
+    file.append(&[Values { number, ..row(0) }, row(1), row(2)]).unwrap();
     assert_eq!(file.finish().unwrap(), [("number", 1)].into());
     let (rows, _) = read(&path);
     assert!(rows[0]["number"].is_null() && rows[2]["number"] == 2);
     let mut file = ColumnFile::create(&path, &columns, &metadata()).unwrap();
-    let problem = file.append(&[Values {
-        small: 200,
-        ..row(0)
-    }]);
+    let problem = file.append(&[Values { small: 200, ..row(0) }]);
     let problem = problem.unwrap_err().to_string();
-    assert!(
-        problem.contains("no value in the column small"),
-        "{problem}"
-    );
+    assert!(problem.contains("no value in the column small"), "{problem}");
     let wrong = vec![Column {
         value: |_: &Values| Cell::Text(Cow::Borrowed("a text")),
         name: "ev",
@@ -212,10 +173,7 @@ fn misfits_are_null_or_errors() {
     }];
     let mut file = ColumnFile::create(&path, &wrong, &metadata()).unwrap();
     let problem = file.append(&[row(0)]).unwrap_err().to_string();
-    assert!(
-        problem.contains("not a value of the column ev"),
-        "{problem}"
-    );
+    assert!(problem.contains("not a value of the column ev"), "{problem}");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Tests of the strict score against hand-computed values, on 24 questions with three choices, two about each of 12 frames.
+//! Tests of the strict score against hand-computed values, on 24 questions with three choices, two about each of 12
+//! frames.
 
 use super::*;
 use crate::tests::{records, with_grid};
@@ -29,16 +30,10 @@ fn questions(records: &[Record], group: impl Fn(usize) -> Option<String>) -> Vec
         });
     }
     let mut sizes = BTreeMap::<String, usize>::new();
-    for group in questions
-        .iter()
-        .filter_map(|question| question.group.as_ref())
-    {
+    for group in questions.iter().filter_map(|question| question.group.as_ref()) {
         *sizes.entry(group.name.clone()).or_default() += 1;
     }
-    for group in questions
-        .iter_mut()
-        .filter_map(|question| question.group.as_mut())
-    {
+    for group in questions.iter_mut().filter_map(|question| question.group.as_mut()) {
         group.size = sizes[&group.name];
     }
     questions
@@ -58,11 +53,7 @@ fn strict<'s>(score: &'s StrictScore, condition: &str) -> &'s GroupCell {
     score
         .cells
         .iter()
-        .find(|cell| {
-            cell.family.is_none()
-                && cell.mode == ParsingMode::Strict
-                && cell.subject.condition() == condition
-        })
+        .find(|cell| cell.family.is_none() && cell.mode == ParsingMode::Strict && cell.subject.condition() == condition)
         .unwrap()
 }
 
@@ -84,22 +75,12 @@ fn one_wrong_member_makes_its_group_wrong() {
     assert_eq!(dark.share, Estimate::share(9, 12));
     // Half of all replies are right, and no group is.
     assert_eq!(strict(&score, "blind").share, Estimate::share(0, 12));
-    assert_eq!(
-        (
-            score.groups,
-            score.single,
-            score.across_frames,
-            score.never_complete
-        ),
-        (12, 0, 0, 0)
-    );
+    assert_eq!((score.groups, score.single, score.across_frames, score.never_complete), (12, 0, 0, 0));
 }
 
 #[test]
 fn a_group_without_all_replies_is_incomplete_and_not_scored() {
-    let made = records("m", "L0", |item| {
-        (item != 7).then_some(item != 6 && item != 0)
-    });
+    let made = records("m", "L0", |item| (item != 7).then_some(item != 6 && item != 0));
     let all = questions(&made, |item| Some(by_frame(item)));
     let cell = score(&made, &all);
     let cell = strict(&cell, "L0");
@@ -117,11 +98,7 @@ fn a_group_without_all_replies_is_incomplete_and_not_scored() {
     assert_eq!(strict(&part, "L0").share, Estimate::share(9, 10));
     assert_eq!(part.chance[0].share.unwrap().n, 11);
     // A question that is known and was not asked of this model.
-    let asked: Vec<Record> = made
-        .iter()
-        .filter(|record| record.question.0 != "q23")
-        .cloned()
-        .collect();
+    let asked: Vec<Record> = made.iter().filter(|record| record.question.0 != "q23").cloned().collect();
     let asked = score(&asked, &all);
     assert_eq!(asked.never_complete, 0);
     assert_eq!(strict(&asked, "L0").incomplete, 2);
@@ -144,13 +121,7 @@ fn chance_is_the_mean_product_of_one_over_the_choices() {
     let families: Vec<&GroupChance> = score.chance.iter().skip(1).collect();
     assert_eq!(families.len(), 1);
     assert_eq!(families[0].share, Some(Estimate::exact(1.0 / 3.0, 1)));
-    assert_eq!(
-        with_grid(&made, |grid| StrictScore::new(
-            grid,
-            &questions(&made, |_| None)
-        )),
-        None
-    );
+    assert_eq!(with_grid(&made, |grid| StrictScore::new(grid, &questions(&made, |_| None))), None);
 }
 
 #[test]
@@ -159,20 +130,13 @@ fn groups_that_share_a_frame_are_one_cluster() {
     let made = records("m", "L0", |item| Some(item / 2 % 3 != 0));
     let alone = score(&made, &questions(&made, |item| Some(format!("{item:02}"))));
     let cell = strict(&alone, "L0");
-    let counts: Vec<ClusterCount> = (0..12)
-        .map(|frame| ClusterCount {
-            right: 2 * u32::from(frame % 3 != 0),
-            replies: 2,
-        })
-        .collect();
+    let counts: Vec<ClusterCount> =
+        (0..12).map(|frame| ClusterCount { right: 2 * u32::from(frame % 3 != 0), replies: 2 }).collect();
     assert_eq!(cell.clusters, 12);
     assert_eq!(cell.share, Estimate::clustered(&counts));
     assert_ne!(cell.share, Estimate::share(16, 24));
     // Two groups about the same two frames: one cluster for both.
-    let crossed = score(
-        &made,
-        &questions(&made, |item| Some(format!("{} {}", item / 4, item % 2))),
-    );
+    let crossed = score(&made, &questions(&made, |item| Some(format!("{} {}", item / 4, item % 2))));
     let cell = strict(&crossed, "L0");
     assert_eq!((cell.clusters, cell.share.unwrap().n), (6, 12));
     assert_eq!(crossed.across_frames, 12);
@@ -196,10 +160,6 @@ fn a_question_asked_again_must_be_right_again() {
     let both = score(&both, &all);
     let cells = both.cells.iter().filter(|cell| cell.subject.model == "n");
     assert!(cells.clone().count() > 0);
-    assert!(
-        cells
-            .clone()
-            .all(|cell| (cell.right, cell.incomplete) == (12, 0))
-    );
+    assert!(cells.clone().all(|cell| (cell.right, cell.incomplete) == (12, 0)));
     assert_eq!(both.cells.len(), 4);
 }

@@ -29,12 +29,7 @@ impl Run {
     fn new(seed: u64, server: Server) -> Self {
         let mut random = SplitMix(seed);
         let by_words = CHOICES.map(|choices| draw(&mut random, choices));
-        Self {
-            random,
-            server,
-            by_words,
-            requests: 0,
-        }
+        Self { random, server, by_words, requests: 0 }
     }
 
     fn next(&mut self) -> LitReply {
@@ -56,12 +51,7 @@ impl Run {
             Server::Drops(_) | Server::DropsSecond if uniform(random) >= 0.9 => other,
             _ => truth,
         };
-        LitReply {
-            wording: Digest::from_bytes(&[place as u8]),
-            choices,
-            truth,
-            chosen,
-        }
+        LitReply { wording: Digest::from_bytes(&[place as u8]), choices, truth, chosen }
     }
 
     /// The finding within this number of replies.
@@ -123,11 +113,7 @@ fn a_server_that_drops_every_second_image_is_found_within_400_replies() {
 fn one_letter_is_told_from_dropped_images() {
     let found = Run::new(3, Server::Guesses(1.0)).found_within(100).unwrap();
     assert_eq!((found.extent, found.p), (Extent::OneLetter(0), None));
-    assert!(
-        found
-            .words("m")
-            .starts_with("m answers A whatever the image and the question: ")
-    );
+    assert!(found.words("m").starts_with("m answers A whatever the image and the question: "));
     let all = Run::new(3, Server::Drops(1)).found_within(100).unwrap();
     assert_eq!((all.extent, all.usual), (Extent::All, all.other_truth));
     assert!(all.p.unwrap() < 0.0005);

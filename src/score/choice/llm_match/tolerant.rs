@@ -1,7 +1,8 @@
 //! The tolerant parsing of a judge's reply ([`mark`]): a mark from 1 to 5 where a person finds one.
 //!
-//! The first form that occurs decides: JSON, a box or tag, a label ("Your mark: 4"), the only number, a fraction ("4 out of 5"), a verb
-//! ("deserves a 4"). Two different marks in the same form, and ranges, fractions and other maxima ("4 or 5", "4.5", "4/10") are no mark.
+//! The first form that occurs decides: JSON, a box or tag, a label ("Your mark: 4"), the only number, a fraction ("4
+//! out of 5"), a verb ("deserves a 4"). Two different marks in the same form, and ranges, fractions and other maxima
+//! ("4 or 5", "4.5", "4/10") are no mark.
 
 use std::sync::LazyLock;
 
@@ -18,13 +19,8 @@ macro_rules! cue {
 }
 
 /// A key of JSON whose value is the mark.
-static KEY: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(concat!(
-        r"(?i)\A.*",
-        cue!(),
-        r"\z|\A(?:answer|result|verdict)\z"
-    ))
-});
+static KEY: LazyLock<Regex> =
+    LazyLock::new(|| compiled(concat!(r"(?i)\A.*", cue!(), r"\z|\A(?:answer|result|verdict)\z")));
 
 /// The range of marks, as prompts and labels state it.
 static SCALE: LazyLock<Regex> = LazyLock::new(|| {
@@ -43,8 +39,7 @@ static BOXED: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// The label of upstream's prompt, with what follows.
-static YOUR_MARK: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"(?i)\byour\W{0,3}mark\b(?P<after>.*)"));
+static YOUR_MARK: LazyLock<Regex> = LazyLock::new(|| compiled(r"(?i)\byour\W{0,3}mark\b(?P<after>.*)"));
 
 /// Another label at the start of a line or sentence, with what follows: "Score: 4", "The rating is 4".
 static LABEL: LazyLock<Regex> = LazyLock::new(|| {
@@ -85,9 +80,8 @@ static NUMBER: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// A maximum after a mark: "/5", "out of 10".
-static MAXIMUM: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(r"(?i)\A[\s*_`)\]]*(?:/|out of|of)\s*[*_`]*(?P<maximum>\d+)(?P<rest>.*)")
-});
+static MAXIMUM: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?i)\A[\s*_`)\]]*(?:/|out of|of)\s*[*_`]*(?P<maximum>\d+)(?P<rest>.*)"));
 
 /// A second number after a mark: "4-5", "4 or 5".
 static RANGE: LazyLock<Regex> = LazyLock::new(|| {
@@ -103,10 +97,7 @@ pub(super) fn mark(reply: &str) -> Option<i64> {
         return found;
     }
     let text = SCALE.replace_all(&tidy, " ");
-    for (form, groups) in [
-        (&BOXED, &["box", "double", "tag", "answer"][..]),
-        (&YOUR_MARK, &["after"][..]),
-    ] {
+    for (form, groups) in [(&BOXED, &["box", "double", "tag", "answer"][..]), (&YOUR_MARK, &["after"][..])] {
         let found: Vec<Option<i64>> = form
             .captures_iter(&text)
             .filter_map(|found| groups.iter().find_map(|group| found.name(group)))
@@ -139,31 +130,22 @@ fn in_sentences(text: &str, pattern: &Regex) -> Option<Stated> {
 
 /// The sentences of a line. A full stop inside a number ends none.
 fn sentences(line: &str) -> impl Iterator<Item = &str> {
-    line.split_inclusive(". ")
-        .flat_map(|part| part.split_inclusive(['!', '?', ';']))
+    line.split_inclusive(". ").flat_map(|part| part.split_inclusive(['!', '?', ';']))
 }
 
 /// The mark that the reply begins or ends with: "4 - close", or 4 on the last line.
 fn at_an_end(text: &str) -> Option<Stated> {
-    let lines = || {
-        text.lines()
-            .map(|line| line.trim_matches(is_sign))
-            .filter(|line| !line.is_empty())
-    };
+    let lines = || text.lines().map(|line| line.trim_matches(is_sign)).filter(|line| !line.is_empty());
     let first = lines().next()?;
     let last = lines().next_back()?;
     let is_alone = |line: &str| !line.is_empty() && line.chars().all(|c| c.is_ascii_digit());
     if is_alone(last) {
         return Some(Stated(number(last)));
     }
-    let digits = first
-        .find(|c: char| !c.is_ascii_digit())
-        .unwrap_or(first.len());
+    let digits = first.find(|c: char| !c.is_ascii_digit()).unwrap_or(first.len());
     let after = first[digits..].trim_start();
-    let is_explained = after.is_empty()
-        || after.starts_with([
-            ':', '：', '-', '–', '—', '.', ',', '(', '/', '*', '_', '`', ')', '"',
-        ]);
+    let is_explained =
+        after.is_empty() || after.starts_with([':', '：', '-', '–', '—', '.', ',', '(', '/', '*', '_', '`', ')', '"']);
     (digits > 0 && is_explained).then(|| Stated(number(first)))
 }
 
@@ -176,11 +158,7 @@ fn json(text: &str) -> Option<Stated> {
         from = match values.next() {
             Some(Ok(value)) => {
                 let fields = value.as_object().into_iter().flatten();
-                found.extend(
-                    fields
-                        .filter(|(key, _)| KEY.is_match(key))
-                        .map(|(_, value)| value_mark(value)),
-                );
+                found.extend(fields.filter(|(key, _)| KEY.is_match(key)).map(|(_, value)| value_mark(value)));
                 start + values.byte_offset()
             }
             _ => start + 1,
@@ -209,9 +187,7 @@ fn common(found: &[Option<i64>]) -> Option<i64> {
 /// The mark at the start of a text; `None` for a number that is no mark from 1 to 5, and if another follows it.
 fn number(text: &str) -> Option<i64> {
     let found = NUMBER.captures(text)?;
-    let is_whole = found
-        .name("fraction")
-        .is_none_or(|fraction| fraction.as_str()[1..].chars().all(|c| c == '0'));
+    let is_whole = found.name("fraction").is_none_or(|fraction| fraction.as_str()[1..].chars().all(|c| c == '0'));
     let mut rest = found.name("rest")?.as_str();
     if let Some(maximum) = MAXIMUM.captures(rest) {
         if &maximum["maximum"] != "5" {
@@ -223,10 +199,7 @@ fn number(text: &str) -> Option<i64> {
     if !is_whole || is_word || RANGE.is_match(rest) {
         return None;
     }
-    found["number"]
-        .parse()
-        .ok()
-        .filter(|mark| (1..=5).contains(mark))
+    found["number"].parse().ok().filter(|mark| (1..=5).contains(mark))
 }
 
 /// True for blanks and markup around a mark.

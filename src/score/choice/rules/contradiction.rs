@@ -9,8 +9,7 @@ use darkqa_base::types::questions::{Answer, UnreadReason};
 /// Unparsed if any letter has the text of another choice: "B. bathroom", "kitchen (C)", "I choose D, the kitchen".
 pub(super) fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {
     let contradicted = view.names.letters.iter().find(|letter| {
-        letter.state.counts()
-            && paired_text(view, letter).is_some_and(|text| text.choice != letter.choice)
+        letter.state.counts() && paired_text(view, letter).is_some_and(|text| text.choice != letter.choice)
     });
     let reason = match contradicted?.choice {
         Some(_) => UnreadReason::Contradiction,
@@ -21,10 +20,7 @@ pub(super) fn contradiction(view: &ReplyView<'_>) -> Option<Answer> {
 
 /// The text that a letter labels, or that is in apposition to it.
 fn paired_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
-    if let Some(text) = view
-        .names
-        .text_before(letter)
-        .filter(|name| name.state.counts())
+    if let Some(text) = view.names.text_before(letter).filter(|name| name.state.counts())
         && view.text[letter.end..].starts_with([')', ']'])
     {
         let next = view.names.labelled_text(letter);
@@ -44,8 +40,8 @@ fn paired_text(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     text_after(view, letter).or_else(|| text_before(view, letter))
 }
 
-/// The text after a letter without brackets, separated only by a comma, a dash or a colon, at the end of a part of a clause: "I choose D,
-/// the kitchen."
+/// The text after a letter without brackets, separated only by a comma, a dash or a colon, at the end of a part of a
+/// clause: "I choose D, the kitchen."
 fn text_after(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     if let Some(text) = explained_text(view, letter) {
         return Some(text);
@@ -76,21 +72,13 @@ fn text_before(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
     let elements = &view.clauses.elements;
     let mut at = view.clauses.index(letter.start);
     let mut called = false;
-    while at > 0
-        && elements[at - 1]
-            .roles
-            .has_any(&[Role::Candidate, Role::Apposition])
-    {
+    while at > 0 && elements[at - 1].roles.has_any(&[Role::Candidate, Role::Apposition]) {
         at -= 1;
         called = true;
     }
     let sign = at.checked_sub(1)?;
-    let joined = view
-        .clauses
-        .is_sign(sign, &[',', '-', '–', '—', '=', '→', ':', '(', '[']);
-    let text = view
-        .names
-        .text_ending_at(elements[sign.checked_sub(1)?].end)?;
+    let joined = view.clauses.is_sign(sign, &[',', '-', '–', '—', '=', '→', ':', '(', '[']);
+    let text = view.names.text_ending_at(elements[sign.checked_sub(1)?].end)?;
     let ends = ends_part(view, letter.end) && view.names.labelled_text(letter).is_none();
     let alone = called || !view.clauses.is_sign(sign, &[',']) || at_clause_end(view, letter.end);
     (joined && ends && alone && text.state.counts()).then_some(text)
@@ -99,9 +87,7 @@ fn text_before(view: &ReplyView<'_>, letter: &Name) -> Option<Name> {
 /// True if a part of a clause ends at a byte.
 fn ends_part(view: &ReplyView<'_>, end: usize) -> bool {
     let next = view.clauses.elements.get(view.clauses.index(end));
-    next.is_none_or(|next| {
-        next.boundary > Boundary::None || next.roles.has_any(&[Role::Within, Role::Preposition])
-    })
+    next.is_none_or(|next| next.boundary > Boundary::None || next.roles.has_any(&[Role::Within, Role::Preposition]))
 }
 
 /// True if a clause ends at a byte.

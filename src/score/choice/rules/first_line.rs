@@ -6,8 +6,8 @@ use crate::choice::text::words::Role;
 use crate::choice::view::ReplyView;
 use darkqa_base::types::questions::{Answer, UnreadReason};
 
-/// The first line, if it parses strictly. It is ambiguous if another line parses strictly as another choice, or if another choice follows a
-/// retraction ("On reflection, it is C").
+/// The first line, if it parses strictly. It is ambiguous if another line parses strictly as another choice, or if
+/// another choice follows a retraction ("On reflection, it is C").
 pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
     let (line, rest) = view.text.split_once('\n')?;
     let index = strict_choice(view, line)?;
@@ -18,9 +18,7 @@ pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
     let mut differs = false;
     for other in rest.lines() {
         let listed = view.state(at) != NameState::Affirmed;
-        differs |= !listed
-            && other != line
-            && strict_choice(view, other).is_some_and(|other| other != index);
+        differs |= !listed && other != line && strict_choice(view, other).is_some_and(|other| other != index);
         at += other.len() + 1;
     }
     let is_retracted = view
@@ -36,11 +34,7 @@ pub(super) fn first_line(view: &ReplyView<'_>) -> Option<Answer> {
                     && name.is_affirmed()
             })
         });
-    Some(if differs || is_retracted {
-        Answer::Unparsed(UnreadReason::Ambiguous)
-    } else {
-        Answer::Chosen(index)
-    })
+    Some(if differs || is_retracted { Answer::Unparsed(UnreadReason::Ambiguous) } else { Answer::Chosen(index) })
 }
 
 /// The choice that the strict parsing finds in a line.

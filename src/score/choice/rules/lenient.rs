@@ -8,8 +8,9 @@
 //! 6. A leading "yes" or "no"; the first line alone, if it parses strictly.
 //! 7. Affirmed letters, then affirmed texts.
 //!
-//! From level 5 on, only affirmed names count: not those in a list of all choices, in a question or in a condition, not a color of the
-//! image, and not denied ones ([`NameState`]). A level that finds two different answers accepts neither, and no later level is tried.
+//! From level 5 on, only affirmed names count: not those in a list of all choices, in a question or in a condition, not
+//! a color of the image, and not denied ones ([`NameState`]). A level that finds two different answers accepts neither,
+//! and no later level is tried.
 
 use super::contradiction::contradiction;
 use super::first_line::first_line;
@@ -32,9 +33,7 @@ pub(crate) fn read(text: &str, choices: &Choices) -> Answer {
     // If the model continues with a next question of its own, its answer is before that question.
     let first = clean::before_next_turn(&tidy).map(|before| steps(before, &choices));
     match first {
-        None | Some(Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)) => {
-            steps(&tidy, &choices)
-        }
+        None | Some(Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Refused)) => steps(&tidy, &choices),
         Some(answer) => answer,
     }
 }
@@ -79,22 +78,12 @@ fn letters(view: &ReplyView<'_>) -> Option<Answer> {
     let Some(index) = first.choice else {
         return Some(Answer::Unparsed(UnreadReason::OutOfRange));
     };
-    let has_other_letter = view
-        .names
-        .letters
-        .iter()
-        .any(|name| name.state.counts() && name.choice != Some(index));
-    let only_text = view.affirmed_texts().next().filter(|text| {
-        text.choice != Some(index)
-            && view
-                .affirmed_texts()
-                .all(|other| other.choice == text.choice)
-    });
-    let reason = if has_other_letter
-        || affirmed
-            .chain(view.affirmed_texts())
-            .any(|name| has_alternative(view, name))
-    {
+    let has_other_letter = view.names.letters.iter().any(|name| name.state.counts() && name.choice != Some(index));
+    let only_text = view
+        .affirmed_texts()
+        .next()
+        .filter(|text| text.choice != Some(index) && view.affirmed_texts().all(|other| other.choice == text.choice));
+    let reason = if has_other_letter || affirmed.chain(view.affirmed_texts()).any(|name| has_alternative(view, name)) {
         UnreadReason::Ambiguous
     } else if is_denied(view, index) {
         UnreadReason::Negated
@@ -109,26 +98,20 @@ fn letters(view: &ReplyView<'_>) -> Option<Answer> {
 /// The texts of choices, as whole words: "It is a kitchen."
 fn texts(view: &ReplyView<'_>) -> Option<Answer> {
     let index = view.affirmed_texts().next()?.choice?;
-    Some(
-        if view
-            .names
-            .all()
-            .any(|name| name.choice != Some(index) && name.state.counts())
-        {
-            Answer::Unparsed(UnreadReason::Ambiguous)
-        } else if is_denied(view, index) {
-            Answer::Unparsed(UnreadReason::Negated)
-        } else {
-            Answer::Chosen(index)
-        },
-    )
+    Some(if view.names.all().any(|name| name.choice != Some(index) && name.state.counts()) {
+        Answer::Unparsed(UnreadReason::Ambiguous)
+    } else if is_denied(view, index) {
+        Answer::Unparsed(UnreadReason::Negated)
+    } else {
+        Answer::Chosen(index)
+    })
 }
 
 /// True if a choice is denied or excluded anywhere in the reply.
 fn is_denied(view: &ReplyView<'_>, index: usize) -> bool {
-    view.names.all().any(|name| {
-        name.choice == Some(index) && matches!(name.state, NameState::Denied | NameState::Excluded)
-    })
+    view.names
+        .all()
+        .any(|name| name.choice == Some(index) && matches!(name.state, NameState::Denied | NameState::Excluded))
 }
 
 /// The reason why a reply without an affirmed choice was not read.

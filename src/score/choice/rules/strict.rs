@@ -5,8 +5,8 @@ use darkqa_base::types::questions::{Answer, UnreadReason};
 
 /// Parses a reply that is exactly one of the strict forms; `None` for any other reply.
 ///
-/// The forms, in upper or lower case, are: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`, `B)`,
-/// `B:`, `（B）`, `B．`, `B：`, `B、`; and such a letter, or `B -`, before the text of the same choice.
+/// The forms, in upper or lower case, are: a choice's text with or without a final period; `B`, `(B)`, `[B]`, `B.`,
+/// `B)`, `B:`, `（B）`, `B．`, `B：`, `B、`; and such a letter, or `B -`, before the text of the same choice.
 pub(crate) fn read(text: &str, choices: &[String]) -> Option<Answer> {
     let by_text = position(text, choices);
     let by_letter = label(text).and_then(|(letter, rest)| {
@@ -15,17 +15,13 @@ pub(crate) fn read(text: &str, choices: &[String]) -> Option<Answer> {
         match (index, named) {
             _ if !rest.is_empty() && named.is_none() => None,
             (None, _) => Some(Answer::Unparsed(UnreadReason::OutOfRange)),
-            (Some(index), Some(named)) if index != named => {
-                Some(Answer::Unparsed(UnreadReason::Contradiction))
-            }
+            (Some(index), Some(named)) if index != named => Some(Answer::Unparsed(UnreadReason::Contradiction)),
             (Some(index), _) => Some(Answer::Chosen(index)),
         }
     });
     match (by_text, by_letter) {
         // A reply can be one choice's text and another's letter only if the choices are themselves letters.
-        (Some(text), Some(Answer::Chosen(letter))) if text != letter => {
-            Some(Answer::Unparsed(UnreadReason::Ambiguous))
-        }
+        (Some(text), Some(Answer::Chosen(letter))) if text != letter => Some(Answer::Unparsed(UnreadReason::Ambiguous)),
         (Some(text), _) => Some(Answer::Chosen(text)),
         (None, by_letter) => by_letter,
     }
@@ -41,16 +37,9 @@ fn position(text: &str, choices: &[String]) -> Option<usize> {
         return None;
     }
     let folded = text.to_lowercase();
-    let choices: Vec<String> = choices
-        .iter()
-        .map(|choice| choice.trim().to_lowercase())
-        .collect();
+    let choices: Vec<String> = choices.iter().map(|choice| choice.trim().to_lowercase()).collect();
     let exact = choices.iter().position(|choice| *choice == folded);
-    exact.or_else(|| {
-        choices
-            .iter()
-            .position(|choice| bare(choice) == bare(&folded))
-    })
+    exact.or_else(|| choices.iter().position(|choice| bare(choice) == bare(&folded)))
 }
 
 /// The letter that a reply begins with as a label, and the text after it, which may be empty.
@@ -63,11 +52,7 @@ fn label(text: &str) -> Option<(char, &str)> {
         '[' => Some(&[']']),
         _ => None,
     };
-    let letter = if close.is_some() {
-        chars.next()?
-    } else {
-        first
-    };
+    let letter = if close.is_some() { chars.next()? } else { first };
     if !letter.is_ascii_alphabetic() {
         return None;
     }

@@ -52,8 +52,8 @@ static TAGGED: LazyLock<Regex> = LazyLock::new(|| {
 /// Maximum length of a LaTeX box, in bytes. An answer is shorter.
 const BOX_BYTES: usize = 2000;
 
-/// The answer under an answer key in the JSON objects of a text. If any object has such a key, later levels are not tried, even if its
-/// value cannot be parsed.
+/// The answer under an answer key in the JSON objects of a text. If any object has such a key, later levels are not
+/// tried, even if its value cannot be parsed.
 pub(super) fn json(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
     let mut answers = Vec::new();
     let mut from = 0;
@@ -78,10 +78,7 @@ pub(super) fn json(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
 
 /// A key in lower case without spaces and punctuation.
 fn normalize_key(key: &str) -> String {
-    key.chars()
-        .filter(|c| c.is_alphanumeric())
-        .flat_map(char::to_lowercase)
-        .collect()
+    key.chars().filter(|c| c.is_alphanumeric()).flat_map(char::to_lowercase).collect()
 }
 
 /// The answer in a JSON value. A number is parsed as a choice's text, never as its index.
@@ -91,10 +88,7 @@ fn value_answer(value: &Value, choices: &ChoiceViews) -> Answer {
         Value::String(text) => text_answer(text, choices),
         Value::Number(number) => text_answer(&number.to_string(), choices),
         Value::Array(values) => {
-            let answers: Vec<Answer> = values
-                .iter()
-                .map(|value| value_answer(value, choices))
-                .collect();
+            let answers: Vec<Answer> = values.iter().map(|value| value_answer(value, choices)).collect();
             common_answer(&answers).unwrap_or(unread)
         }
         Value::Object(fields) => {
@@ -114,10 +108,7 @@ fn value_answer(value: &Value, choices: &ChoiceViews) -> Answer {
 
 /// The answer in `\boxed{…}` and `<answer>…</answer>`.
 pub(super) fn boxed(tidy: &str, choices: &ChoiceViews) -> Option<Answer> {
-    let tagged = TAGGED
-        .captures_iter(tidy)
-        .filter_map(|found| found.get(1))
-        .map(|inner| inner.as_str());
+    let tagged = TAGGED.captures_iter(tidy).filter_map(|found| found.get(1)).map(|inner| inner.as_str());
     let answers: Vec<Answer> = boxes(tidy)
         .chain(tagged)
         .filter(|inner| !inner.trim().is_empty())
@@ -156,16 +147,9 @@ fn text_answer(text: &str, choices: &ChoiceViews) -> Answer {
 /// The answer on which all answers agree. Answers that could not be read are ignored if others could be read.
 fn common_answer(answers: &[Answer]) -> Option<Answer> {
     let mut readable = answers.iter().filter(|answer| {
-        !matches!(
-            answer,
-            Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Empty | UnreadReason::Refused)
-        )
+        !matches!(answer, Answer::Unparsed(UnreadReason::NoChoice | UnreadReason::Empty | UnreadReason::Refused))
     });
     let first = *readable.next().or(answers.first())?;
     let same = readable.all(|answer| *answer == first);
-    Some(if same {
-        first
-    } else {
-        Answer::Unparsed(UnreadReason::Ambiguous)
-    })
+    Some(if same { first } else { Answer::Unparsed(UnreadReason::Ambiguous) })
 }

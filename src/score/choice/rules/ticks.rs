@@ -9,8 +9,7 @@ use crate::choice::text::clean::compiled;
 use darkqa_base::types::questions::{Answer, UnreadReason};
 
 /// A mark for yes or no.
-static MARK: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"(?P<yes>[✓✔✅☑👍]|\[[xX]\])|(?P<no>[✗✘❌❎✖👎☐]|\[ \])"));
+static MARK: LazyLock<Regex> = LazyLock::new(|| compiled(r"(?P<yes>[✓✔✅☑👍]|\[[xX]\])|(?P<no>[✗✘❌❎✖👎☐]|\[ \])"));
 
 /// A mark that may mean either yes or no.
 const UNKNOWN: char = '☒';
@@ -35,8 +34,8 @@ pub(super) struct Ticks {
 const MAX_MARKS: usize = 100;
 
 impl Ticks {
-    /// The only choice that is ticked. Without ticks, `stated` if it is not crossed. Several ticks, or a tick and another stated answer,
-    /// are ambiguous. `None` if no item with a mark names a choice.
+    /// The only choice that is ticked. Without ticks, `stated` if it is not crossed. Several ticks, or a tick and
+    /// another stated answer, are ambiguous. `None` if no item with a mark names a choice.
     pub(super) fn answer(&self, stated: Option<Answer>) -> Option<Answer> {
         let stated = stated.filter(|answer| matches!(answer, Answer::Chosen(_)));
         let ambiguous = Some(Answer::Unparsed(UnreadReason::Ambiguous));
@@ -58,17 +57,14 @@ pub(super) fn without_unknown(tidy: &str) -> Cow<'_, str> {
     if !tidy.contains(UNKNOWN) {
         return Cow::Borrowed(tidy);
     }
-    let lines: Vec<&str> = tidy
-        .lines()
-        .filter(|line| !line.contains(UNKNOWN))
-        .collect();
+    let lines: Vec<&str> = tidy.lines().filter(|line| !line.contains(UNKNOWN)).collect();
     Cow::Owned(lines.join("\n"))
 }
 
 /// The ticked and crossed choices of a text; `read` parses an item. `None` without marks.
 ///
-/// A line with one mark is one item. In a line with several marks, the items follow the marks if the line begins with a mark, otherwise
-/// they precede the marks.
+/// A line with one mark is one item. In a line with several marks, the items follow the marks if the line begins with a
+/// mark, otherwise they precede the marks.
 pub(super) fn ticked(tidy: &str, read: impl Fn(&str) -> Answer) -> Option<Ticks> {
     if !MARK.is_match(tidy) {
         return None;
@@ -80,8 +76,7 @@ pub(super) fn ticked(tidy: &str, read: impl Fn(&str) -> Answer) -> Option<Ticks>
     }
     for line in tidy.lines() {
         for (mark, item) in items(line) {
-            let Answer::Chosen(index) = read(item.trim_matches([' ', '|', ':', ',', '-', '\t']))
-            else {
+            let Answer::Chosen(index) = read(item.trim_matches([' ', '|', ':', ',', '-', '\t'])) else {
                 continue;
             };
             match mark {
@@ -99,17 +94,11 @@ fn items(line: &str) -> Vec<(Mark, &str)> {
         .captures_iter(line)
         .filter_map(|found| {
             let whole = found.get(0)?;
-            let mark = if found.name("yes").is_some() {
-                Mark::Yes
-            } else {
-                Mark::No
-            };
+            let mark = if found.name("yes").is_some() { Mark::Yes } else { Mark::No };
             Some((mark, whole.start(), whole.end()))
         })
         .collect();
-    let leads = marks
-        .first()
-        .is_some_and(|(_, start, _)| is_blank(&line[..*start]));
+    let leads = marks.first().is_some_and(|(_, start, _)| is_blank(&line[..*start]));
     if let [(mark, start, end)] = *marks {
         let item = if leads {
             &line[end..]
@@ -134,6 +123,5 @@ fn items(line: &str) -> Vec<(Mark, &str)> {
 
 /// True if a text contains only spaces, bullets and table rules.
 fn is_blank(text: &str) -> bool {
-    text.trim_matches([' ', '\t', '|', '-', '*', '+', '•'])
-        .is_empty()
+    text.trim_matches([' ', '\t', '|', '-', '*', '+', '•']).is_empty()
 }

@@ -3,8 +3,8 @@
 use crate::choice::text::words::Role;
 use crate::choice::text::{Boundary, Clauses, Element, Ranges};
 
-/// Ranges of conditions with their main clauses, and of the words before phrases such as "would need". A condition that only forces a
-/// choice ("if I had to guess") is not included.
+/// Ranges of conditions with their main clauses, and of the words before phrases such as "would need". A condition that
+/// only forces a choice ("if I had to guess") is not included.
 pub(crate) fn conditional(clauses: &Clauses<'_>) -> Ranges {
     let mut ranges = Vec::new();
     let (mut first, mut unmet) = (0, false);
@@ -13,11 +13,7 @@ pub(crate) fn conditional(clauses: &Clauses<'_>) -> Ranges {
         // A comma ends neither the condition nor its main clause, and a colon may stand between them.
         let is_colon = clauses.is_sign(at, &[':', '：']);
         if element.boundary == Boundary::Sentence || (element.ends_clause() && !is_colon) {
-            let found = conditional_ranges(
-                clauses,
-                first..at,
-                unmet && continues_condition(clauses, first),
-            );
+            let found = conditional_ranges(clauses, first..at, unmet && continues_condition(clauses, first));
             unmet = !found.is_empty();
             ranges.extend(found);
             first = at + 1;
@@ -30,51 +26,30 @@ pub(crate) fn conditional(clauses: &Clauses<'_>) -> Ranges {
 
 /// True if a clause continues the condition before it: "Suppose there is a stove; then it is a kitchen."
 fn continues_condition(clauses: &Clauses<'_>, first: usize) -> bool {
-    clauses
-        .elements
-        .get(first)
-        .is_some_and(|element| element.slice(clauses.folded) == "then")
+    clauses.elements.get(first).is_some_and(|element| element.slice(clauses.folded) == "then")
 }
 
 /// The roles of a phrase about more light, such as "with better lighting".
 const MORE_LIGHT: [Role; 3] = [Role::Given, Role::Better, Role::LightNoun];
 
 /// The conditional ranges in the clauses with these elements; all of them if they continue an earlier condition.
-fn conditional_ranges(
-    clauses: &Clauses<'_>,
-    all: std::ops::Range<usize>,
-    continues: bool,
-) -> Vec<(usize, usize)> {
+fn conditional_ranges(clauses: &Clauses<'_>, all: std::ops::Range<usize>, continues: bool) -> Vec<(usize, usize)> {
     let elements = &clauses.elements[all];
     let (Some(first), Some(last)) = (elements.first(), elements.last()) else {
         return Vec::new();
     };
-    let head = elements
-        .iter()
-        .find(|element| !element.has(Role::And) && !element.has(Role::Adverb))
-        .unwrap_or(first);
+    let head = elements.iter().find(|element| !element.has(Role::And) && !element.has(Role::Adverb)).unwrap_or(first);
     // "Were it brighter, I would …", "I would …, were it brighter".
     let inverted = head.has(Role::Inverted)
         || (any_has(elements, Role::ModalPast)
             && elements
                 .iter()
                 .zip(&elements[1..])
-                .any(|(before, element)| {
-                    before.boundary > Boundary::None && element.has(Role::Inverted)
-                }));
+                .any(|(before, element)| before.boundary > Boundary::None && element.has(Role::Inverted)));
     // "With more light".
-    let in_light = elements.windows(MORE_LIGHT.len()).any(|words| {
-        words
-            .iter()
-            .zip(MORE_LIGHT)
-            .all(|(word, role)| word.has(role))
-    });
-    if continues
-        || in_light
-        || any_has(elements, Role::Condition)
-        || inverted
-        || is_unmet(elements, head)
-    {
+    let in_light =
+        elements.windows(MORE_LIGHT.len()).any(|words| words.iter().zip(MORE_LIGHT).all(|(word, role)| word.has(role)));
+    if continues || in_light || any_has(elements, Role::Condition) || inverted || is_unmet(elements, head) {
         return vec![(first.start, last.end)];
     }
     let forced = any_has(elements, Role::Forced);
@@ -85,7 +60,8 @@ fn conditional_ranges(
             ranges.extend(expects.take().map(|start| (start, element.start)));
             part = element.end;
         }
-        // In "a bedroom would have a bed" and "a kitchen if that is a stove", the whole part of the clause is uncertain.
+        // In "a bedroom would have a bed" and "a kitchen if that is a stove", the whole part of the clause is
+        // uncertain.
         if element.has(Role::Expected) || (element.has(Role::If) && !forced) {
             expects = Some(part);
         }

@@ -1,4 +1,5 @@
-//! [`denied`]: ranges of a text in which choices are denied. A denied choice makes another choice ambiguous ("not A but C").
+//! [`denied`]: ranges of a text in which choices are denied. A denied choice makes another choice ambiguous ("not A but
+//! C").
 
 use crate::choice::name_index::Names;
 use crate::choice::text::words::Role;
@@ -6,13 +7,7 @@ use crate::choice::text::{Boundary, Clauses, Ranges};
 
 /// Ranges of the names that words such as "not" deny: after the word in its part of the clause, and directly before it.
 pub(crate) fn denied(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
-    Ranges::new(
-        [
-            scopes_after_not(clauses),
-            subjects_before_not(clauses, names),
-        ]
-        .concat(),
-    )
+    Ranges::new([scopes_after_not(clauses), subjects_before_not(clauses, names)].concat())
 }
 
 /// Maximum number of elements after the first comma of a list such as "no lamp, sofa, or table".
@@ -21,8 +16,8 @@ const LIST_WITHIN: usize = 24;
 /// Maximum number of elements of an item in such a list.
 const ITEM_WORDS: usize = 3;
 
-/// Scopes of words such as "not", to the end of the part of the clause. A comma directly after "not" does not end the scope ("it is not, I
-/// think, a kitchen"), nor does a comma in a list that ends with "or".
+/// Scopes of words such as "not", to the end of the part of the clause. A comma directly after "not" does not end the
+/// scope ("it is not, I think, a kitchen"), nor does a comma in a list that ends with "or".
 fn scopes_after_not(clauses: &Clauses<'_>) -> Vec<(usize, usize)> {
     let elements = &clauses.elements;
     let mut ranges = Vec::new();
@@ -37,8 +32,7 @@ fn scopes_after_not(clauses: &Clauses<'_>) -> Vec<(usize, usize)> {
                 until = skip_insertion(clauses, at).unwrap_or(0);
             }
             // "Not the answer: B".
-            let heading =
-                at > 0 && clauses.is_sign(at, &[':']) && elements[at - 1].has(Role::Candidate);
+            let heading = at > 0 && clauses.is_sign(at, &[':']) && elements[at - 1].has(Role::Candidate);
             if (element.ends_clause() || at >= until) && !heading {
                 ranges.push((start, element.start));
                 open = None;
@@ -55,8 +49,8 @@ fn scopes_after_not(clauses: &Clauses<'_>) -> Vec<(usize, usize)> {
 /// Maximum number of elements of a parenthesis between two commas.
 const PARENTHESIS_WITHIN: usize = 12;
 
-/// The index after the insertion that a sign begins, if the scope of "not" continues after it: a bracket or a parenthesis between two
-/// commas directly after "not", or the rest of a list.
+/// The index after the insertion that a sign begins, if the scope of "not" continues after it: a bracket or a
+/// parenthesis between two commas directly after "not", or the rest of a list.
 fn skip_insertion(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     let before = clauses.elements[at - 1];
     let word = before.slice(clauses.folded);
@@ -68,13 +62,7 @@ fn skip_insertion(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     }
     if word == "not" || word.ends_with("n't") {
         let within = at + 1..at + PARENTHESIS_WITHIN;
-        return Some(
-            within
-                .into_iter()
-                .find(|at| clauses.is_sign(*at, &[',']))
-                .unwrap_or(at)
-                + 1,
-        );
+        return Some(within.into_iter().find(|at| clauses.is_sign(*at, &[','])).unwrap_or(at) + 1);
     }
     list_end(clauses, at)
 }
@@ -83,13 +71,7 @@ fn skip_insertion(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
 fn list_end(clauses: &Clauses<'_>, comma: usize) -> Option<usize> {
     let mut words = 0;
     let mut closes = false;
-    for (at, element) in clauses
-        .elements
-        .iter()
-        .enumerate()
-        .skip(comma + 1)
-        .take(LIST_WITHIN)
-    {
+    for (at, element) in clauses.elements.iter().enumerate().skip(comma + 1).take(LIST_WITHIN) {
         let is_comma = clauses.is_sign(at, &[',']);
         if element.boundary > Boundary::None && (!is_comma || closes) {
             return closes.then_some(at);
@@ -136,9 +118,7 @@ fn subject_end(clauses: &Clauses<'_>, at: usize) -> Option<usize> {
     let element = &elements[at];
     let word = element.slice(clauses.folded);
     let before = at - 1;
-    if element.has(Role::NotBehind)
-        || (element.has(Role::Not) && (word.ends_with("n't") || word.starts_with("can")))
-    {
+    if element.has(Role::NotBehind) || (element.has(Role::Not) && (word.ends_with("n't") || word.starts_with("can"))) {
         return Some(before);
     }
     if element.has(Role::Absent) {

@@ -5,18 +5,11 @@ use crate::choice::name_index::Names;
 use crate::choice::text::words::Role;
 use crate::choice::text::{Boundary, Clauses, Element, Ranges};
 
-/// Ranges that phrases such as "rule out" exclude (the rest of the clause) and phrases such as "can be ruled out" (the clause before
-/// them).
+/// Ranges that phrases such as "rule out" exclude (the rest of the clause) and phrases such as "can be ruled out" (the
+/// clause before them).
 pub(crate) fn excluded(clauses: &Clauses<'_>, names: &Names<'_>) -> Ranges {
-    let mut exclusions = Exclusions {
-        clauses,
-        names,
-        open: None,
-        clause: 0,
-        before_colon: 0,
-        before_bracket: 0,
-        ranges: Vec::new(),
-    };
+    let mut exclusions =
+        Exclusions { clauses, names, open: None, clause: 0, before_colon: 0, before_bracket: 0, ranges: Vec::new() };
     for (at, element) in clauses.elements.iter().enumerate() {
         if ends_scope(clauses, names, exclusions.open, at) {
             exclusions.close(element.start);
@@ -46,18 +39,13 @@ struct Exclusions<'a> {
 impl Exclusions<'_> {
     /// Ends the open scope, if any.
     fn close(&mut self, end: usize) {
-        self.ranges
-            .extend(self.open.take().map(|start| (start, end)));
+        self.ranges.extend(self.open.take().map(|start| (start, end)));
     }
 
     /// Tracks the start of the current clause. Text in brackets is a separate clause.
     fn begin_clause(&mut self, at: usize, element: &Element) {
         if element.ends_clause() {
-            self.before_colon = if self.clauses.is_sign(at, &[':']) {
-                self.clause
-            } else {
-                element.end
-            };
+            self.before_colon = if self.clauses.is_sign(at, &[':']) { self.clause } else { element.end };
             self.clause = element.end;
         } else if self.clauses.is_sign(at, &['(']) {
             self.before_bracket = self.clause;
@@ -73,8 +61,7 @@ impl Exclusions<'_> {
     fn apply_word(&mut self, at: usize, element: &Element) {
         let next = self.clauses.elements.get(at + 1);
         // "The wrong answer is A", "Wrong: A".
-        let announces = self.clauses.is_sign(at + 1, &[':'])
-            || next.is_some_and(|next| next.has(Role::Candidate));
+        let announces = self.clauses.is_sign(at + 1, &[':']) || next.is_some_and(|next| next.has(Role::Candidate));
         let mut opens = element.has(Role::Exclude) || (element.has(Role::Untrue) && announces);
         if let Some(start) = self.subject(at) {
             self.ranges.push((start, element.start));
@@ -89,8 +76,8 @@ impl Exclusions<'_> {
         }
     }
 
-    /// First byte of the subject that a predicate excludes: "A and C can be excluded", "A: wrong". `None` if the element at `at` is not
-    /// such a predicate.
+    /// First byte of the subject that a predicate excludes: "A and C can be excluded", "A: wrong". `None` if the
+    /// element at `at` is not such a predicate.
     fn subject(&self, at: usize) -> Option<usize> {
         let (clauses, elements) = (self.clauses, &self.clauses.elements);
         let element = &elements[at];
@@ -104,12 +91,7 @@ impl Exclusions<'_> {
             let is_named = self.names.any(self.clause, element.start);
             // "It is wrong" refers to the last name.
             let pronoun = !is_named && last && self.has_pronoun_subject(verb);
-            return Some(
-                self.names
-                    .last_start(element.start)
-                    .filter(|_| pronoun)
-                    .unwrap_or(self.clause),
-            );
+            return Some(self.names.last_start(element.start).filter(|_| pronoun).unwrap_or(self.clause));
         }
         // Without a verb, the element is a predicate only directly after a name.
         let joints = [':', '-', '–', '—', '(', ',', '=', '→', ')', ']'];
@@ -119,11 +101,7 @@ impl Exclusions<'_> {
         }
         let end = elements[name].end;
         self.names.start_of_name_ending_at(end)?;
-        Some(if self.clause < end {
-            self.clause
-        } else {
-            self.before_colon.min(end)
-        })
+        Some(if self.clause < end { self.clause } else { self.before_colon.min(end) })
     }
 
     /// True if the subject of a verb is only a pronoun.
@@ -133,10 +111,6 @@ impl Exclusions<'_> {
             .iter()
             .rev()
             .take_while(|element| element.start >= self.clause)
-            .all(|element| {
-                element
-                    .roles
-                    .has_any(&[Role::Pronoun, Role::Adverb, Role::Copula, Role::Modal])
-            })
+            .all(|element| element.roles.has_any(&[Role::Pronoun, Role::Adverb, Role::Copula, Role::Modal]))
     }
 }

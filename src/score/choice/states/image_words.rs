@@ -5,14 +5,12 @@ use crate::choice::names::Name;
 use crate::choice::text::words::Role;
 use crate::choice::text::{Boundary, Clauses, Ranges, TokenKind};
 
-/// Ranges of the color names that describe the image: "the image is black", "gray noise", "I only see black", "completely black".
+/// Ranges of the color names that describe the image: "the image is black", "gray noise", "I only see black",
+/// "completely black".
 pub(crate) fn image_colors(clauses: &Clauses<'_>, texts: &[Name], offered: &ChoiceViews) -> Ranges {
     let described = texts
         .iter()
-        .filter(|name| {
-            name.choice
-                .is_some_and(|choice| offered.naming[choice] == Naming::Color)
-        })
+        .filter(|name| name.choice.is_some_and(|choice| offered.naming[choice] == Naming::Color))
         .filter(|name| describes_image(clauses, name));
     Ranges::new(described.map(|name| (name.start, name.end)).collect())
 }
@@ -25,13 +23,12 @@ fn describes_image(clauses: &Clauses<'_>, name: &Name) -> bool {
     let first = elements.partition_point(|element| element.end <= name.start);
     let behind = clauses.index(name.end);
     // "Too dark" is one phrase.
-    let denied = elements
-        .get(first)
-        .is_some_and(|element| element.has(Role::Not));
+    let denied = elements.get(first).is_some_and(|element| element.has(Role::Not));
     denied || before_noise(clauses, behind) || after_subject(clauses, first, behind)
 }
 
-/// True if a noun such as "noise" or "image" follows the color, perhaps after further colors: "gray noise", "black and white image".
+/// True if a noun such as "noise" or "image" follows the color, perhaps after further colors: "gray noise", "black and
+/// white image".
 fn before_noise(clauses: &Clauses<'_>, behind: usize) -> bool {
     let elements = &clauses.elements;
     let mut at = behind;
@@ -40,21 +37,14 @@ fn before_noise(clauses: &Clauses<'_>, behind: usize) -> bool {
             return false;
         };
         // "A brown area rug" is a rug.
-        let modifies = elements
-            .get(at + 1)
-            .is_some_and(|next| next.has(Role::Head));
+        let modifies = elements.get(at + 1).is_some_and(|next| next.has(Role::Head));
         if element.has(Role::Noise) {
             return !modifies;
         }
         // "The black part of the image".
-        let within = elements
-            .get(at + 1)
-            .is_some_and(|next| next.has(Role::Within));
+        let within = elements.get(at + 1).is_some_and(|next| next.has(Role::Within));
         if element.has(Role::Portion) && within {
-            return elements[at + 1..]
-                .iter()
-                .take(4)
-                .any(|element| element.has(Role::Image));
+            return elements[at + 1..].iter().take(4).any(|element| element.has(Role::Image));
         }
         let joins = element.roles.has_any(&[Role::And, Role::Or]) || clauses.is_sign(at, &[',']);
         let is_color = element.roles.has_any(&[Role::Color, Role::Shade]);
@@ -66,12 +56,11 @@ fn before_noise(clauses: &Clauses<'_>, behind: usize) -> bool {
     false
 }
 
-/// True if the words before a color attribute it to the image: the subject of the sentence, "I only see", or "completely" alone.
+/// True if the words before a color attribute it to the image: the subject of the sentence, "I only see", or
+/// "completely" alone.
 fn after_subject(clauses: &Clauses<'_>, first: usize, behind: usize) -> bool {
     let elements = &clauses.elements;
-    let ends = elements
-        .get(behind)
-        .is_none_or(|next| next.boundary > Boundary::None);
+    let ends = elements.get(behind).is_none_or(|next| next.boundary > Boundary::None);
     let mut entirely = false;
     for at in (first.saturating_sub(WITHIN)..first).rev() {
         let element = &elements[at];
@@ -80,8 +69,7 @@ fn after_subject(clauses: &Clauses<'_>, first: usize, behind: usize) -> bool {
         entirely |= element.has(Role::Entirely);
         let alone = matches!(word, "only" | "just" | "nothing but");
         let sees_before = at > 0 && elements[at - 1].has(Role::See);
-        if word == "pitch" || (element.has(Role::See) && ends && (!alone || begins || sees_before))
-        {
+        if word == "pitch" || (element.has(Role::See) && ends && (!alone || begins || sees_before)) {
             return true;
         }
         if element.has(Role::Copula) {
@@ -104,9 +92,7 @@ fn after_subject(clauses: &Clauses<'_>, first: usize, behind: usize) -> bool {
 }
 
 fn is_color(clauses: &Clauses<'_>, at: usize) -> bool {
-    clauses.elements[at]
-        .roles
-        .has_any(&[Role::Color, Role::Shade])
+    clauses.elements[at].roles.has_any(&[Role::Color, Role::Shade])
 }
 
 /// True if the subject of a verb is the image, or a pronoun in a clause with a word such as "entirely".
@@ -120,13 +106,11 @@ fn has_image_subject(clauses: &Clauses<'_>, verb: usize, entirely: bool) -> bool
     if entirely && subject.len() == 1 && elements[start].has(Role::Pronoun) {
         return true;
     }
-    subject
-        .clone()
-        .any(|at| elements[at].has(Role::Image) && is_head(clauses, start, at))
+    subject.clone().any(|at| elements[at].has(Role::Image) && is_head(clauses, start, at))
 }
 
-/// True if an image noun is the head of the subject, as in "most of the image is black", and not a place, as in "the sofa in the image is
-/// white".
+/// True if an image noun is the head of the subject, as in "most of the image is black", and not a place, as in "the
+/// sofa in the image is white".
 fn is_head(clauses: &Clauses<'_>, start: usize, noun: usize) -> bool {
     let elements = &clauses.elements;
     let Some(within) = (start..noun)
@@ -140,10 +124,7 @@ fn is_head(clauses: &Clauses<'_>, start: usize, noun: usize) -> bool {
 }
 
 fn is_determiner_or_color(clauses: &Clauses<'_>, at: usize) -> bool {
-    const DETERMINERS: [&str; 9] = [
-        "the", "this", "a", "that", "given", "provided", "your", "entire", "whole",
-    ];
+    const DETERMINERS: [&str; 9] = ["the", "this", "a", "that", "given", "provided", "your", "entire", "whole"];
     let element = &clauses.elements[at];
-    is_color(clauses, at)
-        || (element.kind == TokenKind::Word && DETERMINERS.contains(&element.slice(clauses.folded)))
+    is_color(clauses, at) || (element.kind == TokenKind::Word && DETERMINERS.contains(&element.slice(clauses.folded)))
 }

@@ -6,24 +6,16 @@ use crate::choice::text::{Boundary, Clauses, TokenKind};
 
 /// True if the scope that begins at byte `open` ends at the element at `at`; false without an open scope.
 ///
-/// A scope ends with its clause and at "only … remains". After a name it also ends at "leaves" and at a comma before an independent
-/// clause ("I rule out A, it is B"). It does not end at a colon before the first name ("Ruled out: A"), nor at the line breaks of a list
-/// after such a colon.
-pub(super) fn ends_scope(
-    clauses: &Clauses<'_>,
-    names: &Names<'_>,
-    open: Option<usize>,
-    at: usize,
-) -> bool {
+/// A scope ends with its clause and at "only … remains". After a name it also ends at "leaves" and at a comma before an
+/// independent clause ("I rule out A, it is B"). It does not end at a colon before the first name ("Ruled out: A"), nor
+/// at the line breaks of a list after such a colon.
+pub(super) fn ends_scope(clauses: &Clauses<'_>, names: &Names<'_>, open: Option<usize>, at: usize) -> bool {
     let Some(open) = open else {
         return false;
     };
     let element = &clauses.elements[at];
     match element.boundary {
-        Boundary::None => {
-            (element.has(Role::Leaves) && names.any(open, element.start))
-                || only_remains(clauses, at)
-        }
+        Boundary::None => (element.has(Role::Leaves) && names.any(open, element.start)) || only_remains(clauses, at),
         Boundary::Part => {
             let next = clauses.elements.get(at + 1);
             clauses.is_sign(at, &[','])
@@ -53,7 +45,8 @@ fn only_remains(clauses: &Clauses<'_>, at: usize) -> bool {
 /// Maximum number of elements in a line of a list.
 const LINE_WORDS: usize = 4;
 
-/// True if the element is a line break before another line of a list of names; the list begins on a new line after byte `open`.
+/// True if the element is a line break before another line of a list of names; the list begins on a new line after byte
+/// `open`.
 fn is_in_list(clauses: &Clauses<'_>, names: &Names<'_>, open: usize, at: usize) -> bool {
     let elements = &clauses.elements;
     let first = names.first_start(open).map(|start| clauses.index(start));
@@ -65,11 +58,8 @@ fn is_in_list(clauses: &Clauses<'_>, names: &Names<'_>, open: usize, at: usize) 
     if elements[at].kind != TokenKind::Break || !begins_line {
         return false;
     }
-    let line: Vec<_> = elements[at + 1..]
-        .iter()
-        .take(LINE_WORDS + 1)
-        .take_while(|element| element.kind != TokenKind::Break)
-        .collect();
+    let line: Vec<_> =
+        elements[at + 1..].iter().take(LINE_WORDS + 1).take_while(|element| element.kind != TokenKind::Break).collect();
     let (Some(start), Some(end)) = (line.first(), line.last()) else {
         return false;
     };

@@ -55,17 +55,9 @@ fn rules_agree_with_a_person() {
         }
         counts.entry(case.rule).or_default()[usize::from(found.is_some())] += 1;
     }
-    assert!(
-        wrong.is_empty(),
-        "{} wrong:\n{}",
-        wrong.len(),
-        wrong.join("\n")
-    );
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
     for (rule, both) in counts {
-        assert!(
-            both.iter().all(|count| *count >= EACH_WAY),
-            "{rule}: {both:?}"
-        );
+        assert!(both.iter().all(|count| *count >= EACH_WAY), "{rule}: {both:?}");
     }
 }
 
@@ -81,21 +73,10 @@ fn rules_do_not_change_the_strict_parsing() {
         ("dark", "brightness", 0),
     ] {
         for mode in ParsingMode::ALL {
-            assert_eq!(
-                read(reply, &choices(set), mode),
-                Answer::Chosen(index),
-                "{reply}"
-            );
+            assert_eq!(read(reply, &choices(set), mode), Answer::Chosen(index), "{reply}");
         }
     }
-    for reply in [
-        "No light.",
-        "dining-table",
-        "Grey.",
-        "✅ kitchen",
-        "Kitchen?",
-        "I rule out B.",
-    ] {
+    for reply in ["No light.", "dining-table", "Grey.", "✅ kitchen", "Kitchen?", "I rule out B."] {
         for (set, _) in SETS {
             let strict = read(reply, &choices(set), ParsingMode::Strict);
             assert!(matches!(strict, Answer::Unparsed(_)), "{reply}");

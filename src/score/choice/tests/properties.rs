@@ -29,9 +29,7 @@ const SENTENCES: [&str; 6] = [
 /// The replies of the table that end with a sentence and have no markup, which could enclose an appended question.
 fn whole_sentences() -> Vec<String> {
     let mut replies = super::table_of_replies();
-    replies.retain(|reply| {
-        reply.ends_with(['.', '!']) && !reply.contains(['{', '<', '[', '`', '\\', '?', '◁'])
-    });
+    replies.retain(|reply| reply.ends_with(['.', '!']) && !reply.contains(['{', '<', '[', '`', '\\', '?', '◁']));
     replies
 }
 
@@ -108,17 +106,7 @@ fn parsing_takes_linear_time() {
     /// Time limit for one reply in a build without optimization; a release build takes less than a second.
     const LIMIT: Duration = Duration::from_secs(30);
     const LENGTH: usize = 2_000_000;
-    let signs = [
-        "✅ kitchen\n",
-        "A\n",
-        "B, ",
-        "kitchen ",
-        "bedroom, kitchen, ",
-        "no, ",
-        "(",
-        "[x] A ",
-        "? ",
-    ];
+    let signs = ["✅ kitchen\n", "A\n", "B, ", "kitchen ", "bedroom, kitchen, ", "no, ", "(", "[x] A ", "? "];
     let lists = lists();
     // One entry of each list; all of them are looked up in the same way.
     let words = lists.values().map(|list| list[0].clone() + " ");

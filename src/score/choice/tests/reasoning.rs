@@ -24,20 +24,14 @@ fn reasoning_blocks_are_ignored() {
         ("[THINK]", "[/THINK]"),
         ("◁think▷", "◁/think▷"),
         ("<|START_THINKING|>", "<|END_THINKING|>"),
-        (
-            "<|channel|>analysis<|message|>",
-            "<|channel|>final<|message|>",
-        ),
+        ("<|channel|>analysis<|message|>", "<|channel|>final<|message|>"),
     ] {
         let thought = "It could be A. The answer is C at first sight.\n";
         for (reply, expected) in [
             (format!("{begin}{thought}{end}B"), Answer::Chosen(1)),
             (format!("{begin}{end}\n(B) bedroom"), Answer::Chosen(1)),
             (format!("{thought}{end}B"), Answer::Chosen(1)),
-            (
-                format!("{begin}{thought}"),
-                Answer::Unparsed(UnreadReason::Truncated),
-            ),
+            (format!("{begin}{thought}"), Answer::Unparsed(UnreadReason::Truncated)),
         ] {
             for mode in ParsingMode::ALL {
                 assert_eq!(read(&reply, &rooms, mode), expected, "{reply:?}");
@@ -46,7 +40,8 @@ fn reasoning_blocks_are_ignored() {
     }
 }
 
-/// A server that drops special tokens leaves the name of Gemma's reasoning channel. The end of the reasoning is then unknown.
+/// A server that drops special tokens leaves the name of Gemma's reasoning channel. The end of the reasoning is then
+/// unknown.
 #[test]
 fn reasoning_without_marks_is_not_parsed() {
     let rooms = rooms();
@@ -69,10 +64,7 @@ fn pairs(name: &str, other: &str) -> Vec<(String, String)> {
         (format!("<|{name}_start|>"), format!("<|{name}_end|>")),
         (format!("<|START_{upper}|>"), format!("<|END_{upper}|>")),
         (format!("<|begin_of_{name}|>"), format!("<|end_of_{name}|>")),
-        (
-            format!("<｜begin▁of▁{name}｜>"),
-            format!("<｜end▁of▁{name}｜>"),
-        ),
+        (format!("<｜begin▁of▁{name}｜>"), format!("<｜end▁of▁{name}｜>")),
         (format!("<|{name}>"), format!("<{name}|>")),
         (format!("[BEGIN {upper}]"), format!("[END {upper}]")),
         (format!("◁{name}▷"), format!("◁/{name}▷")),
@@ -211,11 +203,9 @@ fn marks_of_other_families_are_recognized() {
     ] {
         assert_eq!(both(reply), [Answer::Chosen(1); 2], "{reply}");
     }
-    for reply in [
-        "<ponder>C</ponder>\n<answer>B</answer>",
-        "<think>C</think><answer>\nB\n</answer>",
-        "B <ponder>or C?</ponder>",
-    ] {
+    for reply in
+        ["<ponder>C</ponder>\n<answer>B</answer>", "<think>C</think><answer>\nB\n</answer>", "B <ponder>or C?</ponder>"]
+    {
         assert_eq!(both(reply)[1], Answer::Chosen(1), "{reply}");
     }
     for reply in [
@@ -248,27 +238,15 @@ fn plain_answers_in_brackets_are_read() {
         ("<p>B</p><p>The bed is on the left.</p>", NONE, Some(1)),
         ("(B) <table>", NONE, Some(1)),
         ("### Answer: B", NONE, Some(1)),
-        (
-            "### Answer\nB\n\n### Explanation\nThere is a bed.",
-            NONE,
-            Some(1),
-        ),
-        (
-            "**Answer:** B\n**Explanation:** There is a bed.",
-            NONE,
-            Some(1),
-        ),
+        ("### Answer\nB\n\n### Explanation\nThere is a bed.", NONE, Some(1)),
+        ("**Answer:** B\n**Explanation:** There is a bed.", NONE, Some(1)),
         ("<answer>B</answer>", NONE, Some(1)),
         ("<answer>B</answer> as there is a bed", NONE, Some(1)),
         ("<room>B</room>", NONE, Some(1)),
         ("<room>B</room> as there is a bed", NONE, Some(1)),
         ("B <note>It is dark.</note>", NONE, Some(1)),
         ("[note] It is dark. The answer is B.", NONE, Some(1)),
-        (
-            "The answer is <|begin_of_box|>B<|end_of_box|>.",
-            NONE,
-            Some(1),
-        ),
+        ("The answer is <|begin_of_box|>B<|end_of_box|>.", NONE, Some(1)),
         ("- [x] bedroom", NONE, Some(1)),
         ("- [x] B\n- [ ] A", NONE, Some(1)),
         ("B</zorx>", NONE, Some(1)),
@@ -298,15 +276,9 @@ fn open_answers_are_without_thoughts_and_tokens() {
         ("<think>Black?</think><answer>brown</answer>", "brown"),
         ("It is dark. <answer>brown</answer>", "brown"),
         ("brown<|im_end|>\n<|im_start|>user\nAnd now?", "brown"),
-        (
-            "brown<|eot_id|><|start_header_id|>user<|end_header_id|>\n\nAnd now?",
-            "brown",
-        ),
+        ("brown<|eot_id|><|start_header_id|>user<|end_header_id|>\n\nAnd now?", "brown"),
         ("brown<end_of_turn>\n<start_of_turn>user\nAnd now?", "brown"),
-        (
-            "### Reasoning\nIt could be black.\n### Final answer\nbrown",
-            "brown",
-        ),
+        ("### Reasoning\nIt could be black.\n### Final answer\nbrown", "brown"),
     ] {
         assert_eq!(open_answer(reply).as_deref(), Ok(answer), "{reply}");
     }

@@ -8,16 +8,9 @@ use crate::choice::text::{fold, tokens};
 use crate::choice::{ParsingMode, read};
 use darkqa_base::types::questions::Answer;
 
-/// A role, a set of choices, a reply in which an entry of the role replaces `{}`, the choice in it, a reply without such an entry, and the
-/// choice in that reply.
-type Example = (
-    Role,
-    &'static str,
-    &'static str,
-    Option<usize>,
-    &'static str,
-    Option<usize>,
-);
+/// A role, a set of choices, a reply in which an entry of the role replaces `{}`, the choice in it, a reply without
+/// such an entry, and the choice in that reply.
+type Example = (Role, &'static str, &'static str, Option<usize>, &'static str, Option<usize>);
 
 #[rustfmt::skip]
 const EXAMPLES: [Example; 42] = [
@@ -83,10 +76,8 @@ fn every_entry_decides_a_reply() {
         if role == Role::Neutral || CHOICE_ROLES.contains(&role) {
             continue;
         }
-        let (_, set, reply, found, control, other) = EXAMPLES
-            .iter()
-            .find(|(of, ..)| *of == role)
-            .unwrap_or_else(|| panic!("{role:?}"));
+        let (_, set, reply, found, control, other) =
+            EXAMPLES.iter().find(|(of, ..)| *of == role).unwrap_or_else(|| panic!("{role:?}"));
         for word in list {
             // "It's" already contains the verb.
             let reply = reply.replace("{}", &word).replace("'s is ", "'s ");
@@ -98,12 +89,7 @@ fn every_entry_decides_a_reply() {
             }
         }
     }
-    assert!(
-        wrong.is_empty(),
-        "{} wrong:\n{}",
-        wrong.len(),
-        wrong.join("\n")
-    );
+    assert!(wrong.is_empty(), "{} wrong:\n{}", wrong.len(), wrong.join("\n"));
 }
 
 /// A neutral phrase hides a word that would act without it, and denies nothing.
@@ -129,11 +115,7 @@ fn every_neutral_phrase_hides_an_active_word() {
             .filter_map(|(start, end)| phrase_at(&folded, &words[start..end]))
             .any(|(_, roles)| roles != Roles::from_role(Role::Neutral) && roles.has_any(&ACTIVE));
         assert!(hides, "{phrase:?} hides nothing");
-        assert_eq!(
-            lenient("home", &format!("{phrase} the kitchen.")),
-            Some(1),
-            "{phrase:?}"
-        );
+        assert_eq!(lenient("home", &format!("{phrase} the kitchen.")), Some(1), "{phrase:?}");
     }
 }
 
@@ -160,29 +142,19 @@ fn naming(word: &str) -> Vec<Naming> {
     ChoiceViews::new(&choices_of(&[word, "kitchen"])).naming
 }
 
-/// Last words of object names that are not in the list of heads, each with an object whose name keeps its meaning before that word.
-const NO_HEADS: [(&str, &str); 4] = [
-    ("photo", "kitchen"),
-    ("monitor", "TV"),
-    ("oven", "microwave"),
-    ("machine", "dishwasher"),
-];
+/// Last words of object names that are not in the list of heads, each with an object whose name keeps its meaning
+/// before that word.
+const NO_HEADS: [(&str, &str); 4] =
+    [("photo", "kitchen"), ("monitor", "TV"), ("oven", "microwave"), ("machine", "dishwasher")];
 
 /// The last word of every object name in the question rules is in the list of heads.
 #[test]
 fn object_names_end_in_a_head() {
-    let rules: toml::Table = include_str!("../../../questions/rules.toml")
-        .parse()
-        .unwrap();
+    let rules: toml::Table = include_str!("../../../questions/rules.toml").parse().unwrap();
     let heads = &lists()[&Role::Head];
     let (mut known, mut missing) = (0, Vec::new());
     for (_, class) in rules["class"].as_table().unwrap() {
-        for word in class
-            .get("words")
-            .and_then(toml::Value::as_array)
-            .into_iter()
-            .flatten()
-        {
+        for word in class.get("words").and_then(toml::Value::as_array).into_iter().flatten() {
             let last = word.as_str().unwrap().split(' ').next_back().unwrap();
             let is_head = heads.contains(&last.to_lowercase());
             if NO_HEADS.iter().any(|(word, _)| *word == last) {
@@ -198,13 +170,8 @@ fn object_names_end_in_a_head() {
     assert!(known > 60, "{known}");
     for (word, thing) in NO_HEADS {
         let choices = choices_of(&[thing, "sofa"]);
-        let [object, other] = [word, "cupboard"].map(|next| {
-            read(
-                &format!("A {thing} {next}."),
-                &choices,
-                ParsingMode::Lenient,
-            )
-        });
+        let [object, other] =
+            [word, "cupboard"].map(|next| read(&format!("A {thing} {next}."), &choices, ParsingMode::Lenient));
         assert_eq!(object, Answer::Chosen(0), "{thing} {word}");
         assert!(matches!(other, Answer::Unparsed(_)), "{thing}");
     }

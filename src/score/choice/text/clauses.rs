@@ -59,8 +59,7 @@ impl<'a> Clauses<'a> {
         let mut elements = Vec::with_capacity(tokens.len());
         let mut at = 0;
         while let Some(first) = tokens.get(at) {
-            let (count, mut roles) =
-                phrase_at(folded, &tokens[at..]).unwrap_or((1, Roles::default()));
+            let (count, mut roles) = phrase_at(folded, &tokens[at..]).unwrap_or((1, Roles::default()));
             if count > 1 {
                 roles = roles.union(word_roles(folded, &tokens[at..at + count]));
             }
@@ -79,24 +78,20 @@ impl<'a> Clauses<'a> {
 
     /// Index of the first element that begins at a byte or after it.
     pub(crate) fn index(&self, byte: usize) -> usize {
-        self.elements
-            .partition_point(|element| element.start < byte)
+        self.elements.partition_point(|element| element.start < byte)
     }
 
     /// The next element after a byte, if only spaces are between them.
     pub(crate) fn element_at(&self, byte: usize) -> Option<&Element> {
         let element = self.elements.get(self.index(byte))?;
-        self.folded[byte..element.start]
-            .trim()
-            .is_empty()
-            .then_some(element)
+        self.folded[byte..element.start].trim().is_empty().then_some(element)
     }
 
     /// True if the element at an index is one of these signs.
     pub(crate) fn is_sign(&self, at: usize, signs: &[char]) -> bool {
-        self.elements.get(at).is_some_and(|element| {
-            element.kind == TokenKind::Sign && element.slice(self.folded).starts_with(signs)
-        })
+        self.elements
+            .get(at)
+            .is_some_and(|element| element.kind == TokenKind::Sign && element.slice(self.folded).starts_with(signs))
     }
 
     /// True if the element at an index begins a clause or a part of one.
@@ -123,11 +118,7 @@ impl<'a> Clauses<'a> {
     /// Removes the boundary of the sign at a byte, because the full stop in "B. kitchen" ends no sentence.
     pub(crate) fn remove_boundary(&mut self, byte: usize) {
         let at = self.index(byte);
-        if let Some(element) = self
-            .elements
-            .get_mut(at)
-            .filter(|element| element.start == byte)
-        {
+        if let Some(element) = self.elements.get_mut(at).filter(|element| element.start == byte) {
             element.boundary = Boundary::None;
         }
     }

@@ -31,30 +31,20 @@ static NEXT_TURN: LazyLock<Regex> = LazyLock::new(|| {
     ))
 });
 
-/// Normalizes a text to NFKC, removes invisible characters and template tokens, and cuts it at the end of the first turn that contains
-/// text.
+/// Normalizes a text to NFKC, removes invisible characters and template tokens, and cuts it at the end of the first
+/// turn that contains text.
 pub(crate) fn tidy(text: &str) -> String {
-    let mut text: String = if text.is_ascii() {
-        text.to_owned()
-    } else {
-        text.nfkc().filter(|&c| !is_invisible(c)).collect()
-    };
+    let mut text: String =
+        if text.is_ascii() { text.to_owned() } else { text.nfkc().filter(|&c| !is_invisible(c)).collect() };
     if text.contains(['\r', '\u{2028}', '\u{2029}']) {
-        text = text
-            .replace("\r\n", "\n")
-            .replace(['\r', '\u{2028}', '\u{2029}'], "\n");
+        text = text.replace("\r\n", "\n").replace(['\r', '\u{2028}', '\u{2029}'], "\n");
     }
     // Every token has one of these.
     if !text.contains(['<', '[']) {
         return text.trim().to_owned();
     }
-    let text = text
-        .replace("<|begin_of_box|>", "<answer>")
-        .replace("<|end_of_box|>", "</answer>");
-    let end = TURN_END
-        .find_iter(&text)
-        .map(|marker| marker.start())
-        .find(|&start| !text[..start].trim().is_empty());
+    let text = text.replace("<|begin_of_box|>", "<answer>").replace("<|end_of_box|>", "</answer>");
+    let end = TURN_END.find_iter(&text).map(|marker| marker.start()).find(|&start| !text[..start].trim().is_empty());
     let turn = &text[..end.unwrap_or(text.len())];
     let turn = TURN_END.replace_all(turn, " ");
     TOKEN.replace_all(&turn, " ").trim().to_owned()

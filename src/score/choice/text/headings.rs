@@ -9,7 +9,8 @@ use super::marks::{MarkWords, Meaning};
 
 use darkqa_base::types::questions::UnreadReason;
 
-/// A line that is a heading: `### Title`, `**Title:** text`, `[TITLE]`. The text after the colon of a heading belongs to its section.
+/// A line that is a heading: `### Title`, `**Title:** text`, `[TITLE]`. The text after the colon of a heading belongs
+/// to its section.
 static HEADING: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"(?m)^[ \t]*(?:#{1,6}[ \t]+(?P<hash>[^\n:：]{1,60}?)[ \t#]*(?:[:：]|$)",
@@ -29,8 +30,8 @@ struct Heading {
 
 /// The section with the answer, in a text that begins with another section; `None` if the whole text may be the answer.
 ///
-/// The last section under the heading of an answer counts. Without such a heading, the last section counts if it is an answer and nothing
-/// else, and no other section is; otherwise the text after a section of thoughts.
+/// The last section under the heading of an answer counts. Without such a heading, the last section counts if it is an
+/// answer and nothing else, and no other section is; otherwise the text after a section of thoughts.
 ///
 /// # Errors
 /// If nothing follows the heading of the answer.
@@ -48,14 +49,10 @@ pub(super) fn last_section<'t>(
         return Ok(None);
     }
     let section = |index: usize| {
-        let end = headings
-            .get(index + 1)
-            .map_or(text.len(), |next| next.start);
+        let end = headings.get(index + 1).map_or(text.len(), |next| next.start);
         text[headings[index].content..end].trim_matches(is_blank)
     };
-    let titled = headings
-        .iter()
-        .rposition(|heading| heading.meaning == Meaning::Answer);
+    let titled = headings.iter().rposition(|heading| heading.meaning == Meaning::Answer);
     if let Some(titled) = titled {
         return match section(titled) {
             "" => Err(UnreadReason::Truncated),
@@ -82,12 +79,7 @@ fn headings(text: &str, words: &MarkWords) -> Vec<Heading> {
             let title = found.name("hash").or(bold).or(found.name("bracket"))?;
             let meaning = words.title_meaning(title.as_str());
             let is_bold = bold.is_some();
-            let heading = Heading {
-                start: whole.start(),
-                content: whole.end(),
-                meaning,
-                is_bold,
-            };
+            let heading = Heading { start: whole.start(), content: whole.end(), meaning, is_bold };
             (!is_bold || meaning != Meaning::Other).then_some(heading)
         })
         .collect()

@@ -1,5 +1,5 @@
-//! Marks that models and chat templates put around parts of a reply, recognized by their form: special tokens, tags and bracketed names
-//! ([`marks`]).
+//! Marks that models and chat templates put around parts of a reply, recognized by their form: special tokens, tags and
+//! bracketed names ([`marks`]).
 
 use std::collections::HashSet;
 use std::sync::LazyLock;
@@ -29,7 +29,8 @@ const END_WORDS: [&str; 8] = ["end", "close", "stop", "finish", "eos", "eot", "e
 /// Words in names that say nothing.
 const FILLERS: [&str; 2] = ["of", "the"];
 
-/// The longest word of [`MarkWords::thought`] that must match a whole word, in bytes; chosen: "cot" is not in "cottage".
+/// The longest word of [`MarkWords::thought`] that must match a whole word, in bytes; chosen: "cot" is not in
+/// "cottage".
 const WHOLE_WORD: usize = 3;
 
 /// A mark: `<|x|>`, `<|x>`, `<x|>`, `[|x|]`, `◁x▷`, then `<x>`, then `[x]`.
@@ -43,8 +44,7 @@ static MARK: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// The name of a role or channel after a token that begins a turn, alone on its line.
-static TURN_NAME: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"\A[ \t]*(\p{L}{2,20})[ \t]*(?:\r?\n|<)"));
+static TURN_NAME: LazyLock<Regex> = LazyLock::new(|| compiled(r"\A[ \t]*(\p{L}{2,20})[ \t]*(?:\r?\n|<)"));
 
 /// Form of a mark.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -106,8 +106,7 @@ impl Mark<'_> {
     /// True for a token of a tokenizer, which is no part of the answer.
     pub(super) fn is_token(&self) -> bool {
         let is_end_of_answer = self.meaning == Meaning::Answer && self.role == Role::End;
-        self.form == Form::Special
-            || (self.form == Form::Bracket && is_end_of_answer && self.core.contains(' '))
+        self.form == Form::Special || (self.form == Form::Bracket && is_end_of_answer && self.core.contains(' '))
     }
 }
 
@@ -117,9 +116,7 @@ pub(super) fn marks<'t>(text: &'t str, words: &MarkWords) -> Vec<Mark<'t>> {
     if !text.contains(['<', '[', '◁', '⟨', '⟦']) {
         return Vec::new();
     }
-    MARK.captures_iter(text)
-        .filter_map(|found| mark(text, &found, words))
-        .collect()
+    MARK.captures_iter(text).filter_map(|found| mark(text, &found, words)).collect()
 }
 
 fn mark<'t>(text: &'t str, found: &Captures<'t>, words: &MarkWords) -> Option<Mark<'t>> {
@@ -132,10 +129,8 @@ fn mark<'t>(text: &'t str, found: &Captures<'t>, words: &MarkWords) -> Option<Ma
     let parts = name_words(bare);
     let is_numbered = bare.ends_with(|c: char| c.is_ascii_digit());
     // Signs such as ◁ are in no token of a turn.
-    let begins = matches!(group, "left" | "signs")
-        || parts.iter().any(|word| BEGIN_WORDS.contains(&&**word));
-    let ends =
-        has_slash || group == "right" || parts.iter().any(|word| END_WORDS.contains(&&**word));
+    let begins = matches!(group, "left" | "signs") || parts.iter().any(|word| BEGIN_WORDS.contains(&&**word));
+    let ends = has_slash || group == "right" || parts.iter().any(|word| END_WORDS.contains(&&**word));
     let role = match (begins, ends) {
         (_, true) => Role::End,
         (true, false) => Role::Begin,
@@ -144,18 +139,14 @@ fn mark<'t>(text: &'t str, found: &Captures<'t>, words: &MarkWords) -> Option<Ma
     let core: Vec<&str> = parts
         .iter()
         .map(|word| &**word)
-        .filter(|word| {
-            !BEGIN_WORDS.contains(word) && !END_WORDS.contains(word) && !FILLERS.contains(word)
-        })
+        .filter(|word| !BEGIN_WORDS.contains(word) && !END_WORDS.contains(word) && !FILLERS.contains(word))
         .collect();
     let has_role_word = core.len() < parts.len() && role != Role::Single;
     let lower = bare.to_lowercase();
     let (form, meaning) = match group {
         "tag" if words.bare.contains(&lower) => (Form::Special, Meaning::Template),
         "tag" if words.html.contains(&lower) => (Form::Tag, Meaning::Layout),
-        "tag" if is_numbered || (has_role_word && bare.contains('_')) => {
-            (Form::Special, words.meaning(&core))
-        }
+        "tag" if is_numbered || (has_role_word && bare.contains('_')) => (Form::Special, words.meaning(&core)),
         "tag" => (Form::Tag, words.meaning(&core)),
         "bracket" => (Form::Bracket, words.meaning(&core)),
         _ => (Form::Special, words.meaning(&core)),
@@ -185,12 +176,9 @@ fn with_turn_name<'t>(mark: Mark<'t>, after: &'t str, words: &MarkWords) -> Mark
         return mark;
     };
     match words.meaning(&[&*name.as_str().to_lowercase()]) {
-        meaning @ (Meaning::Thought | Meaning::Answer) => Mark {
-            end: mark.end + name.end(),
-            role: Role::Begin,
-            meaning,
-            ..mark
-        },
+        meaning @ (Meaning::Thought | Meaning::Answer) => {
+            Mark { end: mark.end + name.end(), role: Role::Begin, meaning, ..mark }
+        }
         _ => mark,
     }
 }
@@ -212,10 +200,7 @@ fn name_words(name: &str) -> Vec<String> {
         .into_iter()
         .flat_map(|word| {
             let joined = ["endof", "startof", "beginof"].iter().find_map(|prefix| {
-                Some([
-                    prefix[..prefix.len() - 2].to_owned(),
-                    word.strip_prefix(prefix)?.to_owned(),
-                ])
+                Some([prefix[..prefix.len() - 2].to_owned(), word.strip_prefix(prefix)?.to_owned()])
             });
             joined.map_or_else(|| vec![word], Vec::from)
         })
@@ -238,9 +223,7 @@ impl MarkWords {
     }
 
     fn is_thought(&self, word: &str) -> bool {
-        self.thought
-            .iter()
-            .any(|stem| word == stem || (stem.len() > WHOLE_WORD && word.starts_with(&**stem)))
+        self.thought.iter().any(|stem| word == stem || (stem.len() > WHOLE_WORD && word.starts_with(&**stem)))
     }
 
     /// The meaning of the title of a section: `Thought process`, `Final answer`.

@@ -17,18 +17,14 @@ static LATEX_GROUP: LazyLock<Regex> = LazyLock::new(|| {
         r"|boldsymbol|bm|boxed|fbox|framebox|operatorname|underline|mbox|displaystyle)\s*\{([^{}]*)\}"
     ))
 });
-static LATEX_SIGN: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"\\(?:[()\[\],;:! ]|quad\b|qquad\b|bf\b|rm\b)"));
+static LATEX_SIGN: LazyLock<Regex> = LazyLock::new(|| compiled(r"\\(?:[()\[\],;:! ]|quad\b|qquad\b|bf\b|rm\b)"));
 static LETTER_TAG: LazyLock<Regex> = LazyLock::new(|| compiled(r"\A<([A-Za-z])>\z"));
-static BREAK_TAG: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"(?i)</?(?:br|p|div|li|tr|td|th|h[1-6])\s*/?>"));
+static BREAK_TAG: LazyLock<Regex> = LazyLock::new(|| compiled(r"(?i)</?(?:br|p|div|li|tr|td|th|h[1-6])\s*/?>"));
 static TAG: LazyLock<Regex> =
     LazyLock::new(|| compiled(r#"</?[A-Za-z][A-Za-z0-9_-]{0,30}(?:\s+[a-z-]+="[^"<>]*")*\s*/?>"#));
-static LINE_START: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:#{1,6}|>|[-+•·▪◦‣●○■–—])[ \t]+)+"));
+static LINE_START: LazyLock<Regex> = LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:#{1,6}|>|[-+•·▪◦‣●○■–—])[ \t]+)+"));
 /// The check box of a task list item, at the start of a line.
-static TASK: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:[-+*•]|\d+[.)])[ \t]+)?\[[ xX]\][ \t]+"));
+static TASK: LazyLock<Regex> = LazyLock::new(|| compiled(r"(?m)^[ \t]*(?:(?:[-+*•]|\d+[.)])[ \t]+)?\[[ xX]\][ \t]+"));
 /// A check box anywhere. Removed only if the text contains an empty one.
 static BOX: LazyLock<Regex> = LazyLock::new(|| compiled(r"\[[ xX]\]"));
 /// Maximum depth of LaTeX groups that are unwrapped.
@@ -37,11 +33,7 @@ const LATEX_DEPTH: usize = 4;
 /// Removes markup, repeated spaces, empty lines and outer spaces.
 pub(crate) fn plain(text: &str) -> String {
     let text = LETTER_TAG.replace(text.trim(), "($1)");
-    let mut text = if text.contains("```") {
-        FENCE.replace_all(&text, "\n").into_owned()
-    } else {
-        text.into_owned()
-    };
+    let mut text = if text.contains("```") { FENCE.replace_all(&text, "\n").into_owned() } else { text.into_owned() };
     if text.contains('\\') {
         text = without_latex(text);
     }
@@ -76,11 +68,7 @@ fn with_single_spaces(text: &str) -> String {
     let mut gap = None;
     for c in text.trim().chars() {
         if c.is_whitespace() {
-            gap = Some(if c == '\n' || gap == Some('\n') {
-                '\n'
-            } else {
-                ' '
-            });
+            gap = Some(if c == '\n' || gap == Some('\n') { '\n' } else { ' ' });
             continue;
         }
         single.extend(gap.take());
@@ -89,7 +77,8 @@ fn with_single_spaces(text: &str) -> String {
     single
 }
 
-/// Stands for an en dash between two letters. It takes one byte, as a hyphen does: "living–room" is one name, "kitchen–bathroom" two.
+/// Stands for an en dash between two letters. It takes one byte, as a hyphen does: "living–room" is one name,
+/// "kitchen–bathroom" two.
 pub(crate) const RANGE: char = '\u{1e}';
 
 /// Removes emphasis, quotes and pictographs. A cross mark becomes "not", and every hyphen between letters becomes "-".
@@ -99,28 +88,23 @@ fn without_signs(text: &str) -> String {
     let mut rest = text.chars().peekable();
     while let Some(c) = rest.next() {
         let next = rest.peek().copied();
-        let is_inside_word =
-            previous.is_some_and(char::is_alphanumeric) && next.is_some_and(char::is_alphanumeric);
-        let is_compound =
-            previous.is_some_and(char::is_alphabetic) && next.is_some_and(char::is_alphabetic);
+        let is_inside_word = previous.is_some_and(char::is_alphanumeric) && next.is_some_and(char::is_alphanumeric);
+        let is_compound = previous.is_some_and(char::is_alphabetic) && next.is_some_and(char::is_alphabetic);
         match c {
             '‐' | '‑' | '‒' | '−' if is_compound => plain.push('-'),
             '–' if is_compound => plain.push(RANGE),
             RANGE => plain.push(' '),
             '\'' | '’' | '‘' | 'ʼ' if is_inside_word => plain.push('\''),
             '_' if is_inside_word => plain.push('_'),
-            '*' | '`' | '$' | '_' | '\'' | '’' | '‘' | '‚' | '"' | '“' | '”' | '„' | '‟' | '«'
-            | '»' | '‹' | '›' | '「' | '」' | '『' | '』' | '《' | '》' | '〈' | '〉' | '″' =>
-                {}
+            '*' | '`' | '$' | '_' | '\'' | '’' | '‘' | '‚' | '"' | '“' | '”' | '„' | '‟' | '«' | '»' | '‹' | '›'
+            | '「' | '」' | '『' | '』' | '《' | '》' | '〈' | '〉' | '″' => {}
             '【' | '〔' | '〖' => plain.push('['),
             '】' | '〕' | '〗' => plain.push(']'),
             '|' => plain.push('\n'),
             '❌' | '✗' | '✘' | '❎' | '✖' | '👎' | '☐' => plain.push_str(" not "),
-            '~'
-            | '\u{20e3}'
-            | '\u{2600}'..='\u{27bf}'
-            | '\u{2b00}'..='\u{2bff}'
-            | '\u{1f000}'..='\u{1faff}' => plain.push(' '),
+            '~' | '\u{20e3}' | '\u{2600}'..='\u{27bf}' | '\u{2b00}'..='\u{2bff}' | '\u{1f000}'..='\u{1faff}' => {
+                plain.push(' ');
+            }
             c => plain.push(c),
         }
         previous = Some(c);
@@ -128,16 +112,14 @@ fn without_signs(text: &str) -> String {
     plain
 }
 
-/// Converts a text to lower case without moving byte positions: a character whose lower case has another length is kept. A hyphen
-/// between two letters becomes a space, and "grey" becomes "gray".
+/// Converts a text to lower case without moving byte positions: a character whose lower case has another length is
+/// kept. A hyphen between two letters becomes a space, and "grey" becomes "gray".
 pub(crate) fn fold(text: &str) -> String {
     let mut folded = String::with_capacity(text.len());
     let mut rest = text.chars().peekable();
     let mut follows_letter = false;
     while let Some(c) = rest.next() {
-        let is_compound = matches!(c, '-' | RANGE)
-            && follows_letter
-            && rest.peek().is_some_and(|c| c.is_alphabetic());
+        let is_compound = matches!(c, '-' | RANGE) && follows_letter && rest.peek().is_some_and(|c| c.is_alphabetic());
         folded.push(if is_compound { ' ' } else { lower(c) });
         follows_letter = c.is_alphabetic();
     }

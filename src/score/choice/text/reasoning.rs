@@ -1,7 +1,8 @@
 //! Separation of the thoughts in a reply from its answer: [`separate`], [`open_answer`]. All experiments use it.
 //!
-//! The marks of thoughts are recognized by their form: an opening mark at the start, text, a closing mark, and the answer. The words of
-//! its name decide what a mark is only if one of the two is missing, or if HTML and tokens of a chat template look alike.
+//! The marks of thoughts are recognized by their form: an opening mark at the start, text, a closing mark, and the
+//! answer. The words of its name decide what a mark is only if one of the two is missing, or if HTML and tokens of a
+//! chat template look alike.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -45,13 +46,11 @@ static END: LazyLock<Regex> = LazyLock::new(|| any_of(|mark| &mark.end));
 static BEGIN: LazyLock<Regex> = LazyLock::new(|| any_of(|mark| &mark.begin));
 
 /// The name of a reasoning channel alone on the first line. A server that drops special tokens leaves only this name.
-static CHANNEL_NAME: LazyLock<Regex> = LazyLock::new(|| {
-    compiled(r"(?i)\A\s*(?:think|thinking|thoughts?|reasoning|analysis|reflection)[ \t]*\r?\n")
-});
+static CHANNEL_NAME: LazyLock<Regex> =
+    LazyLock::new(|| compiled(r"(?i)\A\s*(?:think|thinking|thoughts?|reasoning|analysis|reflection)[ \t]*\r?\n"));
 
 /// The name of a role after a token that begins a turn.
-static ROLE_NAME: LazyLock<Regex> =
-    LazyLock::new(|| compiled(r"(?i)\A\s*(?:assistant|model|system)\b"));
+static ROLE_NAME: LazyLock<Regex> = LazyLock::new(|| compiled(r"(?i)\A\s*(?:assistant|model|system)\b"));
 
 /// The most words of an answer in a tag whose name is not known, with nothing after it; chosen: thoughts are longer.
 const WRAPPED_WORDS: usize = 5;
@@ -60,11 +59,7 @@ const WRAPPED_WORDS: usize = 5;
 const MAX_BLOCKS: usize = 100;
 
 fn any_of(pattern: fn(&ReasoningMark) -> &String) -> Regex {
-    let patterns: Vec<String> = TABLE
-        .mark
-        .iter()
-        .map(|mark| format!("(?:{})", pattern(mark)))
-        .collect();
+    let patterns: Vec<String> = TABLE.mark.iter().map(|mark| format!("(?:{})", pattern(mark))).collect();
     compiled(&format!("(?i){}", patterns.join("|")))
 }
 
@@ -88,9 +83,7 @@ impl Asked<'_> {
     /// True if a text is known to be an answer.
     fn is_answer(self, text: &str) -> bool {
         match self {
-            Self::Choice(is_answer) | Self::Mark(is_answer) => {
-                is_answer(text.trim_matches(is_blank))
-            }
+            Self::Choice(is_answer) | Self::Mark(is_answer) => is_answer(text.trim_matches(is_blank)),
             Self::Open => false,
         }
     }
@@ -112,7 +105,8 @@ pub(crate) struct Separated<'t> {
     pub(crate) text: &'t str,
     /// True if thoughts were removed.
     pub(crate) has_thoughts: bool,
-    /// True if the text follows an opening mark of thoughts whose end is missing. It is an answer only if it is nothing else.
+    /// True if the text follows an opening mark of thoughts whose end is missing. It is an answer only if it is nothing
+    /// else.
     pub(crate) is_open: bool,
 }
 
@@ -120,10 +114,7 @@ pub(crate) struct Separated<'t> {
 ///
 /// # Errors
 /// The reason why no answer can be read, if the thoughts do not end or no text follows.
-pub(crate) fn separate<'t>(
-    reply: &'t str,
-    asked: Asked<'_>,
-) -> Result<Separated<'t>, UnreadReason> {
+pub(crate) fn separate<'t>(reply: &'t str, asked: Asked<'_>) -> Result<Separated<'t>, UnreadReason> {
     let listed = without_listed(reply)?;
     let marked = Marked::new(listed, asked).separated()?;
     let text = without_tokens_around(marked.text);
@@ -141,10 +132,7 @@ pub(crate) fn separate<'t>(
 ///
 /// # Errors
 /// As for [`separate`].
-pub(crate) fn separate_sections<'t>(
-    reply: &'t str,
-    asked: Asked<'_>,
-) -> Result<Separated<'t>, UnreadReason> {
+pub(crate) fn separate_sections<'t>(reply: &'t str, asked: Asked<'_>) -> Result<Separated<'t>, UnreadReason> {
     let separated = separate(reply, asked)?;
     if separated.is_open {
         return Ok(separated);
@@ -156,20 +144,14 @@ pub(crate) fn separate_sections<'t>(
             is_open: true,
         });
     }
-    Ok(
-        match last_section(separated.text, words(), &|text| asked.is_answer(text))? {
-            Some(text) => Separated {
-                text: without_tokens_around(text),
-                has_thoughts: true,
-                is_open: false,
-            },
-            None => separated,
-        },
-    )
+    Ok(match last_section(separated.text, words(), &|text| asked.is_answer(text))? {
+        Some(text) => Separated { text: without_tokens_around(text), has_thoughts: true, is_open: false },
+        None => separated,
+    })
 }
 
-/// The answer to an open question in a reply: without thoughts, template tokens and the tags of an answer. A reply without any of these
-/// is returned as it is.
+/// The answer to an open question in a reply: without thoughts, template tokens and the tags of an answer. A reply
+/// without any of these is returned as it is.
 ///
 /// # Errors
 /// The reason why there is no answer, if the thoughts do not end or no text follows.
@@ -182,11 +164,7 @@ pub fn open_answer(reply: &str) -> Result<Cow<'_, str>, UnreadReason> {
         return Err(UnreadReason::Truncated);
     }
     let text = tagged_answer(separated.text).unwrap_or(separated.text);
-    let whole = if text.len() == reply.trim_matches(is_blank).len() {
-        reply
-    } else {
-        text
-    };
+    let whole = if text.len() == reply.trim_matches(is_blank).len() { reply } else { text };
     let tokens: Vec<Mark<'_>> = marks(whole, words())
         .into_iter()
         .filter(|mark| mark.form == Form::Special && mark.meaning != Meaning::Other)
@@ -228,10 +206,8 @@ fn remove(text: &str, tokens: &[Mark<'_>]) -> String {
 fn tagged_answer(text: &str) -> Option<&str> {
     let marks = marks(text, words());
     let end = marks.last().filter(|mark| mark.end == text.len())?;
-    let begin = marks
-        .iter()
-        .rev()
-        .find(|mark| mark.meaning == Meaning::Answer && mark.role != Role::End && end.ends(mark))?;
+    let begin =
+        marks.iter().rev().find(|mark| mark.meaning == Meaning::Answer && mark.role != Role::End && end.ends(mark))?;
     let inner = text[begin.end..end.start].trim_matches(is_blank);
     (!inner.is_empty()).then_some(inner)
 }
@@ -262,23 +238,13 @@ struct Marked<'t, 'a> {
 
 impl<'t, 'a> Marked<'t, 'a> {
     fn new(text: &'t str, asked: Asked<'a>) -> Self {
-        Self {
-            text,
-            marks: marks(text, words()),
-            has_tags: text.contains("</"),
-            asked,
-        }
+        Self { text, marks: marks(text, words()), has_tags: text.contains("</"), asked }
     }
 
     /// The text without the thoughts between marks.
     fn separated(&self) -> Result<Separated<'t>, UnreadReason> {
-        let whole = Separated {
-            text: self.text,
-            has_thoughts: false,
-            is_open: false,
-        };
-        let is_choice =
-            || matches!(self.asked, Asked::Choice(_)) && self.asked.is_answer(self.text);
+        let whole = Separated { text: self.text, has_thoughts: false, is_open: false };
+        let is_choice = || matches!(self.asked, Asked::Choice(_)) && self.asked.is_answer(self.text);
         if self.marks.is_empty() || is_choice() {
             return Ok(whole);
         }
@@ -292,19 +258,12 @@ impl<'t, 'a> Marked<'t, 'a> {
         }
         if thoughts.is_some() && self.is_void(from) {
             // The answer may stand before the thoughts.
-            let before = self
-                .marks
-                .iter()
-                .find(|mark| mark.meaning == Meaning::Thought);
+            let before = self.marks.iter().find(|mark| mark.meaning == Meaning::Thought);
             let before = before.filter(|mark| mark.role != Role::End);
             let before = before.map_or("", |mark| without_tokens_around(&self.text[..mark.start]));
             return match before {
                 "" => Err(UnreadReason::Empty),
-                text => Ok(Separated {
-                    text,
-                    has_thoughts: true,
-                    ..whole
-                }),
+                text => Ok(Separated { text, has_thoughts: true, ..whole }),
             };
         }
         self.without_unknown(from)
@@ -329,23 +288,17 @@ impl<'t, 'a> Marked<'t, 'a> {
 
     /// The end of the last mark that closes thoughts, by the words of its name.
     fn end_of_thoughts(&self) -> Option<usize> {
-        let thoughts = || {
-            self.marks
-                .iter()
-                .filter(|mark| mark.meaning == Meaning::Thought)
-        };
+        let thoughts = || self.marks.iter().filter(|mark| mark.meaning == Meaning::Thought);
         let closing = thoughts().rfind(|mark| mark.role == Role::End);
-        let singles: Vec<&Mark<'_>> = thoughts()
-            .filter(|mark| mark.form == Form::Special && mark.role == Role::Single)
-            .collect();
+        let singles: Vec<&Mark<'_>> =
+            thoughts().filter(|mark| mark.form == Form::Special && mark.role == Role::Single).collect();
         // The same token before and after the thoughts.
-        let repeated = singles
-            .last()
-            .filter(|_| closing.is_none() && singles.len().is_multiple_of(2));
+        let repeated = singles.last().filter(|_| closing.is_none() && singles.len().is_multiple_of(2));
         closing.or(repeated.copied()).map(|mark| mark.end)
     }
 
-    /// True if a mark after a byte begins thoughts, by the words of its name. A bracket `[x]` without a closing one is a heading.
+    /// True if a mark after a byte begins thoughts, by the words of its name. A bracket `[x]` without a closing one is
+    /// a heading.
     fn has_unended_thoughts(&self, from: usize) -> bool {
         self.marks.iter().any(|mark| {
             mark.start >= from
@@ -355,15 +308,15 @@ impl<'t, 'a> Marked<'t, 'a> {
         })
     }
 
-    /// The text of an answer that a token or `[BEGIN …]` begins; `None` without such a mark, or if nothing stands before it.
+    /// The text of an answer that a token or `[BEGIN …]` begins; `None` without such a mark, or if nothing stands
+    /// before it.
     fn marked_answer(&self, from: usize) -> Result<Option<Separated<'t>>, UnreadReason> {
         let begin = self.marks.iter().rposition(|mark| {
             mark.start >= from
                 && mark.meaning == Meaning::Answer
                 && mark.role != Role::End
                 && !mark.core.contains("box")
-                && (mark.form == Form::Special
-                    || (mark.form == Form::Bracket && mark.role == Role::Begin))
+                && (mark.form == Form::Special || (mark.form == Form::Bracket && mark.role == Role::Begin))
         });
         let Some(begin) = begin else {
             return Ok(None);
@@ -374,17 +327,11 @@ impl<'t, 'a> Marked<'t, 'a> {
             return Ok(None);
         }
         let after = &self.marks[begin + 1..];
-        let end = after
-            .iter()
-            .find(|mark| mark.meaning == Meaning::Answer && mark.role == Role::End);
+        let end = after.iter().find(|mark| mark.meaning == Meaning::Answer && mark.role == Role::End);
         let end = end.map_or(self.text.len(), |mark| mark.start);
         match without_tokens_around(&self.text[mark.end..end]) {
             "" => Err(UnreadReason::Truncated),
-            text => Ok(Some(Separated {
-                text,
-                has_thoughts,
-                is_open: false,
-            })),
+            text => Ok(Some(Separated { text, has_thoughts, is_open: false })),
         }
     }
 
@@ -400,11 +347,7 @@ impl<'t, 'a> Marked<'t, 'a> {
                     break;
                 }
                 let text = &self.text[self.marks[open].end..];
-                return Ok(Separated {
-                    text,
-                    has_thoughts: true,
-                    is_open: true,
-                });
+                return Ok(Separated { text, has_thoughts: true, is_open: true });
             };
             let inner = &self.text[self.marks[open].end..self.marks[close].start];
             let rest = self.marks[close].end;
@@ -423,11 +366,7 @@ impl<'t, 'a> Marked<'t, 'a> {
         if let Some(end) = self.orphan_end(start) {
             (start, has_thoughts) = (end, true);
         }
-        Ok(Separated {
-            text: &self.text[start..],
-            has_thoughts,
-            is_open: false,
-        })
+        Ok(Separated { text: &self.text[start..], has_thoughts, is_open: false })
     }
 
     /// The index of the mark of unknown meaning with which the text from a byte on begins, after template tokens.
@@ -469,13 +408,11 @@ impl<'t, 'a> Marked<'t, 'a> {
                 mark.form == Form::Special && is_open_name && is_pair
             })
         };
-        named
-            .or_else(|| (begin.form == Form::Special).then(of_form).flatten())
-            .map(|(index, _)| index)
+        named.or_else(|| (begin.form == Form::Special).then(of_form).flatten()).map(|(index, _)| index)
     }
 
-    /// True if thoughts without a closing mark cannot be an answer: after a tag, a reserved token, or a token that begins something. Text
-    /// must follow.
+    /// True if thoughts without a closing mark cannot be an answer: after a tag, a reserved token, or a token that
+    /// begins something. Text must follow.
     fn must_end(&self, open: usize) -> bool {
         let mark = &self.marks[open];
         let begins = match mark.form {
@@ -503,13 +440,13 @@ impl<'t, 'a> Marked<'t, 'a> {
         let mark = last?;
         let before = &self.text[from..mark.start];
         let has_text = !without_tokens_around(before).is_empty() && !self.is_void(mark.end);
-        let is_remark =
-            self.asked.is_answer(before) && !self.asked.is_answer(&self.text[mark.end..]);
+        let is_remark = self.asked.is_answer(before) && !self.asked.is_answer(&self.text[mark.end..]);
         (has_text && !is_remark).then_some(mark.end)
     }
 }
 
-/// A text without blanks, template tokens and names of roles at its ends. The tokens of an answer are removed if they enclose all of it.
+/// A text without blanks, template tokens and names of roles at its ends. The tokens of an answer are removed if they
+/// enclose all of it.
 fn without_tokens_around(text: &str) -> &str {
     let marks = marks(text, words());
     let has_tags = text.contains("</");
@@ -520,24 +457,17 @@ fn without_tokens_around(text: &str) -> &str {
         let inner = rest.trim_end_matches(is_blank);
         start = end - rest.len();
         end = start + inner.len();
-        let front = marks[first..last]
-            .first()
-            .filter(|mark| mark.start == start);
+        let front = marks[first..last].first().filter(|mark| mark.start == start);
         let back = marks[first..last].last().filter(|mark| mark.end == end);
         let is_answer = |mark: &&Mark<'_>| mark.meaning == Meaning::Answer;
-        let has_end = || {
-            marks[first..last]
-                .iter()
-                .any(|mark| is_answer(&mark) && mark.role == Role::End)
-        };
+        let has_end = || marks[first..last].iter().any(|mark| is_answer(&mark) && mark.role == Role::End);
         if let Some(mark) = front.filter(|mark| is_around(mark, has_tags) && !is_answer(mark)) {
             start = mark.end;
             if let Some(role) = ROLE_NAME.find(&text[start..end]) {
                 start += role.end();
             }
             first += 1;
-        } else if let Some(mark) = back.filter(|mark| is_around(mark, has_tags) && !is_answer(mark))
-        {
+        } else if let Some(mark) = back.filter(|mark| is_around(mark, has_tags) && !is_answer(mark)) {
             end = mark.start;
             last -= 1;
         } else if let Some(mark) =
@@ -545,9 +475,9 @@ fn without_tokens_around(text: &str) -> &str {
         {
             start = mark.end;
             first += 1;
-        } else if let Some(mark) = back.filter(|mark| {
-            mark.is_token() && mark.role == Role::End && !begins_answer(&marks[first..last])
-        }) {
+        } else if let Some(mark) =
+            back.filter(|mark| mark.is_token() && mark.role == Role::End && !begins_answer(&marks[first..last]))
+        {
             end = mark.start;
             last -= 1;
         } else {
@@ -558,12 +488,11 @@ fn without_tokens_around(text: &str) -> &str {
 
 /// True if a mark begins an answer.
 fn begins_answer(marks: &[Mark<'_>]) -> bool {
-    marks
-        .iter()
-        .any(|mark| mark.meaning == Meaning::Answer && mark.role != Role::End)
+    marks.iter().any(|mark| mark.meaning == Meaning::Answer && mark.role != Role::End)
 }
 
-/// True for a mark at an end of a text that belongs to a template: a token, or a tag such as `<zork_plugh>` in a text without closing tags.
+/// True for a mark at an end of a text that belongs to a template: a token, or a tag such as `<zork_plugh>` in a text
+/// without closing tags.
 fn is_around(mark: &Mark<'_>, has_tags: bool) -> bool {
     let is_lone_tag = mark.form == Form::Tag && !has_tags && mark.name.contains('_');
     mark.is_token() || is_lone_tag

@@ -35,34 +35,20 @@ impl Token {
     }
 }
 
-/// Every token of a text, from left to right. An apostrophe inside a word belongs to the word, as do a full stop or comma between
-/// digits ("2.5") and the full stops of an abbreviation ("e.g.").
+/// Every token of a text, from left to right. An apostrophe inside a word belongs to the word, as do a full stop or
+/// comma between digits ("2.5") and the full stops of an abbreviation ("e.g.").
 pub(crate) fn tokens(text: &str) -> Vec<Token> {
     let mut tokens: Vec<Token> = Vec::with_capacity(text.len() / 4);
     let mut previous = ' ';
     for (start, c) in text.char_indices() {
         let end = start + c.len_utf8();
-        let last = tokens
-            .last_mut()
-            .filter(|last| last.end == start && last.kind == TokenKind::Word);
+        let last = tokens.last_mut().filter(|last| last.end == start && last.kind == TokenKind::Word);
         match last {
             Some(last) if continues_token(text, last, previous, c, end) => last.end = end,
-            _ if c == '\n' => tokens.push(Token {
-                start,
-                end,
-                kind: TokenKind::Break,
-            }),
+            _ if c == '\n' => tokens.push(Token { start, end, kind: TokenKind::Break }),
             _ if c.is_whitespace() => {}
-            _ if c.is_alphanumeric() || c == '_' => tokens.push(Token {
-                start,
-                end,
-                kind: TokenKind::Word,
-            }),
-            _ => tokens.push(Token {
-                start,
-                end,
-                kind: TokenKind::Sign,
-            }),
+            _ if c.is_alphanumeric() || c == '_' => tokens.push(Token { start, end, kind: TokenKind::Word }),
+            _ => tokens.push(Token { start, end, kind: TokenKind::Sign }),
         }
         previous = c;
     }
@@ -72,8 +58,7 @@ pub(crate) fn tokens(text: &str) -> Vec<Token> {
 /// True if a character that ends at byte `end` continues the word before it.
 fn continues_token(text: &str, word: &Token, previous: char, c: char, end: usize) -> bool {
     if !matches!(c, '\'' | ',' | '.') {
-        return is_spaced_word_char(c)
-            && (is_spaced_word_char(previous) || matches!(previous, '\'' | '.' | ','));
+        return is_spaced_word_char(c) && (is_spaced_word_char(previous) || matches!(previous, '\'' | '.' | ','));
     }
     let mut after = text[end..].chars();
     let (next, second) = (after.next().unwrap_or(' '), after.next().unwrap_or(' '));
@@ -83,10 +68,8 @@ fn continues_token(text: &str, word: &Token, previous: char, c: char, end: usize
         ',' => false,
         _ => {
             let letters = word.slice(text);
-            let begins_abbreviation =
-                letters.len() == 1 && next.is_alphabetic() && !second.is_alphabetic();
-            begins_abbreviation
-                || (letters.len() <= 5 && letters.contains('.') && !next.is_alphanumeric())
+            let begins_abbreviation = letters.len() == 1 && next.is_alphabetic() && !second.is_alphabetic();
+            begins_abbreviation || (letters.len() <= 5 && letters.contains('.') && !next.is_alphanumeric())
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Vocabulary of lenient parsing: [`Role`], [`phrase_at`].
 //!
-//! The lists are data, in `words.toml`. A phrase is looked up word by word; no list is searched as a regular expression.
+//! The lists are data, in `words.toml`. A phrase is looked up word by word; no list is searched as a regular
+//! expression.
 
 use std::collections::{BTreeMap, HashMap};
 use std::sync::LazyLock;
@@ -15,8 +16,8 @@ const WORDS: &str = include_str!("../words.toml");
 
 /// Function of a phrase in a reply. `words.toml` has a list of phrases for each role.
 ///
-/// "Excluding" a name leaves the answer among the other choices. "Denying" a name keeps it as a rival: another choice is then
-/// ambiguous.
+/// "Excluding" a name leaves the answer among the other choices. "Denying" a name keeps it as a rival: another choice
+/// is then ambiguous.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Role {
@@ -166,10 +167,7 @@ static PHRASES: LazyLock<HashMap<String, Vec<Phrase>>> = LazyLock::new(|| {
             let same_start = phrases.entry(first).or_default();
             match same_start.iter_mut().find(|phrase| phrase.rest == rest) {
                 Some(known) => known.roles = known.roles.union(Roles::from_role(role)),
-                None => same_start.push(Phrase {
-                    rest,
-                    roles: Roles::from_role(role),
-                }),
+                None => same_start.push(Phrase { rest, roles: Roles::from_role(role) }),
             }
         }
     }
@@ -180,10 +178,7 @@ static PHRASES: LazyLock<HashMap<String, Vec<Phrase>>> = LazyLock::new(|| {
 });
 
 /// The lists of `words.toml`.
-#[expect(
-    clippy::expect_used,
-    reason = "the file is compiled in and parsed by the tests"
-)]
+#[expect(clippy::expect_used, reason = "the file is compiled in and parsed by the tests")]
 pub(crate) fn lists() -> BTreeMap<Role, Vec<String>> {
     toml::from_str(WORDS).expect("words.toml has the lists of `Role`")
 }
@@ -191,26 +186,17 @@ pub(crate) fn lists() -> BTreeMap<Role, Vec<String>> {
 /// The words of a phrase, tokenized like a reply.
 fn words_of(phrase: &str) -> Vec<String> {
     let folded = fold(phrase);
-    tokens(&folded)
-        .iter()
-        .map(|word| word.slice(&folded).to_owned())
-        .collect()
+    tokens(&folded).iter().map(|word| word.slice(&folded).to_owned()).collect()
 }
 
-/// The longest phrase that begins with the first of these tokens: its number of tokens and its roles. An unlisted contraction with
-/// "not" is [`Role::Not`].
+/// The longest phrase that begins with the first of these tokens: its number of tokens and its roles. An unlisted
+/// contraction with "not" is [`Role::Not`].
 pub(crate) fn phrase_at(folded: &str, tokens: &[Token]) -> Option<(usize, Roles)> {
-    let first = tokens
-        .first()
-        .filter(|token| token.kind == TokenKind::Word)?;
+    let first = tokens.first().filter(|token| token.kind == TokenKind::Word)?;
     let word = first.slice(folded);
     let listed = PHRASES.get(word).into_iter().flatten().find(|phrase| {
         phrase.rest.len() < tokens.len()
-            && phrase
-                .rest
-                .iter()
-                .zip(&tokens[1..])
-                .all(|(word, token)| token.slice(folded) == word)
+            && phrase.rest.iter().zip(&tokens[1..]).all(|(word, token)| token.slice(folded) == word)
     });
     match listed {
         Some(phrase) => Some((phrase.rest.len() + 1, phrase.roles)),

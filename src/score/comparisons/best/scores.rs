@@ -48,7 +48,8 @@ pub struct DarkPair {
 /// Mean accuracy of the leader over the dark levels minus what it reaches without seeing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DarkGain {
-    /// True if the leader is compared with its own replies without images; false if it was not asked so, and is compared with chance.
+    /// True if the leader is compared with its own replies without images; false if it was not asked so, and is
+    /// compared with chance.
     pub is_against_blind: bool,
     /// Difference on the items that have a reply without images, or on all items.
     pub difference: Estimate,
@@ -83,7 +84,8 @@ pub struct LevelLead {
     pub level: AxisLevel,
     /// Accuracy of the leader at the lighter levels minus that of the leader in the dark.
     pub lead: Estimate,
-    /// p-value of the null hypothesis of no difference, times the number of pairs of models (Bonferroni over the pairs that could have led).
+    /// p-value of the null hypothesis of no difference, times the number of pairs of models (Bonferroni over the pairs
+    /// that could have led).
     pub p: f64,
     /// `p` after the correction over all tests that the report's sentences use; `None` before that correction.
     pub p_report: Option<f64>,
@@ -116,10 +118,7 @@ impl ItemScores {
 
     /// Number of levels in a range at which a model is right, if its missing replies are all `if_missing`.
     fn right_count(&self, model: usize, levels: &Range<usize>, if_missing: bool) -> i64 {
-        self.right[model][levels.clone()]
-            .iter()
-            .map(|right| i64::from(right.unwrap_or(if_missing)))
-            .sum()
+        self.right[model][levels.clone()].iter().map(|right| i64::from(right.unwrap_or(if_missing))).sum()
     }
 
     /// Smallest and largest sum of differences over pairs of a model and a level ([`net_bounds`]).
@@ -160,10 +159,8 @@ impl Scores {
                     .collect()
             })
             .collect();
-        let blind: Vec<Option<usize>> = models
-            .iter()
-            .map(|model| grid.find_up_to_group(&ModelInCondition::new(model, None)))
-            .collect();
+        let blind: Vec<Option<usize>> =
+            models.iter().map(|model| grid.find_up_to_group(&ModelInCondition::new(model, None))).collect();
         let mut scores = Self {
             items: Vec::new(),
             incomplete: Vec::new(),
@@ -172,11 +169,7 @@ impl Scores {
             all_clusters: grid.clusters,
         };
         for (index, item) in grid.items.iter().enumerate() {
-            let is_asked = |levels: &Vec<usize>| {
-                levels
-                    .iter()
-                    .all(|subject| grid.result(*subject, index).is_asked())
-            };
+            let is_asked = |levels: &Vec<usize>| levels.iter().all(|subject| grid.result(*subject, index).is_asked());
             let right = subjects.iter().map(|levels| {
                 levels
                     .iter()
@@ -236,9 +229,8 @@ impl Scores {
     fn mean(&self, model: usize, levels: &Range<usize>) -> Option<Estimate> {
         let count = levels.len() as f64;
         let (n, max_weight) = (self.items.len(), count);
-        let share = |if_missing: bool| {
-            move |item: &ItemScores| item.right_count(model, levels, if_missing) as f64 / count
-        };
+        let share =
+            |if_missing: bool| move |item: &ItemScores| item.right_count(model, levels, if_missing) as f64 / count;
         let sums = self.cluster_sums(self.items.iter(), share(false));
         let estimate = Estimate::from_scores(&sums, max_weight, n)?;
         if self.incomplete.is_empty() {
@@ -251,13 +243,9 @@ impl Scores {
         Some(estimate.covering(bounds.into_iter().flatten()))
     }
 
-    /// Tests the mean of a difference over the items that have one. `scale` is the largest possible difference of an item; `bounds` are its
-    /// smallest and largest value. `None` if no complete item has one.
-    fn test(
-        &self,
-        scale: usize,
-        bounds: impl Fn(&ItemScores) -> Option<[i64; 2]>,
-    ) -> Option<PairedTest> {
+    /// Tests the mean of a difference over the items that have one. `scale` is the largest possible difference of an
+    /// item; `bounds` are its smallest and largest value. `None` if no complete item has one.
+    fn test(&self, scale: usize, bounds: impl Fn(&ItemScores) -> Option<[i64; 2]>) -> Option<PairedTest> {
         let mut sums = BoundedSums::new(self.all_clusters);
         for item in &self.items {
             if let Some([net, _]) = bounds(item) {
@@ -272,14 +260,12 @@ impl Scores {
         sums.test(scale as f64)
     }
 
-    /// Tests whether a model is above its own replies without images or, if it has none, above chance, over the dark levels. Levels from
-    /// index `split` on are dark.
+    /// Tests whether a model is above its own replies without images or, if it has none, above chance, over the dark
+    /// levels. Levels from index `split` on are dark.
     pub(super) fn gain(&self, model: usize, split: usize) -> Option<DarkGain> {
         let dark = split..self.levels;
         let levels = dark.len() as i64;
-        let right = |item: &ItemScores| {
-            [false, true].map(|if_missing| item.right_count(model, &dark, if_missing))
-        };
+        let right = |item: &ItemScores| [false, true].map(|if_missing| item.right_count(model, &dark, if_missing));
         let is_against_blind = self.items.iter().any(|item| item.blind[model].is_some());
         let tested = if is_against_blind {
             self.test(dark.len(), |item| {
@@ -288,12 +274,7 @@ impl Scores {
             })
         } else {
             // A guess among k choices counts 1 / k; the common multiple makes all differences integers.
-            let multiple = self
-                .items
-                .iter()
-                .chain(&self.incomplete)
-                .map(|item| item.choices)
-                .fold(1, common_multiple);
+            let multiple = self.items.iter().chain(&self.incomplete).map(|item| item.choices).fold(1, common_multiple);
             self.test(dark.len() * multiple, |item| {
                 let guessed = levels * (multiple / item.choices) as i64;
                 Some(right(item).map(|right| right * multiple as i64 - guessed))
@@ -302,11 +283,7 @@ impl Scores {
         Some(DarkGain {
             is_against_blind,
             difference: tested.difference,
-            p: if tested.difference.value > 0.0 {
-                tested.p
-            } else {
-                1.0
-            },
+            p: if tested.difference.value > 0.0 { tested.p } else { 1.0 },
             p_report: None,
         })
     }
@@ -314,9 +291,7 @@ impl Scores {
     /// Tests the mean accuracy of the first model minus that of the second over a range of levels.
     fn test_pair(&self, [first, second]: [usize; 2], levels: Range<usize>) -> Option<PairedTest> {
         self.test(levels.len(), |item| {
-            let pairs = levels
-                .clone()
-                .map(|level| [(first, level), (second, level)]);
+            let pairs = levels.clone().map(|level| [(first, level), (second, level)]);
             Some(item.net_bounds(pairs))
         })
     }
@@ -326,11 +301,7 @@ impl Scores {
         let (n, dark) = (self.items.len(), split..self.levels);
         let by_level: Vec<f64> = (0..self.levels)
             .map(|level: usize| {
-                self.items
-                    .iter()
-                    .filter(|item| item.right[model][level] == Some(true))
-                    .count() as f64
-                    / n as f64
+                self.items.iter().filter(|item| item.right[model][level] == Some(true)).count() as f64 / n as f64
             })
             .collect();
         let clean = self.mean(model, &(0..1))?;
@@ -376,11 +347,7 @@ impl Scores {
             }
         }
         let least = least_p(self.clusters());
-        let tests = pairs.iter().map(|pair| PValues {
-            p: pair.p,
-            if_answered: pair.p_if_answered,
-            least,
-        });
+        let tests = pairs.iter().map(|pair| PValues { p: pair.p, if_answered: pair.p_if_answered, least });
         let corrected = PValues::corrected(&tests.collect::<Vec<PValues>>());
         for (pair, corrected) in pairs.iter_mut().zip(corrected) {
             pair.holm = corrected.p;
@@ -389,18 +356,13 @@ impl Scores {
         pairs
     }
 
-    /// Tests the leader at the lighter levels against the leader in the dark at each level; `None` if both are the same model.
-    pub(super) fn crossing(
-        &self,
-        models: &[(DarkAccuracy, usize)],
-        levels: &[AxisLevel],
-    ) -> Option<Crossing> {
+    /// Tests the leader at the lighter levels against the leader in the dark at each level; `None` if both are the same
+    /// model.
+    pub(super) fn crossing(&self, models: &[(DarkAccuracy, usize)], levels: &[AxisLevel]) -> Option<Crossing> {
         let (dark, dark_index) = models.first()?;
-        // `max_by` returns the last of equal elements; with `rev` that is the model with the higher accuracy in the dark.
-        let (light, light_index) = models
-            .iter()
-            .rev()
-            .max_by(|(a, _), (b, _)| a.lighter.total_cmp(&b.lighter))?;
+        // `max_by` returns the last of equal elements; with `rev` that is the model with the higher accuracy in the
+        // dark.
+        let (light, light_index) = models.iter().rev().max_by(|(a, _), (b, _)| a.lighter.total_cmp(&b.lighter))?;
         if dark_index == light_index {
             return None;
         }
@@ -414,11 +376,7 @@ impl Scores {
                 p_report: None,
             })
         });
-        Some(Crossing {
-            light: light.model.clone(),
-            dark: dark.model.clone(),
-            levels: levels.collect(),
-        })
+        Some(Crossing { light: light.model.clone(), dark: dark.model.clone(), levels: levels.collect() })
     }
 }
 

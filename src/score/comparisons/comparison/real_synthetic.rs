@@ -8,12 +8,13 @@ use crate::photographs::pair_darkness::{PairDarkness, pair_facts};
 use darkqa_base::types::degradations::Axis;
 use darkqa_base::types::{Variant, View};
 
-/// Maximum distance in EV between a photograph and a level that it is compared with (chosen: half of the largest step of the paper's
-/// levels).
+/// Maximum distance in EV between a photograph and a level that it is compared with (chosen: half of the largest step
+/// of the paper's levels).
 const MAX_DISTANCE_EV: f64 = 1.0;
 
-/// Finds the subjects of the same model, raw or with the same enhancer, whose synthetic images are as dark as the photographs of a subject,
-/// preferably frame by frame; otherwise, for each variant, the level nearest to the median drop of the photographs, if one is near.
+/// Finds the subjects of the same model, raw or with the same enhancer, whose synthetic images are as dark as the
+/// photographs of a subject, preferably frame by frame; otherwise, for each variant, the level nearest to the median
+/// drop of the photographs, if one is near.
 pub(super) fn equally_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
     let subject = &grid.subjects[photographed];
     let facts = pair_facts(grid, photographed);
@@ -30,17 +31,13 @@ pub(super) fn equally_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
         .collect();
     let matches: Vec<usize> = others
         .iter()
-        .filter(|(_, other)| {
-            other.variant.pair.is_some() && other.variant.synthetic_kind().is_some()
-        })
+        .filter(|(_, other)| other.variant.pair.is_some() && other.variant.synthetic_kind().is_some())
         .map(|(index, _)| *index)
         .filter(|index| {
             // Images may be made as dark as another photograph of the same frames; these do not match.
             let other_facts = pair_facts(grid, *index);
-            let shared: Vec<_> = other_facts
-                .iter()
-                .filter_map(|(frame, other)| Some((other, facts.get(frame)?)))
-                .collect();
+            let shared: Vec<_> =
+                other_facts.iter().filter_map(|(frame, other)| Some((other, facts.get(frame)?))).collect();
             !shared.is_empty() && shared.iter().all(|(one, other)| one == other)
         })
         .collect();
@@ -48,11 +45,7 @@ pub(super) fn equally_dark(grid: &Grid<'_>, photographed: usize) -> Vec<usize> {
         return matches;
     }
     let facts: Vec<_> = facts.into_values().collect();
-    let Some(darkness) = subject
-        .variant
-        .photograph()
-        .and_then(|name| PairDarkness::new(name, &facts))
-    else {
+    let Some(darkness) = subject.variant.photograph().and_then(|name| PairDarkness::new(name, &facts)) else {
         return Vec::new();
     };
     let mut nearest = BTreeMap::<&Variant, (f64, usize)>::new();

@@ -44,9 +44,9 @@ impl FamilyContrast {
     /// True if `most` is detected to lose more than `least`, in both parsings.
     #[must_use]
     pub fn is_detected(&self) -> bool {
-        [self.strict, self.lenient].iter().all(|test| {
-            test.difference.value < 0.0 && test.p_report.is_some_and(|value| value < ALPHA)
-        })
+        [self.strict, self.lenient]
+            .iter()
+            .all(|test| test.difference.value < 0.0 && test.p_report.is_some_and(|value| value < ALPHA))
     }
 
     pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut ContrastTest {
@@ -66,20 +66,18 @@ impl FamilyContrast {
     }
 }
 
-/// Returns the contrast of each variant in which two families were asked at its darkest level; `pooled` are the findings of single levels.
+/// Returns the contrast of each variant in which two families were asked at its darkest level; `pooled` are the
+/// findings of single levels.
 #[must_use]
 pub(crate) fn family_contrasts(grid: &Grid<'_>, pooled: &[PooledFinding]) -> Vec<FamilyContrast> {
     grid.variants()
         .into_iter()
         .filter_map(|variant| {
             let losses = pooled.iter().filter(|finding| {
-                finding.kind == PooledKind::Darkness
-                    && finding.variant == *variant
-                    && finding.family.is_some()
+                finding.kind == PooledKind::Darkness && finding.variant == *variant && finding.family.is_some()
             });
             let level = losses.clone().map(|finding| finding.level).max()?;
-            let losses: Vec<&PooledFinding> =
-                losses.filter(|finding| finding.level == level).collect();
+            let losses: Vec<&PooledFinding> = losses.filter(|finding| finding.level == level).collect();
             let most = losses.iter().min_by(|a, b| {
                 let [a, b] = [a, b].map(|loss| loss.strict.difference.high);
                 a.total_cmp(&b)
@@ -95,17 +93,8 @@ pub(crate) fn family_contrasts(grid: &Grid<'_>, pooled: &[PooledFinding]) -> Vec
 }
 
 /// Tests the difference between the losses of two families, which are one of `pairs` pairs.
-fn contrast(
-    grid: &Grid<'_>,
-    [most, least]: [&PooledFinding; 2],
-    pairs: usize,
-) -> Option<FamilyContrast> {
-    let set = PooledSet {
-        kind: PooledKind::Darkness,
-        variant: most.variant.clone(),
-        enhancer: None,
-        against: None,
-    };
+fn contrast(grid: &Grid<'_>, [most, least]: [&PooledFinding; 2], pairs: usize) -> Option<FamilyContrast> {
+    let set = PooledSet { kind: PooledKind::Darkness, variant: most.variant.clone(), enhancer: None, against: None };
     let models: Vec<[&str; 2]> = most.models.iter().map(|model| [&**model; 2]).collect();
     let items = items(grid, &set, &models, most.level)?;
     let [strict, lenient]: [fn(&SideCounts) -> u32; 2] = [|side| side.strict, |side| side.lenient];
@@ -123,20 +112,10 @@ fn contrast(
         if !is_missing {
             return replied;
         }
-        let bounds = [
-            [Missing::Lowest, Missing::Highest],
-            [Missing::Highest, Missing::Lowest],
-        ];
+        let bounds = [[Missing::Lowest, Missing::Highest], [Missing::Highest, Missing::Lowest]];
         let tests = bounds.map(|missing| test(Some(missing)));
-        let (difference, p) = bounded(
-            (replied.difference, replied.p),
-            tests.map(|bound| (bound.difference, bound.p)),
-        );
-        ContrastTest {
-            difference,
-            p,
-            ..replied
-        }
+        let (difference, p) = bounded((replied.difference, replied.p), tests.map(|bound| (bound.difference, bound.p)));
+        ContrastTest { difference, p, ..replied }
     });
     Some(FamilyContrast {
         variant: most.variant.clone(),
@@ -181,13 +160,10 @@ impl FamilyLoss {
         let mut clusters = vec![(0.0, 0.0); grid.clusters];
         for pooled in items {
             let item = &grid.items[pooled.index];
-            let bounds = pooled
-                .net_bounds(counted)
-                .filter(|_| item.is_in_family(family));
+            let bounds = pooled.net_bounds(counted).filter(|_| item.is_in_family(family));
             let net = match (bounds, missing) {
                 (Some([net, _]), _) if pooled.state == PooledState::Answered => net,
-                (Some([net, _]), Some(Missing::Lowest))
-                | (Some([_, net]), Some(Missing::Highest)) => net,
+                (Some([net, _]), Some(Missing::Lowest)) | (Some([_, net]), Some(Missing::Highest)) => net,
                 _ => continue,
             };
             let (sum, count) = &mut clusters[item.cluster as usize];
@@ -211,8 +187,8 @@ impl FamilyLoss {
         }
     }
 
-    /// Tests the difference of two losses by Student's t, with the variance between clusters. A cluster with items of both families counts
-    /// once, with the difference of its residuals.
+    /// Tests the difference of two losses by Student's t, with the variance between clusters. A cluster with items of
+    /// both families counts once, with the difference of its residuals.
     fn test([most, least]: &[Self; 2], pairs: usize) -> ContrastTest {
         let together: Vec<f64> = most
             .residuals
@@ -229,11 +205,7 @@ impl FamilyLoss {
         });
         let n = most.n + least.n;
         if !error.is_finite() || together.len() < 2 {
-            return ContrastTest {
-                difference: Estimate::around(value, [-2.0, 2.0], n),
-                p: 1.0,
-                p_report: None,
-            };
+            return ContrastTest { difference: Estimate::around(value, [-2.0, 2.0], n), p: 1.0, p_report: None };
         }
         let degrees = degrees_of_freedom(&together);
         let half = student(degrees) * error;

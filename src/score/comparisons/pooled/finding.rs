@@ -13,7 +13,8 @@ use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant};
 pub struct PooledFinding {
     /// The two sides of the comparison, and the counted replies.
     pub kind: PooledKind,
-    /// Question family; `None` for all families together. Findings about false answers are only about [`Family::Presence`].
+    /// Question family; `None` for all families together. Findings about false answers are only about
+    /// [`Family::Presence`].
     pub family: Option<Family>,
     /// Kind of degradation of the first side, with its noise profile; [`Variant::NONE`] for L0 against no image.
     pub variant: Variant,
@@ -27,8 +28,8 @@ pub struct PooledFinding {
     pub mean_over: Vec<AxisLevel>,
     /// Models, sorted; the same for all findings of one set (kind, variant and enhancers).
     pub models: Vec<String>,
-    /// Models without images on the second side, sorted; empty for other kinds of findings. The same as `models` if these were also asked
-    /// without images.
+    /// Models without images on the second side, sorted; empty for other kinds of findings. The same as `models` if
+    /// these were also asked without images.
     pub blind_models: Vec<String>,
     /// Difference in the strict parsing, which is the main result.
     pub strict: PooledDifference,
@@ -42,8 +43,8 @@ pub struct PooledFinding {
     pub items: usize,
     /// Number of items that some model was asked on both sides, left out because a model has no reply.
     pub dropped: usize,
-    /// Number of items that every model was asked on both sides, and of which a reply is missing on one side only. The intervals and
-    /// verdicts hold for all values of the missing replies.
+    /// Number of items that every model was asked on both sides, and of which a reply is missing on one side only. The
+    /// intervals and verdicts hold for all values of the missing replies.
     pub missing: usize,
     /// Number of clusters of the items.
     pub clusters: usize,
@@ -62,7 +63,8 @@ pub struct PooledDifference {
     pub second: f64,
     /// `first` minus `second`. Its `n` is the number of items.
     pub difference: Estimate,
-    /// p-value of no difference, for all models at once: the larger one of Student's t and of swapping the two sides in whole clusters.
+    /// p-value of no difference, for all models at once: the larger one of Student's t and of swapping the two sides in
+    /// whole clusters.
     pub p: f64,
     /// Smallest p-value that any values of the missing replies could give; `p` if no reply is missing.
     pub p_if_answered: f64,
@@ -77,7 +79,8 @@ pub struct PooledDifference {
 }
 
 impl PooledFinding {
-    /// Returns the finding with the largest difference in either direction, the first of several; `None` without findings.
+    /// Returns the finding with the largest difference in either direction, the first of several; `None` without
+    /// findings.
     #[must_use]
     pub fn largest<'f>(levels: &[&'f Self]) -> Option<&'f Self> {
         largest(levels, |finding| finding.strict.difference)
@@ -97,12 +100,12 @@ impl PooledFinding {
     /// Verdict in tables and figures, which is that of the sentences; `None` if no sentence is about the finding.
     #[must_use]
     pub fn verdict(&self) -> Option<Significance> {
-        self.claim()
-            .verdict(self.strict.verdict, self.strict.p_report)
+        self.claim().verdict(self.strict.verdict, self.strict.p_report)
     }
 
-    /// True if the level, or every level of a mean, is in the darker part of the ladder: L4 (7.5 EV) and darker, or for another kind of
-    /// degradation the fourth step and beyond. The paper's claims about enhancers divide L1–L3 and L4–L5 in the same way.
+    /// True if the level, or every level of a mean, is in the darker part of the ladder: L4 (7.5 EV) and darker, or for
+    /// another kind of degradation the fourth step and beyond. The paper's claims about enhancers divide L1–L3 and
+    /// L4–L5 in the same way.
     #[must_use]
     pub fn is_severe(&self) -> bool {
         is_severe(self.level, self.variant.kind)

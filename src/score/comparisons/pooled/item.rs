@@ -11,8 +11,9 @@ pub(super) struct PooledItem {
 }
 
 impl PooledItem {
-    /// Smallest and largest difference of the counted replies of both sides, which are equal if all replied; `counted` gives their number.
-    /// `None` if a model was not asked, or without any reply, which tells nothing about the two sides.
+    /// Smallest and largest difference of the counted replies of both sides, which are equal if all replied; `counted`
+    /// gives their number. `None` if a model was not asked, or without any reply, which tells nothing about the two
+    /// sides.
     pub(super) fn net_bounds(&self, counted: impl Fn(&SideCounts) -> u32) -> Option<[i64; 2]> {
         let is_usable = match self.state {
             PooledState::Answered => true,
@@ -20,12 +21,8 @@ impl PooledItem {
             PooledState::Unasked => false,
         };
         let [first, second] = [&self.sides[0], &self.sides[1]].map(|side| i64::from(counted(side)));
-        let [first_missing, second_missing] =
-            [0, 1].map(|side| i64::from(self.sides[side].missing));
-        is_usable.then_some([
-            first - second - second_missing,
-            first + first_missing - second,
-        ])
+        let [first_missing, second_missing] = [0, 1].map(|side| i64::from(self.sides[side].missing));
+        is_usable.then_some([first - second - second_missing, first + first_missing - second])
     }
 }
 
@@ -51,7 +48,8 @@ impl PooledState {
     }
 }
 
-/// Numbers of replies of all models to one item on one side. If a model has no reply on either side, neither side counts it.
+/// Numbers of replies of all models to one item on one side. If a model has no reply on either side, neither side
+/// counts it.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct SideCounts {
     /// Counted replies in the strict parsing: right replies, or false answers.

@@ -7,8 +7,8 @@ use crate::comparisons::pooled_kind::PooledKind;
 use crate::grid::Grid;
 use darkqa_base::types::{AxisLevel, EnhancerName, Variant};
 
-/// Models that a set of findings leaves out because they answered fewer items than others at some levels, or levels that it leaves out
-/// because only these models were asked there.
+/// Models that a set of findings leaves out because they answered fewer items than others at some levels, or levels
+/// that it leaves out because only these models were asked there.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ModelsLeftOut {
     pub kind: PooledKind,
@@ -37,12 +37,7 @@ pub(crate) fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
         let asked: Vec<AxisLevel> = levels
             .iter()
             .copied()
-            .filter(|level| {
-                models
-                    .pooled
-                    .iter()
-                    .all(|[model, other]| set.sides(grid, model, other, *level).is_some())
-            })
+            .filter(|level| models.pooled.iter().all(|[model, other]| set.sides(grid, model, other, *level).is_some()))
             .collect();
         let mut groups = BTreeMap::<(Vec<AxisLevel>, [usize; 2]), BTreeSet<&str>>::new();
         for (model, lacking) in models.left_out {
@@ -50,20 +45,16 @@ pub(crate) fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
             let levels = lacking.iter().map(|(level, _)| *level).collect();
             groups.entry((levels, items)).or_default().insert(model);
         }
-        all.extend(
-            groups
-                .into_iter()
-                .map(|((levels, items), models)| ModelsLeftOut {
-                    kind: set.kind,
-                    variant: set.variant.clone(),
-                    enhancer: set.enhancer.clone(),
-                    models: models.into_iter().map(str::to_owned).collect(),
-                    levels,
-                    asked: asked.clone(),
-                    items,
-                    is_more: false,
-                }),
-        );
+        all.extend(groups.into_iter().map(|((levels, items), models)| ModelsLeftOut {
+            kind: set.kind,
+            variant: set.variant.clone(),
+            enhancer: set.enhancer.clone(),
+            models: models.into_iter().map(str::to_owned).collect(),
+            levels,
+            asked: asked.clone(),
+            items,
+            is_more: false,
+        }));
         let mut more = BTreeMap::<Vec<AxisLevel>, BTreeSet<&str>>::new();
         for (model, levels) in models.extra_levels {
             more.entry(levels).or_default().insert(model);

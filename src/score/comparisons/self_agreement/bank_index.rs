@@ -4,7 +4,8 @@ use std::collections::{BTreeSet, HashMap};
 
 use darkqa_base::types::{QuestionId, RunQuestion};
 
-/// Questions of a bank. Questions about images with the same text and the same choices are the same question of the bank.
+/// Questions of a bank. Questions about images with the same text and the same choices are the same question of the
+/// bank.
 pub(super) struct BankIndex<'a> {
     by_id: HashMap<&'a QuestionId, usize>,
     /// One question about an image for each question of the bank.

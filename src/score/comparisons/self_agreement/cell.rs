@@ -24,8 +24,8 @@ pub struct AgreementCell {
     pub family: Option<Family>,
     /// Parsing of the replies.
     pub mode: ParsingMode,
-    /// Share of the replies with the same answer as at L0, over questions with an answer at L0. An unreadable reply counts as a
-    /// disagreement. Its interval holds for all values of the missing replies. `None` without a reply.
+    /// Share of the replies with the same answer as at L0, over questions with an answer at L0. An unreadable reply
+    /// counts as a disagreement. Its interval holds for all values of the missing replies. `None` without a reply.
     pub agreement: Option<Estimate>,
     /// Agreement on the informative questions only.
     pub informative: Option<Estimate>,
@@ -33,7 +33,8 @@ pub struct AgreementCell {
     pub kappa: Option<Estimate>,
     /// Mean entropy of the answers by question, from 0 to 1: at L0, and in this condition.
     pub entropies: [Option<f64>; 2],
-    /// Share of the evidence that is left, or the reason why it is not given; for conditions other than the floor and the ceiling.
+    /// Share of the evidence that is left, or the reason why it is not given; for conditions other than the floor and
+    /// the ceiling.
     pub evidence: Option<Result<Estimate, NoEvidence>>,
     /// Share of unreadable replies.
     pub unread: Option<Estimate>,
@@ -83,30 +84,19 @@ pub(super) fn cells(
     questions: &[QuestionInLight],
     mode: ParsingMode,
 ) -> Vec<AgreementCell> {
-    let informative: BTreeSet<usize> = questions
-        .iter()
-        .filter(|question| question.is_informative())
-        .map(|question| question.index)
-        .collect();
+    let informative: BTreeSet<usize> =
+        questions.iter().filter(|question| question.is_informative()).map(|question| question.index).collect();
     let is_informative: Vec<bool> = grid
         .items
         .iter()
-        .map(|item| {
-            bank.position(&item.asked.question)
-                .is_some_and(|question| informative.contains(&question))
-        })
+        .map(|item| bank.position(&item.asked.question).is_some_and(|question| informative.contains(&question)))
         .collect();
     let informative_grid = grid.select_items(&is_informative);
     let mut cells = Vec::new();
     for subject in 0..grid.subjects.len() {
         for family in grid.groups() {
             let counts = grid.counts(subject, family, mode);
-            let part = CellItems {
-                grid,
-                subject,
-                family,
-                mode,
-            };
+            let part = CellItems { grid, subject, family, mode };
             let failed = grid.failed(subject, family);
             let mut cell = part.cell(bank, &counts, &failed);
             cell.informative = informative_grid.accuracy(subject, family, mode);
@@ -153,7 +143,8 @@ impl CellItems<'_, '_> {
         }
     }
 
-    /// Share of the replies for which `counts_reply` is true; it takes the parsed answer, if there is one, and the choices.
+    /// Share of the replies for which `counts_reply` is true; it takes the parsed answer, if there is one, and the
+    /// choices.
     fn share(&self, counts_reply: impl Fn(Option<&str>, &[String]) -> bool) -> Option<Estimate> {
         let mut counts = vec![ClusterCount::default(); self.grid.clusters];
         for (item, result) in self.grid.family_items(self.subject, self.family) {
@@ -176,11 +167,7 @@ impl CellItems<'_, '_> {
             .family_items(self.subject, self.family)
             .flat_map(|(item, _)| item.asked.choices.iter())
             .any(|choice| is_cannot_tell(choice));
-        if offers_cannot_tell {
-            self.share(|answer, _| answer.is_some_and(is_cannot_tell))
-        } else {
-            None
-        }
+        if offers_cannot_tell { self.share(|answer, _| answer.is_some_and(is_cannot_tell)) } else { None }
     }
 
     fn refused(&self) -> usize {

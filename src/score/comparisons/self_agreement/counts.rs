@@ -35,23 +35,18 @@ impl<'g> BankCounts<'g> {
         mode: ParsingMode,
         bank: &BankIndex<'_>,
     ) -> Self {
-        let mut counts = Self {
-            whole: BTreeMap::new(),
-            by_cluster: BTreeMap::new(),
-        };
+        let mut counts = Self { whole: BTreeMap::new(), by_cluster: BTreeMap::new() };
         for (index, item) in grid.items.iter().enumerate() {
             let result = grid.result(subject, index);
-            let (Some(question), Some(reading)) =
-                (bank.position(&item.asked.question), result.reading(mode))
-            else {
+            let (Some(question), Some(reading)) = (bank.position(&item.asked.question), result.reading(mode)) else {
                 continue;
             };
             if !item.is_in_family(family) {
                 continue;
             }
             let asked = item.asked;
-            let answers = [asked.truth, reading.map(usize::from)]
-                .map(|index| asked.choices.get(index?).map(String::as_str));
+            let answers =
+                [asked.truth, reading.map(usize::from)].map(|index| asked.choices.get(index?).map(String::as_str));
             let whole = counts.whole.entry(question).or_default();
             let of_cluster = (item.cluster, question);
             let of_cluster = counts.by_cluster.entry(of_cluster).or_default();
@@ -73,18 +68,14 @@ impl<'g> BankCounts<'g> {
         self.whole.values().map(|counts| counts.items).sum()
     }
 
-    /// Entropy of the answers, averaged over the questions, from 0 to 1: at L0, and in the condition. `None` without an answer.
+    /// Entropy of the answers, averaged over the questions, from 0 to 1: at L0, and in the condition. `None` without an
+    /// answer.
     pub(super) fn entropies(&self) -> [Option<f64>; 2] {
         [0, 1].map(|side| {
             let entropies: Vec<f64> = self
                 .whole
                 .values()
-                .filter_map(|counts| {
-                    entropy(
-                        counts.answers.values().map(|answers| answers[side]),
-                        counts.choices,
-                    )
-                })
+                .filter_map(|counts| entropy(counts.answers.values().map(|answers| answers[side]), counts.choices))
                 .collect();
             (!entropies.is_empty()).then(|| entropies.iter().sum::<f64>() / entropies.len() as f64)
         })

@@ -1,5 +1,5 @@
-//! Share of the image's influence on a model that is left in a condition ([`evidence`]), and the exposure drop at which half of it is lost
-//! ([`EvidenceCurve`]).
+//! Share of the image's influence on a model that is left in a condition ([`evidence`]), and the exposure drop at which
+//! half of it is lost ([`EvidenceCurve`]).
 
 use crate::accuracies::{CurvePoints, Floor};
 use crate::bootstrap::Resamples;
@@ -23,8 +23,8 @@ pub enum NoEvidence {
     NotBlind,
     /// The ceiling is less than [`MIN_DISTANCE`] above the floor: this distance.
     Close(f64),
-    /// The lower bound of the 95 % interval of the distance is at or below 0: this bound. The share of a distance that may be 0 has no
-    /// bounded interval (Fieller 1954, J. R. Stat. Soc. B 16:175).
+    /// The lower bound of the 95 % interval of the distance is at or below 0: this bound. The share of a distance that
+    /// may be 0 has no bounded interval (Fieller 1954, J. R. Stat. Soc. B 16:175).
     Unsure(f64),
 }
 
@@ -51,8 +51,7 @@ impl Bounds {
         mode: ParsingMode,
         draws: &Resamples,
     ) -> Result<Self, NoEvidence> {
-        let light =
-            ModelInCondition::with_images(&subject.model, AxisLevel::L0, &subject.variant, None);
+        let light = ModelInCondition::with_images(&subject.model, AxisLevel::L0, &subject.variant, None);
         let again = grid.find_up_to_group(&light).ok_or(NoEvidence::NotAgain)?;
         let blind = ModelInCondition::new(&subject.model, None);
         let blind = grid.find_up_to_group(&blind).ok_or(NoEvidence::NotBlind)?;
@@ -67,20 +66,13 @@ impl Bounds {
             .zip(drawn_shares(&again, draws))
             .map(|(floor, ceiling)| [floor, ceiling])
             .collect();
-        let distances = drawn
-            .iter()
-            .map(|[floor, ceiling]| ceiling - floor)
-            .filter(|distance| !distance.is_nan())
-            .collect();
+        let distances =
+            drawn.iter().map(|[floor, ceiling]| ceiling - floor).filter(|distance| !distance.is_nan()).collect();
         let [low, _] = draws.interval(distances);
         if low <= 0.0 {
             return Err(NoEvidence::Unsure(low));
         }
-        Ok(Self {
-            blind,
-            again,
-            drawn,
-        })
+        Ok(Self { blind, again, drawn })
     }
 }
 
@@ -95,12 +87,7 @@ fn share(counts: &[ClusterCount]) -> Option<f64> {
 fn drawn_shares(counts: &[ClusterCount], draws: &Resamples) -> Vec<f64> {
     let right: Vec<f32> = counts.iter().map(|count| count.right as f32).collect();
     let replies: Vec<f32> = counts.iter().map(|count| count.replies as f32).collect();
-    draws
-        .sums(&right)
-        .iter()
-        .zip(&draws.sums(&replies))
-        .map(|(right, n)| right / n)
-        .collect()
+    draws.sums(&right).iter().zip(&draws.sums(&replies)).map(|(right, n)| right / n).collect()
 }
 
 /// Position of an agreement between floor and ceiling, which are at 0 and 1.
@@ -108,12 +95,13 @@ fn position(here: f64, floor: f64, ceiling: f64) -> f64 {
     (here - floor) / (ceiling - floor)
 }
 
-/// Estimates the position of the agreement G of a condition between the floor B and the ceiling C: (G − B) / (C − B), with the interval of
-/// the cluster bootstrap. It may be outside 0 to 1. `missing` is the number of missing replies of each cluster in the condition, and the
-/// interval holds for all values of them. `None` without replies in the condition.
+/// Estimates the position of the agreement G of a condition between the floor B and the ceiling C: (G − B) / (C − B),
+/// with the interval of the cluster bootstrap. It may be outside 0 to 1. `missing` is the number of missing replies of
+/// each cluster in the condition, and the interval holds for all values of them. `None` without replies in the
+/// condition.
 ///
-/// If all clusters agree as often as at the floor, or as at the ceiling, all draws are equal. That is no certainty, so the interval is then
-/// that of the difference between the two agreements, divided by the distance C − B.
+/// If all clusters agree as often as at the floor, or as at the ceiling, all draws are equal. That is no certainty, so
+/// the interval is then that of the difference between the two agreements, divided by the distance C − B.
 pub(super) fn evidence(
     counts: &[ClusterCount],
     missing: &[u32],
@@ -124,19 +112,15 @@ pub(super) fn evidence(
     if missing.iter().all(|missing| *missing == 0) {
         return Some(estimate);
     }
-    let others = [false, true].map(|are_right| {
-        evidence_of_replies(&fill_missing(counts, missing, are_right), bounds, draws)
-    });
+    let others =
+        [false, true].map(|are_right| evidence_of_replies(&fill_missing(counts, missing, are_right), bounds, draws));
     Some(estimate.covering(others.into_iter().flatten()))
 }
 
-fn evidence_of_replies(
-    counts: &[ClusterCount],
-    bounds: &Bounds,
-    draws: &Resamples,
-) -> Option<Estimate> {
+fn evidence_of_replies(counts: &[ClusterCount], bounds: &Bounds, draws: &Resamples) -> Option<Estimate> {
     let value = position(share(counts)?, share(&bounds.blind)?, share(&bounds.again)?);
-    // Draws without replies are dropped. Floor and ceiling coincide in fewer draws than the interval excludes, so its ends are finite.
+    // Draws without replies are dropped. Floor and ceiling coincide in fewer draws than the interval excludes, so its
+    // ends are finite.
     let drawn: Vec<f64> = drawn_shares(counts, draws)
         .into_iter()
         .zip(&bounds.drawn)
@@ -148,11 +132,7 @@ fn evidence_of_replies(
     let ends = if low < high {
         [low, high]
     } else {
-        let nearest = if value < 0.5 {
-            &bounds.blind
-        } else {
-            &bounds.again
-        };
+        let nearest = if value < 0.5 { &bounds.blind } else { &bounds.again };
         let distance = share(&bounds.again)? - share(&bounds.blind)?;
         let difference = cluster_difference(counts, nearest);
         [difference.low, difference.high].map(|end| value + (end - difference.value) / distance)
@@ -197,8 +177,9 @@ pub struct EvidenceCurve {
     pub threshold: Result<Threshold, NoHalf>,
 }
 
-/// Computes the curves of a model over all families, in the strict parsing. The agreement falls from the ceiling at L0; half of the
-/// evidence is lost half-way between ceiling and floor. The threshold is computed as in other reports, with the floor in place of chance.
+/// Computes the curves of a model over all families, in the strict parsing. The agreement falls from the ceiling at L0;
+/// half of the evidence is lost half-way between ceiling and floor. The threshold is computed as in other reports, with
+/// the floor in place of chance.
 pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
     let mode = ParsingMode::Strict;
     CurvePoints::all(grid)
@@ -211,16 +192,12 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
                 Err(reason) => Err(NoHalf::NoEvidence(reason)),
                 Ok(bounds) => {
                     let subjects = points.subjects.iter();
-                    let missing: Vec<Vec<u32>> = subjects
-                        .clone()
-                        .map(|(_, subject)| grid.failed(*subject, None))
-                        .collect();
+                    let missing: Vec<Vec<u32>> =
+                        subjects.clone().map(|(_, subject)| grid.failed(*subject, None)).collect();
                     let floor = Floor::of_blind(&bounds.blind, &bounds.again, &missing[0])?;
                     let counts = LevelCounts {
                         levels: subjects.clone().map(|(level, _)| *level).collect(),
-                        counts: subjects
-                            .map(|(_, subject)| grid.counts(*subject, None, mode))
-                            .collect(),
+                        counts: subjects.map(|(_, subject)| grid.counts(*subject, None, mode)).collect(),
                         missing,
                         guesses: floor.replies,
                         missing_guesses: floor.missing,
@@ -254,20 +231,13 @@ mod tests {
             .zip(drawn_shares(&again, &draws))
             .map(|(floor, ceiling)| [floor, ceiling])
             .collect();
-        let bounds = Bounds {
-            blind,
-            again,
-            drawn,
-        };
+        let bounds = Bounds { blind, again, drawn };
         for (right, expected) in [(2, 0.0), (6, 1.0)] {
             let kept = evidence(&counts(right), &[], &bounds, &draws).unwrap();
             assert!((kept.value - expected).abs() < 1e-12);
             // 60 equal pairs, of which the two added ones count 1 + 0.2 · 5 times, and a distance of two thirds.
             let half = crate::comparisons::paired::difference(&[(0.0, 6.0); 10], 0.0, 60).high;
-            assert!(
-                (kept.high - expected - 1.5 * half).abs() < 1e-12,
-                "{kept:?}"
-            );
+            assert!((kept.high - expected - 1.5 * half).abs() < 1e-12, "{kept:?}");
             assert!((expected - kept.low - 1.5 * half).abs() < 1e-12, "{kept:?}");
         }
     }

@@ -8,18 +8,16 @@ use crate::statistics::quantiles::{degrees_of_freedom, student};
 /// Expected agreement above which κ is undefined, because all answers agree by their frequencies alone.
 const MAX_EXPECTED: f64 = 1.0 - 1e-9;
 
-/// Estimates Cohen's κ (Cohen 1960, Educ. Psychol. Meas. 20:37) between the answers in a condition and those at L0. The expected agreement
-/// is computed by question: e = (1/N) Σ_q Σ_k a_qk b_qk / n_q, for n_q items of question q, a_qk of them with answer k at L0 and b_qk in
-/// the condition. Answer frequencies pooled over different questions would make e too small and κ too large.
+/// Estimates Cohen's κ (Cohen 1960, Educ. Psychol. Meas. 20:37) between the answers in a condition and those at L0. The
+/// expected agreement is computed by question: e = (1/N) Σ_q Σ_k a_qk b_qk / n_q, for n_q items of question q, a_qk of
+/// them with answer k at L0 and b_qk in the condition. Answer frequencies pooled over different questions would make e
+/// too small and κ too large.
 ///
-/// `None` if e is 1, so that only agreement is possible. The interval is that of the linearization of κ in the counts of the clusters, with
-/// Student's quantile, as for two models ([`clustered_kappa`](crate::comparisons::clustered_kappa)). `agreement` is the share of items that
-/// agree; without any spread between clusters, the interval of κ follows from its interval.
-pub(super) fn kappa(
-    counts: &BankCounts<'_>,
-    by_cluster: &[ClusterCount],
-    agreement: Estimate,
-) -> Option<Estimate> {
+/// `None` if e is 1, so that only agreement is possible. The interval is that of the linearization of κ in the counts
+/// of the clusters, with Student's quantile, as for two models
+/// ([`clustered_kappa`](crate::comparisons::clustered_kappa)). `agreement` is the share of items that agree; without
+/// any spread between clusters, the interval of κ follows from its interval.
+pub(super) fn kappa(counts: &BankCounts<'_>, by_cluster: &[ClusterCount], agreement: Estimate) -> Option<Estimate> {
     let all = counts.items() as f64;
     let expected = counts.whole.values().map(expected).sum::<f64>() / all;
     if all == 0.0 || expected > MAX_EXPECTED {
@@ -53,27 +51,13 @@ pub(super) fn kappa(
         (scaled(agreement.low), scaled(agreement.high))
     };
     // A single cluster gives no information about the spread.
-    let (low, high) = if low.is_finite() && high.is_finite() {
-        (low, high)
-    } else {
-        (-1.0, 1.0)
-    };
-    Some(Estimate {
-        value,
-        low: low.max(-1.0).min(value),
-        high: high.min(1.0).max(value),
-        n: counts.items(),
-    })
+    let (low, high) = if low.is_finite() && high.is_finite() { (low, high) } else { (-1.0, 1.0) };
+    Some(Estimate { value, low: low.max(-1.0).min(value), high: high.min(1.0).max(value), n: counts.items() })
 }
 
 /// Number of items of a question that are expected to agree by the answer frequencies.
 fn expected(counts: &AnswerCounts<'_>) -> f64 {
-    counts
-        .answers
-        .values()
-        .map(|[light, here]| *light as f64 * *here as f64)
-        .sum::<f64>()
-        / counts.items as f64
+    counts.answers.values().map(|[light, here]| *light as f64 * *here as f64).sum::<f64>() / counts.items as f64
 }
 
 /// Derivative of the expected number of agreeing items of a question in the direction of the counts of a cluster.

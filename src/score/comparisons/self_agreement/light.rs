@@ -82,10 +82,8 @@ impl<'a> LightAnswers<'a> {
     /// Collects the replies of a model at L0.
     pub(super) fn new(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
         let mut by_question = HashMap::<QuestionKey<'a>, Vec<TrialRef<'a>>>::new();
-        for trial in trials
-            .iter()
-            .filter(|trial| trial.model() == model)
-            .filter(|trial| is_light(*trial) && trial.repeat() == 0)
+        for trial in
+            trials.iter().filter(|trial| trial.model() == model).filter(|trial| is_light(*trial) && trial.repeat() == 0)
         {
             let key = (trial.question(), trial.choices());
             by_question.entry(key).or_default().push(trial);
@@ -95,43 +93,31 @@ impl<'a> LightAnswers<'a> {
 
     /// First reply to each question, in arbitrary order.
     pub(super) fn first(&self) -> impl Iterator<Item = TrialRef<'a>> + '_ {
-        self.by_question
-            .values()
-            .filter_map(|trials| trials.first().copied())
+        self.by_question.values().filter_map(|trials| trials.first().copied())
     }
 
     /// Choice of the model at L0 for the question of a trial; `None` if it is unreadable or missing.
     fn reference(&self, trial: TrialRef<'_>, mode: ParsingMode) -> Option<usize> {
         let key = (trial.question(), trial.choices());
         let own = run_group(trial);
-        let light = self
-            .by_question
-            .get(&key)?
-            .iter()
-            .find(|light| RunGroup::overlap(run_group(**light), own))?;
+        let light = self.by_question.get(&key)?.iter().find(|light| RunGroup::overlap(run_group(**light), own))?;
         chosen(*light, mode)
     }
 
-    /// Returns the trials of the model with its own answer at L0 as the truth. Questions without such an answer are left out.
+    /// Returns the trials of the model with its own answer at L0 as the truth. Questions without such an answer are
+    /// left out.
     ///
-    /// The first trial at L0 is the reference itself and is left out. If the question was asked again, the second trial takes its place, so
-    /// that it is paired with the first trial of every other condition.
+    /// The first trial at L0 is the reference itself and is left out. If the question was asked again, the second trial
+    /// takes its place, so that it is paired with the first trial of every other condition.
     pub(super) fn scored_against_light(
         &self,
         trials: &'a Trials<ChoiceDetail>,
         mode: ParsingMode,
     ) -> Trials<ChoiceDetail> {
-        let scored = trials
-            .iter()
-            .filter(|trial| trial.model() == self.model)
-            .filter_map(|trial| {
-                let repeat = if is_light(trial) {
-                    trial.repeat().checked_sub(1)?
-                } else {
-                    trial.repeat()
-                };
-                Some((trial, repeat, self.reference(trial, mode)?))
-            });
+        let scored = trials.iter().filter(|trial| trial.model() == self.model).filter_map(|trial| {
+            let repeat = if is_light(trial) { trial.repeat().checked_sub(1)? } else { trial.repeat() };
+            Some((trial, repeat, self.reference(trial, mode)?))
+        });
         with_references(scored)
     }
 
@@ -154,10 +140,7 @@ impl<'a> LightAnswers<'a> {
     /// Counts the replies at L0, in one parsing.
     pub(super) fn replies(&self, mode: ParsingMode) -> LightReplies {
         let replied: Vec<TrialRef<'_>> = self.first().filter(|trial| !trial.failed()).collect();
-        let read = replied
-            .iter()
-            .filter(|trial| chosen(**trial, mode).is_some())
-            .count();
+        let read = replied.iter().filter(|trial| chosen(**trial, mode).is_some()).count();
         LightReplies {
             model: self.model.to_owned(),
             mode,
@@ -174,14 +157,8 @@ impl<'a> LightAnswers<'a> {
     }
 
     fn offers_cannot_tell(&self) -> bool {
-        let lists: HashSet<&[String]> = self
-            .by_question
-            .keys()
-            .map(|(_, choices)| *choices)
-            .collect();
-        lists
-            .iter()
-            .any(|choices| choices.iter().any(|choice| is_cannot_tell(choice)))
+        let lists: HashSet<&[String]> = self.by_question.keys().map(|(_, choices)| *choices).collect();
+        lists.iter().any(|choices| choices.iter().any(|choice| is_cannot_tell(choice)))
     }
 }
 
@@ -190,9 +167,7 @@ fn run_group(trial: TrialRef<'_>) -> Option<&RunGroup> {
 }
 
 /// Copies trials, each with a new repeat number and a reference answer as the truth.
-fn with_references<'t>(
-    scored: impl Iterator<Item = (TrialRef<'t>, u32, usize)>,
-) -> Trials<ChoiceDetail> {
+fn with_references<'t>(scored: impl Iterator<Item = (TrialRef<'t>, u32, usize)>) -> Trials<ChoiceDetail> {
     let mut trials = Trials::default();
     for (trial, repeat, reference) in scored {
         trials.add_scored_against(trial, repeat, reference);

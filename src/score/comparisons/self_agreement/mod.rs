@@ -1,19 +1,20 @@
 //! Agreement of each model with its own answers at L0, for questions whose true answers are unknown: [`SelfAgreement`].
 //!
-//! The reference answer is the model's own answer at L0, for each question and order of choices. It replaces the true answer in scoring,
-//! so the counts by cluster, the paired tests, Holm's correction and the thresholds of curves are those of the other reports. The results
-//! are agreements, not accuracies. By the triangle inequality, the accuracy lost in a condition is at most 1 minus the agreement in that
-//! condition, whatever the true answers are.
+//! The reference answer is the model's own answer at L0, for each question and order of choices. It replaces the true
+//! answer in scoring, so the counts by cluster, the paired tests, Holm's correction and the thresholds of curves are
+//! those of the other reports. The results are agreements, not accuracies. By the triangle inequality, the accuracy
+//! lost in a condition is at most 1 minus the agreement in that condition, whatever the true answers are.
 //!
-//! Agreement alone is weak evidence: a model that answers no to everything agrees with itself. Four other results put it in context:
+//! Agreement alone is weak evidence: a model that answers no to everything agrees with itself. Four other results put
+//! it in context:
 //! - κ, with the expected agreement computed for each question;
 //! - the entropy of the answers;
 //! - the floor, the agreement without an image, and the ceiling, the agreement when a question is repeated at L0;
 //! - the position of the agreement between floor and ceiling ([`evidence`]).
 //!
 //! Sources: metamorphic testing without an oracle (Spieker and Gotlieb 2019, arXiv:1910.00262); prediction flips under
-//! corruption (Hendrycks and Dietterich 2019, arXiv:1903.12261, ImageNet-P); consistency of vision-language models under corruption
-//! (Bench-C, arXiv:2511.19032).
+//! corruption (Hendrycks and Dietterich 2019, arXiv:1903.12261, ImageNet-P); consistency of vision-language models
+//! under corruption (Bench-C, arXiv:2511.19032).
 
 mod bank_index;
 pub mod cell;
@@ -88,11 +89,7 @@ impl<'a> SelfAgreement<'a> {
         let draws = Resamples::new(clusters.count());
         let bank = BankIndex::new(questions);
         let grid = Grid::without_truths(trials, &clusters, listing);
-        let mut models: Vec<String> = grid
-            .subjects
-            .iter()
-            .map(|subject| subject.model.clone())
-            .collect();
+        let mut models: Vec<String> = grid.subjects.iter().map(|subject| subject.model.clone()).collect();
         models.dedup();
         let mut all = Self {
             unit: clusters.unit(),
@@ -115,16 +112,11 @@ impl<'a> SelfAgreement<'a> {
                 let scored = answers.scored_against_light(trials, mode);
                 let grid = Grid::new(&scored, &clusters);
                 let questions = questions_in_light(model, &answers, &bank, mode);
-                all.cells
-                    .extend(cells(&grid, &draws, &bank, &questions, mode));
+                all.cells.extend(cells(&grid, &draws, &bank, &questions, mode));
                 all.light.push(replies);
                 if mode == ParsingMode::Strict {
                     let found = comparisons(&grid);
-                    all.comparisons.extend(
-                        found
-                            .into_iter()
-                            .filter(|found| found.kind != ComparisonKind::Model),
-                    );
+                    all.comparisons.extend(found.into_iter().filter(|found| found.kind != ComparisonKind::Model));
                     all.curves.extend(curves(&grid, &draws));
                     all.confusions.extend(confusions(&grid));
                     all.hallucinations.extend(hallucinations(&grid));
@@ -133,8 +125,7 @@ impl<'a> SelfAgreement<'a> {
             }
         }
         // The order of other reports. The sort is stable, so the levels of a variant stay in ascending order.
-        all.comparisons
-            .sort_by_key(|found| (found.kind, found.family.is_some()));
+        all.comparisons.sort_by_key(|found| (found.kind, found.family.is_some()));
         adjust_comparisons(&mut all.comparisons);
         all
     }
@@ -147,59 +138,42 @@ impl<'a> SelfAgreement<'a> {
 
     /// Names of the models, in the order of the listing.
     pub fn models(&self) -> Vec<&str> {
-        self.light
-            .iter()
-            .filter(|light| light.mode == ParsingMode::Strict)
-            .map(|light| &*light.model)
-            .collect()
+        self.light.iter().filter(|light| light.mode == ParsingMode::Strict).map(|light| &*light.model).collect()
     }
 
     /// Number of items, without repeats. An item is a question about an image in one order of its choices.
     pub fn items(&self) -> usize {
-        self.grid
-            .items
-            .iter()
-            .filter(|item| item.asked.repeat == 0)
-            .count()
+        self.grid.items.iter().filter(|item| item.asked.repeat == 0).count()
     }
 
     /// Counts of the replies of a model at L0, in the strict parsing.
     pub fn light_of(&self, model: &str) -> Option<&LightReplies> {
-        self.light
-            .iter()
-            .find(|light| light.model == model && light.mode == ParsingMode::Strict)
+        self.light.iter().find(|light| light.model == model && light.mode == ParsingMode::Strict)
     }
 
     /// Cells over all question families, in the strict parsing.
     pub fn whole(&self) -> impl Iterator<Item = &AgreementCell> + Clone {
-        self.cells
-            .iter()
-            .filter(|cell| cell.family.is_none() && cell.mode == ParsingMode::Strict)
+        self.cells.iter().filter(|cell| cell.family.is_none() && cell.mode == ParsingMode::Strict)
     }
 
     /// Numbers of informative questions and of all questions in the bank that a model was asked at L0.
     pub fn informative(&self, model: &str) -> (usize, usize) {
-        let questions: Vec<&QuestionInLight> = self
-            .questions
-            .iter()
-            .filter(|question| question.model == model)
-            .collect();
-        let informative = questions
-            .iter()
-            .filter(|question| question.is_informative())
-            .count();
+        let questions: Vec<&QuestionInLight> =
+            self.questions.iter().filter(|question| question.model == model).collect();
+        let informative = questions.iter().filter(|question| question.is_informative()).count();
         (informative, questions.len())
     }
 
-    /// True if no question of the bank is informative for a model: it answers each question alike for nearly all images.
+    /// True if no question of the bank is informative for a model: it answers each question alike for nearly all
+    /// images.
     pub fn cannot_tell(&self, model: &str) -> bool {
         let (informative, all) = self.informative(model);
         informative == 0 && all > 0
     }
 }
 
-/// Sets `p_report` of the comparisons that the report's sentences use. They are corrected together: each model at the darkest testable
-/// level of each variant, and each enhancer at each level.
+/// Sets `p_report` of the comparisons that the report's sentences use. They are corrected together: each model at the
+/// darkest testable level of each variant, and each enhancer at each level.
 fn adjust_comparisons(comparisons: &mut [Comparison]) {
     let mut darkest = BTreeMap::<_, usize>::new();
     let mut enhanced = BTreeMap::<_, Vec<usize>>::new();
@@ -224,11 +198,7 @@ fn adjust_comparisons(comparisons: &mut [Comparison]) {
         .chain(enhanced.into_values())
         .filter(|tests: &Vec<usize>| !tests.is_empty())
         .collect();
-    let tests = TestTree::group(
-        groups
-            .iter()
-            .map(|tests| TestTree::group(tests.iter().copied().map(TestTree::leaf))),
-    );
+    let tests = TestTree::group(groups.iter().map(|tests| TestTree::group(tests.iter().copied().map(TestTree::leaf))));
     let corrected = adjust_p_values(&tests, |index: usize| comparisons[index].strict.paired.p);
     for (index, p) in corrected {
         // The reference answers are from the strict parsing, so a lenient comparison is not available.

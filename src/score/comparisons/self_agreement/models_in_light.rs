@@ -10,8 +10,9 @@ use crate::estimate::Estimate;
 use crate::grid::Grid;
 use darkqa_base::types::{ChoiceDetail, Trials};
 
-/// Agreement of two models at L0, in the strict parsing, on the items to which both gave a readable answer. Each model has its own
-/// reference, so the agreements of the models with themselves in the dark are comparable only as far as the models agree here.
+/// Agreement of two models at L0, in the strict parsing, on the items to which both gave a readable answer. Each model
+/// has its own reference, so the agreements of the models with themselves in the dark are comparable only as far as the
+/// models agree here.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelsInLight {
     pub first: String,

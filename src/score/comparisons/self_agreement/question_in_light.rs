@@ -76,8 +76,8 @@ pub(super) fn questions_in_light(
         .collect()
 }
 
-/// Shannon entropy of counts, relative to that of `choices` equally frequent answers: 0 if all answers are the same, 1 if all choices are
-/// equally frequent. `None` without counts.
+/// Shannon entropy of counts, relative to that of `choices` equally frequent answers: 0 if all answers are the same, 1
+/// if all choices are equally frequent. `None` without counts.
 pub(super) fn entropy(counts: impl Iterator<Item = usize> + Clone, choices: usize) -> Option<f64> {
     let all: usize = counts.clone().sum();
     if all == 0 {

@@ -19,8 +19,8 @@ pub const LADDER_STEPS: usize = 15;
 pub const GAINS: [f64; 2] = [0.02, 30.0];
 /// Number of gains, evenly spaced in ln K, at which the curves are compared (chosen).
 const FINE: usize = 601;
-/// Maximum misfit of a fit, in ln spread (chosen: pairs simulated by this program have up to 0.1, a pair whose low-light image was made
-/// without a sensor at least 0.9).
+/// Maximum misfit of a fit, in ln spread (chosen: pairs simulated by this program have up to 0.1, a pair whose
+/// low-light image was made without a sensor at least 0.9).
 pub const MAX_MISFIT: f64 = 0.3;
 /// Minimum number of bins for a fit (chosen); fewer do not determine the shape of a curve.
 const MIN_BINS: usize = 4;
@@ -63,7 +63,8 @@ pub enum FitOutcome {
 }
 
 impl GainFit {
-    /// Finds the gain at which the synthetic spread is nearest to the real one; `synthetic` has one curve for each gain of [`ladder`].
+    /// Finds the gain at which the synthetic spread is nearest to the real one; `synthetic` has one curve for each gain
+    /// of [`ladder`].
     #[must_use]
     pub fn fit(real: &SpreadCurve, synthetic: &[SpreadCurve; LADDER_STEPS]) -> Self {
         let bins: Vec<(f64, [f64; LADDER_STEPS])> = (0..BINS)
@@ -76,11 +77,7 @@ impl GainFit {
             })
             .collect();
         if bins.len() < MIN_BINS {
-            return Self {
-                gain: None,
-                misfit: None,
-                outcome: FitOutcome::FewBlocks,
-            };
+            return Self { gain: None, misfit: None, outcome: FitOutcome::FewBlocks };
         }
         let (index, misfit) = (0..FINE)
             .map(|index| {
@@ -91,9 +88,7 @@ impl GainFit {
                 (squares.sum::<f64>() / bins.len() as f64).sqrt()
             })
             .enumerate()
-            .fold((0, f64::INFINITY), |best, next| {
-                if next.1 < best.1 { next } else { best }
-            });
+            .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best });
         Self {
             gain: Some(libm::exp(log_gain(index, FINE))),
             misfit: Some(misfit),
@@ -206,28 +201,19 @@ impl ProfileFit {
     #[must_use]
     pub fn new(profile: ProfileName, ratio: Option<f64>, pairs: Vec<PairFit>) -> Self {
         let gains: Vec<f64> = pairs.iter().filter_map(|pair| pair.fit.fitted()).collect();
-        Self {
-            profile,
-            ratio,
-            pooled: PooledGain::new(&gains),
-            pairs,
-        }
+        Self { profile, ratio, pooled: PooledGain::new(&gains), pairs }
     }
 
-    /// Gains for evaluating a pair, with their source: those of the other pairs if at least 3 are fitted, so that no pair is evaluated with
-    /// its own gain; otherwise those of all pairs. `None` if no pair is fitted.
+    /// Gains for evaluating a pair, with their source: those of the other pairs if at least 3 are fitted, so that no
+    /// pair is evaluated with its own gain; otherwise those of all pairs. `None` if no pair is fitted.
     #[must_use]
     pub fn for_pair(&self, name: &str) -> Option<(PooledGain, CameraOrigin)> {
         let all = self.pooled.clone()?;
         if all.n < MIN_VALUES {
             return Some((all, CameraOrigin::SamePairs));
         }
-        let gains: Vec<f64> = self
-            .pairs
-            .iter()
-            .filter(|pair| pair.pair != name)
-            .filter_map(|pair| pair.fit.fitted())
-            .collect();
+        let gains: Vec<f64> =
+            self.pairs.iter().filter(|pair| pair.pair != name).filter_map(|pair| pair.fit.fitted()).collect();
         PooledGain::new(&gains).map(|gains| (gains, CameraOrigin::OtherPairs))
     }
 }
@@ -239,9 +225,7 @@ mod tests {
     /// Spread ∝ √K in all bins, a bin higher than the one before, times `factor(bin)`.
     fn curve(gain: f64, factor: impl Fn(usize) -> f64) -> SpreadCurve {
         SpreadCurve {
-            bins: std::array::from_fn(|bin| {
-                Some(0.5 * libm::log(gain * (1.0 + bin as f64)) + libm::log(factor(bin)))
-            }),
+            bins: std::array::from_fn(|bin| Some(0.5 * libm::log(gain * (1.0 + bin as f64)) + libm::log(factor(bin)))),
         }
     }
 

@@ -4,8 +4,8 @@ use serde::Serialize;
 
 use crate::statistics::quantiles::student;
 
-/// Minimum number of values for an interval (chosen). With two values, the half-width is more than 6 times their distance, which can exceed
-/// the range of the quantity.
+/// Minimum number of values for an interval (chosen). With two values, the half-width is more than 6 times their
+/// distance, which can exceed the range of the quantity.
 pub const MIN_VALUES: usize = 3;
 
 /// A mean with its 95 % interval by Student's t distribution.

@@ -1,5 +1,6 @@
-//! Similarity of a synthetic image to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise ([`residual`]). Also
-//! the camera gain estimated from the noise of a real image ([`gain`]), and the check that two images show the same scene ([`scene`]).
+//! Similarity of a synthetic image to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
+//! ([`residual`]). Also the camera gain estimated from the noise of a real image ([`gain`]), and the check that two
+//! images show the same scene ([`scene`]).
 
 pub mod gain;
 pub mod mean;
@@ -33,21 +34,13 @@ pub struct ImageComparison {
 }
 
 impl ImageComparison {
-    /// Difference of the PSNR in dB, of the SSIM and of the divergence in nats from those of another image of the same pair.
+    /// Difference of the PSNR in dB, of the SSIM and of the divergence in nats from those of another image of the same
+    /// pair.
     #[must_use]
     pub fn differences(&self, other: &Self) -> [f64; 3] {
-        [
-            (self.psnr, other.psnr),
-            (self.ssim, other.ssim),
-            (self.kl.nats, other.kl.nats),
-        ]
-        .map(|(own, other)| {
+        [(self.psnr, other.psnr), (self.ssim, other.ssim), (self.kl.nats, other.kl.nats)].map(|(own, other)| {
             // Two perfect images differ by 0, although both have an infinite PSNR.
-            if own.total_cmp(&other).is_eq() {
-                0.0
-            } else {
-                own - other
-            }
+            if own.total_cmp(&other).is_eq() { 0.0 } else { own - other }
         })
     }
 }
@@ -133,11 +126,7 @@ pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
         .chunks(1 << 16)
         .zip(b.samples().chunks(1 << 16))
         .map(|(a, b)| {
-            let squares: u32 = a
-                .iter()
-                .zip(b)
-                .map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2))
-                .sum();
+            let squares: u32 = a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b)).pow(2)).sum();
             u64::from(squares)
         })
         .sum::<u64>() as f64
@@ -150,15 +139,10 @@ pub fn psnr(a: &Rgb, b: &Rgb) -> Result<f64> {
 /// # Errors
 /// If one of the images is black.
 pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
-    let linear: [f64; 256] =
-        std::array::from_fn(|code| libm::pow((code as f64 / 255.0).max(1e-8), 2.2));
+    let linear: [f64; 256] = std::array::from_fn(|code| libm::pow((code as f64 / 255.0).max(1e-8), 2.2));
     let images = [normal, low];
-    if images
-        .iter()
-        .any(|image| image.samples().iter().all(|code| *code == 0))
-    {
-        let problem =
-            "an image is black, so its exposure drop cannot be estimated; set it with --ev";
+    if images.iter().any(|image| image.samples().iter().all(|code| *code == 0)) {
+        let problem = "an image is black, so its exposure drop cannot be estimated; set it with --ev";
         return Err(Error::data("pair", problem));
     }
     let [normal_light, low_light] = images.map(|image| {
@@ -166,12 +150,7 @@ pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
         for code in image.samples() {
             counts[usize::from(*code)] += 1;
         }
-        counts
-            .iter()
-            .zip(linear)
-            .map(|(n, light)| *n as f64 * light)
-            .sum::<f64>()
-            / image.samples().len() as f64
+        counts.iter().zip(linear).map(|(n, light)| *n as f64 * light).sum::<f64>() / image.samples().len() as f64
     });
     Ok(libm::log2(normal_light / low_light) as f32)
 }
@@ -199,23 +178,11 @@ mod tests {
 
     #[test]
     fn equal_numbers_do_not_differ_even_if_infinite() {
-        let kl = residual::Divergence {
-            nats: 0.5,
-            empty: 0,
-        };
-        let perfect = ImageComparison {
-            psnr: f64::INFINITY,
-            ssim: 1.0,
-            kl,
-            kl_other: kl,
-        };
+        let kl = residual::Divergence { nats: 0.5, empty: 0 };
+        let perfect = ImageComparison { psnr: f64::INFINITY, ssim: 1.0, kl, kl_other: kl };
         let same = perfect.differences(&perfect);
         assert!(same.iter().all(|difference| difference.abs() < 1e-12));
-        let worse = ImageComparison {
-            psnr: 30.0,
-            ssim: 0.75,
-            ..perfect
-        };
+        let worse = ImageComparison { psnr: 30.0, ssim: 0.75, ..perfect };
         let [psnr, ssim, kl] = worse.differences(&perfect);
         assert!(psnr.is_infinite() && psnr < 0.0);
         assert!((ssim + 0.25).abs() < 1e-12 && kl.abs() < 1e-12);

@@ -1,5 +1,5 @@
-//! Residuals of noisy images relative to their clean image ([`Residuals`]), and the divergence of synthetic residuals from real ones
-//! ([`divergence`]).
+//! Residuals of noisy images relative to their clean image ([`Residuals`]), and the divergence of synthetic residuals
+//! from real ones ([`divergence`]).
 
 use std::fmt;
 
@@ -24,10 +24,7 @@ pub struct Residuals {
 
 impl Default for Residuals {
     fn default() -> Self {
-        Self {
-            counts: vec![0; STEPS],
-            codes: vec![[0; 3]; 256],
-        }
+        Self { counts: vec![0; STEPS], codes: vec![[0; 3]; 256] }
     }
 }
 
@@ -70,19 +67,11 @@ impl Residuals {
 
     /// For each clean code that occurs: code, number of samples, and mean and standard deviation of its residuals.
     pub fn by_code(&self) -> impl Iterator<Item = (usize, i64, [f64; 2])> {
-        self.codes
-            .iter()
-            .enumerate()
-            .filter(|(_, [n, ..])| *n > 0)
-            .map(|(code, [n, sum, squares])| {
-                let [count, sum, squares] = [*n, *sum, *squares].map(|x| x as f64);
-                let mean = sum / count;
-                (
-                    code,
-                    *n,
-                    [mean, (squares / count - mean * mean).max(0.0).sqrt()],
-                )
-            })
+        self.codes.iter().enumerate().filter(|(_, [n, ..])| *n > 0).map(|(code, [n, sum, squares])| {
+            let [count, sum, squares] = [*n, *sum, *squares].map(|x| x as f64);
+            let mean = sum / count;
+            (code, *n, [mean, (squares / count - mean * mean).max(0.0).sqrt()])
+        })
     }
 
     /// Number of samples in each bin.
@@ -113,8 +102,8 @@ pub enum EmptyBins {
     /// 10⁻⁸ is added to the share of each bin, and the shares are normalized to sum to 1 again.
     #[default]
     Eps,
-    /// Only bins that are filled on both sides are used, and the shares are not normalized: a synthesis without noise then
-    /// has a divergence of 0 or less.
+    /// Only bins that are filled on both sides are used, and the shares are not normalized: a synthesis without noise
+    /// then has a divergence of 0 or less.
     Drop,
 }
 
@@ -142,17 +131,15 @@ impl Bins {
             // A value on an edge belongs to the bin above, as in numpy.
             Self::Fu => {
                 let residual = f64::from(difference) / 255.0;
-                (0..65)
-                    .take_while(|edge| inner_edge(*edge) <= residual)
-                    .count()
+                (0..65).take_while(|edge| inner_edge(*edge) <= residual).count()
             }
             Self::Kousha => ((difference + 260) / 4) as usize,
         }
     }
 }
 
-/// Inner edge of [`Bins::Fu`]. The edges are those of numpy's `arange(-0.1, 0.1 + 1e-9, 0.2 / 64)`: s + i · d with d = (s + 0.2/64) − s.
-/// The middle edge is 8·10⁻¹⁷, not 0, so that a residual of 0 is counted in the bin below it.
+/// Inner edge of [`Bins::Fu`]. The edges are those of numpy's `arange(-0.1, 0.1 + 1e-9, 0.2 / 64)`: s + i · d with d =
+/// (s + 0.2/64) − s. The middle edge is 8·10⁻¹⁷, not 0, so that a residual of 0 is counted in the bin below it.
 fn inner_edge(index: usize) -> f64 {
     const FIRST: f64 = -0.1;
     let step = (FIRST + 0.2 / 64.0) - FIRST;
@@ -168,32 +155,20 @@ pub struct Divergence {
     pub empty: usize,
 }
 
-/// Computes D_KL(real ‖ synthetic) of two sets of residuals. The rule is ignored for [`Bins::Kousha`], which has no empty bins.
+/// Computes D_KL(real ‖ synthetic) of two sets of residuals. The rule is ignored for [`Bins::Kousha`], which has no
+/// empty bins.
 #[must_use]
-pub fn divergence(
-    real: &Residuals,
-    synthetic: &Residuals,
-    bins: Bins,
-    rule: EmptyBins,
-) -> Divergence {
+pub fn divergence(real: &Residuals, synthetic: &Residuals, bins: Bins, rule: EmptyBins) -> Divergence {
     let [real, synthetic] = [real, synthetic].map(|residuals| residuals.binned(bins));
-    let empty = real
-        .iter()
-        .zip(&synthetic)
-        .filter(|(p, q)| **p > 0 && **q == 0)
-        .count();
+    let empty = real.iter().zip(&synthetic).filter(|(p, q)| **p > 0 && **q == 0).count();
     let added = match (bins, rule) {
         (Bins::Kousha, _) => AddedCount::Count,
         (Bins::Fu, EmptyBins::Eps) => AddedCount::Share,
         (Bins::Fu, EmptyBins::Drop) => AddedCount::Nothing,
     };
     let [real, synthetic] = [real, synthetic].map(|counts| shares(&counts, added));
-    let nats = real
-        .iter()
-        .zip(&synthetic)
-        .filter(|(p, q)| **p > 0.0 && **q > 0.0)
-        .map(|(p, q)| p * libm::log(p / q))
-        .sum();
+    let nats =
+        real.iter().zip(&synthetic).filter(|(p, q)| **p > 0.0 && **q > 0.0).map(|(p, q)| p * libm::log(p / q)).sum();
     Divergence { nats, empty }
 }
 
@@ -258,11 +233,7 @@ mod tests {
     #[test]
     fn equal_residuals_have_no_divergence() {
         let same = residuals(&[(-3, 10), (0, 80), (7, 10)]);
-        for (bins, rule) in [
-            (Bins::Fu, EmptyBins::Eps),
-            (Bins::Fu, EmptyBins::Drop),
-            (Bins::Kousha, EmptyBins::Eps),
-        ] {
+        for (bins, rule) in [(Bins::Fu, EmptyBins::Eps), (Bins::Fu, EmptyBins::Drop), (Bins::Kousha, EmptyBins::Eps)] {
             let found = divergence(&same, &same, bins, rule);
             assert!(found.nats.abs() < 1e-12 && found.empty == 0);
         }
@@ -289,9 +260,8 @@ mod tests {
     }
 
     const NUMPY: [usize; 53] = [
-        0, 1, 2, 4, 5, 6, 7, 9, 10, 11, 12, 14, 15, 16, 17, 19, 20, 21, 22, 24, 25, 26, 27, 29, 30,
-        31, 32, 34, 35, 36, 38, 39, 40, 41, 43, 44, 45, 46, 48, 49, 50, 51, 53, 54, 55, 56, 58, 59,
-        60, 61, 63, 64, 65,
+        0, 1, 2, 4, 5, 6, 7, 9, 10, 11, 12, 14, 15, 16, 17, 19, 20, 21, 22, 24, 25, 26, 27, 29, 30, 31, 32, 34, 35, 36,
+        38, 39, 40, 41, 43, 44, 45, 46, 48, 49, 50, 51, 53, 54, 55, 56, 58, 59, 60, 61, 63, 64, 65,
     ];
 
     /// The bins of numpy for the residuals k/255, k from −26 to 26: `np.histogram` with the edges above.
@@ -300,10 +270,7 @@ mod tests {
         let found: Vec<usize> = (-26..=26).map(|k| Bins::Fu.index(k)).collect();
         assert_eq!(found, NUMPY);
         assert_eq!((Bins::Fu.index(-255), Bins::Fu.index(255)), (0, 65));
-        assert_eq!(
-            [-255, -1, 0, 3, 4, 255].map(|k| Bins::Kousha.index(k)),
-            [1, 64, 65, 65, 66, 128]
-        );
+        assert_eq!([-255, -1, 0, 3, 4, 255].map(|k| Bins::Kousha.index(k)), [1, 64, 65, 65, 66, 128]);
     }
 
     #[test]

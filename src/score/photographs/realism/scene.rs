@@ -1,21 +1,21 @@
 //! Check that two images show the same scene in different light: [`SceneMatch`].
 //!
-//! Both images are divided into blocks, whose means have little noise. The mean of the surrounding 5 × 5 blocks is subtracted from each
-//! mean, which removes the large-scale distribution of light. The remaining structure correlates if the scene is the same. An exposure drop
-//! multiplies codes by 2^(−ΔEV/2.2), which does not change the correlation.
+//! Both images are divided into blocks, whose means have little noise. The mean of the surrounding 5 × 5 blocks is
+//! subtracted from each mean, which removes the large-scale distribution of light. The remaining structure correlates
+//! if the scene is the same. An exposure drop multiplies codes by 2^(−ΔEV/2.2), which does not change the correlation.
 //!
-//! Measured on 33 indoor photographs of 21 scenes at 600 × 400: the correlation is 0.37 to 1 (median 0.99) for 1,055 synthetic
-//! partners of 2 to 9 EV, all noise profiles, K 0.1 and 6; at most 0.21 for 1,483 pairs of two scenes, 427 of them with real
-//! low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. An image at 4 EV that is shifted by 2 % of its shorter
-//! side has at least 0.67, by 4 % at least 0.25.
+//! Measured on 33 indoor photographs of 21 scenes at 600 × 400: the correlation is 0.37 to 1 (median 0.99) for 1,055
+//! synthetic partners of 2 to 9 EV, all noise profiles, K 0.1 and 6; at most 0.21 for 1,483 pairs of two scenes, 427 of
+//! them with real low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. An image at 4 EV that is
+//! shifted by 2 % of its shorter side has at least 0.67, by 4 % at least 0.25.
 
 use crate::photographs::dot;
 use darkqa_base::types::Rgb;
 
 /// Minimum correlation of images of the same scene (chosen, see above).
 pub const MIN_CORRELATION: f64 = 0.25;
-/// Minimum correlation that the same scene would reach under the noise of the dark image (chosen). Below it, a low correlation is no
-/// evidence.
+/// Minimum correlation that the same scene would reach under the noise of the dark image (chosen). Below it, a low
+/// correlation is no evidence.
 const MIN_REACH: f64 = 0.5;
 /// Approximate number of blocks along the shorter side (chosen).
 const BLOCKS: usize = 25;
@@ -45,21 +45,15 @@ impl SceneMatch {
         let reach = signal / libm::hypot(signal, low.noise);
         let is_clear = reach >= MIN_REACH && squares > 0.0;
         Self {
-            correlation: is_clear.then(|| {
-                if others > 0.0 {
-                    dot(&clean, &noisy) / (squares * others).sqrt()
-                } else {
-                    0.0
-                }
-            }),
+            correlation: is_clear
+                .then(|| if others > 0.0 { dot(&clean, &noisy) / (squares * others).sqrt() } else { 0.0 }),
         }
     }
 
     /// True if the images show two different scenes.
     #[must_use]
     pub fn is_of_two_scenes(self) -> bool {
-        self.correlation
-            .is_some_and(|correlation| correlation < MIN_CORRELATION)
+        self.correlation.is_some_and(|correlation| correlation < MIN_CORRELATION)
     }
 }
 
@@ -91,7 +85,8 @@ impl BlockMeans {
         }
     }
 
-    /// Subtracts from each mean that of the surrounding blocks, then the overall mean. Blocks at the edges are repeated beyond the image.
+    /// Subtracts from each mean that of the surrounding blocks, then the overall mean. Blocks at the edges are repeated
+    /// beyond the image.
     fn structure(&self) -> Vec<f64> {
         let [height, width] = self.size;
         let mut structure: Vec<f64> = (0..height)
@@ -117,12 +112,11 @@ impl BlockMeans {
 
 /// Indices around an index, inside 0..`size`; the ends are repeated.
 fn surrounding(index: usize, size: usize) -> impl Iterator<Item = usize> {
-    (index..=index + 2 * SURROUNDING_RADIUS)
-        .map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
+    (index..=index + 2 * SURROUNDING_RADIUS).map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
 }
 
-/// Mean green codes of two halves of a block with the same center: of every eight rows, the outer four and the inner four. Their difference
-/// is noise.
+/// Mean green codes of two halves of a block with the same center: of every eight rows, the outer four and the inner
+/// four. Their difference is noise.
 fn halves(image: &Rgb, [top, left]: [usize; 2], side: usize) -> [f64; 2] {
     let mut sums = [0_u64; 2];
     for row in 0..side {
@@ -198,10 +192,7 @@ mod tests {
     #[test]
     fn a_mirrored_image_is_another_scene() {
         let normal = scene(3);
-        let mirrored = normal
-            .samples()
-            .chunks(3 * SIZE[1])
-            .flat_map(|row| row.chunks(3).rev().flatten().copied());
+        let mirrored = normal.samples().chunks(3 * SIZE[1]).flat_map(|row| row.chunks(3).rev().flatten().copied());
         let mirrored = Rgb::new(SIZE[0], SIZE[1], mirrored.collect()).unwrap();
         assert!(SceneMatch::new(&normal, &low(&mirrored, 4.0), 4.4).is_of_two_scenes());
     }
@@ -211,11 +202,7 @@ mod tests {
     fn images_without_structure_are_not_judged() {
         let [height, width] = SIZE;
         let wall = Rgb::new(height, width, vec![120; height * width * 3]).unwrap();
-        let codes = scene(5)
-            .samples()
-            .iter()
-            .map(|code| 118 + code / 64)
-            .collect();
+        let codes = scene(5).samples().iter().map(|code| 118 + code / 64).collect();
         let faint = Rgb::new(height, width, codes).unwrap();
         for (normal, low) in [
             (&wall, low(&wall, 9.0)),

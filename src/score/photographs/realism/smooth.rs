@@ -1,9 +1,9 @@
 //! Noise of a low-light image, measured in smooth blocks: [`SmoothBlocks`] and [`SpreadCurve`].
 //!
-//! Blocks are smooth if the image in normal light has little structure there. Variation in the same blocks of the low-light image is
-//! noise. A noise model must reproduce its spread as a function of the clean code, which is the green code that the exposure drop alone
-//! leaves. The spread about a fitted plane is biased by demosaicing, rounding and texture. Comparing a real with a synthetic image cancels
-//! this bias, because both pass through the same steps.
+//! Blocks are smooth if the image in normal light has little structure there. Variation in the same blocks of the
+//! low-light image is noise. A noise model must reproduce its spread as a function of the clean code, which is the
+//! green code that the exposure drop alone leaves. The spread about a fitted plane is biased by demosaicing, rounding
+//! and texture. Comparing a real with a synthetic image cancels this bias, because both pass through the same steps.
 
 use super::quantile::quantile;
 use darkqa_base::types::Rgb;
@@ -18,7 +18,8 @@ const SMOOTH_SHARE: f64 = 0.3;
 const MIN_BLOCKS: usize = 20;
 /// Minimum number of smooth blocks in a bin (chosen).
 const MIN_SMOOTH_BLOCKS: usize = 10;
-/// A block is excluded if a green code in normal light is this high or higher: near clipping, noise is cut off (chosen).
+/// A block is excluded if a green code in normal light is this high or higher: near clipping, noise is cut off
+/// (chosen).
 const CLIPPING_CODE: u8 = 250;
 /// Clean code that a block must exceed: below it, rounding leaves no spread (chosen).
 const MIN_CLEAN_CODE: f64 = 1.0;
@@ -28,14 +29,16 @@ const MIN_SPREAD: f64 = 0.05;
 /// Smooth blocks of 8 × 8 pixels in an image in normal light, in bins of their clean code after the exposure drop.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SmoothBlocks {
-    /// Indices of the smooth blocks in each bin, counted row by row over the image; empty for a bin with too few blocks.
+    /// Indices of the smooth blocks in each bin, counted row by row over the image; empty for a bin with too few
+    /// blocks.
     bins: [Vec<usize>; BINS],
 }
 
 /// Spread of the green codes in the smooth blocks of each bin.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpreadCurve {
-    /// Natural logarithm of the root mean square of the blocks' spreads, in codes; `None` for a bin with too few blocks.
+    /// Natural logarithm of the root mean square of the blocks' spreads, in codes; `None` for a bin with too few
+    /// blocks.
     pub(super) bins: [Option<f64>; BINS],
 }
 
@@ -57,32 +60,20 @@ impl SmoothBlocks {
             .filter_map(|index| {
                 let block = Block::new(normal, index);
                 let clean_code = block.mean() * code_factor;
-                let is_used =
-                    block.brightest() < f64::from(CLIPPING_CODE) && clean_code > MIN_CLEAN_CODE;
-                is_used.then(|| Candidate {
-                    index,
-                    clean_code,
-                    spread: block.spread(),
-                })
+                let is_used = block.brightest() < f64::from(CLIPPING_CODE) && clean_code > MIN_CLEAN_CODE;
+                is_used.then(|| Candidate { index, clean_code, spread: block.spread() })
             })
             .collect();
         let mut codes: Vec<f64> = blocks.iter().map(|block| block.clean_code).collect();
         codes.sort_by(f64::total_cmp);
-        let edges: Vec<f64> = (1..BINS)
-            .filter_map(|edge| quantile(&codes, edge as f64 / BINS as f64))
-            .collect();
+        let edges: Vec<f64> = (1..BINS).filter_map(|edge| quantile(&codes, edge as f64 / BINS as f64)).collect();
         let mut bins: [Vec<&Candidate>; BINS] = Default::default();
         for block in &blocks {
             // A code on the edge of two bins belongs to the upper bin.
-            let bin = edges
-                .iter()
-                .filter(|edge| **edge <= block.clean_code)
-                .count();
+            let bin = edges.iter().filter(|edge| **edge <= block.clean_code).count();
             bins[bin].push(block);
         }
-        Self {
-            bins: bins.map(|blocks| smoothest(&blocks)),
-        }
+        Self { bins: bins.map(|blocks| smoothest(&blocks)) }
     }
 
     /// Measures the spread of an image in the smooth blocks. The image must have the size of the image in normal light.
@@ -90,10 +81,7 @@ impl SmoothBlocks {
     pub fn spread(&self, image: &Rgb) -> SpreadCurve {
         SpreadCurve {
             bins: self.bins.each_ref().map(|blocks| {
-                let mean_square = blocks
-                    .iter()
-                    .map(|index| Block::new(image, *index).spread().powi(2))
-                    .sum::<f64>()
+                let mean_square = blocks.iter().map(|index| Block::new(image, *index).spread().powi(2)).sum::<f64>()
                     / blocks.len() as f64;
                 (!blocks.is_empty()).then(|| libm::log(mean_square.sqrt().max(MIN_SPREAD)))
             }),
@@ -109,11 +97,8 @@ fn smoothest(blocks: &[&Candidate]) -> Vec<usize> {
     let mut spreads: Vec<f64> = blocks.iter().map(|block| block.spread).collect();
     spreads.sort_by(f64::total_cmp);
     let max_spread = quantile(&spreads, SMOOTH_SHARE).unwrap_or_default();
-    let smooth: Vec<usize> = blocks
-        .iter()
-        .filter(|block| block.spread <= max_spread)
-        .map(|block| block.index)
-        .collect();
+    let smooth: Vec<usize> =
+        blocks.iter().filter(|block| block.spread <= max_spread).map(|block| block.index).collect();
     if smooth.len() < MIN_SMOOTH_BLOCKS {
         return Vec::new();
     }
@@ -132,8 +117,7 @@ impl Block {
     /// Block `index` of an image, counted row by row; `index` is below [`block_count`].
     fn new(image: &Rgb, index: usize) -> Self {
         let blocks_per_row = image.width() / SIDE;
-        let [top, left] =
-            [index / blocks_per_row, index % blocks_per_row].map(|block| block * SIDE);
+        let [top, left] = [index / blocks_per_row, index % blocks_per_row].map(|block| block * SIDE);
         Self(std::array::from_fn(|row| {
             let line = ((top + row) * image.width() + left) * 3;
             std::array::from_fn(|column| f64::from(image.samples()[line + 3 * column + 1]))
@@ -169,8 +153,7 @@ impl Block {
         let mut squared_residuals = 0.0;
         for (row, codes) in self.0.iter().enumerate() {
             for (column, code) in codes.iter().enumerate() {
-                let residual =
-                    code - mean - slope_across * centred(column) - slope_down * centred(row);
+                let residual = code - mean - slope_across * centred(column) - slope_down * centred(row);
                 squared_residuals += residual * residual;
             }
         }
@@ -204,10 +187,7 @@ mod tests {
         assert!(Block::new(&ramp(|_| 0), 7).spread() < 1e-12);
         // ±2 about the mean: the variance is 4 · 64/61.
         let spread = Block::new(&ramp(|_| 4), 7).spread();
-        assert!(
-            (spread - f64::sqrt(4.0 * 64.0 / 61.0)).abs() < 0.02,
-            "{spread}"
-        );
+        assert!((spread - f64::sqrt(4.0 * 64.0 / 61.0)).abs() < 0.02, "{spread}");
     }
 
     #[test]
@@ -222,12 +202,7 @@ mod tests {
         let curve = smooth.spread(&clean);
         assert_eq!(curve.bins, [Some(libm::log(MIN_SPREAD)); BINS]);
         let noisy = smooth.spread(&ramp(|_| 4));
-        assert!(
-            noisy
-                .bins
-                .iter()
-                .all(|ln| (ln.unwrap() - 0.717).abs() < 0.02)
-        );
+        assert!(noisy.bins.iter().all(|ln| (ln.unwrap() - 0.717).abs() < 0.02));
     }
 
     #[test]

@@ -1,9 +1,6 @@
 //! Structural similarity of two images: [`ssim`].
 
-#![expect(
-    clippy::inline_always,
-    reason = "only inlined code is compiled for a kernel's instruction set, see isa"
-)]
+#![expect(clippy::inline_always, reason = "only inlined code is compiled for a kernel's instruction set, see isa")]
 
 use rayon::prelude::*;
 
@@ -22,8 +19,8 @@ type Window = [f32; TAPS];
 /// Number of local means: of x, y, x² + y² and xy.
 const MOMENTS: usize = 4;
 
-/// Windows in a row of a tile, a multiple of [`LANES`]. The last [`TAPS`] rows of all moments fit in the L1 cache. Tiles of 64 to 192
-/// are equally fast on an AMD EPYC.
+/// Windows in a row of a tile, a multiple of [`LANES`]. The last [`TAPS`] rows of all moments fit in the L1 cache.
+/// Tiles of 64 to 192 are equally fast on an AMD EPYC.
 const TILE: usize = 96;
 
 /// Number of partial sums that are added in parallel.
@@ -51,12 +48,13 @@ pub fn same_size(a: &Rgb, b: &Rgb) -> Result<()> {
     Err(Error::data("pair", problem))
 }
 
-/// Structural similarity (Wang et al. 2004): Gaussian window of standard deviation 1.5 (11 × 11), K1 0.01, K2 0.03, population
-/// covariance, data range 255. The result is the mean over the three channels and over all windows inside the image.
+/// Structural similarity (Wang et al. 2004): Gaussian window of standard deviation 1.5 (11 × 11), K1 0.01, K2 0.03,
+/// population covariance, data range 255. The result is the mean over the three channels and over all windows inside
+/// the image.
 ///
-/// It equals scikit-image's `structural_similarity` with `gaussian_weights=True, sigma=1.5, use_sample_covariance=False,
-/// data_range=255, channel_axis=-1` to 10⁻⁶, and to 10⁻⁵ for dark images. Local means are `f32`, relative to code 128: this takes a
-/// third of the time of `f64`.
+/// It equals scikit-image's `structural_similarity` with `gaussian_weights=True, sigma=1.5,
+/// use_sample_covariance=False, data_range=255, channel_axis=-1` to 10⁻⁶, and to 10⁻⁵ for dark images. Local means are
+/// `f32`, relative to code 128: this takes a third of the time of `f64`.
 ///
 /// # Errors
 /// If the sizes differ, or if a side is shorter than the window.
@@ -64,28 +62,21 @@ pub fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
     same_size(a, b)?;
     let (height, width) = (a.height(), a.width());
     if height < TAPS || width < TAPS {
-        let problem =
-            format_args!("{width} × {height} pixels are fewer than the window's {TAPS} × {TAPS}");
+        let problem = format_args!("{width} × {height} pixels are fewer than the window's {TAPS} × {TAPS}");
         return Err(Error::data("pair", problem));
     }
     Ok(mean_similarity(a, b, Isa::best()))
 }
 
-/// Mean similarity over all windows. Row sums are added in row order, so that the result does not depend on the number of threads.
+/// Mean similarity over all windows. Row sums are added in row order, so that the result does not depend on the number
+/// of threads.
 fn mean_similarity(a: &Rgb, b: &Rgb, isa: Isa) -> f64 {
     let [height, width] = [a.height(), a.width()].map(|side| side - (TAPS - 1));
     let window = window();
     let mut sums = vec![0.0; height];
-    sums.par_chunks_mut(BAND)
-        .enumerate()
-        .for_each(|(band, sums)| {
-            isa.run(Band {
-                images: [a, b],
-                first: band * BAND,
-                window: &window,
-                sums,
-            });
-        });
+    sums.par_chunks_mut(BAND).enumerate().for_each(|(band, sums)| {
+        isa.run(Band { images: [a, b], first: band * BAND, window: &window, sums });
+    });
     sums.iter().sum::<f64>() / (3 * height * width) as f64
 }
 
@@ -150,11 +141,7 @@ impl Kernel for Band<'_> {
         // Ring buffer of the weighted means along the last `TAPS` image rows.
         let mut recent = vec![[Row([0.0; TILE]); MOMENTS]; TAPS];
         let mut means = [Row([0.0; TILE]); MOMENTS];
-        for (tile, begin) in self
-            .tiled()
-            .chunks_exact(self.lines())
-            .zip((0..).step_by(TILE))
-        {
+        for (tile, begin) in self.tiled().chunks_exact(self.lines()).zip((0..).step_by(TILE)) {
             for (line, codes) in tile.iter().enumerate() {
                 set_moments(&mut moments, codes);
                 for (row, moment) in recent[line % TAPS].iter_mut().zip(&moments) {
@@ -188,7 +175,8 @@ fn set_moments(moments: &mut [Row<COVERED>; MOMENTS], codes: &Codes) {
     }
 }
 
-/// Computes the weighted mean along a row for each window. The window is symmetric: two samples share one multiplication.
+/// Computes the weighted mean along a row for each window. The window is symmetric: two samples share one
+/// multiplication.
 #[inline(always)]
 fn filter_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERED>) {
     for i in 0..TILE {
@@ -249,9 +237,7 @@ mod tests {
         Rgb::new(
             height,
             width,
-            (0..height * width * 3)
-                .map(|i: usize| ((i * i * 31 + i * salt * 17 + salt) % 251) as u8)
-                .collect(),
+            (0..height * width * 3).map(|i: usize| ((i * i * 31 + i * salt * 17 + salt) % 251) as u8).collect(),
         )
         .unwrap()
     }
@@ -269,10 +255,7 @@ mod tests {
     fn ssim_matches_scikit_image() {
         for (height, width, salt, expected) in SKIMAGE {
             let found = ssim(&image(height, width, 1), &image(height, width, salt)).unwrap();
-            assert!(
-                (found - expected).abs() < 1e-6,
-                "{height} × {width}: {found}"
-            );
+            assert!((found - expected).abs() < 1e-6, "{height} × {width}: {found}");
         }
     }
 
@@ -310,9 +293,7 @@ mod tests {
 
     #[test]
     fn small_images_are_rejected() {
-        let error = ssim(&image(10, 30, 1), &image(10, 30, 1))
-            .unwrap_err()
-            .to_string();
+        let error = ssim(&image(10, 30, 1), &image(10, 30, 1)).unwrap_err().to_string();
         assert!(error.contains("30 × 10"), "{error}");
     }
 }

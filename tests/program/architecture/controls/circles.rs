@@ -43,16 +43,12 @@ fn circles_are_found() {
     check(
         circles_of,
         &["a circle of files: ask/a.rs, ask/b.rs, ask/c.rs"],
-        &[
-            "ask/a.rs: use super::b; ++ ask/b.rs: use super::c; ++ ask/c.rs: use super::a::A; ++ ask/mod.rs",
-        ],
+        &["ask/a.rs: use super::b; ++ ask/b.rs: use super::c; ++ ask/c.rs: use super::a::A; ++ ask/mod.rs"],
     );
     check(
         circles_of,
         &["a circle of files: error.rs, types/frame.rs"],
-        &[
-            "error.rs: use crate::types::F; ++ types/frame.rs: use crate::error::E; ++ types/mod.rs: pub use frame::F;",
-        ],
+        &["error.rs: use crate::types::F; ++ types/frame.rs: use crate::error::E; ++ types/mod.rs: pub use frame::F;"],
     );
 }
 

@@ -70,11 +70,7 @@ fn imports_of_no_room_are_found() {
         &["src/ask/mod.rs:1: `ask` uses `crate::Frame`, which is no room of the map"],
         &["ask/mod.rs: use crate::Frame;"],
     );
-    check(
-        rule,
-        &["src/main.rs:1: `main` may not use `ask`"],
-        &["main.rs: use darkqa_eval::{ask};"],
-    );
+    check(rule, &["src/main.rs:1: `main` may not use `ask`"], &["main.rs: use darkqa_eval::{ask};"]);
 }
 
 #[test]
@@ -109,10 +105,7 @@ fn commands_that_use_another_are_found() {
     check(
         rules::commands,
         &["src/commands/show.rs:1: a command uses `commands`, which is not its own"],
-        &[
-            "commands/show.rs: use crate::commands;",
-            "commands/show.rs: use super as all;",
-        ],
+        &["commands/show.rs: use crate::commands;", "commands/show.rs: use super as all;"],
     );
     check(
         rules::commands,
@@ -126,9 +119,7 @@ fn commands_that_use_another_are_found() {
     );
     check(
         rules::commands,
-        &[
-            "src/commands/export/set.rs:1: a command uses `commands::show::go`, which is not its own",
-        ],
+        &["src/commands/export/set.rs:1: a command uses `commands::show::go`, which is not its own"],
         &["commands/export/set.rs: fn f() { super::super::show::go() }"],
     );
     check(

@@ -24,9 +24,7 @@ fn the_map_must_be_true() {
     ];
     let wrong = rows.iter().filter_map(|(row, rooms, expected)| {
         let map = Map::read(&LIB.replace("| `run` | `ask`, `types` |", row)).unwrap();
-        let rooms = rooms
-            .split_whitespace()
-            .chain(["error", "types", "ask", "score"]);
+        let rooms = rooms.split_whitespace().chain(["error", "types", "ask", "score"]);
         let found = map.untrue(&rooms.collect());
         (found != *expected).then(|| format!("in {row}\n  found {found:?}"))
     });
@@ -35,12 +33,7 @@ fn the_map_must_be_true() {
 
 #[test]
 fn unreadable_map_is_an_error() {
-    let rows = [
-        "| run | nothing |",
-        "| `run` | everything |",
-        "| `run` | `ask` (only here) |",
-        "| `run` |",
-    ];
+    let rows = ["| run | nothing |", "| `run` | everything |", "| `run` | `ask` (only here) |", "| `run` |"];
     let wrong = rows.iter().filter_map(|row| {
         let found = Map::read(&LIB.replace("| `run` | `ask`, `types` |", row)).err();
         let expected = format!("src/lib.rs: this row cannot be read: {row}");

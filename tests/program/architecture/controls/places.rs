@@ -9,27 +9,16 @@ fn missing_code_and_long_files_reported() {
     check(
         rules::unfinished,
         &["src/error.rs:1: `todo!` stands for code that is missing"],
-        &[
-            "error.rs: fn f() { todo!() }",
-            "error.rs: fn f() { vec![std::todo!(\"x\")] }",
-        ],
+        &["error.rs: fn f() { todo!() }", "error.rs: fn f() { vec![std::todo!(\"x\")] }"],
     );
     check(
         rules::unfinished,
         &["src/error.rs:1: `unimplemented!` stands for code that is missing"],
         &["error.rs: #[cfg(test)] mod tests { fn f() { unimplemented!() } }"],
     );
-    check(
-        rules::unfinished,
-        &[],
-        &["error.rs: fn f(todo: bool) { made!(todo != true, \"todo!()\"); } // todo!()"],
-    );
+    check(rules::unfinished, &[], &["error.rs: fn f(todo: bool) { made!(todo != true, \"todo!()\"); } // todo!()"]);
     let most = |files: &Files| rules::long_files(files, 2);
-    check(
-        most,
-        &["src/error.rs:3: 3 lines, and a file may have 2"],
-        &["error.rs: \n\n\n"],
-    );
+    check(most, &["src/error.rs:3: 3 lines, and a file may have 2"], &["error.rs: \n\n\n"]);
     check(most, &[], &["error.rs: \n\n"]);
 }
 
@@ -39,28 +28,15 @@ fn listings_in_other_places_are_reported() {
     let unused = "a list of a folder or an open file may stand in dataset/root.rs, but does not: delete this place";
     check(
         rule,
-        &[
-            "src/dataset/a.rs:1: a list of a folder or an open file may stand only in dataset/root.rs",
-            unused,
-        ],
+        &["src/dataset/a.rs:1: a list of a folder or an open file may stand only in dataset/root.rs", unused],
         &[
             "dataset/a.rs: use crate::files::reading::entries;",
             "dataset/a.rs: fn f() { std::fs::read(p) }",
             "dataset/a.rs: fn f() { File::open(p) }",
         ],
     );
-    check(
-        rule,
-        &[],
-        &[
-            "dataset/root.rs: fn f() { reading::entries(p) } ++ engine/a.rs: fn f() { std::fs::read(p) }",
-        ],
-    );
-    check(
-        rule,
-        &[unused],
-        &["dataset/a.rs: #[cfg(test)] mod tests { fn f() { std::fs::read(p) } }"],
-    );
+    check(rule, &[], &["dataset/root.rs: fn f() { reading::entries(p) } ++ engine/a.rs: fn f() { std::fs::read(p) }"]);
+    check(rule, &[unused], &["dataset/a.rs: #[cfg(test)] mod tests { fn f() { std::fs::read(p) } }"]);
     check(
         |files: &Files| rules::listings(files, &["dataset"], &["dataset"]),
         &["dataset is a folder: name its files"],
@@ -124,20 +100,13 @@ fn misplaced_libraries_are_reported() {
         ],
     );
     check(rule, &[], &["enhance/planes.rs: use image::Rgb;"]);
-    check(
-        rule,
-        &[&outside.replace("types/a", "enhances"), unused],
-        &["enhances.rs: use image::Rgb;"],
-    );
+    check(rule, &[&outside.replace("types/a", "enhances"), unused], &["enhances.rs: use image::Rgb;"]);
 }
 
 #[test]
 fn digests_of_debug_output_are_found() {
     let rule = |files: &Files| {
-        digests::makers(files)
-            .into_iter()
-            .map(|(file, name, has_debug)| format!("{file} {name} {has_debug}"))
-            .collect()
+        digests::makers(files).into_iter().map(|(file, name, has_debug)| format!("{file} {name} {has_debug}")).collect()
     };
     check(
         rule,

@@ -35,10 +35,7 @@ fn batch_output_key_is_never_stored() {
     assert_eq!(called.code, Some(1), "{called:?}");
     assert!(!called.stderr.contains(KEY), "{called:?}");
     let records = records(&bench.path("run"));
-    let hidden = records
-        .iter()
-        .map(ToString::to_string)
-        .filter(|record| record.contains("[secret]"));
+    let hidden = records.iter().map(ToString::to_string).filter(|record| record.contains("[secret]"));
     assert_eq!(hidden.count(), QUESTIONS);
     let mut texts = 0;
     for folder in ["run", "run/batch"] {
@@ -66,10 +63,7 @@ fn server_faults_are_asked_again() {
         |_| Line::Status(503, "down"),
     ];
     for (case, line) in lines.into_iter().enumerate() {
-        let (bench, mock, called) = blind(
-            &[Course::of("completed").lines(line), Course::of("completed")],
-            "",
-        );
+        let (bench, mock, called) = blind(&[Course::of("completed").lines(line), Course::of("completed")], "");
         assert_eq!(called.code, Some(0), "{case}: {called:?}");
         assert_eq!(answered(&bench).len(), QUESTIONS, "{case}");
         let again = if case == 4 { QUESTIONS } else { QUESTIONS / 2 };
@@ -79,14 +73,10 @@ fn server_faults_are_asked_again() {
 
 #[test]
 fn refused_requests_are_not_repeated() {
-    let course =
-        Course::of("completed").lines(|i| [Line::Right, Line::Status(413, "bad image")][i % 2]);
+    let course = Course::of("completed").lines(|i| [Line::Right, Line::Status(413, "bad image")][i % 2]);
     let (bench, mock, called) = blind(&[course, Course::of("completed")], "");
     assert_eq!(called.code, Some(1), "{called:?}");
-    assert_eq!(
-        (mock.asked().len(), answered(&bench).len()),
-        (1, QUESTIONS / 2)
-    );
+    assert_eq!((mock.asked().len(), answered(&bench).len()), (1, QUESTIONS / 2));
     // The next command asks it, as every evaluation does.
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
@@ -95,15 +85,11 @@ fn refused_requests_are_not_repeated() {
 
 #[test]
 fn expired_requests_retry_three_times() {
-    let (bench, mock, called) = blind(
-        &[Course::of("in_progress expired").lines(|_| Line::Expired)],
-        "",
-    );
+    let (bench, mock, called) = blind(&[Course::of("in_progress expired").lines(|_| Line::Expired)], "");
     assert_eq!(called.code, Some(1), "{called:?}");
     assert_eq!((mock.asked().len(), answered(&bench).len()), (4, 0));
     // One that expires in the middle.
-    let middle = Course::of("in_progress expired")
-        .lines(|i| if i == 0 { Line::Right } else { Line::Expired });
+    let middle = Course::of("in_progress expired").lines(|i| if i == 0 { Line::Right } else { Line::Expired });
     let (bench, mock, called) = blind(&[middle, Course::of("completed")], "");
     assert_eq!(called.code, Some(0), "{called:?}");
     let sizes: Vec<usize> = mock.asked().iter().map(Vec::len).collect();
@@ -150,29 +136,16 @@ fn polling_failures_do_not_fail_batch() {
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
-    assert_eq!(
-        called.stderr.matches("\"dreaming\"").count(),
-        1,
-        "{called:?}"
-    );
+    assert_eq!(called.stderr.matches("\"dreaming\"").count(), 1, "{called:?}");
     mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
 }
 
 #[test]
 fn refusal_stops_run_until_resumed() {
     let rows = [
-        (
-            "POST files",
-            Answer::error(413, "too_large", "the file is too large"),
-        ),
-        (
-            "POST files",
-            Answer::error(401, "invalid_api_key", "Incorrect API key"),
-        ),
-        (
-            "POST batches",
-            Answer::error(400, "invalid_request", "unknown window"),
-        ),
+        ("POST files", Answer::error(413, "too_large", "the file is too large")),
+        ("POST files", Answer::error(401, "invalid_api_key", "Incorrect API key")),
+        ("POST batches", Answer::error(400, "invalid_request", "unknown window")),
     ];
     for (kind, answer) in rows {
         let bench = Bench::with_questions(QUESTIONS);
@@ -199,10 +172,7 @@ fn persistent_upload_failures_end_run() {
         let called = call_with(BLIND, &bench, &mock, "");
         assert_eq!(called.code, Some(2), "{called:?}");
         assert_eq!(mock.count(kind), 5, "{called:?}");
-        assert!(
-            called.stderr.contains("the same command continues"),
-            "{called:?}"
-        );
+        assert!(called.stderr.contains("the same command continues"), "{called:?}");
         let called = call_with(BLIND, &bench, &mock, "");
         assert_eq!(called.code, Some(0), "{called:?}");
         assert_each_once(&bench, &mock, QUESTIONS);
@@ -214,30 +184,16 @@ fn endless_batch_is_cancelled_on_request() {
     let course = Course::of(&"in_progress ".repeat(1000)).lines(|_| Line::Absent);
     let (bench, mock, called) = blind(&[course, Course::of("completed")], "--give-up 0.0003");
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert_eq!(
-        (mock.count("POST batches/id/cancel"), mock.asked().len()),
-        (1, 2)
-    );
+    assert_eq!((mock.count("POST batches/id/cancel"), mock.asked().len()), (1, 2));
     assert_eq!(answered(&bench).len(), QUESTIONS);
 }
 
 #[test]
 fn edited_file_is_not_uploaded() {
-    let (bench, mock, called) = blind(
-        &[Course::of("completed")],
-        "--max-cost 0.0000001 --prices prices.toml",
-    );
+    let (bench, mock, called) = blind(&[Course::of("completed")], "--max-cost 0.0000001 --prices prices.toml");
     assert_eq!(called.code, Some(2), "no prices yet: {called:?}");
-    bench.file(
-        "prices.toml",
-        "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n",
-    );
-    let limited = call_with(
-        BLIND,
-        &bench,
-        &mock,
-        "--max-cost 0.0000001 --prices prices.toml",
-    );
+    bench.file("prices.toml", "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n");
+    let limited = call_with(BLIND, &bench, &mock, "--max-cost 0.0000001 --prices prices.toml");
     assert_eq!(limited.code, Some(3), "{limited:?}");
     let path = bench.path("run/batch/part-1-m-001.jsonl");
     let text = std::fs::read_to_string(&path).unwrap();
@@ -255,16 +211,8 @@ fn edited_file_is_not_uploaded() {
 #[test]
 fn unknown_batch_api_is_refused_early() {
     let rows = [
-        (
-            "https://api.mistral.ai/v1",
-            "MISTRAL_API_KEY",
-            "Mistral has another form",
-        ),
-        (
-            "https://api.deepseek.com",
-            "DEEPSEEK_API_KEY",
-            "DeepSeek has no Batch API",
-        ),
+        ("https://api.mistral.ai/v1", "MISTRAL_API_KEY", "Mistral has another form"),
+        ("https://api.deepseek.com", "DEEPSEEK_API_KEY", "DeepSeek has no Batch API"),
     ];
     check_rows(rows, |(base, key, expected)| {
         let bench = Bench::with_questions(1);

@@ -8,10 +8,7 @@ use crate::support::snapshot::redacted;
 
 #[test]
 fn folder_controls_detached_run() {
-    let (bench, mock, called) = blind(
-        &[Course::of("in_progress in_progress in_progress completed")],
-        "--detach",
-    );
+    let (bench, mock, called) = blind(&[Course::of("in_progress in_progress in_progress completed")], "--detach");
     insta::assert_snapshot!(called, @"
     exit code: 0
     stdout:
@@ -22,11 +19,7 @@ fn folder_controls_detached_run() {
     insta::assert_snapshot!(redacted(&status), @"part-1-m-001.jsonl: 4 requests to m, batch_1, in_progress, 0 of 4");
     // The second look, then the fourth.
     let early = bench.call(&words("batch fetch run"));
-    assert_eq!(
-        (early.code, answered(&bench).len()),
-        (Some(1), 0),
-        "{early:?}"
-    );
+    assert_eq!((early.code, answered(&bench).len()), (Some(1), 0), "{early:?}");
     bench.call(&words("batch fetch run"));
     let fetched = bench.call(&words("batch fetch run"));
     insta::assert_snapshot!(fetched, @"
@@ -44,8 +37,7 @@ fn folder_controls_detached_run() {
     assert_each_once(&bench, &mock, QUESTIONS);
     mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
 
-    let course = Course::of(&"in_progress ".repeat(1000))
-        .lines(|i| if i < 1 { Line::Right } else { Line::Absent });
+    let course = Course::of(&"in_progress ".repeat(1000)).lines(|i| if i < 1 { Line::Right } else { Line::Absent });
     let (bench, mock, _) = blind(&[course, Course::of("completed")], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
     insta::assert_snapshot!(cancelled, @"
@@ -63,32 +55,17 @@ fn folder_controls_detached_run() {
     run: run
     report: run/report.html
     ");
-    assert_eq!(
-        (mock.count("POST batches/id/cancel"), answered(&bench).len()),
-        (1, 1)
-    );
+    assert_eq!((mock.count("POST batches/id/cancel"), answered(&bench).len()), (1, 1));
     // The rest may be asked directly.
-    let called = call_with(
-        "--data set.jsonl --blind-model m --resume run",
-        &bench,
-        &mock,
-        "",
-    );
-    assert_eq!(
-        (called.code, mock.count("POST chat/completions")),
-        (Some(0), 3),
-        "{called:?}"
-    );
+    let called = call_with("--data set.jsonl --blind-model m --resume run", &bench, &mock, "");
+    assert_eq!((called.code, mock.count("POST chat/completions")), (Some(0), 3), "{called:?}");
 }
 
 #[test]
 fn built_in_models_cannot_be_batched() {
     let bench = Bench::with_questions(QUESTIONS);
     for (args, message) in [
-        (
-            "batch run --data set.jsonl --model random --out x",
-            "built in",
-        ),
+        ("batch run --data set.jsonl --model random --out x", "built in"),
         ("batch status nowhere", "no run in this folder"),
         ("batch cancel x", "has submitted no batch of this run"),
     ] {
@@ -116,12 +93,7 @@ fn cancel_frees_parts_awaiting_quota() {
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
     assert_eq!(cancelled.code, Some(1), "{cancelled:?}");
     mock.with(|server| assert!(server.files.iter().all(|file| file.deleted)));
-    let called = call_with(
-        "--data set.jsonl --blind-model m --resume run",
-        &bench,
-        &mock,
-        "",
-    );
+    let called = call_with("--data set.jsonl --blind-model m --resume run", &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!(mock.count("POST chat/completions"), QUESTIONS);
 }
@@ -147,22 +119,14 @@ fn no_key_for_address_in_folder() {
     let stranger = MockBatches::start([Course::of("in_progress")]);
     let state = bench.path("run/batch/state.jsonl");
     let text = std::fs::read_to_string(&state).unwrap();
-    let own = text
-        .lines()
-        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
-        .next()
-        .unwrap()["base"]
+    let own = text.lines().map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap()).next().unwrap()["base"]
         .as_str()
         .unwrap()
         .to_owned();
     std::fs::write(&state, text.replace(&own, &stranger.base_url())).unwrap();
     for task in ["status", "fetch", "cancel"] {
         let line = format!("batch {task} run");
-        let refused = called(
-            bench
-                .command(&words(&line))
-                .env("OPENAI_API_KEY", "sk-campus-key-4711"),
-        );
+        let refused = called(bench.command(&words(&line)).env("OPENAI_API_KEY", "sk-campus-key-4711"));
         assert_eq!(refused.code, Some(2), "{refused:?}");
         assert!(refused.stderr.contains("--base-url"), "{refused:?}");
     }
@@ -170,16 +134,8 @@ fn no_key_for_address_in_folder() {
     // An address of the user's own gets it.
     let base = stranger.base_url();
     let line = format!("batch status run --base-url {base}");
-    let shown = called(
-        bench
-            .command(&words(&line))
-            .env("OPENAI_API_KEY", "sk-campus-key-4711"),
-    );
-    assert_eq!(
-        (shown.code, stranger.requests().len()),
-        (Some(0), 1),
-        "{shown:?}"
-    );
+    let shown = called(bench.command(&words(&line)).env("OPENAI_API_KEY", "sk-campus-key-4711"));
+    assert_eq!((shown.code, stranger.requests().len()), (Some(0), 1), "{shown:?}");
     // Another machine is refused without a key, too; no other header goes anywhere.
     std::fs::write(&state, text.replace(&own, "https://gateway.example/v1")).unwrap();
     let other = bench.call(&words("batch fetch run"));
@@ -195,13 +151,7 @@ fn part_is_name_not_path() {
     let (bench, _, _) = blind(&[Course::of("completed")], "--detach");
     let state = bench.path("run/batch/state.jsonl");
     let text = std::fs::read_to_string(&state).unwrap();
-    for name in [
-        "../../part-1.jsonl",
-        "/tmp/part-1.jsonl",
-        "part-a/b.jsonl",
-        "notes.jsonl",
-        "",
-    ] {
+    for name in ["../../part-1.jsonl", "/tmp/part-1.jsonl", "part-a/b.jsonl", "notes.jsonl", ""] {
         std::fs::write(&state, text.replace("part-1-m-001.jsonl", name)).unwrap();
         for task in ["status", "fetch", "cancel"] {
             let refused = bench.call(&words(&format!("batch {task} run")));

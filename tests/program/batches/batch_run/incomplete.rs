@@ -1,4 +1,5 @@
-//! Batches that have ended, and whose files are late, cut, empty or gone: nothing is asked and paid again, and nothing is deleted.
+//! Batches that have ended, and whose files are late, cut, empty or gone: nothing is asked and paid again, and nothing
+//! is deleted.
 
 use super::{BLIND, QUESTIONS, answered, assert_each_once, blind, call_with};
 use crate::support::batches::{Course, Fault, Line, MockBatches, Order};
@@ -27,10 +28,7 @@ fn late_output_is_awaited() {
 #[test]
 fn short_output_stops_the_run() {
     for (order, replies) in [(Order::Cut, QUESTIONS - 1), (Order::Empty, 0)] {
-        let courses = [
-            Course::of("completed").order(order),
-            Course::of("completed"),
-        ];
+        let courses = [Course::of("completed").order(order), Course::of("completed")];
         let (bench, mock, called) = blind(&courses, "");
         assert_stopped(&mock, &called, &format!("{order:?}"));
         // What is there is not lost.
@@ -118,10 +116,7 @@ fn fetch_imports_nothing_of_incomplete_batch() {
         imported, asked again or deleted; look again later (the command of the run without --detach, or batch
         cancel, ends the wait)
     ");
-    assert_eq!(
-        (answered(&bench).len(), mock.count("DELETE files/id")),
-        (0, 0)
-    );
+    assert_eq!((answered(&bench).len(), mock.count("DELETE files/id")), (0, 0));
 }
 
 #[test]
@@ -151,9 +146,8 @@ fn expired_batch_without_counts_is_awaited() {
 
 #[test]
 fn cancelled_batch_is_fetched_before_deletion() {
-    let course = Course::of(&"in_progress ".repeat(1000))
-        .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
-        .late(3);
+    let course =
+        Course::of(&"in_progress ".repeat(1000)).lines(|i| if i < 1 { Line::Right } else { Line::Absent }).late(3);
     let (bench, _mock, _) = blind(&[course, Course::of("completed")], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
     insta::assert_snapshot!(cancelled.lines_with("cancelled"), @"
@@ -165,9 +159,8 @@ fn cancelled_batch_is_fetched_before_deletion() {
 
 #[test]
 fn incomplete_cancelled_batch_keeps_files() {
-    let course = Course::of(&"in_progress ".repeat(1000))
-        .lines(|i| if i < 1 { Line::Right } else { Line::Absent })
-        .late(1000);
+    let course =
+        Course::of(&"in_progress ".repeat(1000)).lines(|i| if i < 1 { Line::Right } else { Line::Absent }).late(1000);
     let (bench, mock, _) = blind(&[course], "--detach");
     let cancelled = bench.call(&words("batch cancel run --poll 0.02"));
     insta::assert_snapshot!(cancelled.messages(), @"

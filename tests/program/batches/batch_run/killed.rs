@@ -23,26 +23,17 @@ fn batch_before_broken_connection_is_found() {
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
-    assert_eq!(
-        (mock.count("POST files"), mock.count("POST batches")),
-        (1, 1)
-    );
+    assert_eq!((mock.count("POST files"), mock.count("POST batches")), (1, 1));
 
     // What was not made is made, after it was looked for.
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("completed")]);
     mock.fault("POST files", Fault::Instead(Answer::dropped()));
-    mock.fault(
-        "POST batches",
-        Fault::Instead(Answer::error(500, "oops", "oops")),
-    );
+    mock.fault("POST batches", Fault::Instead(Answer::error(500, "oops", "oops")));
     let called = call_with(BLIND, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
-    assert_eq!(
-        (mock.count("POST files"), mock.count("POST batches")),
-        (2, 2)
-    );
+    assert_eq!((mock.count("POST files"), mock.count("POST batches")), (2, 2));
 }
 
 #[test]
@@ -62,10 +53,7 @@ fn each_search_has_its_whole_time() {
     let called = call_with(&run, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
-    assert_eq!(
-        (mock.count("POST files"), mock.count("POST batches")),
-        (1, 1)
-    );
+    assert_eq!((mock.count("POST files"), mock.count("POST batches")), (1, 1));
 }
 
 #[test]
@@ -83,7 +71,8 @@ fn late_listed_batch_is_not_repeated() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
     assert_eq!(mock.count("POST batches"), 1);
-    let said = "part-1-m-001.jsonl: the server does not list its batch; looked for again for 60 s, as a list may be late";
+    let said =
+        "part-1-m-001.jsonl: the server does not list its batch; looked for again for 60 s, as a list may be late";
     assert_eq!(called.stderr.matches(said).count(), 1, "{called:?}");
 
     // It was given up, and is listed before the next attempt.
@@ -117,16 +106,14 @@ fn file_copies_are_deleted_together() {
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_each_once(&bench, &mock, QUESTIONS);
     mock.with(|server| {
-        let uploaded = server
-            .files
-            .iter()
-            .filter(|file| file.name.contains("part"));
+        let uploaded = server.files.iter().filter(|file| file.name.contains("part"));
         assert_eq!(uploaded.count(), 2);
         assert!(server.files.iter().all(|file| file.deleted));
     });
 }
 
-/// Starts the run, kills it at the request with this number, and lets the same command end. False if there is no such request.
+/// Starts the run, kills it at the request with this number, and lets the same command end. False if there is no such
+/// request.
 fn is_killed_at(number: usize, fault: Fault) -> bool {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("validating completed")]);
@@ -151,10 +138,7 @@ fn is_killed_at(number: usize, fault: Fault) -> bool {
     }
     assert_each_once(&bench, &mock, QUESTIONS);
     let batches = mock.count("POST batches");
-    assert!(
-        mock.asked().len() == 1,
-        "{number}: {batches} calls to make one batch"
-    );
+    assert!(mock.asked().len() == 1, "{number}: {batches} calls to make one batch");
     is_held
 }
 
@@ -174,10 +158,7 @@ fn the_state_file_may_end_anywhere() {
     let called = call_with(BLIND, &bench, &mock, "--keep-files");
     assert_eq!(called.code, Some(0), "{called:?}");
     let path = bench.path("run/batch/state.jsonl");
-    let (state, log) = (
-        fs::read_to_string(&path).unwrap(),
-        bench.path("run/records.jsonl"),
-    );
+    let (state, log) = (fs::read_to_string(&path).unwrap(), bench.path("run/records.jsonl"));
     let records = fs::read_to_string(&log).unwrap();
     let lines: Vec<&str> = state.lines().collect();
     assert!(lines.len() > 7, "{state}");
@@ -187,32 +168,14 @@ fn the_state_file_may_end_anywhere() {
         fs::write(&path, text).unwrap();
         let taken: Vec<&str> = records.lines().take(kept % (QUESTIONS + 1)).collect();
         let is_fetched = lines[kept - 1].contains("fetched");
-        let taken = if is_fetched {
-            taken.join("\n") + "\n"
-        } else {
-            String::new()
-        };
-        fs::write(
-            &log,
-            if lines[kept - 1].contains("taken_over") {
-                &records
-            } else {
-                &taken
-            },
-        )
-        .unwrap();
+        let taken = if is_fetched { taken.join("\n") + "\n" } else { String::new() };
+        fs::write(&log, if lines[kept - 1].contains("taken_over") { &records } else { &taken }).unwrap();
         // An event stands before its call, so that without it the server has nothing.
         mock.with(|server| {
-            if !lines[..kept]
-                .iter()
-                .any(|line| line.contains("\"creating\""))
-            {
+            if !lines[..kept].iter().any(|line| line.contains("\"creating\"")) {
                 server.batches.clear();
             }
-            if !lines[..kept]
-                .iter()
-                .any(|line| line.contains("\"uploading\""))
-            {
+            if !lines[..kept].iter().any(|line| line.contains("\"uploading\"")) {
                 server.files.clear();
             }
         });
@@ -235,12 +198,7 @@ fn an_interrupt_leaves_the_batches_working() {
     assert_eq!(process.wait().unwrap().code(), Some(130));
     assert_eq!(mock.count("POST batches/id/cancel"), 0);
     // What is out is asked nowhere else.
-    let called = call_with(
-        "--data set.jsonl --blind-model m --out run",
-        &bench,
-        &mock,
-        "",
-    );
+    let called = call_with("--data set.jsonl --blind-model m --out run", &bench, &mock, "");
     insta::assert_snapshot!(called.messages(), @"
     exit code: 1
      WARN 4 trials are waiting for a batch and not asked here; import the replies with batch run, batch fetch or
@@ -303,11 +261,7 @@ fn kill_while_splitting_keeps_one_version() {
         let state = fs::read_to_string(bench.path("run/batch/state.jsonl")).unwrap();
         let split = state.lines().position(|line| line.contains("\"split\""));
         let split = split.unwrap();
-        keep_lines(
-            &bench,
-            "run/batch/state.jsonl",
-            split + usize::from(is_named),
-        );
+        keep_lines(&bench, "run/batch/state.jsonl", split + usize::from(is_named));
         let mut whole = String::new();
         for number in 2..=5 {
             let path = bench.path(&format!("run/batch/part-1-m-{number:03}.jsonl"));
@@ -336,9 +290,7 @@ fn random_kills_lose_and_repeat_nothing() {
         for _ in 0..8 {
             let mut process = bench.spawn(&args, Stdio::null());
             // A linear congruential generator (Knuth, MMIX).
-            random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             std::thread::sleep(Duration::from_millis(20 + (random >> 33) % 400));
             if process.try_wait().unwrap().is_none() {
                 signal(&process, "-9");

@@ -17,16 +17,10 @@ fn a_full_quota_is_a_wait() {
     for first in [refused, failed] {
         let (bench, mock, called) = blind(&[first, Course::of("completed")], "");
         assert_eq!(called.code, Some(0), "{called:?}");
-        assert!(
-            called.stderr.contains("at most 1000000 tokens"),
-            "{called:?}"
-        );
+        assert!(called.stderr.contains("at most 1000000 tokens"), "{called:?}");
         assert_each_once(&bench, &mock, QUESTIONS);
         // The file is not uploaded again.
-        assert_eq!(
-            (mock.count("POST files"), mock.count("POST batches")),
-            (1, 2)
-        );
+        assert_eq!((mock.count("POST files"), mock.count("POST batches")), (1, 2));
     }
 }
 
@@ -46,17 +40,8 @@ fn waiting_tokens_respect_server_limit() {
     let called = call_with(BLIND, &bench, &mock, "--enqueued-tokens 60");
     assert_eq!(called.code, Some(0), "{called:?}");
     let log = mock.with(|server| server.log.clone());
-    let calls: Vec<&str> = log
-        .iter()
-        .map(String::as_str)
-        .filter(|one| one.contains("batches"))
-        .collect();
-    let one = [
-        "POST batches",
-        "GET batches/id",
-        "GET batches/id",
-        "GET batches/id",
-    ];
+    let calls: Vec<&str> = log.iter().map(String::as_str).filter(|one| one.contains("batches")).collect();
+    let one = ["POST batches", "GET batches/id", "GET batches/id", "GET batches/id"];
     assert_eq!(calls, one.repeat(QUESTIONS));
 }
 
@@ -95,12 +80,11 @@ fn cost_limit_uses_batch_price() {
     let bench = Bench::with_questions(QUESTIONS);
     bench.file("prices.toml", prices);
     let mock = MockBatches::start([Course::of("completed")]);
-    // A reply is charged 91 tokens at half of 10 dollars a million: $0.000455. A question a part, which may cost up to $0.0012: the bytes
-    // of its text, 64 and 16 tokens.
+    // A reply is charged 91 tokens at half of 10 dollars a million: $0.000455. A question a part, which may cost up to
+    // $0.0012: the bytes of its text, 64 and 16 tokens.
     let limited = |limit: &str| {
-        let more = format!(
-            "--prices prices.toml --file-requests 1 --enqueued-tokens 60 --max-tokens 16 --max-cost {limit}"
-        );
+        let more =
+            format!("--prices prices.toml --file-requests 1 --enqueued-tokens 60 --max-tokens 16 --max-cost {limit}");
         call_with(BLIND, &bench, &mock, &more)
     };
     let called = limited("0.002");
@@ -119,19 +103,14 @@ fn cost_limit_uses_batch_price() {
 fn cost_limit_holds_for_file_models() {
     // The name in tables has no row in the table of prices; the id has one, or the file states the price.
     let table = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nm = { input = 10, output = 10 }\n";
-    let other =
-        "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nother = { input = 1, output = 1 }\n";
-    for (prices, price) in [
-        (table, ""),
-        (other, "price = { input = 10, output = 10 }\n"),
-    ] {
+    let other = "as-of = \"2026-01-01\"\nbatch = 0.5\n[models]\nother = { input = 1, output = 1 }\n";
+    for (prices, price) in [(table, ""), (other, "price = { input = 10, output = 10 }\n")] {
         let bench = Bench::with_questions(QUESTIONS);
         let mock = MockBatches::start([Course::of("completed")]);
         bench.file("prices.toml", prices);
         let base = mock.base_url();
-        let models = format!(
-            "[[model]]\nname = \"A name\"\nid = \"m\"\nview = \"blind\"\nendpoints = [\"{base}\"]\n{price}"
-        );
+        let models =
+            format!("[[model]]\nname = \"A name\"\nid = \"m\"\nview = \"blind\"\nendpoints = [\"{base}\"]\n{price}");
         bench.file("models.toml", models);
         let limited = |limit: &str| {
             let line = format!(
@@ -185,12 +164,7 @@ fn direct_run_leaves_room_for_batches() {
     let called = call_with(BLIND, &bench, &mock, more);
     assert_eq!(called.code, Some(0), "{called:?}");
     // Three requests of up to $0.0513 are out, so one of $0.1026 does not fit.
-    let direct =
-        "--data set.jsonl --blind-model m --resume run --prices prices.toml --max-cost 0.25";
+    let direct = "--data set.jsonl --blind-model m --resume run --prices prices.toml --max-cost 0.25";
     let called = call_with(direct, &bench, &mock, "");
-    assert_eq!(
-        (called.code, mock.count("POST chat/completions")),
-        (Some(3), 0),
-        "{called:?}"
-    );
+    assert_eq!((called.code, mock.count("POST chat/completions")), (Some(3), 0), "{called:?}");
 }

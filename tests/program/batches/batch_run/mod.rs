@@ -19,8 +19,7 @@ use crate::support::run::{Bench, Called, model_args, records, words};
 const QUESTIONS: usize = 4;
 
 /// The run, without its endpoint: L0, L3 in both variants, and blind, so 4 conditions of 4 questions.
-const RUN: &str =
-    "batch run --data set.jsonl --model m --blind-model m --levels L0,L3 --out run --poll 0.02";
+const RUN: &str = "batch run --data set.jsonl --model m --blind-model m --levels L0,L3 --out run --poll 0.02";
 
 /// The number of its trials.
 const TRIALS: usize = 16;
@@ -48,11 +47,8 @@ fn blind(courses: &[Course], more: &str) -> (Bench, MockBatches, Called) {
 /// The records of a run with a reply.
 fn answered(bench: &Bench) -> Vec<Value> {
     let mut records = records(&bench.path("run"));
-    let replies: BTreeSet<String> = records
-        .iter()
-        .filter(|record| record["outcome"] != "failed")
-        .map(|record| record["key"].to_string())
-        .collect();
+    let replies: BTreeSet<String> =
+        records.iter().filter(|record| record["outcome"] != "failed").map(|record| record["key"].to_string()).collect();
     records.retain(|record| record["outcome"] != "failed");
     assert_eq!(replies.len(), records.len(), "a trial has two replies");
     records
@@ -77,10 +73,7 @@ fn batches_are_submitted_and_imported() {
     assert_each_once(&bench, &mock, TRIALS);
     // Two directly, one of each view, before the batches.
     assert_eq!(mock.count("POST chat/completions"), 2);
-    assert_eq!(
-        (mock.count("POST files"), mock.count("POST batches")),
-        (2, 2)
-    );
+    assert_eq!((mock.count("POST files"), mock.count("POST batches")), (2, 2));
     let records = records(&bench.path("run"));
     let batched = records.iter().filter(|record| record["via"] == "batch");
     assert_eq!(batched.count(), TRIALS - 2);
@@ -97,46 +90,22 @@ fn refused_field_costs_one_batch() {
     let bench = Bench::with_questions(QUESTIONS);
     let mock = MockBatches::start([Course::of("completed")]);
     let words = "'temperature' is not supported with this model: only the default (1) is supported";
-    mock.fault(
-        "POST chat/completions",
-        Fault::Instead(Answer::error(400, "unsupported_value", words)),
-    );
+    mock.fault("POST chat/completions", Fault::Instead(Answer::error(400, "unsupported_value", words)));
     let called = call_with(SCOUTED, &bench, &mock, "");
     assert_eq!(called.code, Some(0), "{called:?}");
-    assert_eq!(
-        (mock.count("POST chat/completions"), mock.asked().len()),
-        (2, 1)
-    );
+    assert_eq!((mock.count("POST chat/completions"), mock.asked().len()), (2, 1));
     mock.with(|server| {
         let requests = &server.batches[0].requests;
-        assert!(
-            requests
-                .iter()
-                .all(|one| one["body"].get("temperature").is_none())
-        );
+        assert!(requests.iter().all(|one| one["body"].get("temperature").is_none()));
     });
     // By the batch itself, where nothing was asked directly.
-    let refused = |_| {
-        Line::Status(
-            400,
-            "'temperature' is not supported with this model: only the default (1) is supported",
-        )
-    };
-    let (bench, mock, called) = blind(
-        &[
-            Course::of("completed").lines(refused),
-            Course::of("completed"),
-        ],
-        "",
-    );
+    let refused =
+        |_| Line::Status(400, "'temperature' is not supported with this model: only the default (1) is supported");
+    let (bench, mock, called) = blind(&[Course::of("completed").lines(refused), Course::of("completed")], "");
     assert_eq!(called.code, Some(0), "{called:?}");
     assert_eq!((mock.asked().len(), answered(&bench).len()), (2, QUESTIONS));
     mock.with(|server| {
-        let has = |batch: usize| {
-            server.batches[batch].requests[0]["body"]
-                .get("temperature")
-                .is_some()
-        };
+        let has = |batch: usize| server.batches[batch].requests[0]["body"].get("temperature").is_some();
         assert_eq!((has(0), has(1)), (true, false));
     });
 }
@@ -151,10 +120,7 @@ fn early_ends_are_unread_in_batches() {
         [Line::Right, Line::Ended("NO_IMAGE")][i % 2]
     }
     fn moderated(i: usize) -> Line {
-        [
-            Line::Right,
-            Line::Status(403, "Content violates usage guidelines."),
-        ][i % 2]
+        [Line::Right, Line::Status(403, "Content violates usage guidelines.")][i % 2]
     }
     fn refused(i: usize) -> Line {
         [Line::Right, Line::Status(400, "an odd refusal")][i % 2]
@@ -180,10 +146,8 @@ fn early_ends_are_unread_in_batches() {
 /// What the second batch answers was broken off.
 #[test]
 fn broken_generation_is_answered_by_the_next_batch() {
-    let courses = [
-        Course::of("completed").lines(|i| [Line::Right, Line::Ended("zeitgeist")][i % 2]),
-        Course::of("completed"),
-    ];
+    let courses =
+        [Course::of("completed").lines(|i| [Line::Right, Line::Ended("zeitgeist")][i % 2]), Course::of("completed")];
     let (bench, mock, called) = blind(&courses, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     let answered = answered(&bench);
@@ -211,11 +175,7 @@ fn answers_and_marks_use_batches() {
                           world knowledge         75.0   75.0 (0.0)   −63.2 +23.5
     ");
     mock.with(|server| {
-        let models: Vec<&Value> = server
-            .batches
-            .iter()
-            .map(|one| &one.requests[0]["body"]["model"])
-            .collect();
+        let models: Vec<&Value> = server.batches.iter().map(|one| &one.requests[0]["body"]["model"]).collect();
         assert_eq!(models, ["m", "j"]);
     });
     assert_eq!(mock.count("POST chat/completions"), 0);

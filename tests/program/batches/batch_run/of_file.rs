@@ -9,18 +9,15 @@ use crate::support::batches::{Course, Line, MockBatches};
 use crate::support::endpoint::Answer;
 use crate::support::run::{Bench, Called, called, words};
 
-const RUN: &str =
-    "batch run --data set.jsonl --models models.toml --trust-models --out run --poll 0.02";
+const RUN: &str = "batch run --data set.jsonl --models models.toml --trust-models --out run --poll 0.02";
 
-const TEMPERATURE: &str =
-    "'temperature' is not supported with this model: only the default (1) is supported";
+const TEMPERATURE: &str = "'temperature' is not supported with this model: only the default (1) is supported";
 
 /// A folder with a file of two blind models at one server; `keys` are further lines of each.
 fn bench_of_two(mock: &MockBatches, models: [&str; 2]) -> Bench {
     let bench = Bench::with_questions(QUESTIONS);
     let base = mock.base_url();
-    let table =
-        |keys: &str| format!("[[model]]\n{keys}\nview = \"blind\"\nendpoints = [\"{base}\"]\n");
+    let table = |keys: &str| format!("[[model]]\n{keys}\nview = \"blind\"\nendpoints = [\"{base}\"]\n");
     bench.file("models.toml", models.map(table).concat());
     bench
 }
@@ -34,10 +31,7 @@ fn call(bench: &Bench, line: &str) -> Called {
 #[test]
 fn batches_use_key_of_model() {
     let mock = MockBatches::start([Course::of("in_progress completed")]);
-    let keys = [
-        "name = \"A\"\nid = \"m\"\nkey-env = \"TEAM_A\"",
-        "name = \"B\"\nid = \"n\"\nkey-env = \"TEAM_B\"",
-    ];
+    let keys = ["name = \"A\"\nid = \"m\"\nkey-env = \"TEAM_A\"", "name = \"B\"\nid = \"n\"\nkey-env = \"TEAM_B\""];
     let bench = bench_of_two(&mock, keys);
     let detached = call(&bench, &format!("{RUN} --no-scout --detach"));
     assert_eq!(detached.code, Some(0), "{detached:?}");
@@ -90,19 +84,13 @@ fn folder_fetches_models_with_one_key() {
 fn refused_batch_field_affects_one_model() {
     let refused = Course::of("completed").lines(|_| Line::Status(400, TEMPERATURE));
     let mock = MockBatches::start([Course::of("completed"), refused, Course::of("completed")]);
-    let keys = [
-        "name = \"A\"\nid = \"m\"",
-        "name = \"B\"\nid = \"m\"\ndeployment = \"b\"",
-    ];
+    let keys = ["name = \"A\"\nid = \"m\"", "name = \"B\"\nid = \"m\"\ndeployment = \"b\""];
     let bench = bench_of_two(&mock, keys);
     let called = call(&bench, &format!("{RUN} --no-scout"));
     assert_eq!(called.code, Some(0), "{called:?}");
     mock.with(|server| {
-        let sent: Vec<bool> = server
-            .batches
-            .iter()
-            .map(|one| one.requests[0]["body"].get("temperature").is_some())
-            .collect();
+        let sent: Vec<bool> =
+            server.batches.iter().map(|one| one.requests[0]["body"].get("temperature").is_some()).collect();
         assert_eq!(sent, [true, true, false]);
     });
     let manifest = bench.path("run/manifest.json");
@@ -137,10 +125,8 @@ fn unusable_model_stops_alone() {
         model (the server knows no model of this name: check --model and --base-url) (replies so far are stored;
         the same command continues)
     ");
-    let models: BTreeSet<String> = answered(&bench)
-        .iter()
-        .map(|record| record["model"].as_str().unwrap().to_owned())
-        .collect();
+    let models: BTreeSet<String> =
+        answered(&bench).iter().map(|record| record["model"].as_str().unwrap().to_owned()).collect();
     assert_eq!(models, BTreeSet::from(["m".to_owned()]));
     assert_eq!(answered(&bench).len(), QUESTIONS);
     // Nothing of the other is in a batch.

@@ -29,16 +29,8 @@ impl House {
         let house = Self(tempfile::tempdir().unwrap());
         fs::create_dir_all(house.path("HM3D/val")).unwrap();
         fs::create_dir_all(house.path("modules")).unwrap();
-        fs::write(
-            house.path("modules/habitat_sim.py"),
-            include_str!("habitat_sim.py"),
-        )
-        .unwrap();
-        fs::write(
-            house.path("write_states.py"),
-            include_str!("write_states.py"),
-        )
-        .unwrap();
+        fs::write(house.path("modules/habitat_sim.py"), include_str!("habitat_sim.py")).unwrap();
+        fs::write(house.path("write_states.py"), include_str!("write_states.py")).unwrap();
         for (name, annotated) in [(ANNOTATED, true), (PLAIN, false)] {
             let stages = json!({
                 "paths": {".glb": ["val/*/*.basis.glb"]},
@@ -54,8 +46,8 @@ impl House {
         self.0.path().join(name)
     }
 
-    /// A room of 6 m by 5 m with six pieces of furniture. One can walk between them, on a small island apart, and upstairs, where
-    /// nothing is seen.
+    /// A room of 6 m by 5 m with six pieces of furniture. One can walk between them, on a small island apart, and
+    /// upstairs, where nothing is seen.
     pub(super) fn scene(&self, name: &str) {
         let (_, hash) = name.split_once('-').unwrap();
         let folder = self.path("HM3D/val").join(name);
@@ -92,11 +84,7 @@ impl House {
         let script = self.print_script();
         let config = format!("HM3D/{config}");
         let fixed = ["--hm3d", "HM3D/val", "--config", &config, "--out", out];
-        let size: &[&str] = if flags.contains(&"--size") {
-            &[]
-        } else {
-            &["--size", SIZE]
-        };
+        let size: &[&str] = if flags.contains(&"--size") { &[] } else { &["--size", SIZE] };
         let output = self.python(&script, &[&fixed, size, flags].concat());
         let said = text(&output);
         assert_eq!(output.status.code(), Some(code), "{said}");
@@ -132,11 +120,7 @@ impl House {
     /// Reads a pickle as Python does.
     pub(super) fn unpickle(&self, name: &str) {
         let script = self.path("unpickle.py");
-        fs::write(
-            &script,
-            "import pickle, sys\npickle.load(open(sys.argv[1], 'rb'))\n",
-        )
-        .unwrap();
+        fs::write(&script, "import pickle, sys\npickle.load(open(sys.argv[1], 'rb'))\n").unwrap();
         self.python(&script, &[name]);
     }
 
@@ -187,9 +171,7 @@ impl House {
 
     pub(super) fn lines(&self, name: &str) -> Vec<Value> {
         let text = fs::read_to_string(self.path(name)).unwrap();
-        text.lines()
-            .map(|line| serde_json::from_str(line).unwrap())
-            .collect()
+        text.lines().map(|line| serde_json::from_str(line).unwrap()).collect()
     }
 
     /// The files of a folder and of those in it, by path, with their bytes.

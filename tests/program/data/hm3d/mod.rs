@@ -1,5 +1,5 @@
-//! `import script habitat`: the script renders a stand-in for HM3D with a stand-in for habitat-sim (`habitat_sim.py`), and what
-//! it renders is imported and asked about. habitat-sim itself is in no test.
+//! `import script habitat`: the script renders a stand-in for HM3D with a stand-in for habitat-sim (`habitat_sim.py`),
+//! and what it renders is imported and asked about. habitat-sim itself is in no test.
 
 mod house;
 
@@ -33,11 +33,7 @@ fn walks(house: &House) {
 
 fn names(list: &Value) -> Vec<(String, String)> {
     let text = |value: &Value| value.as_str().unwrap().to_owned();
-    list.as_array()
-        .unwrap()
-        .iter()
-        .map(|entry| (text(&entry["name"]), text(&entry["why"])))
-        .collect()
+    list.as_array().unwrap().iter().map(|entry| (text(&entry["name"]), text(&entry["why"]))).collect()
 }
 
 #[test]
@@ -60,27 +56,16 @@ fn walks_become_frames_and_questions() {
 
     house.import("renders", "frames");
     let lines = house.lines("frames/frames.jsonl");
-    let frames: Vec<String> = lines
-        .iter()
-        .map(|line| format!("{} {} {}", line["scene"], line["frame"], line["t"]))
-        .collect();
-    let expected = [
-        (BED, "00000", 0.0),
-        (BED, "00020", 2.0),
-        (BED, "00040", 4.0),
-    ];
+    let frames: Vec<String> =
+        lines.iter().map(|line| format!("{} {} {}", line["scene"], line["frame"], line["t"])).collect();
+    let expected = [(BED, "00000", 0.0), (BED, "00020", 2.0), (BED, "00040", 4.0)];
     let more = [(SECOND, "00000", 0.0), (SECOND, "00020", 2.0)];
-    let expected: Vec<String> = expected
-        .iter()
-        .chain(&more)
-        .map(|(scene, frame, time)| format!("{scene:?} {frame:?} {time:?}"))
-        .collect();
+    let expected: Vec<String> =
+        expected.iter().chain(&more).map(|(scene, frame, time)| format!("{scene:?} {frame:?} {time:?}")).collect();
     assert_eq!(frames, expected);
     // The camera is at the place of the first state, 1.25 m above it, and looks along -z with 90 degrees of view.
     let pose: Vec<f64> = serde_json::from_value(lines[0]["pose"].clone()).unwrap();
-    let expected = [
-        1., 0., 0., 3.2, 0., 1., 0., 1.25, 0., 0., 1., 2.5, 0., 0., 0., 1.,
-    ];
+    let expected = [1., 0., 0., 3.2, 0., 1., 0., 1.25, 0., 0., 1., 2.5, 0., 0., 0., 1.];
     assert!(pose.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6));
     assert!((lines[0]["intrinsics"]["fx"].as_f64().unwrap() - 32.0).abs() < 1e-9);
 
@@ -121,10 +106,7 @@ fn covering_places_become_frames_and_questions() {
     assert!(dropped > 0);
     for step in house.lines(&format!("renders/{BED}/trajectory.jsonl")) {
         let place = |i: usize| step["pose"][i].as_f64().unwrap();
-        assert!(
-            (2.0..=5.0).contains(&place(3)) && (place(7) - 1.5).abs() < 1e-6,
-            "{step}"
-        );
+        assert!((2.0..=5.0).contains(&place(3)) && (place(7) - 1.5).abs() < 1e-6, "{step}");
     }
     assert_eq!(house.json("frames/dataset.json")["renders"], record);
     assert!(house.questions("frames") > 0);
@@ -150,10 +132,7 @@ fn rendered_scenes_are_not_repeated() {
     let flags = ["--walks", "states"];
     house.render(ANNOTATED, "renders", &flags, 0);
     let before = house.files("renders");
-    assert_eq!(
-        house.opened(),
-        ["aaaaAAAA111.basis.glb", "bbbbBBBB222.basis.glb"]
-    );
+    assert_eq!(house.opened(), ["aaaaAAAA111.basis.glb", "bbbbBBBB222.basis.glb"]);
     let said = house.render(ANNOTATED, "renders", &flags, 0);
     insta::assert_snapshot!(redacted(&said), @"
     the rate of walks is not stored: times are those of 10 states a second
@@ -173,12 +152,7 @@ fn rendered_scenes_are_not_repeated() {
     assert_eq!(house.opened().len(), 3);
     assert_eq!(house.files("renders"), before);
 
-    let said = house.render(
-        ANNOTATED,
-        "renders",
-        &["--walks", "states", "--every", "1"],
-        1,
-    );
+    let said = house.render(ANNOTATED, "renders", &["--walks", "states", "--every", "1"], 1);
     insta::assert_snapshot!(redacted(&said), @"
     the rate of walks is not stored: times are those of 10 states a second
     003-hm3d-ddddDDDD444: skipped: no folder NNNNN-ddddDDDD444 in --hm3d
@@ -221,11 +195,7 @@ fn state_archive_is_read_unpacked() {
     hm3d_frames.py: evil.tgz: the member 'hm3d-v0/../../outside.pkl' is a link or leads out of the archive;
         nothing was rendered
     ");
-    fs::write(
-        house.path("cut.tgz"),
-        &fs::read(house.path("states.tgz")).unwrap()[..900],
-    )
-    .unwrap();
+    fs::write(house.path("cut.tgz"), &fs::read(house.path("states.tgz")).unwrap()[..900]).unwrap();
     let said = house.render(ANNOTATED, "cut", &["--walks", "cut.tgz"], 1);
     insta::assert_snapshot!(redacted(&said), @"
     cut.tgz: md5 [DIGEST], not OpenEQA's archive v0 ([DIGEST])
@@ -243,39 +213,18 @@ fn pickle_with_calls_is_refused() {
     let refused = names(&house.json("renders/scenes.json")["refused"]);
     assert_eq!(refused.len(), 1, "{said}");
     let (name, why) = &refused[0];
-    assert!(
-        name == BED && why.contains("000-hm3d-aaaaAAAA111/00002.pkl"),
-        "{why}"
-    );
+    assert!(name == BED && why.contains("000-hm3d-aaaaAAAA111/00002.pkl"), "{why}");
     insta::assert_snapshot!(
         redacted(why),
         @"000-hm3d-aaaaAAAA111/00002.pkl: it names posix.system, which no agent state needs; nothing of it was run"
     );
-    assert!(
-        !house
-            .path("states/hm3d-v0/000-hm3d-aaaaAAAA111/was-run")
-            .exists()
-    );
+    assert!(!house.path("states/hm3d-v0/000-hm3d-aaaaAAAA111/was-run").exists());
     // Read without care, the same pickle runs.
     house.unpickle("states/hm3d-v0/000-hm3d-aaaaAAAA111/00002.pkl");
-    assert!(
-        house
-            .path("states/hm3d-v0/000-hm3d-aaaaAAAA111/was-run")
-            .exists()
-    );
-    assert!(
-        house
-            .path("renders")
-            .join(SECOND)
-            .join("done.json")
-            .exists()
-    );
+    assert!(house.path("states/hm3d-v0/000-hm3d-aaaaAAAA111/was-run").exists());
+    assert!(house.path("renders").join(SECOND).join("done.json").exists());
 
-    fs::write(
-        house.path("states/hm3d-v0/001-hm3d-bbbbBBBB222/00001.pkl"),
-        "no pickle",
-    )
-    .unwrap();
+    fs::write(house.path("states/hm3d-v0/001-hm3d-bbbbBBBB222/00001.pkl"), "no pickle").unwrap();
     let said = house.render(ANNOTATED, "other", &["--walks", "states"], 1);
     insta::assert_snapshot!(redacted(&said), @"
     the rate of walks is not stored: times are those of 10 states a second
@@ -319,29 +268,17 @@ fn wrong_calls_say_what_is_expected() {
     let house = house();
     walks(&house);
     for (flags, says) in [
-        (
-            &["--cover", "--every", "2"][..],
-            "--every goes with --walks",
-        ),
-        (
-            &["--walks", "states", "--height", "1"],
-            "--height goes with --cover",
-        ),
+        (&["--cover", "--every", "2"][..], "--every goes with --walks"),
+        (&["--walks", "states", "--height", "1"], "--height goes with --cover"),
         (&["--cover", "--size", "64"], "WIDTHxHEIGHT expected"),
-        (
-            &["--cover", "--hfov", "180"],
-            "--hfov above 0 and below 180",
-        ),
+        (&["--cover", "--hfov", "180"], "--hfov above 0 and below 180"),
         (&["--cover", "--walks", "states"], "not allowed with"),
     ] {
         let said = house.render(ANNOTATED, "out", flags, 2);
         assert!(said.contains(says), "{flags:?}: {said}");
     }
     for (flags, says) in [
-        (
-            &["--cover", "--scenes", "eeee"][..],
-            "--scenes: no eeee in --hm3d",
-        ),
+        (&["--cover", "--scenes", "eeee"][..], "--scenes: no eeee in --hm3d"),
         (&["--walks", "nowhere"], "nowhere: no .pkl in it"),
     ] {
         let said = house.render(ANNOTATED, "out", flags, 1);
@@ -349,14 +286,7 @@ fn wrong_calls_say_what_is_expected() {
     }
     let said = house.render("nowhere.json", "out", &["--cover"], 1);
     insta::assert_snapshot!(redacted(&said), @"hm3d_frames.py: --config HM3D/nowhere.json: no such file");
-    fs::write(
-        house
-            .path("HM3D/val")
-            .join(BED)
-            .join("aaaaAAAA111.basis.glb"),
-        ISLANDS,
-    )
-    .unwrap();
+    fs::write(house.path("HM3D/val").join(BED).join("aaaaAAAA111.basis.glb"), ISLANDS).unwrap();
     let said = house.render(ANNOTATED, "out", &["--cover", "--scenes", BED], 1);
     insta::assert_snapshot!(redacted(&said), @"
     00800-aaaaAAAA111: refused: it has no navigation mesh (.basis.navmesh), which --cover needs

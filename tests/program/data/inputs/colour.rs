@@ -4,8 +4,7 @@ use std::fs;
 
 use crate::support::icc_files::{DISPLAY_P3, SRGB, grey_profile, rgb_profile, srgb_curve, table};
 use crate::support::image_files::{
-    chunk, jpeg, jpeg_with_profile, png, png_with_profile, profile_chunk, webp_with_profile,
-    with_chunks,
+    chunk, jpeg, jpeg_with_profile, png, png_with_profile, profile_chunk, webp_with_profile, with_chunks,
 };
 use crate::support::run::{Bench, words};
 use crate::support::snapshot::redacted;
@@ -17,16 +16,9 @@ use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
 
 /// The XYZ of the colours of Adobe RGB (1998), and of a space that is wider than the eye.
-const ADOBE_RGB: [[f64; 3]; 3] = [
-    [0.60974, 0.31111, 0.01947],
-    [0.20528, 0.62567, 0.06087],
-    [0.14919, 0.06322, 0.74457],
-];
-const WIDE_GAMUT: [[f64; 3]; 3] = [
-    [0.79767, 0.28802, 0.0],
-    [0.13519, 0.71187, 0.0],
-    [0.03134, 0.00009, 0.8249],
-];
+const ADOBE_RGB: [[f64; 3]; 3] =
+    [[0.60974, 0.31111, 0.01947], [0.20528, 0.62567, 0.06087], [0.14919, 0.06322, 0.74457]];
+const WIDE_GAMUT: [[f64; 3]; 3] = [[0.79767, 0.28802, 0.0], [0.13519, 0.71187, 0.0], [0.03134, 0.00009, 0.8249]];
 
 /// The colours that are converted.
 #[rustfmt::skip]
@@ -87,10 +79,7 @@ fn image() -> RgbImage {
 }
 
 fn file(bytes: Vec<u8>, colour: ColourRule) -> ImageFile {
-    let rule = DecodeRule {
-        colour,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { colour, ..DecodeRule::default() };
     ImageFile::new(bytes, "a file".to_owned(), rule)
 }
 
@@ -113,18 +102,9 @@ fn fault(bytes: Vec<u8>) -> String {
 fn profiles_are_converted_as_littlecms_does() {
     let image = image();
     for (profile, expected) in [
-        (
-            rgb_profile("Display P3", DISPLAY_P3, &srgb_curve()),
-            OF_DISPLAY_P3,
-        ),
-        (
-            rgb_profile("Adobe RGB (1998)", ADOBE_RGB, &table(&[563])),
-            OF_ADOBE_RGB,
-        ),
-        (
-            rgb_profile("Wide gamut", WIDE_GAMUT, &in_33_values()),
-            OF_WIDE_GAMUT,
-        ),
+        (rgb_profile("Display P3", DISPLAY_P3, &srgb_curve()), OF_DISPLAY_P3),
+        (rgb_profile("Adobe RGB (1998)", ADOBE_RGB, &table(&[563])), OF_ADOBE_RGB),
+        (rgb_profile("Wide gamut", WIDE_GAMUT, &in_33_values()), OF_WIDE_GAMUT),
     ] {
         let found = converted(png_with_profile(&image, &profile));
         let pairs = found.iter().zip(expected.as_flattened());
@@ -135,10 +115,7 @@ fn profiles_are_converted_as_littlecms_does() {
         assert!(pairs.map(|(a, b)| a.abs_diff(*b)).max() > Some(60));
         // The other formats hold the profile elsewhere, and the same pixels come of it.
         let page = Page::rgb(&image).with_profile(&profile);
-        for bytes in [
-            webp_with_profile(&image, &profile),
-            tiff(Order::Big, &[page]),
-        ] {
+        for bytes in [webp_with_profile(&image, &profile), tiff(Order::Big, &[page])] {
             assert_eq!(converted(bytes), found);
         }
         let coded = file(jpeg(&image), ColourRule::Convert).decode().unwrap();
@@ -153,8 +130,8 @@ fn profiles_are_converted_as_littlecms_does() {
 #[test]
 fn grey_profiles_match_littlecms() {
     let expected = [
-        0, 6, 20, 32, 43, 53, 63, 72, 81, 90, 99, 107, 115, 123, 131, 139, 146, 154, 161, 168, 176,
-        183, 190, 197, 203, 210, 217, 223, 230, 237, 243, 249,
+        0, 6, 20, 32, 43, 53, 63, 72, 81, 90, 99, 107, 115, 123, 131, 139, 146, 154, 161, 168, 176, 183, 190, 197, 203,
+        210, 217, 223, 230, 237, 243, 249,
     ];
     let shades = image::GrayImage::from_fn(32, 1, |x, _| image::Luma([8 * x as u8]));
     let mut png = std::io::Cursor::new(Vec::new());
@@ -224,21 +201,12 @@ fn unconvertible_profile_is_refused_or_ignored() {
         (with(*b"cICP", &[9, 18, 0, 1]), "HLG"),
         (with(*b"cICP", &[1, 13, 0, 0]), "narrow range"),
         (with(*b"gAMA", &55_556_u32.to_be_bytes()), "0.55556"),
-        (
-            with(*b"gAMA", &100_000_u32.to_be_bytes()),
-            "linear light in 8 bits",
-        ),
+        (with(*b"gAMA", &100_000_u32.to_be_bytes()), "linear light in 8 bits"),
         (png_with_profile(&image, &cut), "ICC profile"),
-        (
-            jpeg_with_profile(&jpeg(&image), b"no profile"),
-            "ICC profile",
-        ),
+        (jpeg_with_profile(&jpeg(&image), b"no profile"), "ICC profile"),
     ] {
         let error = fault(bytes.clone());
-        assert!(
-            error.starts_with("a file: ") && error.contains(says),
-            "{error}"
-        );
+        assert!(error.starts_with("a file: ") && error.contains(says), "{error}");
         let digest = blake3::hash(&bytes).to_hex().to_string();
         let ignoring = file(bytes, ColourRule::Ignore);
         assert!(ignoring.decode().is_ok());
@@ -279,10 +247,7 @@ fn a_run_says_what_was_converted() {
     assert_eq!(called.stderr.matches(said).count(), 1, "{called:?}");
     let manifest = fs::read(bench.path("run/manifest.json")).unwrap();
     let manifest: Value = serde_json::from_slice(&manifest).unwrap();
-    assert_eq!(
-        manifest["inputs"]["converted"],
-        json!({"images": {"Display P3": 1}, "example": "a.png"})
-    );
+    assert_eq!(manifest["inputs"]["converted"], json!({"images": {"Display P3": 1}, "example": "a.png"}));
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains(said));
     // The same images by another rule are other images.
@@ -297,20 +262,14 @@ fn a_run_says_what_was_converted() {
     // What was asked is made again by the rule of the run.
     let shown = bench.call(&words("show run a.png"));
     assert_eq!(shown.code, Some(0), "{shown:?}");
-    for (rule, said, handling) in [
-        ("convert", said, "converted"),
-        ("ignore", "1 image is taken as sRGB", "ignored"),
-    ] {
+    for (rule, said, handling) in [("convert", said, "converted"), ("ignore", "1 image is taken as sRGB", "ignored")] {
         let line = format!("synthesize set --out {rule} --levels L0 --colour {rule}");
         let made = bench.call(&words(&line));
         assert!(made.stderr.contains(said), "{made:?}");
         let sidecar = fs::read(bench.path(&format!("{rule}/a_L0.json"))).unwrap();
         let sidecar: Value = serde_json::from_slice(&sidecar).unwrap();
         let digest = blake3::hash(&profile).to_hex().to_string();
-        assert_eq!(
-            sidecar["colour"],
-            json!({"from": "Display P3", "profile": digest, "handling": handling})
-        );
+        assert_eq!(sidecar["colour"], json!({"from": "Display P3", "profile": digest, "handling": handling}));
         let pixels = image::open(bench.path(&format!("{rule}/a_L0.png"))).unwrap();
         assert_eq!(pixels.into_rgb8() == image(), rule == "ignore");
     }

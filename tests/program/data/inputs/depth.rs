@@ -44,21 +44,14 @@ fn file(bytes: Vec<u8>) -> ImageFile {
 }
 
 fn linear(bytes: Vec<u8>) -> ImageFile {
-    let rule = DecodeRule {
-        transfer: Transfer::Linear,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { transfer: Transfer::Linear, ..DecodeRule::default() };
     ImageFile::new(bytes, "a file".to_owned(), rule)
 }
 
 #[test]
 fn codes_darken_before_rounding() {
     let image = all_codes();
-    for bytes in [
-        png(&image),
-        tiff_of(Order::Big, &image),
-        tiff_of(Order::Little, &image),
-    ] {
+    for bytes in [png(&image), tiff_of(Order::Big, &image), tiff_of(Order::Little, &image)] {
         let file = file(bytes.clone());
         let pixels = file.pixels().unwrap();
         assert!(matches!(&pixels, Pixels::Rgb16Image(codes) if codes.samples() == image.as_raw()));
@@ -90,20 +83,14 @@ fn codes_darken_before_rounding() {
 fn eight_bits_in_sixteen_match() {
     let bench = Bench::new();
     let eight = RgbImage::from_fn(37, 21, |x, y| Rgb([(x * 6) as u8, (y * 12) as u8, 90]));
-    let samples = eight
-        .as_raw()
-        .iter()
-        .map(|code| 257 * u16::from(*code))
-        .collect();
+    let samples = eight.as_raw().iter().map(|code| 257 * u16::from(*code)).collect();
     let sixteen = Image16::from_raw(37, 21, samples).unwrap();
     fs::create_dir_all(bench.path("8")).unwrap();
     eight.save(bench.path("8/a.png")).unwrap();
     bench.file("16/a.png", png(&sixteen));
     let levels = "--levels L0,L1,2.2,L5 --profile all";
     for depth in ["8", "16"] {
-        let made = bench.call(&words(&format!(
-            "synthesize {depth} --out out-{depth} {levels}"
-        )));
+        let made = bench.call(&words(&format!("synthesize {depth} --out out-{depth} {levels}")));
         assert_eq!(made.code, Some(0), "{made:?}");
         let said = "1 image is of more than 8 bits, which are rounded to 8 only after the light is reduced (16-bit codes: 1; for example a.png)";
         assert_eq!(made.stderr.contains(said), depth == "16", "{made:?}");
@@ -126,48 +113,31 @@ fn eight_bits_in_sixteen_match() {
     assert_eq!(compared, 16);
     // What is finer than 8 bits does show.
     let mut finer = sixteen;
-    finer
-        .iter_mut()
-        .for_each(|code| *code = code.saturating_add(100));
+    finer.iter_mut().for_each(|code| *code = code.saturating_add(100));
     bench.file("finer/a.png", png(&finer));
-    let made = bench.call(&words(&format!(
-        "synthesize finer --out finer-out {levels}"
-    )));
+    let made = bench.call(&words(&format!("synthesize finer --out finer-out {levels}")));
     assert_eq!(made.code, Some(0), "{made:?}");
     let read = |path: &str| fs::read(bench.path(path)).unwrap();
     assert_eq!(read("finer-out/a_L0.png"), read("out-8/a_L0.png"));
     for condition in ["L1-ev", "L1-noise", "L5-noise@physical"] {
         let name = format!("a_{condition}.png");
-        assert_ne!(
-            read(&format!("finer-out/{name}")),
-            read(&format!("out-8/{name}"))
-        );
+        assert_ne!(read(&format!("finer-out/{name}")), read(&format!("out-8/{name}")));
     }
     // The JSON file makes the same image again.
     let again = "synthesize finer/a.png --from finer-out/a_L5-noise@physical.json --out again";
     assert_eq!(bench.call(&words(again)).code, Some(0));
-    assert_eq!(
-        read("again/a_L5-noise@physical.png"),
-        read("finer-out/a_L5-noise@physical.png")
-    );
+    assert_eq!(read("again/a_L5-noise@physical.png"), read("finer-out/a_L5-noise@physical.png"));
 }
 
 #[test]
 fn sixteen_bit_profiles_keep_sixteen_bits() {
-    let image = Image16::from_fn(16, 16, |x, y| {
-        Rgb([(x * 4112) as u16, (y * 4112) as u16, 31_097])
-    });
+    let image = Image16::from_fn(16, 16, |x, y| Rgb([(x * 4112) as u16, (y * 4112) as u16, 31_097]));
     let profile = profile_chunk(&rgb_profile("P3", DISPLAY_P3, &srgb_curve()));
     let deep = file(with_chunks(&png(&image), std::slice::from_ref(&profile)));
-    let Pixels::Rgb16Image(codes) = deep.pixels().unwrap() else {
-        panic!("16 bits")
-    };
+    let Pixels::Rgb16Image(codes) = deep.pixels().unwrap() else { panic!("16 bits") };
     // The same colours in 8 bits, which are multiples of 257 in 16.
     let eight = RgbImage::from_fn(16, 16, |x, y| {
-        Rgb(image
-            .get_pixel(x, y)
-            .0
-            .map(|code| ((u32::from(code) + 128) / 257) as u8))
+        Rgb(image.get_pixel(x, y).0.map(|code| ((u32::from(code) + 128) / 257) as u8))
     });
     let shallow = with_chunks(&crate::support::image_files::png(&eight), &[profile]);
     let shallow = file(shallow).decode().unwrap();
@@ -180,26 +150,17 @@ fn sixteen_bit_profiles_keep_sixteen_bits() {
 
 #[test]
 fn linear_light_from_flag_or_file() {
-    let image = Image16::from_fn(8, 8, |x, y| {
-        Rgb([(x * 8000) as u16, (y * 100) as u16, 65_535])
-    });
+    let image = Image16::from_fn(8, 8, |x, y| Rgb([(x * 8000) as u16, (y * 100) as u16, 65_535]));
     let gamma = |value: u32| chunk(*b"gAMA", &value.to_be_bytes());
     let by_file = with_chunks(&png(&image), &[gamma(100_000)]);
     let light = |file: &ImageFile| match file.pixels().unwrap() {
         Pixels::Light(light) => light,
         other => panic!("{other:?}"),
     };
-    let expected: Vec<f32> = image
-        .as_raw()
-        .iter()
-        .map(|code| f32::from(*code) / 65_535.0)
-        .collect();
-    for file in [
-        linear(png(&image)),
-        linear(tiff_of(Order::Big, &image)),
-        file(by_file.clone()),
-        linear(by_file.clone()),
-    ] {
+    let expected: Vec<f32> = image.as_raw().iter().map(|code| f32::from(*code) / 65_535.0).collect();
+    for file in
+        [linear(png(&image)), linear(tiff_of(Order::Big, &image)), file(by_file.clone()), linear(by_file.clone())]
+    {
         assert_eq!(light(&file).samples(), expected);
         let note = serde_json::to_value(file.note()).unwrap();
         assert_eq!(note, serde_json::json!({"depth": "light"}));
@@ -209,10 +170,7 @@ fn linear_light_from_flag_or_file() {
     for contradicting in [
         with_chunks(&png(&image), &[gamma(45_455)]),
         with_chunks(&png(&image), &[chunk(*b"sRGB", &[0])]),
-        with_chunks(
-            &png(&image),
-            &[profile_chunk(&rgb_profile("P3", DISPLAY_P3, &srgb_curve()))],
-        ),
+        with_chunks(&png(&image), &[profile_chunk(&rgb_profile("P3", DISPLAY_P3, &srgb_curve()))]),
     ] {
         let file = linear(contradicting);
         let error = file.decode().unwrap_err().to_string();

@@ -59,11 +59,7 @@ fn lossless_files_have_pixels_of_png() {
 fn lossy_webp_is_read() {
     let text = "UklGRloAAABXRUJQVlA4IE4AAADQAgCdASoQABAAAMASJbACdHMBMAH6ALEAE3ctuVroAP7/25Ju3CH22WwE6y5cQSCFn/xykcgP6B0+y8YTRif/7lC9F//3pm9Ank0AAAA=";
     let pixels = decoded(STANDARD.decode(text).unwrap());
-    for ([x, y], expected) in [
-        ([5, 3], [62, 35, 78]),
-        ([15, 15], [179, 178, 87]),
-        ([0, 0], [1, 3, 75]),
-    ] {
+    for ([x, y], expected) in [([5, 3], [62, 35, 78]), ([15, 15], [179, 178, 87]), ([0, 0], [1, 3, 75])] {
         let found = pixels.get_pixel(x, y).0;
         let close = found.iter().zip(expected).all(|(a, b)| a.abs_diff(b) <= 1);
         assert!(close, "{x}, {y}: {found:?}");
@@ -76,11 +72,7 @@ fn webp_and_tiff_orientation_is_applied() {
     for orientation in 1..=8 {
         let expected = seen(&stored, orientation);
         let page = || Page::rgb(&stored).with(274, orientation.into());
-        for bytes in [
-            turned_webp(&stored, orientation),
-            tiff(Order::Little, &[page()]),
-            tiff(Order::Big, &[page()]),
-        ] {
+        for bytes in [turned_webp(&stored, orientation), tiff(Order::Little, &[page()]), tiff(Order::Big, &[page()])] {
             let stated = (orientation > 1).then_some(orientation as u8);
             assert_eq!(file(bytes.clone()).note().orientation, stated);
             assert_eq!(file(bytes.clone()).check().unwrap(), expected.dimensions());
@@ -95,10 +87,7 @@ fn of_several_pictures_first_is_read() {
     let second = RgbImage::from_pixel(7, 4, Rgb([9; 3]));
     let pages = || [Page::rgb(&first), Page::rgb(&second)];
     for (bytes, kind) in [
-        (
-            animated_webp(&[first.clone(), second.clone()]),
-            Some("animated WebP"),
-        ),
+        (animated_webp(&[first.clone(), second.clone()]), Some("animated WebP")),
         (tiff(Order::Big, &pages()), Some("TIFF of several pages")),
         (animated_webp(std::slice::from_ref(&first)), None),
         (tiff(Order::Big, &pages()[..1]), None),
@@ -144,21 +133,13 @@ fn a_cut_file_is_named() {
     let late = {
         let page = Page::rgb(&image).with(278, 48);
         let mut bytes = tiff(Order::Little, &[page]);
-        let strip = 12
-            + bytes
-                .windows(4)
-                .position(|four| four == [0x11, 1, 4, 0])
-                .unwrap()
-            - 4;
+        let strip = 12 + bytes.windows(4).position(|four| four == [0x11, 1, 4, 0]).unwrap() - 4;
         let at = bytes.len() as u32;
         bytes[strip..strip + 4].copy_from_slice(&at.to_le_bytes());
         bytes.extend(vec![7; 64 * 48 * 3]);
         bytes
     };
-    assert_eq!(
-        decoded(late.clone()),
-        RgbImage::from_pixel(64, 48, Rgb([7; 3]))
-    );
+    assert_eq!(decoded(late.clone()), RgbImage::from_pixel(64, 48, Rgb([7; 3])));
     let error = fault(late[..late.len() - 1].to_vec());
     insta::assert_snapshot!(redacted(&error), @"a file: not a whole image: the file ends at byte 18559 of 18560; copy or export it again");
 }
@@ -166,12 +147,7 @@ fn a_cut_file_is_named() {
 #[test]
 fn inks_in_a_tiff_become_rgb() {
     let inks = [[0, 0, 0, 0], [255, 0, 0, 0], [40, 90, 200, 60]];
-    let page = Page {
-        size: [3, 1],
-        channels: 4,
-        samples: inks.as_flattened().to_vec(),
-        ..Page::rgb(&image())
-    };
+    let page = Page { size: [3, 1], channels: 4, samples: inks.as_flattened().to_vec(), ..Page::rgb(&image()) };
     let read = decoded(tiff(Order::Big, &[page.with(262, 5)]));
     let codes = [[255, 255, 255], [0, 255, 255], [164, 126, 42]];
     assert_eq!(read.as_raw().as_slice(), codes.as_flattened());
@@ -180,11 +156,7 @@ fn inks_in_a_tiff_become_rgb() {
 #[test]
 fn unsupported_images_are_refused_by_name() {
     let rgb = |tag, value| tiff(Order::Little, &[Page::rgb(&image()).with(tag, value)]);
-    let four = Page {
-        channels: 4,
-        samples: vec![9; 7 * 4 * 4],
-        ..Page::rgb(&image())
-    };
+    let four = Page { channels: 4, samples: vec![9; 7 * 4 * 4], ..Page::rgb(&image()) };
     let mut clear = image::RgbaImage::new(2, 2);
     clear.put_pixel(1, 1, image::Rgba([1, 2, 3, 4]));
     let mut transparent = std::io::Cursor::new(Vec::new());
@@ -201,18 +173,9 @@ fn unsupported_images_are_refused_by_name() {
         (rgb(50706, 1), "a camera's RAW file: only its preview"),
         (rgb(262, 32803), "a camera's RAW file"),
         (rgb(339, 3), "floating-point samples"),
-        (
-            transparent.into_inner(),
-            "transparent in places; flatten it",
-        ),
-        (
-            b"\0\0\0\x18ftypheic\0\0\0\0".to_vec(),
-            "a HEIC image, which is not read; convert it to PNG",
-        ),
-        (
-            b"\0\0\0\x1cftypavif\0\0\0\0".to_vec(),
-            "an AVIF image, which is not read; convert it to PNG",
-        ),
+        (transparent.into_inner(), "transparent in places; flatten it"),
+        (b"\0\0\0\x18ftypheic\0\0\0\0".to_vec(), "a HEIC image, which is not read; convert it to PNG"),
+        (b"\0\0\0\x1cftypavif\0\0\0\0".to_vec(), "an AVIF image, which is not read; convert it to PNG"),
     ] {
         let error = fault(bytes);
         assert!(error.contains(says), "{error}");
@@ -233,31 +196,21 @@ fn unread_compressions_are_named() {
         (61234, "method 61234"),
     ] {
         let error = fault(tiff_of(method));
-        let expected = format!(
-            "a TIFF of the compression {name}, which is not read; save it with LZW or deflate first"
-        );
+        let expected =
+            format!("a TIFF of the compression {name}, which is not read; save it with LZW or deflate first");
         assert!(error.ends_with(&expected), "{error}");
     }
     assert_eq!(decoded(tiff_of(1)), image());
     let attribute = b"compression\0compression\0\x01\0\0\0";
     let light: Vec<f32> = (0..7 * 4 * 3).map(|at| at as f32 / 100.0).collect();
     let mut exr = exr([7, 4], &light);
-    let at = exr
-        .windows(attribute.len())
-        .position(|part| part == attribute);
+    let at = exr.windows(attribute.len()).position(|part| part == attribute);
     let at = at.unwrap() + attribute.len();
-    for (method, name) in [
-        (10, "HTJ2K"),
-        (11, "HTJ2K"),
-        (12, "LJ2K"),
-        (13, "ZSTD"),
-        (77, "number 77"),
-    ] {
+    for (method, name) in [(10, "HTJ2K"), (11, "HTJ2K"), (12, "LJ2K"), (13, "ZSTD"), (77, "number 77")] {
         exr[at] = method;
         let error = fault(exr.clone());
-        let expected = format!(
-            "an OpenEXR image of the compression {name}, which is not read; save it with ZIP or PIZ"
-        );
+        let expected =
+            format!("an OpenEXR image of the compression {name}, which is not read; save it with ZIP or PIZ");
         assert!(error.ends_with(&expected), "{error}");
     }
 }
@@ -267,21 +220,12 @@ fn decompression_bomb_is_refused_early() {
     let mut webp = webp_of(&[webp_samples(&image())]);
     // 16383 × 16383 pixels: 14 bits each behind the signature of the samples.
     webp[21..25].copy_from_slice(&[0xFE, 0xBF, 0xFF, 0x0F]);
-    let tall = Page {
-        size: [100_000, 100_000],
-        ..Page::rgb(&image())
-    };
+    let tall = Page { size: [100_000, 100_000], ..Page::rgb(&image()) };
     for bytes in [webp, tiff(Order::Big, &[tall])] {
         let error = fault(bytes);
-        assert!(
-            error.contains("pixels are more than") && error.contains("--decode max-pixels"),
-            "{error}"
-        );
+        assert!(error.contains("pixels are more than") && error.contains("--decode max-pixels"), "{error}");
     }
-    let rule = DecodeRule {
-        max_pixels: 27,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { max_pixels: 27, ..DecodeRule::default() };
     let limited = |bytes| ImageFile::new(bytes, "a file".to_owned(), rule).check();
     for format in [ImageFormat::WebP, ImageFormat::Tiff] {
         let error = limited(encoded(&image(), format)).unwrap_err().to_string();
@@ -294,23 +238,22 @@ fn run_reads_all_formats_of_folder() {
     let bench = Bench::new();
     let frames = [
         ("a.webp", encoded(&image(), ImageFormat::WebP)),
-        (
-            "b.TIF",
-            tiff(Order::Big, &[Page::rgb(&image()), Page::rgb(&image())]),
-        ),
+        ("b.TIF", tiff(Order::Big, &[Page::rgb(&image()), Page::rgb(&image())])),
         ("c.png", png(&image())),
     ];
-    let questions: Vec<String> = frames.iter().map(|(name, bytes)| {
-        bench.file(&format!("set/{name}"), bytes);
-        json!({"id": name, "frame": name, "question": "Is it?", "choices": ["yes", "no"], "answer": "no"}).to_string()
-    }).collect();
+    let questions: Vec<String> = frames
+        .iter()
+        .map(|(name, bytes)| {
+            bench.file(&format!("set/{name}"), bytes);
+            json!({"id": name, "frame": name, "question": "Is it?", "choices": ["yes", "no"], "answer": "no"})
+                .to_string()
+        })
+        .collect();
     bench.file("set/questions.jsonl", questions.join("\n"));
     bench.file("set/IMG_2.HEIC", "x");
     bench.file("set/IMG_1.HEIC", "x");
     bench.file("set/notes.txt", "x");
-    let called = bench.call(&words(
-        "--data set --model random --levels L0,L2 --variant ev --out run",
-    ));
+    let called = bench.call(&words("--data set --model random --levels L0,L2 --variant ev --out run"));
     assert_eq!(called.code, Some(0), "{called:?}");
     let unread = "set: 2 files look like images and are not read, as IMG_1.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected, so convert them first";
     assert_eq!(called.stderr.matches(unread).count(), 1, "{called:?}");
@@ -327,9 +270,7 @@ fn run_reads_all_formats_of_folder() {
         digests
     };
     assert_eq!((digests("L0").len(), digests("L2-ev").len()), (1, 1));
-    let made = bench.call(&words(
-        "synthesize set/a.webp set/b.TIF --out dark --levels L0",
-    ));
+    let made = bench.call(&words("synthesize set/a.webp set/b.TIF --out dark --levels L0"));
     assert_eq!(made.code, Some(0), "{made:?}");
     let pixels = image::open(bench.path("dark/a_L0.png")).unwrap();
     assert_eq!(pixels.into_rgb8(), image());

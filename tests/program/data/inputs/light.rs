@@ -2,9 +2,7 @@
 
 use std::fs;
 
-use crate::support::exr_files::{
-    compressed, cropped, exr, with_channels, with_primaries, with_two_layers,
-};
+use crate::support::exr_files::{compressed, cropped, exr, with_channels, with_primaries, with_two_layers};
 use crate::support::run::{Bench, records, words};
 use crate::support::snapshot::redacted;
 use darkqa_base::types::{FrameId, Light, Pixels, Severity};
@@ -20,9 +18,7 @@ use serde_json::Value;
 
 /// Light from black over white to 64 times white.
 fn lights() -> Vec<f32> {
-    (0..48 * 32 * 3)
-        .map(|i| 64.0 * (i as f32 / 4607.0).powi(4))
-        .collect()
+    (0..48 * 32 * 3).map(|i| 64.0 * (i as f32 / 4607.0).powi(4)).collect()
 }
 
 fn file(bytes: Vec<u8>) -> ImageFile {
@@ -84,31 +80,22 @@ fn without_noise(reading: NoiseProfile, light: f32, drop: Severity) -> f64 {
     sum / image.samples().len() as f64
 }
 
-/// Where the sensor saturates: at white before the drop by the letter of the paper, and after it where less light means fewer
-/// photons.
+/// Where the sensor saturates: at white before the drop by the letter of the paper, and after it where less light means
+/// fewer photons.
 #[test]
 fn sensor_saturates_as_reading_says() {
     let drop = Severity::L2;
     for reading in NoiseProfile::ALL {
         // Greys are those of the exposure branch, since no tone curve is undone.
         for light in [0.0, 0.02, 0.18, 0.5, 0.9] {
-            let (found, expected) = (
-                without_noise(reading, light, drop),
-                f64::from(code(light, drop.value())),
-            );
-            assert!(
-                (found - expected).abs() <= 1.0,
-                "{reading:?}, {light}: {found}"
-            );
+            let (found, expected) = (without_noise(reading, light, drop), f64::from(code(light, drop.value())));
+            assert!((found - expected).abs() <= 1.0, "{reading:?}, {light}: {found}");
         }
         let lamp = without_noise(reading, 16.0, drop);
         let bright = without_noise(reading, 4.0, drop);
         match reading {
             NoiseProfile::Paper | NoiseProfile::Eld => {
-                assert!(
-                    (lamp - 72.0).abs() < 1.0 && (bright - 72.0).abs() < 1.0,
-                    "{lamp}"
-                );
+                assert!((lamp - 72.0).abs() < 1.0 && (bright - 72.0).abs() < 1.0, "{lamp}");
             }
             NoiseProfile::Level | NoiseProfile::Physical => {
                 assert!((lamp - 255.0).abs() < 1.0, "{lamp}");
@@ -127,16 +114,7 @@ fn shallow_and_deep_floats_are_read() {
     let ones = || FlatSamples::F32(vec![1.0; 6]);
     for bytes in [
         with_channels([3, 2], vec![("R", half()), ("G", single()), ("B", half())]),
-        with_channels(
-            [3, 2],
-            vec![
-                ("R", half()),
-                ("G", single()),
-                ("B", half()),
-                ("A", ones()),
-                ("Z", half()),
-            ],
-        ),
+        with_channels([3, 2], vec![("R", half()), ("G", single()), ("B", half()), ("A", ones()), ("Z", half())]),
     ] {
         let expected: Vec<f32> = values.iter().flat_map(|value| [*value; 3]).collect();
         assert_eq!(light(&file(bytes)), expected);
@@ -150,13 +128,9 @@ fn shallow_and_deep_floats_are_read() {
 #[test]
 fn every_lossless_compression_is_read() {
     let lights = lights();
-    for compression in [
-        Compression::Uncompressed,
-        Compression::RLE,
-        Compression::ZIP1,
-        Compression::ZIP16,
-        Compression::PIZ,
-    ] {
+    for compression in
+        [Compression::Uncompressed, Compression::RLE, Compression::ZIP1, Compression::ZIP16, Compression::PIZ]
+    {
         let bytes = compressed([48, 32], &lights, compression);
         assert_eq!(light(&file(bytes)), lights, "{compression:?}");
     }
@@ -184,35 +158,17 @@ fn invalid_light_is_refused_by_name() {
     let whole = FlatSamples::U32(vec![1; 6]);
     let colours = || vec![("R", grey(0.5)), ("G", grey(0.5)), ("B", grey(0.5))];
     for (bytes, says) in [
-        (
-            with(f32::NAN),
-            "NaN at the pixel (0, 1), channel G, is not an amount of light",
-        ),
+        (with(f32::NAN), "NaN at the pixel (0, 1), channel G, is not an amount of light"),
         (with(f32::INFINITY), "inf at the pixel (0, 1)"),
         (with(-2e-3), "-0.002 at the pixel (0, 1)"),
-        (
-            with_channels([3, 2], [colours(), vec![("A", grey(0.5))]].concat()),
-            "transparent in places",
-        ),
-        (
-            with_channels(
-                [3, 2],
-                vec![("R", whole.clone()), ("G", whole.clone()), ("B", whole)],
-            ),
-            "whole numbers",
-        ),
-        (
-            with_channels([3, 2], vec![("Y", grey(0.5))]),
-            "channels R, G and B",
-        ),
+        (with_channels([3, 2], [colours(), vec![("A", grey(0.5))]].concat()), "transparent in places"),
+        (with_channels([3, 2], vec![("R", whole.clone()), ("G", whole.clone()), ("B", whole)]), "whole numbers"),
+        (with_channels([3, 2], vec![("Y", grey(0.5))]), "channels R, G and B"),
         (cropped([3, 2], [5, 4]), "does not cover its display window"),
     ] {
         let file = file(bytes);
         let error = file.decode().unwrap_err().to_string();
-        assert!(
-            error.starts_with("a file: ") && error.contains(says),
-            "{error}"
-        );
+        assert!(error.starts_with("a file: ") && error.contains(says), "{error}");
         assert_eq!(file.check().unwrap_err().to_string(), error);
     }
     // Overscan is cut off.
@@ -222,10 +178,7 @@ fn invalid_light_is_refused_by_name() {
         let error = file(whole[..length].to_vec()).decode().unwrap_err();
         assert!(error.to_string().contains("not a"), "{length}: {error}");
     }
-    let rule = DecodeRule {
-        max_pixels: 48 * 32 - 1,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { max_pixels: 48 * 32 - 1, ..DecodeRule::default() };
     let error = ImageFile::new(whole, "a file".to_owned(), rule).decode();
     insta::assert_snapshot!(
         redacted(&error.unwrap_err().to_string()),
@@ -236,17 +189,9 @@ fn invalid_light_is_refused_by_name() {
 /// The matrix of ITU-R BT.2087, table 1, inverted: from the primaries of BT.2020 to those of BT.709.
 #[test]
 fn other_primaries_are_converted() {
-    const TO_BT709: [[f32; 3]; 3] = [
-        [1.6605, -0.5876, -0.0728],
-        [-0.1246, 1.1329, -0.0083],
-        [-0.0182, -0.1006, 1.1187],
-    ];
-    const BT2020: [[f32; 2]; 4] = [
-        [0.708, 0.292],
-        [0.170, 0.797],
-        [0.131, 0.046],
-        [0.3127, 0.3290],
-    ];
+    const TO_BT709: [[f32; 3]; 3] =
+        [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]];
+    const BT2020: [[f32; 2]; 4] = [[0.708, 0.292], [0.170, 0.797], [0.131, 0.046], [0.3127, 0.3290]];
     const BT709: [[f32; 2]; 4] = [[0.64, 0.33], [0.30, 0.60], [0.15, 0.06], [0.3127, 0.3290]];
     let stated = [0.5, 0.4, 0.3, 0.0, 2.0, 0.0, 3.0, 3.0, 3.0_f32];
     let wide = with_primaries([3, 1], &stated, Some(BT2020));
@@ -266,10 +211,7 @@ fn other_primaries_are_converted() {
     let same = file(with_primaries([3, 1], &stated, Some(BT709)));
     assert_eq!(light(&same), stated);
     assert_eq!(same.note().colour, None);
-    let rule = DecodeRule {
-        colour: ColourRule::Ignore,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { colour: ColourRule::Ignore, ..DecodeRule::default() };
     let ignoring = ImageFile::new(wide, "a file".to_owned(), rule);
     assert_eq!(light(&ignoring), stated);
     assert_ne!(ignoring.digest(), converted.digest());
@@ -282,9 +224,7 @@ fn exposure_scales_light_alone() {
     bench.file("one/a.exr", exr([48, 32], &lights()));
     bench.file("two/a.exr", exr([48, 32], &doubled));
     RgbImage::new(48, 32).save(bench.path("one/b.png")).unwrap();
-    let made = bench.call(&words(
-        "synthesize one --out scaled --exposure 1 --levels L0,L3 --profile paper,physical",
-    ));
+    let made = bench.call(&words("synthesize one --out scaled --exposure 1 --levels L0,L3 --profile paper,physical"));
     insta::assert_snapshot!(made.messages(), @"
     exit code: 0
      WARN 1 image is of more than 8 bits, which are rounded to 8 only after the light is reduced (linear light: 1;
@@ -292,20 +232,13 @@ fn exposure_scales_light_alone() {
      WARN 1 image is scaled by --decode exposure (1 EV: 1; for example a.exr)
      WARN 1 image is not linear light, so that a flag does not apply (--decode exposure: 1; for example b.png)
     ");
-    let made = bench.call(&words(
-        "synthesize two --out plain --levels L0,L3 --profile paper,physical",
-    ));
+    let made = bench.call(&words("synthesize two --out plain --levels L0,L3 --profile paper,physical"));
     assert_eq!(made.code, Some(0), "{made:?}");
     for condition in ["L0", "L3-ev", "L3-noise", "L3-noise@physical"] {
-        let read = |folder: &str, end: &str| {
-            fs::read(bench.path(&format!("{folder}/a_{condition}.{end}"))).unwrap()
-        };
+        let read = |folder: &str, end: &str| fs::read(bench.path(&format!("{folder}/a_{condition}.{end}"))).unwrap();
         assert_eq!(read("scaled", "png"), read("plain", "png"), "{condition}");
         let sidecar: Value = serde_json::from_slice(&read("scaled", "json")).unwrap();
-        assert_eq!(
-            (&sidecar["depth"], &sidecar["exposure_ev"]),
-            (&"light".into(), &1.0.into())
-        );
+        assert_eq!((&sidecar["depth"], &sidecar["exposure_ev"]), (&"light".into(), &1.0.into()));
     }
     let from = "synthesize one/a.exr --from scaled/a_L3-noise@physical.json --out again";
     assert_eq!(bench.call(&words(from)).code, Some(2), "another exposure");
@@ -316,9 +249,7 @@ fn exposure_scales_light_alone() {
         fs::read(bench.path("scaled/a_L3-noise@physical.png")).unwrap()
     );
     for wrong in ["21", "x", "nan"] {
-        let refused = bench.call(&words(&format!(
-            "synthesize one --out no --exposure {wrong}"
-        )));
+        let refused = bench.call(&words(&format!("synthesize one --out no --exposure {wrong}")));
         assert_eq!(refused.code, Some(2), "{refused:?}");
     }
 }
@@ -328,14 +259,10 @@ fn exposure_scales_light_alone() {
 fn rooms_have_light() {
     let bench = Bench::new();
     let rooms = "frames=4,size=64x48";
-    let written = bench.call(&words(
-        "rooms --out lit --frames 4 --size 64x48 --light linear",
-    ));
+    let written = bench.call(&words("rooms --out lit --frames 4 --size 64x48 --light linear"));
     assert_eq!(written.code, Some(0), "{written:?}");
     let run = |data: &str, out: &str| {
-        let line = format!(
-            "--data {data} --model random --levels L0,L2 --profile paper,physical --out {out}"
-        );
+        let line = format!("--data {data} --model random --levels L0,L2 --profile paper,physical --out {out}");
         let called = bench.call(&words(&line));
         assert_eq!(called.code, Some(0), "{called:?}");
         let mut records: Vec<(String, String)> = records(&bench.path(out))
@@ -386,9 +313,7 @@ fn rooms_have_light() {
 fn realism_keeps_bit_depth() {
     let bench = Bench::new();
     bench.file("pairs/normal/1.exr", exr([48, 32], &lights()));
-    let made = bench.call(&words(
-        "synthesize pairs/normal/1.exr --out dark --levels L1 --variant ev",
-    ));
+    let made = bench.call(&words("synthesize pairs/normal/1.exr --out dark --levels L1 --variant ev"));
     assert_eq!(made.code, Some(0), "{made:?}");
     let dark = fs::read(bench.path("dark/1_L1-ev.png")).unwrap();
     bench.file("pairs/low/1.png", dark);

@@ -25,10 +25,7 @@ fn all_orientations_match_turned_copy() {
     let coded = RgbImage::from_raw(7, 4, coded.samples().to_vec()).unwrap();
     for orientation in 1..=8 {
         let of_jpeg = turned_jpeg(&jpeg(&stored), orientation);
-        for (bytes, pixels) in [
-            (turned_png(&stored, orientation), &stored),
-            (of_jpeg, &coded),
-        ] {
+        for (bytes, pixels) in [(turned_png(&stored, orientation), &stored), (of_jpeg, &coded)] {
             let expected = seen(pixels, orientation);
             let (plain, turned) = (file(png(&expected)), file(bytes));
             let decoded = turned.decode().unwrap();
@@ -95,9 +92,7 @@ fn dark_images_match_turned_copy() {
         let expected = usize::from(set == "stated");
         assert_eq!(made.stderr.matches("turned").count(), expected, "{made:?}");
     }
-    let again = bench.call(&words(
-        "synthesize stated --out dark-stated --levels L0,L3 --profile paper,physical",
-    ));
+    let again = bench.call(&words("synthesize stated --out dark-stated --levels L0,L3 --profile paper,physical"));
     insta::assert_snapshot!(again, @"
     exit code: 0
     stdout:
@@ -145,10 +140,7 @@ fn a_run_says_what_was_turned() {
     let shown: Vec<&str> = called.stdout.split_whitespace().collect();
     assert!(shown.join(" ").contains(said), "{called:?}");
     assert!(page.contains(said));
-    assert_eq!(
-        manifest["inputs"],
-        json!({"turned": {"images": {"orientation 8": 1}, "example": "a.png"}})
-    );
+    assert_eq!(manifest["inputs"], json!({"turned": {"images": {"orientation 8": 1}, "example": "a.png"}}));
     let (called, manifest, page, by_hand) = run("by-hand");
     assert!(!called.stderr.contains("turned") && !page.contains("EXIF"));
     assert_eq!(manifest.get("inputs"), None);
@@ -169,10 +161,7 @@ fn with_map(bench: &Bench, name: &str, size: [u32; 2]) {
     bench.file(&format!("{name}/a.jpg"), turned_jpeg(&jpeg(&image()), 6));
     let map = image::GrayImage::new(size[0], size[1]);
     map.save(bench.path(&format!("{name}/sem.png"))).unwrap();
-    bench.file(
-        &format!("{name}/frames.jsonl"),
-        r#"{"scene":"s","frame":"0","rgb":"a.jpg","sem":"sem.png"}"#,
-    );
+    bench.file(&format!("{name}/frames.jsonl"), r#"{"scene":"s","frame":"0","rgb":"a.jpg","sem":"sem.png"}"#);
 }
 
 #[test]

@@ -1,9 +1,9 @@
-//! Images with the colours of video: SDR codes are kept on every route, wide primaries are converted, HDR only on demand.
+//! Images with the colours of video: SDR codes are kept on every route, wide primaries are converted, HDR only on
+//! demand.
 
 use crate::support::icc_files::{SRGB, rgb_profile, segments, table};
 use crate::support::image_files::{
-    chunk, jpeg, jpeg_with_profile, png, png_with_profile, profile_chunk, webp_with_profile,
-    with_chunks,
+    chunk, jpeg, jpeg_with_profile, png, png_with_profile, profile_chunk, webp_with_profile, with_chunks,
 };
 use crate::support::run::{Bench, words};
 use darkqa_pictures::decode_rule::ColourRule;
@@ -11,28 +11,14 @@ use darkqa_pictures::{DecodeRule, ImageFile};
 use image::{Rgb, RgbImage};
 
 /// XYZ of the primaries of BT.2020 at D50 (ITU-R BT.2020-2, adapted by Bradford).
-const BT2020: [[f64; 3]; 3] = [
-    [0.67348, 0.27904, -0.00194],
-    [0.16567, 0.67534, 0.02998],
-    [0.12505, 0.04562, 0.79685],
-];
+const BT2020: [[f64; 3]; 3] = [[0.67348, 0.27904, -0.00194], [0.16567, 0.67534, 0.02998], [0.12505, 0.04562, 0.79685]];
 
 /// The values of `cHRM`: white, red, green and blue.
-const SRGB_CHRM: [u32; 8] = [
-    31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000,
-];
-const SMPTE_CHRM: [u32; 8] = [
-    31_270, 32_900, 63_000, 34_000, 31_000, 59_500, 15_500, 7_000,
-];
-const PAL_CHRM: [u32; 8] = [
-    31_270, 32_900, 64_000, 33_000, 29_000, 60_000, 15_000, 6_000,
-];
-const BT2020_CHRM: [u32; 8] = [
-    31_270, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600,
-];
-const P3_CHRM: [u32; 8] = [
-    31_270, 32_900, 68_000, 32_000, 26_500, 69_000, 15_000, 6_000,
-];
+const SRGB_CHRM: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 30_000, 60_000, 15_000, 6_000];
+const SMPTE_CHRM: [u32; 8] = [31_270, 32_900, 63_000, 34_000, 31_000, 59_500, 15_500, 7_000];
+const PAL_CHRM: [u32; 8] = [31_270, 32_900, 64_000, 33_000, 29_000, 60_000, 15_000, 6_000];
+const BT2020_CHRM: [u32; 8] = [31_270, 32_900, 70_800, 29_200, 17_000, 79_700, 13_100, 4_600];
+const P3_CHRM: [u32; 8] = [31_270, 32_900, 68_000, 32_000, 26_500, 69_000, 15_000, 6_000];
 
 /// Grey, a colour, dark grey and white.
 const PIXELS: [[u8; 3]; 4] = [[128; 3], [200, 100, 50], [60; 3], [255; 3]];
@@ -50,9 +36,7 @@ fn image() -> RgbImage {
 
 /// [`PIXELS`] in 16 bits.
 fn deep_png() -> Vec<u8> {
-    let image = image::ImageBuffer::from_fn(4, 1, |x, _| {
-        Rgb(PIXELS[x as usize].map(|code| u16::from(code) * 257))
-    });
+    let image = image::ImageBuffer::from_fn(4, 1, |x, _| Rgb(PIXELS[x as usize].map(|code| u16::from(code) * 257)));
     let mut file = std::io::Cursor::new(Vec::new());
     image.write_to(&mut file, image::ImageFormat::Png).unwrap();
     file.into_inner()
@@ -71,10 +55,7 @@ fn chrm(numbers: [u32; 8]) -> Vec<u8> {
 }
 
 fn file(bytes: Vec<u8>, colour: ColourRule) -> ImageFile {
-    let rule = DecodeRule {
-        colour,
-        ..DecodeRule::default()
-    };
+    let rule = DecodeRule { colour, ..DecodeRule::default() };
     ImageFile::new(bytes, "a file".to_owned(), rule)
 }
 
@@ -114,10 +95,7 @@ fn codes_of_sdr_video_are_kept_in_png() {
 #[test]
 fn codes_of_sdr_video_are_kept_with_a_profile() {
     // The curve of BT.709 in segments, and the gamma of 1.961 that approximates it.
-    let camera = segments(
-        3,
-        &[1.0 / 0.45, 1.0 / 1.099, 0.099 / 1.099, 1.0 / 4.5, 0.081],
-    );
+    let camera = segments(3, &[1.0 / 0.45, 1.0 / 1.099, 0.099 / 1.099, 1.0 / 4.5, 0.081]);
     for curve in [camera, table(&[502])] {
         let profile = rgb_profile("Rec. ITU-R BT.709-5", SRGB, &curve);
         let png = png_with_profile(&image(), &profile);
@@ -174,18 +152,11 @@ fn hdr_is_converted_on_demand_alone() {
     // A profile of HDR states code points beside its tables.
     let hdr_profile = |points: [u8; 4]| {
         let data = [&b"cicp\0\0\0\0"[..], &points].concat();
-        let profile = crate::support::icc_files::profile(
-            *b"RGB ",
-            &[(*b"cicp", data), (*b"A2B0", vec![0; 64])],
-        );
+        let profile = crate::support::icc_files::profile(*b"RGB ", &[(*b"cicp", data), (*b"A2B0", vec![0; 64])]);
         profile_chunk(&profile)
     };
     for (chunks, expected, name) in [
-        (
-            vec![cicp([9, 18, 0, 1]), chrm(BT2020_CHRM)],
-            OF_HLG,
-            "HLG (HDR), BT.2020",
-        ),
+        (vec![cicp([9, 18, 0, 1]), chrm(BT2020_CHRM)], OF_HLG, "HLG (HDR), BT.2020"),
         (vec![cicp([9, 16, 0, 1])], OF_PQ, "PQ (HDR), BT.2020"),
         (vec![cicp([2, 16, 0, 1])], OF_PQ, "PQ (HDR), BT.2020"),
         (vec![hdr_profile([9, 16, 0, 1])], OF_PQ, "PQ (HDR), BT.2020"),
@@ -194,10 +165,7 @@ fn hdr_is_converted_on_demand_alone() {
             let bytes = with_chunks(&image, &chunks);
             let refused = file(bytes.clone(), ColourRule::Convert);
             let problem = refused.decode().unwrap_err().to_string();
-            assert!(
-                problem.contains(name) && problem.contains("--decode colour=clip"),
-                "{problem}"
-            );
+            assert!(problem.contains(name) && problem.contains("--decode colour=clip"), "{problem}");
             assert_eq!(refused.check().unwrap_err().to_string(), problem);
             let clipped = file(bytes.clone(), ColourRule::Clip);
             assert_near(&clipped, expected);
@@ -210,16 +178,9 @@ fn hdr_is_converted_on_demand_alone() {
         }
     }
     // Other images are the same by both rules.
-    for bytes in [
-        png(&image()),
-        with_chunks(&png(&image()), &[cicp([12, 13, 0, 1])]),
-    ] {
-        let [convert, clip] =
-            [ColourRule::Convert, ColourRule::Clip].map(|rule| file(bytes.clone(), rule));
-        assert_eq!(
-            (pixels(&convert), convert.digest()),
-            (pixels(&clip), clip.digest())
-        );
+    for bytes in [png(&image()), with_chunks(&png(&image()), &[cicp([12, 13, 0, 1])])] {
+        let [convert, clip] = [ColourRule::Convert, ColourRule::Clip].map(|rule| file(bytes.clone(), rule));
+        assert_eq!((pixels(&convert), convert.digest()), (pixels(&clip), clip.digest()));
     }
 }
 
@@ -229,20 +190,14 @@ fn wide_primaries_without_a_transfer_are_refused() {
     for chunks in [vec![chrm(BT2020_CHRM)], vec![cicp([9, 2, 0, 1])]] {
         let file = file(with_chunks(&deep_png(), &chunks), ColourRule::Clip);
         let problem = file.decode().unwrap_err().to_string();
-        assert!(
-            problem.contains("no transfer is stated: the codes may be HDR"),
-            "{problem}"
-        );
+        assert!(problem.contains("no transfer is stated: the codes may be HDR"), "{problem}");
     }
 }
 
 #[test]
 fn the_flag_in_the_message_about_hdr_helps() {
     let bench = Bench::new();
-    bench.file(
-        "set/a.png",
-        with_chunks(&deep_png(), &[cicp([9, 18, 0, 1])]),
-    );
+    bench.file("set/a.png", with_chunks(&deep_png(), &[cicp([9, 18, 0, 1])]));
     let refused = bench.call(&words("synthesize set --levels L0 --out dark"));
     insta::assert_snapshot!(refused.messages(), @"
     exit code: 1
@@ -252,12 +207,7 @@ fn the_flag_in_the_message_about_hdr_helps() {
     ");
     let line = "synthesize set --levels L0 --out dark --decode colour=clip";
     let said = bench.call(&words(line)).ended(0).stderr;
-    assert!(
-        said.contains("converted to sRGB by --decode colour=clip"),
-        "{said}"
-    );
-    let made = image::open(bench.path("dark/a_L0.png"))
-        .unwrap()
-        .into_rgb8();
+    assert!(said.contains("converted to sRGB by --decode colour=clip"), "{said}");
+    let made = image::open(bench.path("dark/a_L0.png")).unwrap().into_rgb8();
     assert_eq!(made[(0, 0)].0, [137; 3]);
 }

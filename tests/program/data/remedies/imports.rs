@@ -139,11 +139,7 @@ pub(super) const ROWS: &[Remedy] = &[
         says: "the folder has frames already; --force overwrites them, another --out keeps both",
         state: |bench| {
             recording(bench);
-            super::call(
-                bench,
-                "import mcap drive.mcap --topic /front/image_raw --out out",
-            )
-            .ended(0);
+            super::call(bench, "import mcap drive.mcap --topic /front/image_raw --out out").ended(0);
         },
         command: "import mcap drive.mcap --topic /front/image_raw --out out",
         printed: "--force overwrites them",
@@ -232,14 +228,8 @@ const PYTHON: &str = "tests/program/data/remedies/python.rs";
 
 /// Messages whose remedies are not followed here.
 pub(super) const UNFOLLOWED: &[Unfollowed] = &[
-    Unfollowed {
-        says: "take a newer darkqa-eval, or the revision v3.0",
-        why: Why::Cannot(NETWORK),
-    },
-    Unfollowed {
-        says: "The hub may have a newer revision",
-        why: Why::Cannot(NETWORK),
-    },
+    Unfollowed { says: "take a newer darkqa-eval, or the revision v3.0", why: Why::Cannot(NETWORK) },
+    Unfollowed { says: "The hub may have a newer revision", why: Why::Cannot(NETWORK) },
     Unfollowed {
         says: "install it (apt install ffmpeg, brew install ffmpeg)",
         why: Why::Cannot("it installs a program on the machine"),
@@ -248,29 +238,14 @@ pub(super) const UNFOLLOWED: &[Unfollowed] = &[
         says: "the installed one has no decoder for",
         why: Why::Cannot("it installs a program on the machine"),
     },
-    Unfollowed {
-        says: "-c:v ffv1 converted.mkv",
-        why: Why::Test(PYTHON, "colours_of_videos_are_converted"),
-    },
+    Unfollowed { says: "-c:v ffv1 converted.mkv", why: Why::Test(PYTHON, "colours_of_videos_are_converted") },
     Unfollowed {
         says: "zstd -d {file} -o {new}",
-        why: Why::Test(
-            "tests/program/data/remedies/mod.rs",
-            "remedies_of_imports_lead_on",
-        ),
+        why: Why::Test("tests/program/data/remedies/mod.rs", "remedies_of_imports_lead_on"),
     },
-    Unfollowed {
-        says: "convert it, which changes no image:",
-        why: Why::Test(PYTHON, "bags_are_converted"),
-    },
-    Unfollowed {
-        says: "rosbags-convert --src {old}",
-        why: Why::Test(PYTHON, "bags_are_converted"),
-    },
-    Unfollowed {
-        says: "darkqa-eval import mcap {}",
-        why: Why::Test(PYTHON, "bags_are_converted"),
-    },
+    Unfollowed { says: "convert it, which changes no image:", why: Why::Test(PYTHON, "bags_are_converted") },
+    Unfollowed { says: "rosbags-convert --src {old}", why: Why::Test(PYTHON, "bags_are_converted") },
+    Unfollowed { says: "darkqa-eval import mcap {}", why: Why::Test(PYTHON, "bags_are_converted") },
     Unfollowed {
         says: "make a video of its messages, with their mean rate",
         why: Why::Test(PYTHON, "video_of_a_topic_is_extracted"),
@@ -279,14 +254,8 @@ pub(super) const UNFOLLOWED: &[Unfollowed] = &[
         says: "without --out prints the commands that make a video file of it",
         why: Why::Test(PYTHON, "video_of_a_topic_is_extracted"),
     },
-    Unfollowed {
-        says: "--at: no frame at one of its times in",
-        why: Why::NoRemedy,
-    },
-    Unfollowed {
-        says: "of --at",
-        why: Why::NoRemedy,
-    },
+    Unfollowed { says: "--at: no frame at one of its times in", why: Why::NoRemedy },
+    Unfollowed { says: "of --at", why: Why::NoRemedy },
     Unfollowed {
         says: "the video does not state its duration, over which frames would be spread; use --every",
         why: Why::Test(PYTHON, "video_without_duration_needs_every"),

@@ -1,6 +1,8 @@
-//! Remedies in messages about data, imports and enhancers: each is followed as printed, in the state that printed it, and must lead on.
+//! Remedies in messages about data, imports and enhancers: each is followed as printed, in the state that printed it,
+//! and must lead on.
 //!
-//! [`every_remedy_has_a_row`] finds the messages with a command or a flag in the source, so that a new one needs a row here.
+//! [`every_remedy_has_a_row`] finds the messages with a command or a flag in the source, so that a new one needs a row
+//! here.
 
 mod enhancers;
 mod imports;
@@ -30,14 +32,7 @@ struct Remedy {
     followed: &'static str,
 }
 
-const ROW: Remedy = Remedy {
-    says: "",
-    state: nothing,
-    command: "",
-    printed: "",
-    effect: nothing,
-    followed: "",
-};
+const ROW: Remedy = Remedy { says: "", state: nothing, command: "", printed: "", effect: nothing, followed: "" };
 
 /// A message with a flag or a command whose remedy no row follows.
 struct Unfollowed {
@@ -57,22 +52,13 @@ enum Why {
 }
 
 /// Folders and files with messages about data, imports and enhancers, in `src/`.
-const PLACES: [&str; 6] = [
-    "data/",
-    "enhance/",
-    "engine/images/enhancement/",
-    "commands/import",
-    "commands/enhance/",
-    "commands/realism/",
-];
+const PLACES: [&str; 6] =
+    ["data/", "enhance/", "engine/images/enhancement/", "commands/import", "commands/enhance/", "commands/realism/"];
 
 fn nothing(_: &Bench) {}
 
 fn rows() -> impl Iterator<Item = &'static Remedy> {
-    sets::ROWS
-        .iter()
-        .chain(imports::ROWS)
-        .chain(enhancers::ROWS)
+    sets::ROWS.iter().chain(imports::ROWS).chain(enhancers::ROWS)
 }
 
 fn unfollowed() -> impl Iterator<Item = &'static Unfollowed> {
@@ -84,8 +70,7 @@ fn unfollowed() -> impl Iterator<Item = &'static Unfollowed> {
 fn photograph(bench: &Bench, name: &str, shade: u8) {
     let path = bench.path(name);
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    let image =
-        image::RgbImage::from_fn(96, 64, |x, y| image::Rgb([x as u8 + shade, y as u8, shade]));
+    let image = image::RgbImage::from_fn(96, 64, |x, y| image::Rgb([x as u8 + shade, y as u8, shade]));
     image.save(path).unwrap();
 }
 
@@ -113,10 +98,7 @@ fn problem(row: &Remedy) -> Option<String> {
     let first = printed(&call(&bench, row.command));
     for part in [row.says, row.printed] {
         if !first.contains(part) {
-            return Some(format!(
-                "`{}` does not print {part:?}: {first}",
-                row.command
-            ));
+            return Some(format!("`{}` does not print {part:?}: {first}", row.command));
         }
     }
     (row.effect)(&bench);
@@ -131,10 +113,8 @@ fn problem(row: &Remedy) -> Option<String> {
 
 /// Follows each remedy, and fails with all that do not lead on.
 fn follow(rows: &[Remedy]) {
-    let problems: Vec<String> = rows
-        .iter()
-        .filter_map(|row| Some(format!("{:?}: {}", row.says, problem(row)?)))
-        .collect();
+    let problems: Vec<String> =
+        rows.iter().filter_map(|row| Some(format!("{:?}: {}", row.says, problem(row)?))).collect();
     assert!(problems.is_empty(), "\n{}", problems.join("\n\n"));
 }
 
@@ -160,26 +140,15 @@ fn remedies_about_enhancers_lead_on() {
 
 /// The flags and commands in a text.
 fn commands(text: &str) -> BTreeSet<String> {
-    let programs = [
-        "ffmpeg",
-        "python",
-        "python3",
-        "rosbags-convert",
-        "zstd",
-        "hf",
-    ];
+    let programs = ["ffmpeg", "python", "python3", "rosbags-convert", "zstd", "hf"];
     let managers = ["git", "pip", "apt", "brew", "conda"];
     let is_sign = |sign: char| !sign.is_alphanumeric() && !"-_".contains(sign);
-    let words: Vec<&str> = text
-        .split_whitespace()
-        .map(|word| word.trim_matches(is_sign))
-        .collect();
+    let words: Vec<&str> = text.split_whitespace().map(|word| word.trim_matches(is_sign)).collect();
     let mut found = BTreeSet::new();
     for (at, word) in words.iter().enumerate() {
         let next = words.get(at + 1).copied().unwrap_or_default();
-        let is_flag = word
-            .strip_prefix("--")
-            .is_some_and(|name| name.starts_with(|sign: char| sign.is_ascii_lowercase()));
+        let is_flag =
+            word.strip_prefix("--").is_some_and(|name| name.starts_with(|sign: char| sign.is_ascii_lowercase()));
         let is_command = programs.contains(word) && next.starts_with('-')
             || managers.contains(word) && ["install", "lfs", "config"].contains(&next)
             || *word == "darkqa-eval" && !next.is_empty();
@@ -194,10 +163,7 @@ fn commands(text: &str) -> BTreeSet<String> {
 /// True for a name of a flag, such as `--read split`, which is the place of an error and no message.
 fn is_name(text: &str) -> bool {
     let mut words = text.split(' ');
-    let is_word = |word: &str| {
-        word.chars()
-            .all(|sign| sign.is_ascii_lowercase() || sign == '-')
-    };
+    let is_word = |word: &str| word.chars().all(|sign| sign.is_ascii_lowercase() || sign == '-');
     words.clone().count() <= 2 && words.all(is_word)
 }
 
@@ -219,19 +185,14 @@ fn every_remedy_has_a_row() {
             continue;
         }
         let own: Vec<&Remedy> = rows().filter(|row| text.contains(row.says)).collect();
-        let followed: BTreeSet<String> = own
-            .iter()
-            .flat_map(|row| self::commands(row.printed))
-            .collect();
+        let followed: BTreeSet<String> = own.iter().flat_map(|row| self::commands(row.printed)).collect();
         let missing: Vec<&String> = commands.difference(&followed).collect();
         if !missing.is_empty() {
             problems.push(format!("{place}: no row follows {missing:?} of {text:?}"));
         }
     }
     // Rows whose message is no longer in the source.
-    let says = rows()
-        .map(|row| row.says)
-        .chain(unfollowed().map(|row| row.says));
+    let says = rows().map(|row| row.says).chain(unfollowed().map(|row| row.says));
     for says in says {
         if !all.iter().any(|text| text.contains(says)) {
             problems.push(format!("no message has the words {says:?}"));

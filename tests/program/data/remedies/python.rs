@@ -10,9 +10,7 @@ use crate::support::tools::{skip, succeeds};
 
 /// True if Python has these packages; else the test is skipped.
 fn has_packages(packages: &str) -> bool {
-    let has = ["python", "python3"]
-        .iter()
-        .all(|python| succeeds(python, &["-c", &format!("import {packages}")]));
+    let has = ["python", "python3"].iter().all(|python| succeeds(python, &["-c", &format!("import {packages}")]));
     if !has {
         skip(&format!("no Python with {packages}"));
     }
@@ -20,10 +18,7 @@ fn has_packages(packages: &str) -> bool {
 }
 
 fn has_programs(programs: &[&str]) -> bool {
-    let missing: Vec<&&str> = programs
-        .iter()
-        .filter(|name| !super::is_installed(name))
-        .collect();
+    let missing: Vec<&&str> = programs.iter().filter(|name| !super::is_installed(name)).collect();
     if !missing.is_empty() {
         skip(&format!("no {missing:?}"));
     }
@@ -32,11 +27,7 @@ fn has_programs(programs: &[&str]) -> bool {
 
 /// Runs a program of Python in a folder.
 fn python(folder: &Path, program: &str) {
-    let run = called(
-        Command::new("python")
-            .args(["-c", program])
-            .current_dir(folder),
-    );
+    let run = called(Command::new("python").args(["-c", program]).current_dir(folder));
     run.ended(0);
 }
 
@@ -48,18 +39,14 @@ fn shell(folder: &Path, line: &str) {
 /// A message from a text on, as printed; without its breaks of lines.
 fn from(message: &str, start: &str) -> String {
     let message = one_line(message);
-    let at = message
-        .find(start)
-        .unwrap_or_else(|| panic!("{start:?} in {message}"));
+    let at = message.find(start).unwrap_or_else(|| panic!("{start:?} in {message}"));
     message[at..].to_owned()
 }
 
 /// The part of a message from one text until another.
 fn between(message: &str, start: &str, end: &str) -> String {
     let rest = from(message, start);
-    let end = rest
-        .find(end)
-        .unwrap_or_else(|| panic!("{end:?} in {rest}"));
+    let end = rest.find(end).unwrap_or_else(|| panic!("{end:?} in {rest}"));
     rest[..end].to_owned()
 }
 
@@ -89,28 +76,15 @@ fn saved_folders_are_converted() {
     for (folder, more) in [("one", ""), ("splits", " --read split=train")] {
         let check = format!("check --model random --levels L0 --data {folder}");
         let message = refusal(&bench, &check);
-        shell(
-            &bench.path(folder),
-            &between(&message, "python -c", " in it"),
-        );
+        shell(&bench.path(folder), &between(&message, "python -c", " in it"));
         call(&bench, &format!("{check}{more}")).ended(0);
     }
     // A file alone.
     let bench = Bench::new();
     python(&bench.path(""), &format!("{DATA_SET}d.save_to_disk('one')"));
-    let message = refusal(
-        &bench,
-        "check --model random --data one/data-00000-of-00001.arrow",
-    );
-    shell(
-        &bench.path("one"),
-        &between(&message, "python -c", " in its folder"),
-    );
-    call(
-        &bench,
-        "check --model random --levels L0 --data one/set.parquet",
-    )
-    .ended(0);
+    let message = refusal(&bench, "check --model random --data one/data-00000-of-00001.arrow");
+    shell(&bench.path("one"), &between(&message, "python -c", " in its folder"));
+    call(&bench, "check --model random --levels L0 --data one/set.parquet").ended(0);
 }
 
 #[test]
@@ -123,11 +97,7 @@ fn parquet_is_compressed_again() {
     python(&bench.path(""), &format!("{DATA_SET}{write}"));
     let message = refusal(&bench, "check --model random --levels L0 --data a.parquet");
     shell(&bench.path(""), &from(&message, "python -c"));
-    call(
-        &bench,
-        "check --model random --levels L0 --data again.parquet",
-    )
-    .ended(0);
+    call(&bench, "check --model random --levels L0 --data again.parquet").ended(0);
 }
 
 /// Shards as `webdataset.ShardWriter` writes them: a TAR file of images and JSON with the same names.
@@ -153,15 +123,9 @@ for shard in (0, 1):
         let check = ["check", "--model", "random", "--levels", "L0", "--data"];
         let refused = bench.call(&[&check[..], &[data]].concat());
         let message = refused.stdout + &refused.stderr;
-        shell(
-            &bench.path(""),
-            &between(&message, "python -c", "; then --data unpacked"),
-        );
+        shell(&bench.path(""), &between(&message, "python -c", "; then --data unpacked"));
         let called = bench.call(&[&check[..], &["unpacked"]].concat()).ended(0);
-        assert!(
-            called.stdout.contains(&format!("{questions} questions")),
-            "{called:?}"
-        );
+        assert!(called.stdout.contains(&format!("{questions} questions")), "{called:?}");
         let home = bench.call(&[&check[..], &["unpacked", "--ask", "home"]].concat());
         home.ended(0);
     }
@@ -192,10 +156,7 @@ with Two('two', version=9, storage_plugin=StoragePlugin.SQLITE3) as w: fill(w, g
     python(&bench.path(""), write);
     for bag in ["old.bag", "two"] {
         let message = refusal(&bench, &format!("import rosbag {bag}"));
-        shell(
-            &bench.path(""),
-            &between(&message, "rosbags-convert", " darkqa-eval"),
-        );
+        shell(&bench.path(""), &between(&message, "rosbags-convert", " darkqa-eval"));
         let import = message.lines().last().unwrap().trim();
         let import = import.strip_prefix("darkqa-eval ").unwrap();
         let called = call(&bench, &format!("{import} --every 0 --out frames-{bag}")).ended(0);
@@ -219,24 +180,14 @@ fn video_of_a_topic_is_extracted() {
     let starts: Vec<usize> = starts.chain([stream.len()]).collect();
     let definition = "std_msgs/Header header\nstring format\nuint8[] data\n================================================================================\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n================================================================================\nMSG: builtin_interfaces/Time\nint32 sec\nuint32 nanosec\n";
     let mut records = Records::default();
-    records.topic(
-        1,
-        "/cam",
-        "sensor_msgs/msg/CompressedImage",
-        "cdr",
-        definition,
-    );
+    records.topic(1, "/cam", "sensor_msgs/msg/CompressedImage", "cdr", definition);
     for (number, unit) in starts.windows(2).enumerate() {
         let at = number as f64 / 5.0;
         records.message(1, at, &compressed(at, "h264", &stream[unit[0]..unit[1]]));
     }
     bench.file("drive.mcap", records.file());
     let message = refusal(&bench, "import mcap drive.mcap");
-    let lines: Vec<&str> = message
-        .lines()
-        .map(str::trim)
-        .skip_while(|line| !line.starts_with("pip install"))
-        .collect();
+    let lines: Vec<&str> = message.lines().map(str::trim).skip_while(|line| !line.starts_with("pip install")).collect();
     let [_, decode, encode, import] = lines[..] else {
         panic!("{message}");
     };
@@ -251,11 +202,7 @@ fn colours_of_videos_are_converted() {
     if !has_programs(&["ffmpeg"]) || !succeeds("ffmpeg", &["-v", "error", "-h", "filter=zscale"]) {
         return;
     }
-    for colours in [
-        "colorspace=ycgco",
-        "color_trc=linear",
-        "color_primaries=bt2020",
-    ] {
+    for colours in ["colorspace=ycgco", "color_trc=linear", "color_primaries=bt2020"] {
         let bench = Bench::new();
         let make = format!(
             "ffmpeg -v error -f lavfi -i testsrc2=size=96x64:rate=5:duration=1 -vf format=yuv444p,setparams={colours} -c:v ffv1 video.mkv"
@@ -265,11 +212,7 @@ fn colours_of_videos_are_converted() {
         let convert = between(&message, "ffmpeg -i video.mkv", "converted.mkv");
         let convert = convert.replace("arib-std-b67", "bt709");
         shell(&bench.path(""), &format!("{convert}converted.mkv"));
-        let called = call(
-            &bench,
-            "import video converted.mkv --every 0 --out converted",
-        )
-        .ended(0);
+        let called = call(&bench, "import video converted.mkv --every 0 --out converted").ended(0);
         assert!(called.stdout.contains("5 frames"), "{colours}: {called:?}");
     }
 }

@@ -5,18 +5,14 @@ use crate::support::image_files::png;
 use crate::support::lerobot;
 use crate::support::parquet_file::{Column, table};
 
-const QUESTION: &str =
-    r#"{"question": "Is it red?", "choices": ["yes", "no"], "answer": 0, "image": "1.png"}"#;
+const QUESTION: &str = r#"{"question": "Is it red?", "choices": ["yes", "no"], "answer": 0, "image": "1.png"}"#;
 
 fn photographs(bench: &Bench) {
     for (number, shade) in [(1, 100), (2, 40)] {
         photograph(bench, &format!("photos/{number}.png"), shade);
     }
     bench.file("q.jsonl", QUESTION);
-    bench.file(
-        "bank.jsonl",
-        r#"{"id": "red", "question": "Is it red?", "choices": ["yes", "no"]}"#,
-    );
+    bench.file("bank.jsonl", r#"{"id": "red", "question": "Is it red?", "choices": ["yes", "no"]}"#);
 }
 
 fn pairs(bench: &Bench) {
@@ -51,11 +47,8 @@ fn set(bench: &Bench, name: &str, lines: &[&str]) {
 
 /// A Parquet file of two rows with images, questions, options and answers.
 fn parquet(bench: &Bench, path: &str) {
-    let images = [100, 40].map(|shade| {
-        png(&image::RgbImage::from_fn(48, 32, |x, y| {
-            image::Rgb([x as u8 + shade, y as u8, shade])
-        }))
-    });
+    let images = [100, 40]
+        .map(|shade| png(&image::RgbImage::from_fn(48, 32, |x, y| image::Rgb([x as u8 + shade, y as u8, shade]))));
     let texts = |texts: [&str; 2]| Column::Texts(texts.map(str::to_owned).to_vec());
     let columns = [
         ("image", Column::Images(images.to_vec())),
@@ -68,17 +61,8 @@ fn parquet(bench: &Bench, path: &str) {
 
 /// A Parquet file of two rows with images in a column whose name says nothing.
 fn images_alone(bench: &Bench, path: &str) {
-    let images = [100, 40].map(|shade| {
-        png(&image::RgbImage::from_pixel(
-            48,
-            32,
-            image::Rgb([shade, 9, 9]),
-        ))
-    });
-    bench.file(
-        path,
-        table([("observation.front", Column::Images(images.to_vec()))]),
-    );
+    let images = [100, 40].map(|shade| png(&image::RgbImage::from_pixel(48, 32, image::Rgb([shade, 9, 9]))));
+    bench.file(path, table([("observation.front", Column::Images(images.to_vec()))]));
 }
 
 fn saved_to_disk(bench: &Bench) {
@@ -89,10 +73,7 @@ fn saved_to_disk(bench: &Bench) {
 }
 
 fn saved_splits(bench: &Bench) {
-    bench.file(
-        "saved/dataset_dict.json",
-        r#"{"splits": ["train", "test"]}"#,
-    );
+    bench.file("saved/dataset_dict.json", r#"{"splits": ["train", "test"]}"#);
     bench.file("saved/train/data-00000-of-00001.arrow", "");
 }
 
@@ -112,31 +93,21 @@ fn splits(bench: &Bench) {
 
 /// Two questions, one with two images.
 fn two_images(bench: &Bench) {
-    let both = r#"{"question": "Are they equal?", "choices": ["yes", "no"], "answer": 1, "images": ["1.png", "2.png"]}"#;
-    set(
-        bench,
-        "q.jsonl",
-        &[
-            both,
-            &QUESTION.replace("\"image\": \"1.png\"", "\"images\": [\"1.png\"]"),
-        ],
-    );
+    let both =
+        r#"{"question": "Are they equal?", "choices": ["yes", "no"], "answer": 1, "images": ["1.png", "2.png"]}"#;
+    set(bench, "q.jsonl", &[both, &QUESTION.replace("\"image\": \"1.png\"", "\"images\": [\"1.png\"]")]);
 }
 
 /// A folder of photographs, and questions of which one names no photograph.
 fn one_unmatched(bench: &Bench) {
     photographs(bench);
-    bench.file(
-        "q.jsonl",
-        [QUESTION, &QUESTION.replace("1.png", "9.png")].join("\n"),
-    );
+    bench.file("q.jsonl", [QUESTION, &QUESTION.replace("1.png", "9.png")].join("\n"));
 }
 
 fn families(bench: &Bench) {
     let rows = (0..100).map(|family| format!("Is it {family}?,1.png,yes,no,A,f{family},k"));
-    let lines: Vec<String> = std::iter::once("question,image,A,B,answer,category,kind".to_owned())
-        .chain(rows)
-        .collect();
+    let lines: Vec<String> =
+        std::iter::once("question,image,A,B,answer,category,kind".to_owned()).chain(rows).collect();
     let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
     set(bench, "q.csv", &lines);
 }
@@ -260,11 +231,7 @@ pub(super) const ROWS: &[Remedy] = &[
     Remedy {
         says: "names the signs between them",
         state: |bench| {
-            set(
-                bench,
-                "q.csv",
-                &["question,image,options,answer", "Which?,1.png,red|blue,red"],
-            );
+            set(bench, "q.csv", &["question,image,options,answer", "Which?,1.png,red|blue,red"]);
         },
         command: CHECK,
         printed: "--map options='options:split(|)'",
@@ -274,14 +241,7 @@ pub(super) const ROWS: &[Remedy] = &[
     Remedy {
         says: "neither options nor answers among its columns",
         state: |bench| {
-            set(
-                bench,
-                "q.csv",
-                &[
-                    "question,image,eins,zwei",
-                    "Which?,1.png,\"[\"\"red\"\", \"\"blue\"\"]\",red",
-                ],
-            );
+            set(bench, "q.csv", &["question,image,eins,zwei", "Which?,1.png,\"[\"\"red\"\", \"\"blue\"\"]\",red"]);
         },
         command: CHECK,
         printed: "--map options=COLUMN,answer=COLUMN names them",
@@ -291,15 +251,7 @@ pub(super) const ROWS: &[Remedy] = &[
     Remedy {
         says: "neither options nor answers among its columns",
         state: |bench| {
-            set(
-                bench,
-                "q.csv",
-                &[
-                    "question,image,eins",
-                    "Is it red?,1.png,yes",
-                    "Is it blue?,2.png,no",
-                ],
-            );
+            set(bench, "q.csv", &["question,image,eins", "Is it red?,1.png,yes", "Is it blue?,2.png,no"]);
         },
         command: CHECK,
         printed: "--map answer=COLUMN those of yes/no questions",
@@ -326,11 +278,7 @@ pub(super) const ROWS: &[Remedy] = &[
         says: "a test split without them? (--ask FILE",
         state: |bench| {
             photographs(bench);
-            set(
-                bench,
-                "q.csv",
-                &["question,image,A,B", "Which?,1.png,red,blue"],
-            );
+            set(bench, "q.csv", &["question,image,A,B", "Which?,1.png,red,blue"]);
         },
         command: "check --model random --levels L0 --data set/q.csv",
         printed: "--ask FILE asks",
@@ -344,10 +292,7 @@ pub(super) const ROWS: &[Remedy] = &[
                 set(
                     bench,
                     &format!("{split}.csv"),
-                    &[
-                        "question,image,A,B,answer",
-                        &format!("Which?,1.png,red,blue,{answer}"),
-                    ],
+                    &["question,image,A,B,answer", &format!("Which?,1.png,red,blue,{answer}")],
                 );
             }
         },
@@ -360,11 +305,7 @@ pub(super) const ROWS: &[Remedy] = &[
         says: "a test split without them? --read split names another",
         state: |bench| {
             photographs(bench);
-            set(
-                bench,
-                "test.csv",
-                &["question,image,A,B,answer", "Which?,1.png,red,blue,"],
-            );
+            set(bench, "test.csv", &["question,image,A,B,answer", "Which?,1.png,red,blue,"]);
         },
         command: "check --model random --levels L0 --data set/test.csv",
         printed: "--ask FILE asks questions without answers",
@@ -398,11 +339,7 @@ pub(super) const ROWS: &[Remedy] = &[
     Remedy {
         says: "which is not there",
         state: |bench| {
-            set(
-                bench,
-                "q.csv",
-                &["Frage_1,image,A,B,answer", "Which?,1.png,red,blue,A"],
-            );
+            set(bench, "q.csv", &["Frage_1,image,A,B,answer", "Which?,1.png,red,blue,A"]);
         },
         command: "check --model random --levels L0 --data set --map question=frage1",
         printed: "--map names the column \"frage1\", which is not there; did you mean \"Frage_1\"?",
@@ -544,11 +481,7 @@ pub(super) const ROWS: &[Remedy] = &[
     Remedy {
         says: "scores questions together by",
         state: |bench| {
-            set(
-                bench,
-                "q.csv",
-                &["question,image,A,B,answer", "Which?,1.png,red,blue,A"],
-            );
+            set(bench, "q.csv", &["question,image,A,B,answer", "Which?,1.png,red,blue,A"]);
         },
         command: "--model random --levels L0 --out run --data mmvp:set --map image=image",
         printed: "--map group=COLUMN names another",
@@ -575,11 +508,7 @@ pub(super) const ROWS: &[Remedy] = &[
         says: "allows the folder that it names",
         state: |bench| {
             photograph(bench, "other/1.png", 9);
-            set(
-                bench,
-                "q.jsonl",
-                &[&QUESTION.replace("1.png", "../other/1.png")],
-            );
+            set(bench, "q.jsonl", &[&QUESTION.replace("1.png", "../other/1.png")]);
         },
         command: CHECK,
         printed: "--data-root ",
@@ -649,24 +578,12 @@ pub(super) const ROWS: &[Remedy] = &[
 
 /// Messages whose remedies are not followed here.
 pub(super) const UNFOLLOWED: &[Unfollowed] = &[
-    Unfollowed {
-        says: "questions in it are ignored, and those of --ask are asked",
-        why: Why::NoRemedy,
-    },
-    Unfollowed {
-        says: "EV both images have nearly the same light",
-        why: Why::NoRemedy,
-    },
-    Unfollowed {
-        says: "is ignored: the questions are those of --ask",
-        why: Why::NoRemedy,
-    },
+    Unfollowed { says: "questions in it are ignored, and those of --ask are asked", why: Why::NoRemedy },
+    Unfollowed { says: "EV both images have nearly the same light", why: Why::NoRemedy },
+    Unfollowed { says: "is ignored: the questions are those of --ask", why: Why::NoRemedy },
     Unfollowed {
         says: "--map {}={}",
-        why: Why::Test(
-            "src/data/ready_made/tests/user_shapes.rs",
-            "error_for_conversations_suggests_a_map",
-        ),
+        why: Why::Test("src/data/ready_made/tests/user_shapes.rs", "error_for_conversations_suggests_a_map"),
     },
     Unfollowed {
         says: "--skip bad={}%",
@@ -677,24 +594,15 @@ pub(super) const UNFOLLOWED: &[Unfollowed] = &[
     },
     Unfollowed {
         says: "allows the folder that it leads to",
-        why: Why::Test(
-            "tests/program/data/ready_made.rs",
-            "outside_links_are_named_and_skipped",
-        ),
+        why: Why::Test("tests/program/data/ready_made.rs", "outside_links_are_named_and_skipped"),
     },
     Unfollowed {
         says: "archives such as WebDataset shards (.tar) are not read",
-        why: Why::Test(
-            "tests/program/data/remedies/python.rs",
-            "shards_are_unpacked",
-        ),
+        why: Why::Test("tests/program/data/remedies/python.rs", "shards_are_unpacked"),
     },
     Unfollowed {
         says: "which is not read; write it again, as again.parquet",
-        why: Why::Test(
-            "tests/program/data/remedies/python.rs",
-            "parquet_is_compressed_again",
-        ),
+        why: Why::Test("tests/program/data/remedies/python.rs", "parquet_is_compressed_again"),
     },
     Unfollowed {
         says: "only its pointer: git lfs pull in its folder brings the file",

@@ -14,24 +14,9 @@ fn single_request_faults_fail_at_once() {
     use FailureKind::{Filtered, Request, Response, Server};
     let bomb = vec![b' '; 300 << 20];
     let cases = [
-        (
-            "400",
-            Answer::error(400, "x", "bad image"),
-            Request,
-            "bad image",
-        ),
-        (
-            "a context that is too long",
-            Answer::error(400, "context_length_exceeded", "too long"),
-            Request,
-            "too long",
-        ),
-        (
-            "413 as a page",
-            Answer::new(413, "<html><title>Too Large</title>"),
-            Request,
-            "--image max-side",
-        ),
+        ("400", Answer::error(400, "x", "bad image"), Request, "bad image"),
+        ("a context that is too long", Answer::error(400, "context_length_exceeded", "too long"), Request, "too long"),
+        ("413 as a page", Answer::new(413, "<html><title>Too Large</title>"), Request, "--image max-side"),
         ("415", Answer::new(415, "image/webp"), Request, "image/webp"),
         (
             "422 of FastAPI",
@@ -39,15 +24,7 @@ fn single_request_faults_fail_at_once() {
             Request,
             "field required",
         ),
-        (
-            "a flat error",
-            Answer::json(
-                400,
-                &json!({"object": "error", "message": "no", "code": 400}),
-            ),
-            Request,
-            "no",
-        ),
+        ("a flat error", Answer::json(400, &json!({"object": "error", "message": "no", "code": 400})), Request, "no"),
         (
             "a filter of Azure",
             Answer::json(
@@ -59,10 +36,7 @@ fn single_request_faults_fail_at_once() {
         ),
         (
             "a moderator",
-            Answer::json(
-                403,
-                &json!({"error": {"message": "no", "metadata": {"reasons": ["x"]}}}),
-            ),
+            Answer::json(403, &json!({"error": {"message": "no", "metadata": {"reasons": ["x"]}}})),
             Filtered,
             "no",
         ),
@@ -72,33 +46,14 @@ fn single_request_faults_fail_at_once() {
             Server,
             "oops",
         ),
-        (
-            "400 with status 200",
-            Answer::json(200, &json!({"error": {"message": "odd", "code": 400}})),
-            Request,
-            "odd",
-        ),
-        (
-            "a body without end",
-            Answer::new(200, vec![b' '; (16 << 20) + 1]),
-            Response,
-            "16 MiB",
-        ),
-        (
-            "a small body that unpacks without end",
-            gzipped(&bomb),
-            Response,
-            "16 MiB",
-        ),
+        ("400 with status 200", Answer::json(200, &json!({"error": {"message": "odd", "code": 400}})), Request, "odd"),
+        ("a body without end", Answer::new(200, vec![b' '; (16 << 20) + 1]), Response, "16 MiB"),
+        ("a small body that unpacks without end", gzipped(&bomb), Response, "16 MiB"),
     ];
     check_rows(cases, |(name, answer, kind, message)| {
         let outcome = ask(vec![answer]);
         let error = outcome.result.unwrap_err();
-        assert_eq!(
-            (error.failure.kind, error.reach),
-            (kind, Reach::Trial),
-            "{name}: {error}"
-        );
+        assert_eq!((error.failure.kind, error.reach), (kind, Reach::Trial), "{name}: {error}");
         assert_eq!((error.attempts, outcome.requests.len()), (1, 1), "{name}");
         assert!(error.failure.message.contains(message), "{name}: {error}");
     });
@@ -113,16 +68,8 @@ fn general_faults_are_told_apart() {
         ("402", Answer::error(402, "x", "pay"), "credit"),
         ("403", Answer::error(403, "x", "forbidden"), "key"),
         ("404", Answer::new(404, ""), "--base-url"),
-        (
-            "404 of a model",
-            Answer::error(404, "model_not_found", "no such model"),
-            "--model",
-        ),
-        (
-            "404 of OpenRouter",
-            Answer::error(404, "x", "No endpoints found that support image input"),
-            "--blind",
-        ),
+        ("404 of a model", Answer::error(404, "model_not_found", "no such model"), "--model"),
+        ("404 of OpenRouter", Answer::error(404, "x", "No endpoints found that support image input"), "--blind"),
         ("405", Answer::new(405, ""), "--base-url"),
         ("407", Answer::new(407, ""), "NO_PROXY"),
         ("no HTTP", Answer::raw("SSH-2.0-x\r\n"), "https://"),
@@ -131,36 +78,12 @@ fn general_faults_are_told_apart() {
         ("302", moved(302), "--base-url"),
         ("307", moved(307), "elsewhere"),
         ("308", moved(308), "elsewhere"),
-        (
-            "no quota",
-            Answer::error(429, "insufficient_quota", "no quota"),
-            "credit",
-        ),
-        (
-            "no billing",
-            Answer::error(429, "billing_hard_limit_reached", "no"),
-            "credit",
-        ),
-        (
-            "no credit",
-            Answer::error(400, "x", "Your credit balance is too low"),
-            "credit",
-        ),
-        (
-            "400 of a model",
-            Answer::error(400, "model_not_found", "no such model"),
-            "--model",
-        ),
-        (
-            "a gateway without keys",
-            Answer::error(400, "400", "No connected db."),
-            "key",
-        ),
-        (
-            "a key with status 200",
-            Answer::json(200, &json!({"error": {"message": "who?", "code": 401}})),
-            "who?",
-        ),
+        ("no quota", Answer::error(429, "insufficient_quota", "no quota"), "credit"),
+        ("no billing", Answer::error(429, "billing_hard_limit_reached", "no"), "credit"),
+        ("no credit", Answer::error(400, "x", "Your credit balance is too low"), "credit"),
+        ("400 of a model", Answer::error(400, "model_not_found", "no such model"), "--model"),
+        ("a gateway without keys", Answer::error(400, "400", "No connected db."), "key"),
+        ("a key with status 200", Answer::json(200, &json!({"error": {"message": "who?", "code": 401}})), "who?"),
         (
             "no eyes: llama.cpp",
             Answer::error(
@@ -172,24 +95,13 @@ fn general_faults_are_told_apart() {
         ),
         (
             "no eyes: vLLM",
-            Answer::json(
-                400,
-                &json!({"object": "error", "message": "m is not a multimodal model None"}),
-            ),
+            Answer::json(400, &json!({"object": "error", "message": "m is not a multimodal model None"})),
             "--blind",
         ),
-        (
-            "no eyes: Ollama",
-            Answer::error(400, "x", "this model does not support image input"),
-            "--blind",
-        ),
+        ("no eyes: Ollama", Answer::error(400, "x", "this model does not support image input"), "--blind"),
         (
             "no eyes: OpenAI",
-            Answer::error(
-                400,
-                "x",
-                "Invalid content type. image_url is only supported by certain models.",
-            ),
+            Answer::error(400, "x", "Invalid content type. image_url is only supported by certain models."),
             "--blind",
         ),
     ];

@@ -12,10 +12,7 @@ use crate::support::snapshot::redacted;
 fn fields_are_adapted_once_for_all() {
     let refused = |param: &str, code: &str| {
         let message = format!("Unsupported: '{param}' is not supported with this model.");
-        Answer::json(
-            400,
-            &json!({"error": {"param": param, "code": code, "message": message}}),
-        )
+        Answer::json(400, &json!({"error": {"param": param, "code": code, "message": message}}))
     };
     let limit = || refused("max_tokens", "unsupported_parameter");
     let heat = || refused("temperature", "unsupported_value");
@@ -24,22 +21,13 @@ fn fields_are_adapted_once_for_all() {
     let [first, second, third] = &outcome.requests[..] else {
         panic!("{:?}", outcome.requests);
     };
-    assert_eq!(
-        (&first["max_tokens"], &first["temperature"]),
-        (&json!(1024), &json!(0.0))
-    );
+    assert_eq!((&first["max_tokens"], &first["temperature"]), (&json!(1024), &json!(0.0)));
     assert_eq!(second["max_tokens"], Value::Null);
     assert_eq!(second["max_completion_tokens"], 1024);
-    assert_eq!(
-        (&third["max_completion_tokens"], &third["temperature"]),
-        (&json!(1024), &Value::Null)
-    );
+    assert_eq!((&third["max_completion_tokens"], &third["temperature"]), (&json!(1024), &Value::Null));
 
     // What the user has said is never changed.
-    let stated = Parameters {
-        temperature: Temperature::Of(0.5),
-        ..Parameters::new("m".into())
-    };
+    let stated = Parameters { temperature: Temperature::Of(0.5), ..Parameters::new("m".into()) };
     let outcome = ask_with(vec![heat()], sending(), stated);
     let error = outcome.result.unwrap_err();
     assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
@@ -55,18 +43,10 @@ fn fields_are_adapted_once_for_all() {
     assert!(last.get("max_tokens").is_none() && last.get("max_completion_tokens").is_none());
     let outcome = ask(vec![limit(), neither()]);
     let error = outcome.result.unwrap_err();
-    assert_eq!(
-        (error.reach, error.attempts),
-        (Reach::Endpoint, 3),
-        "{error}"
-    );
+    assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 3), "{error}");
     let outcome = ask(vec![heat(), heat()]);
     let error = outcome.result.unwrap_err();
-    assert_eq!(
-        (error.reach, error.attempts),
-        (Reach::Endpoint, 2),
-        "{error}"
-    );
+    assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 2), "{error}");
 }
 
 /// Lists of details name the field by its place.
@@ -83,23 +63,13 @@ fn field_is_found_by_detail_location() {
 /// What the table says of servers on this machine; a model without such a switch is the server's to refuse.
 #[test]
 fn thinking_uses_field_of_server() {
-    let off = || Parameters {
-        thinking: Some(Thinking::Off),
-        ..Parameters::new("m".into())
-    };
+    let off = || Parameters { thinking: Some(Thinking::Off), ..Parameters::new("m".into()) };
     let outcome = ask_with(vec![Answer::text("B")], sending(), off());
     outcome.result.unwrap();
     let body = &outcome.requests[0];
-    assert_eq!(
-        body["chat_template_kwargs"],
-        json!({"enable_thinking": false})
-    );
+    assert_eq!(body["chat_template_kwargs"], json!({"enable_thinking": false}));
     assert!(body.get("reasoning_effort").is_none() && body.get("switch").is_none());
-    let refusal = Answer::error(
-        400,
-        "unknown_parameter",
-        "Unknown parameter: 'chat_template_kwargs'.",
-    );
+    let refusal = Answer::error(400, "unknown_parameter", "Unknown parameter: 'chat_template_kwargs'.");
     let outcome = ask_with(vec![refusal], sending(), off());
     let error = outcome.result.unwrap_err();
     assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));

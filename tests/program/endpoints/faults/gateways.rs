@@ -1,4 +1,5 @@
-//! Gateways that give up on long requests, streams that break off, and servers that load a model: what is sent again, and how often.
+//! Gateways that give up on long requests, streams that break off, and servers that load a model: what is sent again,
+//! and how often.
 
 use darkqa_base::types::{FailureKind, Finish};
 use darkqa_eval::internals::ask::{Parameters, Reach, Sending, WireSetting};
@@ -19,10 +20,7 @@ fn cut() -> Answer {
 }
 
 fn ask_by(wire: WireSetting, answers: Vec<Answer>) -> Outcome {
-    let parameters = Parameters {
-        wire,
-        ..Parameters::new("m".into())
-    };
+    let parameters = Parameters { wire, ..Parameters::new("m".into()) };
     ask_with(answers, sending(), parameters)
 }
 
@@ -51,10 +49,7 @@ fn cut_requests_are_sent_twice() {
         let error = outcome.result.unwrap_err();
         assert_eq!((error.attempts, outcome.requests.len()), (2, 2), "{wire:?}");
         assert_eq!(error.failure.kind, FailureKind::Timeout);
-        assert_eq!(
-            (error.failure.status, error.reach),
-            (Some(524), Reach::Trial)
-        );
+        assert_eq!((error.failure.status, error.reach), (Some(524), Reach::Trial));
         assert!(error.failure.message.contains(remedy), "{wire:?}: {error}");
     }
 }
@@ -62,10 +57,7 @@ fn cut_requests_are_sent_twice() {
 #[test]
 fn paid_retries_decide_about_cut_requests() {
     for (paid_retries, sent) in [(0, 1), (1, 2), (3, 4)] {
-        let sending = Sending {
-            paid_retries,
-            ..sending()
-        };
+        let sending = Sending { paid_retries, ..sending() };
         let outcome = ask_with(vec![cut()], sending, Parameters::new("m".into()));
         assert_eq!(outcome.requests.len(), sent);
     }
@@ -96,10 +88,7 @@ fn quick_timeouts_are_retried() {
     assert!(!outcome.requests.iter().any(is_stream));
     let outcome = ask(vec![down()]);
     let error = outcome.result.unwrap_err();
-    assert_eq!(
-        (error.attempts, error.failure.kind),
-        (6, FailureKind::Server)
-    );
+    assert_eq!((error.attempts, error.failure.kind), (6, FailureKind::Server));
 }
 
 #[test]
@@ -125,26 +114,16 @@ fn broken_streams_are_sent_twice() {
 #[test]
 fn stream_without_finish_reason_is_read_once() {
     let counts = r#"{"choices":[],"usage":{"prompt_tokens":9,"completion_tokens":1}}"#;
-    check_rows(
-        [
-            vec![PIECE, DONE],
-            vec![PIECE, counts],
-            vec![PIECE, counts, DONE],
-        ],
-        |events| {
-            let outcome = ask_by(WireSetting::ChatStream, vec![Answer::stream(&events)]);
-            let reply = outcome.result.unwrap();
-            assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
-            assert_eq!(reply.finish, Finish::Unknown);
-        },
-    );
+    check_rows([vec![PIECE, DONE], vec![PIECE, counts], vec![PIECE, counts, DONE]], |events| {
+        let outcome = ask_by(WireSetting::ChatStream, vec![Answer::stream(&events)]);
+        let reply = outcome.result.unwrap();
+        assert_eq!((reply.text.as_str(), reply.attempts), ("B", 1));
+        assert_eq!(reply.finish, Finish::Unknown);
+    });
 }
 
 fn patient() -> Sending {
-    Sending {
-        retries: 1,
-        ..sending()
-    }
+    Sending { retries: 1, ..sending() }
 }
 
 #[test]
@@ -154,15 +133,9 @@ fn loading_model_is_waited_for() {
     answers.push(Answer::text("B"));
     let outcome = ask_with(answers, patient(), Parameters::new("m".into()));
     assert_eq!(outcome.result.unwrap().attempts, 9);
-    let impatient = Sending {
-        patience: std::time::Duration::from_millis(200),
-        ..patient()
-    };
+    let impatient = Sending { patience: std::time::Duration::from_millis(200), ..patient() };
     let outcome = ask_with(vec![loading()], impatient, Parameters::new("m".into()));
     let error = outcome.result.unwrap_err();
     assert_eq!(error.reach, Reach::Endpoint);
-    assert!(
-        error.failure.message.contains("--retries patience"),
-        "{error}"
-    );
+    assert!(error.failure.message.contains("--retries patience"), "{error}");
 }

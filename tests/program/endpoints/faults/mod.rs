@@ -14,19 +14,13 @@ use std::time::{Duration, Instant};
 
 use crate::support::endpoint::{Answer, MockEndpoint, Request};
 use darkqa_base::types::{Reply, Rgb};
-use darkqa_eval::internals::ask::{
-    Access, AskError, Endpoint, Message, Parameters, Remote, Secret, Sending,
-};
+use darkqa_eval::internals::ask::{Access, AskError, Endpoint, Message, Parameters, Remote, Secret, Sending};
 use darkqa_pictures::Payload;
 use darkqa_pictures::PayloadFormat;
 use serde_json::Value;
 
 fn sending() -> Sending {
-    Sending {
-        first_delay: Duration::from_millis(1),
-        timeout: Duration::from_secs(20),
-        ..Sending::default()
-    }
+    Sending { first_delay: Duration::from_millis(1), timeout: Duration::from_secs(20), ..Sending::default() }
 }
 
 fn image() -> Payload {
@@ -49,25 +43,15 @@ fn ask_with(answers: Vec<Answer>, sending: Sending, parameters: Parameters) -> O
         key: Some(Secret::new("sk-0123456789abcdef", "KEY").unwrap()),
         ..Access::new(mock.base_url().parse().unwrap())
     };
-    let runtime = tokio::runtime::Builder::new_current_thread()
-        .enable_all()
-        .build()
-        .unwrap();
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
     runtime.block_on(async {
         let endpoint = Arc::new(Endpoint::open(access, sending).unwrap());
         let model = Remote::open(endpoint, parameters).unwrap();
         let started = Instant::now();
         let images = [Arc::new(image())];
-        let message = Message {
-            images: &images,
-            ..Message::text_only("Red?")
-        };
+        let message = Message { images: &images, ..Message::text_only("Red?") };
         let result = model.ask(message, 2).await;
-        Outcome {
-            result,
-            time: started.elapsed(),
-            requests: mock.requests().iter().map(Request::json).collect(),
-        }
+        Outcome { result, time: started.elapsed(), requests: mock.requests().iter().map(Request::json).collect() }
     })
 }
 

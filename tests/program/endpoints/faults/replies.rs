@@ -16,20 +16,10 @@ fn message_is_found_in_every_shape() {
     let http = |head: &str, body: &str| Answer::raw(format!("{head}\r\n\r\n{body}"));
     let cases: Vec<(&str, Answer, &str, Finish)> = vec![
         ("plain", Answer::text("B"), "B", Finish::Stop),
-        (
-            "a bare minimum",
-            Answer::new(200, r#"{"choices":[{"message":{"content":"B"}}]}"#),
-            "B",
-            Finish::Unknown,
-        ),
+        ("a bare minimum", Answer::new(200, r#"{"choices":[{"message":{"content":"B"}}]}"#), "B", Finish::Unknown),
         (
             "text parts",
-            Answer::new(
-                200,
-                completion(
-                    r#"{"content":[{"type":"text","text":"B"},{"type":"text","text":"."}]}"#,
-                ),
-            ),
+            Answer::new(200, completion(r#"{"content":[{"type":"text","text":"B"},{"type":"text","text":"."}]}"#)),
             "B.",
             Finish::Stop,
         ),
@@ -46,40 +36,19 @@ fn message_is_found_in_every_shape() {
         ),
         (
             "reasoning apart",
-            Answer::new(
-                200,
-                completion(r#"{"content":"B","reasoning_content":"A","reasoning":"A"}"#),
-            ),
+            Answer::new(200, completion(r#"{"content":"B","reasoning_content":"A","reasoning":"A"}"#)),
             "B",
             Finish::Stop,
         ),
         (
             "no content",
-            Answer::message(
-                &json!({"content": null, "reasoning_content": "A? B?"}),
-                "length",
-            ),
+            Answer::message(&json!({"content": null, "reasoning_content": "A? B?"}), "length"),
             "",
             Finish::Length,
         ),
-        (
-            "a missing content",
-            Answer::message(&json!({"role": "assistant"}), "stop"),
-            "",
-            Finish::Stop,
-        ),
-        (
-            "filtered",
-            Answer::message(&json!({"content": null}), "content_filter"),
-            "",
-            Finish::Filter,
-        ),
-        (
-            "refused, as Claude says it",
-            Answer::message(&json!({"content": ""}), "refusal"),
-            "",
-            Finish::Filter,
-        ),
+        ("a missing content", Answer::message(&json!({"role": "assistant"}), "stop"), "", Finish::Stop),
+        ("filtered", Answer::message(&json!({"content": null}), "content_filter"), "", Finish::Filter),
+        ("refused, as Claude says it", Answer::message(&json!({"content": ""}), "refusal"), "", Finish::Filter),
         (
             "a tool call",
             Answer::message(&json!({"content": null, "tool_calls": []}), "tool_calls"),
@@ -104,24 +73,11 @@ fn message_is_found_in_every_shape() {
             "B",
             Finish::Stop,
         ),
-        (
-            "blank lines first",
-            Answer::new(200, format!("\n\n \r\n{plain}")),
-            "B",
-            Finish::Stop,
-        ),
-        (
-            "a byte order mark",
-            Answer::new(200, format!("\u{FEFF}{plain}")),
-            "B",
-            Finish::Stop,
-        ),
+        ("blank lines first", Answer::new(200, format!("\n\n \r\n{plain}")), "B", Finish::Stop),
+        ("a byte order mark", Answer::new(200, format!("\u{FEFF}{plain}")), "B", Finish::Stop),
         (
             "bytes that are no text",
-            Answer::new(
-                200,
-                [b"{\"choices\":[{\"message\":{\"content\":\"B\xff\"}}]}".as_slice()].concat(),
-            ),
+            Answer::new(200, [b"{\"choices\":[{\"message\":{\"content\":\"B\xff\"}}]}".as_slice()].concat()),
             "B\u{FFFD}",
             Finish::Unknown,
         ),
@@ -140,28 +96,17 @@ fn message_is_found_in_every_shape() {
         ("compressed", gzipped(plain.as_bytes()), "B", Finish::Stop),
         (
             "an event stream",
-            Answer::stream(&[
-                PIECE,
-                r#"{"choices":[{"index":0,"delta":{},"finish_reason":"stop"}]}"#,
-                "[DONE]",
-            ]),
+            Answer::stream(&[PIECE, r#"{"choices":[{"index":0,"delta":{},"finish_reason":"stop"}]}"#, "[DONE]"]),
             "B",
             Finish::Stop,
         ),
         (
             "an event stream without an end mark",
-            Answer::stream(&[
-                r#"{"choices":[{"index":0,"delta":{"content":"B"},"finish_reason":"length"}]}"#,
-            ]),
+            Answer::stream(&[r#"{"choices":[{"index":0,"delta":{"content":"B"},"finish_reason":"length"}]}"#]),
             "B",
             Finish::Length,
         ),
-        (
-            "HTTP/1.0 without a length",
-            http("HTTP/1.0 200 OK", &plain),
-            "B",
-            Finish::Stop,
-        ),
+        ("HTTP/1.0 without a length", http("HTTP/1.0 200 OK", &plain), "B", Finish::Stop),
         (
             "chunks",
             Answer::raw(format!(
@@ -184,14 +129,8 @@ fn message_is_found_in_every_shape() {
     ];
     check_rows(cases, |(name, answer, text, finish)| {
         let outcome = ask(vec![answer]);
-        let reply = outcome
-            .result
-            .unwrap_or_else(|error| panic!("{name}: {error}"));
-        assert_eq!(
-            (reply.text.as_str(), &reply.finish),
-            (text, &finish),
-            "{name}"
-        );
+        let reply = outcome.result.unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!((reply.text.as_str(), &reply.finish), (text, &finish), "{name}");
         assert_eq!((reply.attempts, outcome.requests.len()), (1, 1), "{name}");
     });
     let refused = json!({"content": null, "refusal": "The answer is A, but I cannot say so."});
@@ -219,21 +158,13 @@ fn tokens_are_read_in_every_shape() {
             json!({"prompt_tokens": 90, "prompt_tokens_details": {"cached_tokens": 0}}),
             (Some(90), None, None),
         ),
-        (
-            "no numbers",
-            json!({"prompt_tokens": "many"}),
-            (None, None, None),
-        ),
+        ("no numbers", json!({"prompt_tokens": "many"}), (None, None, None)),
     ];
     check_rows(cases, |(name, usage, expected)| {
         let completion = json!({"choices": [{"message": {"content": "B"}}], "usage": usage});
         let reply = ask(vec![Answer::json(200, &completion)]).result.unwrap();
         let usage = reply.usage.unwrap_or_default();
-        let tokens = (
-            usage.prompt_tokens,
-            usage.completion_tokens,
-            usage.cached_tokens,
-        );
+        let tokens = (usage.prompt_tokens, usage.completion_tokens, usage.cached_tokens);
         assert_eq!(tokens, expected, "{name}");
     });
 }

@@ -11,18 +11,12 @@ use crate::support::endpoint::Answer;
 use crate::support::table::check_rows;
 
 fn by(wire: WireSetting) -> Parameters {
-    Parameters {
-        wire,
-        ..Parameters::new("m".into())
-    }
+    Parameters { wire, ..Parameters::new("m".into()) }
 }
 
 /// A reply without what differs from one request to the next.
 fn comparable(reply: Reply) -> Reply {
-    Reply {
-        latency_ms: 0,
-        ..reply
-    }
+    Reply { latency_ms: 0, ..reply }
 }
 
 fn delta(delta: &Value, finish: Option<&str>) -> String {
@@ -30,14 +24,12 @@ fn delta(delta: &Value, finish: Option<&str>) -> String {
         .to_string()
 }
 
-const USAGE: &str = r#"{"model":"mock-1","choices":[],"usage":{"prompt_tokens":90,"completion_tokens":1,"total_tokens":91}}"#;
+const USAGE: &str =
+    r#"{"model":"mock-1","choices":[],"usage":{"prompt_tokens":90,"completion_tokens":1,"total_tokens":91}}"#;
 
 fn streamed(text: &[&str]) -> Answer {
     let mut events = vec![delta(&json!({"role": "assistant", "content": ""}), None)];
-    events.extend(
-        text.iter()
-            .map(|text| delta(&json!({"content": text}), None)),
-    );
+    events.extend(text.iter().map(|text| delta(&json!({"content": text}), None)));
     events.push(delta(&json!({}), Some("stop")));
     events.extend([USAGE.to_owned(), "[DONE]".to_owned()]);
     let events: Vec<&str> = events.iter().map(String::as_str).collect();
@@ -61,17 +53,10 @@ fn response(text: &str) -> Answer {
 #[test]
 fn reply_is_same_by_every_wire() {
     let whole = ask(vec![Answer::text("B.")]).result.unwrap();
-    let pieces = ask_with(
-        vec![streamed(&["B", "."])],
-        sending(),
-        by(WireSetting::ChatStream),
-    );
+    let pieces = ask_with(vec![streamed(&["B", "."])], sending(), by(WireSetting::ChatStream));
     let response = ask_with(vec![response("B.")], sending(), by(WireSetting::Responses));
     assert_eq!(pieces.requests[0]["stream"], true);
-    assert_eq!(
-        pieces.requests[0]["stream_options"],
-        json!({"include_usage": true})
-    );
+    assert_eq!(pieces.requests[0]["stream_options"], json!({"include_usage": true}));
     let whole = comparable(whole);
     assert_eq!(comparable(pieces.result.unwrap()), whole);
     assert_eq!(comparable(response.result.unwrap()), whole);
@@ -80,10 +65,7 @@ fn reply_is_same_by_every_wire() {
 
 #[test]
 fn responses_request_has_correct_form() {
-    let parameters = Parameters {
-        reasoning_effort: Some("low".into()),
-        ..by(WireSetting::Responses)
-    };
+    let parameters = Parameters { reasoning_effort: Some("low".into()), ..by(WireSetting::Responses) };
     let outcome = ask_with(vec![response("B")], sending(), parameters);
     outcome.result.unwrap();
     let mut body = outcome.requests[0].clone();
@@ -135,25 +117,14 @@ fn auto_learns_wire_from_refusal() {
         let error = outcome.result.unwrap_err();
         assert_eq!((error.reach, error.attempts), (Reach::Endpoint, 1));
         let message = error.failure.message;
-        assert!(
-            message.contains(&format!("--request wire={wire}")),
-            "{message}"
-        );
+        assert!(message.contains(&format!("--request wire={wire}")), "{message}");
     });
 }
 
 #[test]
 fn stream_without_usage_is_repeated() {
-    let refusal = Answer::error(
-        400,
-        "unknown_parameter",
-        "Unknown parameter: 'stream_options'.",
-    );
-    let outcome = ask_with(
-        vec![refusal, streamed(&["B"])],
-        sending(),
-        by(WireSetting::ChatStream),
-    );
+    let refusal = Answer::error(400, "unknown_parameter", "Unknown parameter: 'stream_options'.");
+    let outcome = ask_with(vec![refusal, streamed(&["B"])], sending(), by(WireSetting::ChatStream));
     assert_eq!(outcome.result.unwrap().attempts, 2);
     assert!(outcome.requests[1].get("stream_options").is_none());
     assert_eq!(outcome.requests[1]["stream"], true);
@@ -170,11 +141,7 @@ fn broken_stream_is_asked_again() {
         streamed(&["A"]).cut(60),
     ];
     check_rows(broken, |broken| {
-        let outcome = ask_with(
-            vec![broken, streamed(&["B"])],
-            sending(),
-            by(WireSetting::ChatStream),
-        );
+        let outcome = ask_with(vec![broken, streamed(&["B"])], sending(), by(WireSetting::ChatStream));
         let reply = outcome.result.unwrap();
         assert_eq!((reply.text.as_str(), reply.attempts), ("B", 2));
     });
@@ -183,16 +150,8 @@ fn broken_stream_is_asked_again() {
 /// The timeout of a stream is for its silence, that of a whole reply for all of it.
 #[test]
 fn stream_may_outlast_timeout_unless_silent() {
-    let impatient = Sending {
-        timeout: Duration::from_millis(300),
-        retries: 0,
-        ..sending()
-    };
-    let slow = ask_with(
-        vec![streamed(&["B"]).drip(2)],
-        impatient,
-        by(WireSetting::ChatStream),
-    );
+    let impatient = Sending { timeout: Duration::from_millis(300), retries: 0, ..sending() };
+    let slow = ask_with(vec![streamed(&["B"]).drip(2)], impatient, by(WireSetting::ChatStream));
     assert!(slow.time > Duration::from_millis(600), "{:?}", slow.time);
     assert_eq!(slow.result.unwrap().text, "B");
     let whole = Answer::message(&json!({"content": "B".repeat(300)}), "stop").drip(2);

@@ -166,12 +166,7 @@ fn white_must_be_known() {
 fn white_is_held_against_the_codes() {
     let warnings = |bench: &Bench, white: u16| -> Vec<String> {
         let found = measured(bench, &format!("cam --white {white}"));
-        found["warnings"]
-            .as_array()
-            .unwrap()
-            .iter()
-            .map(|line| line.as_str().unwrap().to_owned())
-            .collect()
+        found["warnings"].as_array().unwrap().iter().map(|line| line.as_str().unwrap().to_owned()).collect()
     };
     let bench = recording(|_| ());
     let message = refused(&bench, "cam --white 5000");
@@ -182,9 +177,8 @@ fn white_is_held_against_the_codes() {
     assert_eq!(warnings(&bench, WHITE), [""; 0]);
     let far = warnings(&bench, 65535);
     assert!(
-        far.iter()
-            .any(|line| line.contains("the greatest code of the flats, ")
-                && line.contains(" % of white, 65535: is white right?")),
+        far.iter().any(|line| line.contains("the greatest code of the flats, ")
+            && line.contains(" % of white, 65535: is white right?")),
         "{far:?}"
     );
     // The brightest exposure is overexposed: its frames are equal.
@@ -195,16 +189,9 @@ fn white_is_held_against_the_codes() {
         }
     });
     let left_out = warnings(&bench, WHITE);
-    assert!(
-        left_out.len() == 1 && left_out[0].ends_with("of a colour are at white, 16383; left out"),
-        "{left_out:?}"
-    );
+    assert!(left_out.len() == 1 && left_out[0].ends_with("of a colour are at white, 16383; left out"), "{left_out:?}");
     let low = warnings(&bench, 20000);
-    assert!(
-        low.iter()
-            .any(|line| line.contains("is clipped at 16383, far below white, 20000")),
-        "{low:?}"
-    );
+    assert!(low.iter().any(|line| line.contains("is clipped at 16383, far below white, 20000")), "{low:?}");
 }
 
 #[test]
@@ -214,28 +201,13 @@ fn wrong_flags_are_named() {
         [
             ("nowhere", "nowhere"),
             ("cam --white 70000", "--white"),
-            (
-                "cam --cfa RGB",
-                "possible values: RGGB, BGGR, GRBG, GBRG, mono",
-            ),
+            ("cam --cfa RGB", "possible values: RGGB, BGGR, GRBG, GBRG, mono"),
             ("cam --crop 1,2,3", "--crop"),
-            (
-                "cam --white 9999 --crop 0,0,100,100",
-                "100 × 100 sites are too few",
-            ),
-            (
-                "cam --white 9999 --max-pixels 100",
-                "raise --decode max-pixels",
-            ),
-            (
-                "cam --out camera.svg",
-                "--out: camera.svg does not end in .toml",
-            ),
+            ("cam --white 9999 --crop 0,0,100,100", "100 × 100 sites are too few"),
+            ("cam --white 9999 --max-pixels 100", "raise --decode max-pixels"),
+            ("cam --out camera.svg", "--out: camera.svg does not end in .toml"),
             ("cam --out mycam", "--out: mycam does not end in .toml"),
-            (
-                "cam --out out/my.cam",
-                "--out: out/my.cam does not end in .toml",
-            ),
+            ("cam --out out/my.cam", "--out: out/my.cam does not end in .toml"),
         ],
         |(line, part)| {
             let message = refused(&bench, line);
@@ -264,10 +236,7 @@ fn a_list_of_frames_replaces_folders() {
     assert_eq!(measured(&bench, &line), by_folder);
     // The control: a list that leaves out an exposure leaves it out.
     let short = fs::read_to_string(bench.path("cam/frames.csv")).unwrap();
-    let short: Vec<&str> = short
-        .lines()
-        .filter(|line| !line.contains("flat-4"))
-        .collect();
+    let short: Vec<&str> = short.lines().filter(|line| !line.contains("flat-4")).collect();
     bench.file("cam/frames.csv", short.join("\n"));
     let found = measured(&bench, &line);
     assert_eq!(found["settings"][0]["frames"]["exposures"], 4);

@@ -15,9 +15,9 @@ fn under(gain: f64, drift: f32) -> Value {
     measured(&bench, &format!("lamp --white {WHITE}"))
 }
 
-/// Light that drifts and falls off towards the corners is taken for noise neither in K nor between neighbours. The frames fall off by
-/// 25 %: without compensation, 3 % more light makes neighbours correlate by more than is allowed at both gains, and 4.9 % makes K
-/// 7 % too large at the lower one.
+/// Light that drifts and falls off towards the corners is taken for noise neither in K nor between neighbours. The
+/// frames fall off by 25 %: without compensation, 3 % more light makes neighbours correlate by more than is allowed at
+/// both gains, and 4.9 % makes K 7 % too large at the lower one.
 #[test]
 fn drifting_lamp_keeps_gain() {
     check_rows([0.0939, 0.7513], |gain| {
@@ -35,16 +35,9 @@ fn drifting_lamp_keeps_gain() {
             assert!(bend.abs() < 0.02, "K {gain}, {drift}: {bend:+.4}");
             // A line for each pair, and no other doubt.
             let warnings = found["warnings"].as_array().unwrap();
-            let word = if drift < 0.0 {
-                " % less light;"
-            } else {
-                " % more light;"
-            };
+            let word = if drift < 0.0 { " % less light;" } else { " % more light;" };
             assert!(
-                warnings.len() == 10
-                    && warnings
-                        .iter()
-                        .all(|line| line.as_str().unwrap().contains(word)),
+                warnings.len() == 10 && warnings.iter().all(|line| line.as_str().unwrap().contains(word)),
                 "{warnings:?}"
             );
         }

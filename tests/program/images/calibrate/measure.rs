@@ -1,5 +1,5 @@
-//! The figures of `src/docs/camera.md` that no command of the program makes: errors by number of frames, and times. They take minutes:
-//! `cargo test --release --test program calibrate::measure -- --ignored --nocapture`.
+//! The figures of `src/docs/camera.md` that no command of the program makes: errors by number of frames, and times.
+//! They take minutes: `cargo test --release --test program calibrate::measure -- --ignored --nocapture`.
 
 #![expect(clippy::print_stdout, reason = "the measured figures")]
 
@@ -15,16 +15,8 @@ const RUNS: u64 = 4;
 #[test]
 #[ignore = "measures"]
 fn errors_by_number_of_frames() {
-    println!(
-        "| camera | K | bias frames | pairs | K % | σ_TL % (mean) | λ | σ_row % | bias ADU | warnings |"
-    );
-    for camera in [
-        "sony-a7s2",
-        "nikon-d850",
-        "canon-eos-5d4",
-        "canon-eos-70d",
-        "canon-eos-700d",
-    ] {
+    println!("| camera | K | bias frames | pairs | K % | σ_TL % (mean) | λ | σ_row % | bias ADU | warnings |");
+    for camera in ["sony-a7s2", "nikon-d850", "canon-eos-5d4", "canon-eos-70d", "canon-eos-700d"] {
         for gain in [0.15, 0.8, 5.0] {
             for (bias, pairs) in [(2, 1), (10, 2), (40, 4)] {
                 row(camera, gain, bias, pairs);
@@ -46,21 +38,19 @@ fn row(camera: &str, gain: f64, bias: usize, pairs: usize) {
         warnings.extend(found["warnings"].as_array().unwrap().clone());
         let setting = &found["settings"][0];
         for (sum, (name, truth, _)) in squares.iter_mut().zip(truths(&sensor)) {
-            let scale = if name == "read_shape" {
-                1.0
-            } else {
-                truth / 100.0
-            };
+            let scale = if name == "read_shape" { 1.0 } else { truth / 100.0 };
             let value = number(setting, &format!("/{name}/value"));
             *sum += ((value - truth) / scale).powi(2) / RUNS as f64;
             if name == "read_scale" {
                 scale_off += (value - truth) / scale / RUNS as f64;
             }
         }
-        let off =
-            sensor.state.bias.iter().enumerate().map(|(plane, truth)| {
-                (number(setting, &format!("/bias/{plane}/value")) - truth).abs()
-            });
+        let off = sensor
+            .state
+            .bias
+            .iter()
+            .enumerate()
+            .map(|(plane, truth)| (number(setting, &format!("/bias/{plane}/value")) - truth).abs());
         squares[4] += off.fold(0.0, f64::max).powi(2) / RUNS as f64;
     }
     let [gain_error, scale, shape, row, offset] = squares.map(f64::sqrt);
@@ -90,14 +80,8 @@ fn calibration_time_by_size() {
     for name in ["pgm", "png", "large"] {
         for threads in [1, 2] {
             let start = Instant::now();
-            measured(
-                &bench,
-                &format!("{name} --white {WHITE} --threads {threads}"),
-            );
-            println!(
-                "{name}, {threads} threads: {:.2} s",
-                start.elapsed().as_secs_f64()
-            );
+            measured(&bench, &format!("{name} --white {WHITE} --threads {threads}"));
+            println!("{name}, {threads} threads: {:.2} s", start.elapsed().as_secs_f64());
         }
     }
 }

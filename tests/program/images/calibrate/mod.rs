@@ -48,11 +48,7 @@ fn truths(sensor: &Sensor) -> [(&'static str, f64, f64); 4] {
         ("gain", state.system_gain, 0.005 * state.system_gain),
         ("read_scale", state.read_scale, 0.007 * state.read_scale),
         ("read_shape", state.read_shape, 0.006),
-        (
-            "row_deviation",
-            state.row_deviation,
-            0.06 * state.row_deviation,
-        ),
+        ("row_deviation", state.row_deviation, 0.06 * state.row_deviation),
     ]
 }
 
@@ -69,10 +65,7 @@ fn a_known_sensor_comes_back() {
     fs::write(path, Form::Pgm.encode(&white, 512)).unwrap();
     let found = measured(&bench, "camera");
     assert_eq!(found["warnings"], Value::Array(Vec::new()), "{found:#}");
-    assert_eq!(
-        (&found["black"], &found["white"]),
-        (&512.into(), &WHITE.into())
-    );
+    assert_eq!((&found["black"], &found["white"]), (&512.into(), &WHITE.into()));
     for (index, (sensor, _)) in RECORDED.iter().enumerate() {
         let setting = &found["settings"][index];
         for (name, truth, allowed) in truths(sensor) {
@@ -80,20 +73,14 @@ fn a_known_sensor_comes_back() {
             let error = number(setting, &format!("/{name}/error"));
             assert!((value - truth).abs() < allowed, "{name}: {value}, {truth}");
             // The standard error says how far it may be off: one in a thousand is further than 5 of them.
-            assert!(
-                (value - truth).abs() < 5.0 * error,
-                "{name}: {value} ± {error}, {truth}"
-            );
+            assert!((value - truth).abs() < 5.0 * error, "{name}: {value} ± {error}, {truth}");
             assert!(error < allowed, "{name}: ± {error}");
         }
         // Row noise shifts whole frames a little: 512 rows of ten frames.
         let allowed = 6.0 * sensor.state.row_deviation / (10.0 * 256.0_f64).sqrt() + 0.02;
         for (plane, truth) in sensor.state.bias.iter().enumerate() {
             let value = number(setting, &format!("/bias/{plane}/value"));
-            assert!(
-                (value - truth).abs() < allowed,
-                "bias {plane}: {value}, {truth}"
-            );
+            assert!((value - truth).abs() < allowed, "bias {plane}: {value}, {truth}");
         }
     }
     // The medians of the preset are on its lines, so that the lines come back, too.
@@ -122,11 +109,7 @@ fn camera_is_used(bench: &Bench) {
         assert!(text.contains(part), "{part}: {text}");
     }
     assert!(!text.contains("first-gain") && text.matches("\ngain = ").count() == 4);
-    assert!(
-        fs::read_to_string(bench.path("camera.svg"))
-            .unwrap()
-            .starts_with("<svg")
-    );
+    assert!(fs::read_to_string(bench.path("camera.svg")).unwrap().starts_with("<svg"));
     let image = image::RgbImage::from_pixel(32, 32, image::Rgb([90, 60, 30]));
     image.save(bench.path("a.png")).unwrap();
     let made = "synthesize a.png --levels L1 --variant noise --gain 0.8 --fixed";
@@ -139,16 +122,9 @@ fn camera_is_used(bench: &Bench) {
     };
     let (own, sony) = (state("own"), state("sony"));
     // Near the lines of the preset, with the shape of the setting whose K is nearest: 0.7513.
-    for (path, allowed) in [
-        ("/read_scale", 0.02),
-        ("/row_deviation", 0.05),
-        ("/read_shape", 0.006),
-    ] {
+    for (path, allowed) in [("/read_scale", 0.02), ("/row_deviation", 0.05), ("/read_shape", 0.006)] {
         let (own, sony) = (number(&own, path), number(&sony, path));
-        assert!(
-            (own - sony).abs() < allowed && (own - sony).abs() > 0.0,
-            "{path}: {own}, {sony}"
-        );
+        assert!((own - sony).abs() < allowed && (own - sony).abs() > 0.0, "{path}: {own}, {sony}");
     }
 }
 
@@ -159,11 +135,7 @@ fn forms_and_threads_change_nothing() {
     let (_, shots) = &RECORDED[1];
     let shots = Shots {
         bias: shots.bias[..3].to_vec(),
-        flats: shots
-            .flats
-            .iter()
-            .map(|frames| frames[..2].to_vec())
-            .collect(),
+        flats: shots.flats.iter().map(|frames| frames[..2].to_vec()).collect(),
         side: shots.side,
     };
     let forms = [
@@ -235,13 +207,9 @@ fn the_table_and_the_flags() {
     };
     let plain = json("");
     let moved = json("--cfa GRBG --black 500 --name mine --crop 0,0,512,256");
-    assert_eq!(
-        (&moved["name"], &moved["black"]),
-        (&"mine".into(), &500.into())
-    );
+    assert_eq!((&moved["name"], &moved["black"]), (&"mine".into(), &500.into()));
     assert_eq!(moved["size"], serde_json::json!([512, 256]));
-    let offset =
-        |found: &Value, plane: usize| number(found, &format!("/settings/0/offsets/{plane}/value"));
+    let offset = |found: &Value, plane: usize| number(found, &format!("/settings/0/offsets/{plane}/value"));
     for (plane, other) in [(0, 1), (1, 0), (2, 3), (3, 2)] {
         let difference = offset(&plain, plane) - offset(&moved, other);
         assert!(difference.abs() < 0.1, "{plane}: {difference}");
@@ -251,23 +219,11 @@ fn the_table_and_the_flags() {
     let mono = json("--cfa mono");
     assert_eq!(mono["settings"][0]["offsets"].as_array().unwrap().len(), 1);
     let gain = number(&mono, "/settings/0/gain/value");
-    assert!(
-        (gain / sensor.state.system_gain - 1.0).abs() < 0.005,
-        "{gain}"
-    );
+    assert!((gain / sensor.state.system_gain - 1.0).abs() < 0.005, "{gain}");
     let text = fs::read_to_string(bench.path("camera.toml")).unwrap();
-    let bias = text
-        .lines()
-        .find(|line| line.starts_with("bias = "))
-        .unwrap();
-    let values: Vec<&str> = bias
-        .trim_matches(|c: char| !c.is_ascii_digit() && c != '-')
-        .split(", ")
-        .collect();
-    assert!(
-        values.len() == 4 && values.iter().all(|value| *value == values[0]),
-        "{bias}"
-    );
+    let bias = text.lines().find(|line| line.starts_with("bias = ")).unwrap();
+    let values: Vec<&str> = bias.trim_matches(|c: char| !c.is_ascii_digit() && c != '-').split(", ").collect();
+    assert!(values.len() == 4 && values.iter().all(|value| *value == values[0]), "{bias}");
 }
 
 /// The one line of a call that is refused.
@@ -279,16 +235,8 @@ fn refused(bench: &Bench, line: &str) -> String {
     }
     let called = bench.call(&args);
     assert_eq!(called.code, Some(2), "{line}: {called:?}");
-    assert_eq!(
-        called.stderr.trim_end().lines().count(),
-        1,
-        "{line}: {}",
-        called.stderr
-    );
-    assert!(
-        !bench.path("camera.toml").exists(),
-        "{line}: a file was left"
-    );
+    assert_eq!(called.stderr.trim_end().lines().count(), 1, "{line}: {}", called.stderr);
+    assert!(!bench.path("camera.toml").exists(), "{line}: a file was left");
     called.stderr
 }
 

@@ -1,4 +1,5 @@
-//! A simulated sensor: the program's own noise, with whole codes, sites that respond differently, and light that falls off.
+//! A simulated sensor: the program's own noise, with whole codes, sites that respond differently, and light that falls
+//! off.
 
 use std::fs;
 use std::io::Cursor;
@@ -32,17 +33,8 @@ impl Sensor {
         model.set_sampling(Sampling::Fixed);
         model.pin_gain(gain).unwrap();
         let key = NoiseKey::new(seed, &FrameId("camera".to_owned()));
-        let state = CameraState {
-            ratio: 1.0,
-            adu_range: f64::from(WHITE - BLACK),
-            ..CameraState::draw(&key, &model)
-        };
-        Self {
-            state,
-            side,
-            seed,
-            response: response(side, seed),
-        }
+        let state = CameraState { ratio: 1.0, adu_range: f64::from(WHITE - BLACK), ..CameraState::draw(&key, &model) };
+        Self { state, side, seed, response: response(side, seed) }
     }
 
     /// One frame; without light it is a bias frame. `light` is in shares of white.
@@ -65,9 +57,7 @@ impl Sensor {
             (adu + 0.5).floor().clamp(0.0, f64::from(WHITE)) as u16
         };
         let sites = (0..side * side).into_par_iter();
-        sites
-            .map(|site| code(raw.sample(site / side, site % side)))
-            .collect()
+        sites.map(|site| code(raw.sample(site / side, site % side))).collect()
     }
 }
 
@@ -75,9 +65,7 @@ impl Sensor {
 fn response(side: usize, seed: u64) -> Vec<f32> {
     let mut state = seed;
     let mut uniform = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (state >> 40) as f32 / 16_777_216.0
     };
     let place = |at: usize| 2.0 * at as f32 / (side - 1) as f32 - 1.0;
@@ -118,21 +106,13 @@ impl Shots {
             };
             frames.map(shoot).collect()
         });
-        Self {
-            side: sensor.side,
-            bias: bias.collect(),
-            flats: flats.collect(),
-        }
+        Self { side: sensor.side, bias: bias.collect(), flats: flats.collect() }
     }
 
     /// The same with every frame changed.
     pub(super) fn each(&self, mut change: impl FnMut(&[u16]) -> Vec<u16>) -> Self {
         let mut all = |frames: &[Vec<u16>]| frames.iter().map(|frame| change(frame)).collect();
-        Self {
-            side: self.side,
-            bias: all(&self.bias),
-            flats: self.flats.iter().map(|frames| all(frames)).collect(),
-        }
+        Self { side: self.side, bias: all(&self.bias), flats: self.flats.iter().map(|frames| all(frames)).collect() }
     }
 
     /// Writes the frames into the folders of a setting.

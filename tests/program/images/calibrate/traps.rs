@@ -51,10 +51,7 @@ fn bias(change: impl Fn(usize, usize, u16) -> u16) -> Shots {
 
 /// Each row and its left neighbour of the same colour, averaged.
 fn smoothed(frame: &[u16]) -> Vec<u16> {
-    frame
-        .chunks(SIDE)
-        .flat_map(|row| (0..SIDE).map(|x| row[x].midpoint(row[(x + SIDE - 2) % SIDE])))
-        .collect()
+    frame.chunks(SIDE).flat_map(|row| (0..SIDE).map(|x| row[x].midpoint(row[(x + SIDE - 2) % SIDE]))).collect()
 }
 
 fn found(name: &str, shots: &Shots) -> Value {
@@ -85,52 +82,23 @@ fn useless_recordings_are_refused() {
     let compressed = |share: f64| {
         small.each(|frame| {
             let bent = |x: f64| x - share * x * x / f64::from(WHITE - BLACK);
-            frame
-                .iter()
-                .map(|sample| code(bent(light(*sample))))
-                .collect()
+            frame.iter().map(|sample| code(bent(light(*sample)))).collect()
         })
     };
     let rows: Vec<(&str, Shots, &[&str])> = vec![
         (
             "cut",
-            small.each(|frame| {
-                frame
-                    .iter()
-                    .map(|sample| sample.saturating_sub(BLACK))
-                    .collect()
-            }),
-            &[
-                "bias/00.pgm: 4",
-                "bias frames must keep negative noise; export without subtracting",
-            ],
+            small.each(|frame| frame.iter().map(|sample| sample.saturating_sub(BLACK)).collect()),
+            &["bias/00.pgm: 4", "bias frames must keep negative noise; export without subtracting"],
         ),
-        (
-            "unpaired",
-            unpaired,
-            &["flat-0/00.pgm: ", "flat-0/01.pgm has ", " % more light"],
-        ),
-        (
-            "smoothed",
-            small.each(smoothed),
-            &[
-                "bias/00.pgm: not raw",
-                "neighbours of one colour correlates by 0.",
-            ],
-        ),
+        ("unpaired", unpaired, &["flat-0/00.pgm: ", "flat-0/01.pgm has ", " % more light"]),
+        ("smoothed", small.each(smoothed), &["bias/00.pgm: not raw", "neighbours of one colour correlates by 0."]),
         (
             "smoothed flats",
-            Shots {
-                bias: small.bias.clone(),
-                ..small.each(smoothed)
-            },
+            Shots { bias: small.bias.clone(), ..small.each(smoothed) },
             &["flat-0/00.pgm: not raw", "smoothed or resized"],
         ),
-        (
-            "compressed",
-            compressed(0.12),
-            &["photon transfer bends by -", "not linear"],
-        ),
+        ("compressed", compressed(0.12), &["photon transfer bends by -", "not linear"]),
         (
             "clipped",
             small.each(|frame| frame.iter().map(|sample| (*sample).min(1800)).collect()),
@@ -154,11 +122,7 @@ fn useless_recordings_are_refused() {
             small.each(|frame| frame.iter().map(|sample| (sample & 0x0FFF) * 4).collect()),
             &["every code is a multiple of 4"],
         ),
-        (
-            "constant",
-            bias(|index, site, _| BLACK + u16::from(site == index)),
-            &["noise"],
-        ),
+        ("constant", bias(|index, site, _| BLACK + u16::from(site == index)), &["noise"]),
     ];
     check_rows(rows, |(name, shots, parts)| {
         let bench = Bench::new();
@@ -176,10 +140,7 @@ fn doubtful_recordings_are_named() {
     let small = &SMALL.1;
     let compressed = small.each(|frame| {
         let bent = |x: f64| x - 0.05 * x * x / f64::from(WHITE - BLACK);
-        frame
-            .iter()
-            .map(|sample| code(bent(light(*sample))))
-            .collect()
+        frame.iter().map(|sample| code(bent(light(*sample)))).collect()
     });
     let rows: Vec<(&str, Shots, &str)> = vec![
         ("compressed", compressed, "photon transfer bends by -"),
@@ -193,19 +154,12 @@ fn doubtful_recordings_are_named() {
             flats(|_, _, sample| sample.min(7000)),
             "exposure 4 is clipped at 7000, far below white, 16383",
         ),
-        (
-            "dark current",
-            flats(|_, _, sample| sample + 40),
-            "photon transfer does not pass through 0",
-        ),
+        ("dark current", flats(|_, _, sample| sample + 40), "photon transfer does not pass through 0"),
     ];
     check_rows(rows, |(name, shots, part)| {
         let found = found(&name.replace(' ', "-"), &shots);
         let warnings = warnings(&found);
-        assert!(
-            warnings.iter().any(|line| line.contains(part)),
-            "{name}: {warnings:?}"
-        );
+        assert!(warnings.iter().any(|line| line.contains(part)), "{name}: {warnings:?}");
     });
 }
 
@@ -228,10 +182,7 @@ fn dark_frames_explain_an_offset() {
     let found = measured(&bench, &format!("dark --white {WHITE}"));
     assert_eq!(warnings(&found), [""; 0]);
     let gain = number(&found, "/settings/0/gain/value");
-    assert!(
-        (gain / SMALL.0.state.system_gain - 1.0).abs() < 0.01,
-        "{gain}"
-    );
+    assert!((gain / SMALL.0.state.system_gain - 1.0).abs() < 0.01, "{gain}");
 }
 
 /// Hot pixels are left out of everything; without that λ falls by 0.1.
@@ -241,11 +192,7 @@ fn hot_pixels_are_masked_and_counted() {
     let (plain, masked) = (found("plain", &SMALL.1), found("hot", &hot));
     assert_eq!(masked["settings"][0]["hot_pixels"], 66);
     insta::assert_snapshot!(redacted(warnings(&masked)[0]), @"iso800: 66 hot pixels (0.101 %) are left out");
-    for (path, allowed) in [
-        ("read_shape", 0.003),
-        ("read_scale", 0.004),
-        ("gain", 0.002),
-    ] {
+    for (path, allowed) in [("read_shape", 0.003), ("read_scale", 0.004), ("gain", 0.002)] {
         let path = format!("/settings/0/{path}/value");
         let (a, b) = (number(&plain, &path), number(&masked, &path));
         assert!((a - b).abs() < allowed, "{path}: {a}, {b}");
@@ -261,24 +208,16 @@ fn fixed_pattern_is_removed_with_biases() {
     let mut state = 7_u64;
     let pattern: Vec<u16> = (0..SIDE * SIDE)
         .map(|_| {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             ((state >> 33) % 7) as u16
         })
         .collect();
     let mut fixed = shots.clone();
     for frame in &mut fixed.bias {
-        frame
-            .iter_mut()
-            .zip(&pattern)
-            .for_each(|(sample, p)| *sample += p);
+        frame.iter_mut().zip(&pattern).for_each(|(sample, p)| *sample += p);
     }
     for frame in fixed.flats.iter_mut().flatten() {
-        frame
-            .iter_mut()
-            .zip(&pattern)
-            .for_each(|(sample, p)| *sample += p);
+        frame.iter_mut().zip(&pattern).for_each(|(sample, p)| *sample += p);
     }
     let scale = |found: &Value| number(found, "/settings/0/read_scale/value");
     let (plain, with_it) = (found("plain", &shots), found("fixed", &fixed));
@@ -293,10 +232,7 @@ fn fixed_pattern_is_removed_with_biases() {
     let plot = |found: &Value| number(found, "/settings/0/plot/scale") / scale(found);
     let ratio = plot(&with_it) / plot(&plain);
     assert!((ratio - 1.0).abs() < 0.015, "{ratio}");
-    let few = Shots {
-        bias: fixed.bias[..8].to_vec(),
-        ..fixed
-    };
+    let few = Shots { bias: fixed.bias[..8].to_vec(), ..fixed };
     let few = found("few", &few);
     insta::assert_snapshot!(redacted(warnings(&few)[0]), @"
     iso800: a fixed pattern has 42 % of the variance of the noise: σ_TL holds it, too; with 16 bias frames or more
@@ -333,10 +269,7 @@ fn invisible_row_noise_is_named() {
         "{lines:?}"
     );
     let text = fs::read_to_string(bench.path("camera.toml")).unwrap();
-    assert!(
-        text.contains("[row-deviation]\n# No setting has noise of this kind.\nslope = "),
-        "{text}"
-    );
+    assert!(text.contains("[row-deviation]\n# No setting has noise of this kind.\nslope = "), "{text}");
 }
 
 #[test]
@@ -355,14 +288,8 @@ fn settings_in_wrong_folders_are_named() {
     }
     let found = measured(&bench, &format!("mixed --white {WHITE}"));
     let lines = warnings(&found);
-    assert!(
-        lines.len() == 1 && lines[0].contains("iso3200: K 0.75"),
-        "{lines:?}"
-    );
-    assert!(
-        lines[0].contains("is not above that of iso800"),
-        "{lines:?}"
-    );
+    assert!(lines.len() == 1 && lines[0].contains("iso3200: K 0.75"), "{lines:?}");
+    assert!(lines[0].contains("is not above that of iso800"), "{lines:?}");
     for (index, (name, shots)) in names.iter().zip(&shots).enumerate() {
         let more = if index == 1 { 90 } else { 0 };
         let shots = shots.each(|frame| frame.iter().map(|sample| sample + more).collect());
@@ -371,8 +298,5 @@ fn settings_in_wrong_folders_are_named() {
     let found = measured(&bench, &format!("other --white {WHITE}"));
     let lines = warnings(&found);
     assert!(lines.len() == 1, "{lines:?}");
-    assert!(
-        lines[0].contains("iso800: the offset of its bias frames, 60"),
-        "{lines:?}"
-    );
+    assert!(lines[0].contains("iso800: the offset of its bias frames, 60"), "{lines:?}");
 }

@@ -16,38 +16,20 @@ fn the_command_enhances_files_and_folders() {
     std::fs::create_dir(at("dark")).unwrap();
     let dark = image(20, 30);
     for name in ["dark/a.png", "dark/b.png", "c.png"] {
-        image::save_buffer(
-            at(name),
-            dark.samples(),
-            30,
-            20,
-            image::ExtendedColorType::Rgb8,
-        )
-        .unwrap();
+        image::save_buffer(at(name), dark.samples(), 30, 20, image::ExtendedColorType::Rgb8).unwrap();
     }
     std::fs::write(at("dark/b.png"), "no image").unwrap();
     let call = |args: &[&str]| {
         let mut command = Command::new(PROGRAM);
-        let output = command
-            .current_dir(folder.path())
-            .arg("enhance")
-            .arg(&model)
-            .args(args);
+        let output = command.current_dir(folder.path()).arg("enhance").arg(&model).args(args);
         let output = output.output().unwrap();
         let text = |bytes| String::from_utf8(bytes).unwrap();
-        (
-            output.status.code().unwrap(),
-            text(output.stdout),
-            text(output.stderr),
-        )
+        (output.status.code().unwrap(), text(output.stdout), text(output.stderr))
     };
     let (code, out, err) = call(&["dark", "c.png", "--out", "mended", "--llie-anyway"]);
     assert_eq!(
         (code, out.as_str()),
-        (
-            1,
-            "mended: 2 made by gain because of --allow bad-enhancer, 1 failed\n"
-        ),
+        (1, "mended: 2 made by gain because of --allow bad-enhancer, 1 failed\n"),
         "{err}"
     );
     let json = std::fs::read_to_string(at("mended/c.json")).unwrap();
@@ -70,11 +52,7 @@ fn the_command_enhances_files_and_folders() {
     // What another model made, or the same with other settings, is never taken for the image.
     std::fs::write(at("gain.onnx.toml"), "color_out = \"bgr\"\n").unwrap();
     let (code, out, err) = call(&["c.png", "--out", "mended", "--llie-anyway"]);
-    assert_eq!(
-        (code, out.as_str()),
-        (1, "mended: 0 made by gain, 1 failed\n"),
-        "{err}"
-    );
+    assert_eq!((code, out.as_str()), (1, "mended: 0 made by gain, 1 failed\n"), "{err}");
     insta::assert_snapshot!(redacted(&err), @r#"
      WARN gain: on 3 of 3 dark frames its images are not brighter than the dark frames (mean brightness -9.6 of
         255). If its images should be this dim, add to gain.onnx.toml next to it: `range_in = "0..1"` and
@@ -89,16 +67,8 @@ fn the_command_enhances_files_and_folders() {
     assert!(code == 0 && out.contains("1 left as they were"), "{out}");
     assert!(at("mended/c.json").is_file());
     let (code, out, _) = call(&["--describe"]);
-    assert!(
-        code == 0 && out.contains("NCHW") && out.contains("default, cannot be checked"),
-        "{out}"
-    );
-    let rows = [
-        &["--out", "x"][..],
-        &["c.png"],
-        &["c.png", "--describe"],
-        &["c.png", "--out", "x", "--tile", "0"],
-    ];
+    assert!(code == 0 && out.contains("NCHW") && out.contains("default, cannot be checked"), "{out}");
+    let rows = [&["--out", "x"][..], &["c.png"], &["c.png", "--describe"], &["c.png", "--out", "x", "--tile", "0"]];
     check_rows(rows, |args| {
         let (code, _, err) = call(args);
         assert_eq!((code, err.lines().count()), (2, 1), "{err}");
@@ -113,9 +83,7 @@ fn images_in_subfolders_are_reported() {
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         image::RgbImage::new(8, 8).save(path).unwrap();
     }
-    let called = bench.call(&words(
-        "synthesize photos --out dark --levels L1 --variant ev",
-    ));
+    let called = bench.call(&words("synthesize photos --out dark --levels L1 --variant ev"));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
      WARN photos: the images of 1 folder in it are not read: photos/sub; name such a folder, too, to read them

@@ -15,13 +15,9 @@ const ASK: &str = "--model random --data rooms --levels L3,L5 --variant noise";
 fn bench() -> Bench {
     let bench = Bench::new();
     bench.rooms("rooms", 8, "96x64");
-    bench.complete(&words(
-        "synthesize rooms --out dark --levels L0,L3,L5 --variant noise",
-    ));
+    bench.complete(&words("synthesize rooms --out dark --levels L0,L3,L5 --variant noise"));
     for dark in images(&bench.path("dark"), "") {
-        let made = bench
-            .path("made")
-            .join(dark.strip_prefix(bench.path("dark")).unwrap());
+        let made = bench.path("made").join(dark.strip_prefix(bench.path("dark")).unwrap());
         fs::create_dir_all(made.parent().unwrap()).unwrap();
         let mut image = image::open(&dark).unwrap().into_rgb8();
         for sample in image.iter_mut() {
@@ -113,9 +109,7 @@ fn enhanced_folder_is_a_condition() {
     assert_eq!(fs::read(bench.path("run/records.jsonl")).unwrap(), before);
     // Other images of the same name are another enhancer.
     let changed = images(&bench.path("moved"), "L3")[0].clone();
-    pixels(&images(&bench.path("dark"), "L3")[0])
-        .save(&changed)
-        .unwrap();
+    pixels(&images(&bench.path("dark"), "L3")[0]).save(&changed).unwrap();
     let called = ask(&bench, "--enhanced mine=moved --resume run");
     insta::assert_snapshot!(called.messages(), @r#"
     exit code: 2
@@ -131,9 +125,7 @@ fn enhanced_folder_is_a_condition() {
 fn parts_of_run_share_folder() {
     let bench = bench();
     for part in ["1/2", "2/2"] {
-        bench.complete(&words(&format!(
-            "{ASK} --enhanced mine=made --out run --shard {part}"
-        )));
+        bench.complete(&words(&format!("{ASK} --enhanced mine=made --out run --shard {part}")));
     }
     bench.complete(&words("merge run --out whole"));
     bench.complete(&words(&format!("{ASK} --enhanced mine=made --out at-once")));
@@ -154,9 +146,7 @@ fn each_unusable_image_is_named() {
     DynamicImage::new_rgb8(48, 32).save(&made[2]).unwrap();
     let deep: ImageBuffer<Rgb<u16>, Vec<u16>> = ImageBuffer::new(96, 64);
     deep.save(&made[3]).unwrap();
-    DynamicImage::new_rgb8(96, 64)
-        .save_with_format(&made[4], image::ImageFormat::Jpeg)
-        .unwrap();
+    DynamicImage::new_rgb8(96, 64).save_with_format(&made[4], image::ImageFormat::Jpeg).unwrap();
     fs::remove_file(json(&made[5])).unwrap();
     fs::copy(json(&made[7]), json(&made[6])).unwrap();
     fs::write(&made[8], "no image").unwrap();
@@ -184,16 +174,8 @@ fn images_of_other_sources_are_refused() {
         refused(&bench, &format!("{enhanced} {flags}"), &[expected]);
     }
     refused(&bench, "--enhanced mine=dark", &["dark images themselves"]);
-    refused(
-        &bench,
-        "--enhanced mine=made --enhanced mine=dark",
-        &["two enhancers are named mine"],
-    );
-    refused(
-        &bench,
-        "--llie lift --enhanced lift=made",
-        &["two enhancers are named lift"],
-    );
+    refused(&bench, "--enhanced mine=made --enhanced mine=dark", &["two enhancers are named mine"]);
+    refused(&bench, "--llie lift --enhanced lift=made", &["two enhancers are named lift"]);
     // Images in each other's place.
     let dark = images(&bench.path("made"), "noise");
     let bytes: Vec<Vec<u8>> = dark.iter().map(|path| fs::read(path).unwrap()).collect();
@@ -210,9 +192,5 @@ fn images_of_other_sources_are_refused() {
         frames (-0.01 of the edges agree, 1 at best); check that each has the name of its own dark image; --allow
         bad-enhancer uses them anyway
     ");
-    ask(
-        &bench,
-        "--enhanced mine=made --allow bad-enhancer --out run",
-    )
-    .ended(0);
+    ask(&bench, "--enhanced mine=made --allow bad-enhancer --out run").ended(0);
 }

@@ -30,20 +30,13 @@ fn slow_image_fails_alone() {
     let (_folder, enhancer) = loaded(&onnx::endless_if_bright());
     let limit = TimeLimit::new(Duration::from_millis(300));
     let mut enhancer = enhancer.with_time_limit(limit);
-    let (dark, bright) = (
-        Rgb::new(4, 4, vec![50; 48]).unwrap(),
-        Rgb::new(4, 4, vec![200; 48]).unwrap(),
-    );
+    let (dark, bright) = (Rgb::new(4, 4, vec![50; 48]).unwrap(), Rgb::new(4, 4, vec![200; 48]).unwrap());
     assert_eq!(enhancer.enhance(&dark).unwrap(), dark);
     for _ in 0..2 {
         let start = Instant::now();
         let message = enhancer.enhance(&bright).unwrap_err().to_string();
         assert!(message.contains("longer than 0.3 s"), "{message}");
-        assert!(
-            start.elapsed() < Duration::from_mins(1),
-            "{:?}",
-            start.elapsed()
-        );
+        assert!(start.elapsed() < Duration::from_mins(1), "{:?}", start.elapsed());
     }
     // The session serves again, and the count begins again.
     assert_eq!(enhancer.enhance(&dark).unwrap(), dark);
@@ -112,10 +105,7 @@ fn too_new_model_is_named() {
         let bytes = onnx::identity().model_of(versions.0, versions.1);
         std::fs::write(&path, bytes).unwrap();
         let message = open(&path).err().unwrap().to_string();
-        assert!(
-            message.contains(part) && message.contains("--llie-options ort-lib"),
-            "{message}"
-        );
+        assert!(message.contains(part) && message.contains("--llie-options ort-lib"), "{message}");
     }
     insta::assert_snapshot!(redacted(&fault(&onnx::no_image())), @r#"
     [TMP]/model.onnx: gives "curves" (float32 [1, 24, height, width]), 24 channels, but an image has 3; if they

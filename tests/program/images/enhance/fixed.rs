@@ -12,15 +12,8 @@ use crate::support::table::check_rows;
 /// Number of samples that differ between two images of one size, in rows and columns before these.
 fn differing(one: &Rgb, other: &Rgb, [rows, columns]: [usize; 2]) -> usize {
     let width = 3 * one.width();
-    let lines = one
-        .samples()
-        .chunks(width)
-        .zip(other.samples().chunks(width));
-    lines
-        .take(rows)
-        .flat_map(|(a, b)| a[..3 * columns].iter().zip(&b[..3 * columns]))
-        .filter(|(a, b)| a != b)
-        .count()
+    let lines = one.samples().chunks(width).zip(other.samples().chunks(width));
+    lines.take(rows).flat_map(|(a, b)| a[..3 * columns].iter().zip(&b[..3 * columns])).filter(|(a, b)| a != b).count()
 }
 
 #[test]
@@ -57,12 +50,8 @@ fn reach_is_measured_and_is_context() {
     enhancer.enhance(&image(64, 81)).unwrap();
     let log = enhancer.sizes();
     assert_eq!((log.reach, log.context), (Some(2), Some(8)));
-    assert_eq!(
-        (log.tile, log.fixed),
-        (Some([80, 64]), Some([Some(80), Some(64)]))
-    );
-    let expected =
-        "2 images: 1 as they are, 1 in tiles of 80 × 64 with 8 px context (no difference at seams)";
+    assert_eq!((log.tile, log.fixed), (Some([80, 64]), Some([Some(80), Some(64)])));
+    let expected = "2 images: 1 as they are, 1 in tiles of 80 × 64 with 8 px context (no difference at seams)";
     assert_eq!(log.summary(), expected);
 }
 
@@ -74,12 +63,7 @@ fn fixed_size_global_model_needs_resize() {
         let same = image(48, 48);
         enhancer.enhance(&same).unwrap();
         let message = enhancer.enhance(&image(60, 100)).unwrap_err().to_string();
-        for part in [
-            "48 × 48",
-            "100 × 60",
-            "dynamic_axes",
-            "--llie-options resize",
-        ] {
+        for part in ["48 × 48", "100 × 60", "dynamic_axes", "--llie-options resize"] {
             assert!(message.contains(part), "{message}");
         }
         let mut enhancer = enhancer.with_fitting(Fitting::Resize);
@@ -131,10 +115,7 @@ fn batch_gets_image_several_times() {
     assert!(described.contains("repeated 3 times"), "{described}");
     let (_folder, mut single) = loaded(&onnx::blurred());
     let image = image(24, 32);
-    assert_eq!(
-        enhancer.enhance(&image).unwrap(),
-        single.enhance(&image).unwrap()
-    );
+    assert_eq!(enhancer.enhance(&image).unwrap(), single.enhance(&image).unwrap());
 }
 
 #[test]

@@ -39,12 +39,7 @@ fn map_pixels(image: &Rgb, with: impl Fn([f64; 3]) -> [f64; 3]) -> Rgb {
 
 /// Asserts that no sample is more than one code off.
 fn assert_near(found: &Rgb, expected: &Rgb) {
-    let most = found
-        .samples()
-        .iter()
-        .zip(expected.samples())
-        .map(|(a, b)| a.abs_diff(*b))
-        .max();
+    let most = found.samples().iter().zip(expected.samples()).map(|(a, b)| a.abs_diff(*b)).max();
     assert!(most <= Some(1), "{most:?} codes");
 }
 
@@ -58,17 +53,7 @@ fn numbers_of_each_type_are_given() {
         (Type::Byte, &[Size::Known(1), Size::Known(1)], "2", 2.0),
         (Type::Double, &[], "0.5", 0.5),
         (Type::Half, &[Size::Known(1)], "0.5", 0.5),
-        (
-            Type::Float,
-            &[
-                Size::Known(1),
-                Size::Known(1),
-                Size::Known(1),
-                Size::Known(1),
-            ],
-            "0.5",
-            0.5,
-        ),
+        (Type::Float, &[Size::Known(1), Size::Known(1), Size::Known(1), Size::Known(1)], "0.5", 0.5),
         (Type::Bool, &[Size::Known(1)], "true", 1.0),
         (Type::Bool, &[], "false", 0.0),
     ];
@@ -88,11 +73,7 @@ fn unsuitable_number_names_its_type() {
         (Type::Byte, "256", "256 does not fit its type uint8"),
         (Type::Bool, "1", "1 does not fit its type bool"),
         (Type::Half, "1e6", "1000000.0 does not fit its type float16"),
-        (
-            Type::Float,
-            "{ map = 2 }",
-            "it takes a single number: `factor = NUMBER`",
-        ),
+        (Type::Float, "{ map = 2 }", "it takes a single number: `factor = NUMBER`"),
     ];
     check_rows(rows, |(element, value, part)| {
         let graph = onnx::times_input(element, &one);
@@ -105,10 +86,7 @@ fn unsuitable_number_names_its_type() {
 fn single_number_does_not_fill_vector() {
     let graph = onnx::times_input(Type::Float, &[Size::Known(1), Size::Known(3)]);
     let message = fault_of(&graph, "[extra]\nfactor = 0.5");
-    assert!(
-        message.contains("it takes a list of 3 numbers: `factor = ["),
-        "{message}"
-    );
+    assert!(message.contains("it takes a list of 3 numbers: `factor = ["), "{message}");
 }
 
 #[test]
@@ -117,11 +95,7 @@ fn map_and_expression_have_images_size() {
     let graph = onnx::times_plane("factor");
     let found = enhanced(&graph, "[extra]\nfactor = { map = 0.5 }", &image);
     assert_eq!(found, map(&image, |x| 0.5 * x));
-    let found = enhanced(
-        &graph,
-        "[extra]\nfactor = { from = \"1 - max(image)\" }",
-        &image,
-    );
+    let found = enhanced(&graph, "[extra]\nfactor = { from = \"1 - max(image)\" }", &image);
     let expected = map_pixels(&image, |pixel| {
         let light = pixel.into_iter().fold(0.0, f64::max);
         pixel.map(|x| x * (1.0 - light))
@@ -149,9 +123,7 @@ fn noise_ignores_tiles_and_threads() {
     let image = image(40, 60);
     let graph = onnx::plus_noise();
     let noise = |std: f64, seed: u64| {
-        format!(
-            "tile = \"exact:2\"\n[extra]\nz = {{ noise = \"normal\", std = {std}, seed = {seed} }}"
-        )
+        format!("tile = \"exact:2\"\n[extra]\nz = {{ noise = \"normal\", std = {std}, seed = {seed} }}")
     };
     assert_eq!(enhanced(&graph, &noise(0.0, 0), &image), image);
     let (folder, mut whole) = stated(&graph, &noise(0.1, 0));
@@ -160,18 +132,10 @@ fn noise_ignores_tiles_and_threads() {
     let path = folder.path().join("model.onnx");
     let threads = NonZeroUsize::new(2);
     let file = ModelFile::read(&path).unwrap();
-    let mut tiled = Enhancer::open(file, &runtime(), threads)
-        .unwrap()
-        .with_tiling(Tiling::Side(NonZeroUsize::new(16).unwrap()));
+    let mut tiled =
+        Enhancer::open(file, &runtime(), threads).unwrap().with_tiling(Tiling::Side(NonZeroUsize::new(16).unwrap()));
     assert_eq!(tiled.enhance(&image).unwrap(), first);
-    let differing = |other: &Rgb| {
-        other
-            .samples()
-            .iter()
-            .zip(first.samples())
-            .filter(|(a, b)| a != b)
-            .count()
-    };
+    let differing = |other: &Rgb| other.samples().iter().zip(first.samples()).filter(|(a, b)| a != b).count();
     for other in [enhanced(&graph, &noise(0.1, 1), &image), image.clone()] {
         assert!(differing(&other) > image.samples().len() / 2);
     }
@@ -220,9 +184,7 @@ fn outputs_compose_image_by_name() {
     let image = image(12, 20);
     let graph = onnx::light_and_reflectance();
     let light = |pixel: [f64; 3]| pixel.into_iter().fold(1e-3, f64::max);
-    let expected = map_pixels(&image, |pixel| {
-        pixel.map(|x| light(pixel).powf(0.2) * x / light(pixel))
-    });
+    let expected = map_pixels(&image, |pixel| pixel.map(|x| light(pixel).powf(0.2) * x / light(pixel)));
     let composed = "image = \"L ^ 0.2 * R\"";
     assert_near(&enhanced(&graph, composed, &image), &expected);
     let preset = |name: &str| {
@@ -247,10 +209,7 @@ fn inputs_and_outputs_are_expressions() {
     let rows = [
         (onnx::identity(), "input = \"1 - image\""),
         (onnx::identity(), "image = \"1 - output\""),
-        (
-            onnx::ranged(-1.0, 1.0),
-            "range_out = \"-1..1\"\nimage = \"1 - output\"",
-        ),
+        (onnx::ranged(-1.0, 1.0), "range_out = \"-1..1\"\nimage = \"1 - output\""),
         (onnx::gain(2.0), "image = \"1 - (2 * output - 3 * input)\""),
     ];
     check_rows(rows, |(graph, sidecar)| {
@@ -266,10 +225,7 @@ fn inputs_and_outputs_are_expressions() {
 
 #[test]
 fn what_is_not_finite_is_error() {
-    let rows = [
-        ("input = \"image / 0\"", "values that are not finite"),
-        ("image = \"output / 0\"", "not numbers"),
-    ];
+    let rows = [("input = \"image / 0\"", "values that are not finite"), ("image = \"output / 0\"", "not numbers")];
     check_rows(rows, |(sidecar, part)| {
         let (_folder, mut enhancer) = stated(&onnx::identity(), sidecar);
         let message = enhancer.enhance(&image(12, 20)).unwrap_err().to_string();
@@ -281,27 +237,12 @@ fn what_is_not_finite_is_error() {
 fn missing_sidecar_lines_are_named() {
     let one = [Size::Known(1)];
     let rows = [
-        (
-            onnx::times_input(Type::Int, &one),
-            "`factor = NUMBER` (as in the model's code)",
-        ),
-        (
-            onnx::times_input(Type::Bool, &one),
-            "`factor = true` or `factor = false`",
-        ),
-        (
-            onnx::two_inputs(),
-            "`exposure = 0.2` (as in preset pairlie)",
-        ),
+        (onnx::times_input(Type::Int, &one), "`factor = NUMBER` (as in the model's code)"),
+        (onnx::times_input(Type::Bool, &one), "`factor = true` or `factor = false`"),
+        (onnx::two_inputs(), "`exposure = 0.2` (as in preset pairlie)"),
         (onnx::times_plane("ratio"), "`ratio = { map = 5.0 }`"),
-        (
-            onnx::plus_noise(),
-            "`z = { noise = \"normal\", std = NUMBER, seed = 0 }`",
-        ),
-        (
-            onnx::times_plane("attention"),
-            "`attention = { from = \"1 - max(image)\" }`",
-        ),
+        (onnx::plus_noise(), "`z = { noise = \"normal\", std = NUMBER, seed = 0 }`"),
+        (onnx::times_plane("attention"), "`attention = { from = \"1 - max(image)\" }`"),
         (onnx::luma_gain(2.0), "`channels = \"y\"`"),
     ];
     check_rows(rows, |(graph, part)| {
@@ -310,10 +251,7 @@ fn missing_sidecar_lines_are_named() {
     });
     // Presets are named only if they know such a list of outputs.
     let message = fault(&onnx::two_outputs());
-    assert!(
-        message.contains("darkir, sci, zero-dce++") && !message.contains("ruas"),
-        "{message}"
-    );
+    assert!(message.contains("darkir, sci, zero-dce++") && !message.contains("ruas"), "{message}");
 }
 
 #[test]

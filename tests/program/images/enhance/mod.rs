@@ -21,10 +21,8 @@ use tempfile::TempDir;
 
 fn runtime() -> Runtime {
     crate::support::disable_telemetry();
-    let search = RuntimeSearch {
-        library: std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from),
-        install: Install::Allowed,
-    };
+    let search =
+        RuntimeSearch { library: std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from), install: Install::Allowed };
     search.open().unwrap()
 }
 
@@ -52,10 +50,7 @@ fn fault(graph: &Graph) -> String {
     let folder = tempfile::tempdir().unwrap();
     let path = graph.write(folder.path(), "model.onnx");
     let message = open(&path).err().unwrap().to_string();
-    assert!(
-        message.starts_with(&path.display().to_string()),
-        "{message}"
-    );
+    assert!(message.starts_with(&path.display().to_string()), "{message}");
     message
 }
 
@@ -67,10 +62,8 @@ fn image(height: usize, width: usize) -> Rgb {
 
 /// An image with a function on each byte.
 fn map(image: &Rgb, with: impl Fn(f64) -> f64) -> Rgb {
-    let samples = image
-        .samples()
-        .iter()
-        .map(|byte| (with(f64::from(*byte) / 255.0).clamp(0.0, 1.0) * 255.0).round() as u8);
+    let samples =
+        image.samples().iter().map(|byte| (with(f64::from(*byte) / 255.0).clamp(0.0, 1.0) * 255.0).round() as u8);
     Rgb::new(image.height(), image.width(), samples.collect()).unwrap()
 }
 
@@ -80,10 +73,7 @@ fn the_runtime_is_opened_once() {
     assert_eq!(first.path(), runtime().path());
     assert!(first.version().starts_with("1."));
     let folder = tempfile::tempdir().unwrap();
-    let other = RuntimeSearch {
-        library: Some(folder.path().join("other.so")),
-        install: Install::Offline,
-    };
+    let other = RuntimeSearch { library: Some(folder.path().join("other.so")), install: Install::Offline };
     let message = other.open().err().unwrap().to_string();
     insta::assert_snapshot!(redacted(&message), @"
     ONNX Runtime: [TMP]/other.so cannot be loaded, because this process has already loaded [LIBRARY]; name a

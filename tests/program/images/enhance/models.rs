@@ -26,19 +26,13 @@ fn gain_and_gamma_stay_in_range() {
     let (_folder, mut gain) = loaded(&onnx::gain(2.2));
     assert_eq!(gain.enhance(&image).unwrap(), map(&image, |x| 2.2 * x));
     let (_folder, mut gamma) = loaded(&onnx::gamma(0.45));
-    assert_eq!(
-        gamma.enhance(&image).unwrap(),
-        map(&image, |x| x.powf(0.45))
-    );
+    assert_eq!(gamma.enhance(&image).unwrap(), map(&image, |x| x.powf(0.45)));
 }
 
 #[test]
 fn second_zero_dce_output_is_image() {
     let image = image(8, 8);
-    let rows = [
-        ["enhance_image_1", "enhance_image", "r"],
-        ["101", "102", "103"],
-    ];
+    let rows = [["enhance_image_1", "enhance_image", "r"], ["101", "102", "103"]];
     check_rows(rows, |names| {
         let (_folder, mut enhancer) = loaded(&onnx::three_outputs(names));
         assert_eq!(enhancer.enhance(&image).unwrap(), map(&image, |x| 2.0 * x));
@@ -109,12 +103,7 @@ fn every_layout_returns_every_byte() {
     check_rows(rows, |shape| {
         for element in [Type::Float, Type::Half, Type::Byte] {
             let (_folder, mut enhancer) = loaded(&onnx::shaped(element, &shape));
-            assert_eq!(
-                enhancer.enhance(&image).unwrap(),
-                image,
-                "{}",
-                enhancer.describe()
-            );
+            assert_eq!(enhancer.enhance(&image).unwrap(), image, "{}", enhancer.describe());
         }
     });
 }
@@ -123,18 +112,9 @@ fn every_layout_returns_every_byte() {
 fn other_conventions_are_refused_by_name() {
     let any = [Named("height"), Named("width")];
     let rows = [
-        (
-            onnx::shaped(Type::Float, &[Known(1), Known(1), any[0], any[1]]),
-            "channels = \"y\"",
-        ),
-        (
-            onnx::shaped(Type::Long, &[Known(1), Known(3), any[0], any[1]]),
-            "int64",
-        ),
-        (
-            onnx::shaped(Type::Float, &[Named("n"), Named("c"), any[0], any[1]]),
-            "layout_in",
-        ),
+        (onnx::shaped(Type::Float, &[Known(1), Known(1), any[0], any[1]]), "channels = \"y\""),
+        (onnx::shaped(Type::Long, &[Known(1), Known(3), any[0], any[1]]), "int64"),
+        (onnx::shaped(Type::Float, &[Named("n"), Named("c"), any[0], any[1]]), "layout_in"),
         (onnx::no_image(), "24 channels, but an image has 3"),
         (onnx::two_inputs(), "exposure = 0.2"),
     ];
@@ -209,11 +189,7 @@ fn channels_of_an_output_are_selected() {
     [TMP]/model.onnx: gives "x" (float32 [1, 7, height, width]), 7 channels, but an image has 3; add to
         model.onnx.toml next to it those that are the image (from 0, end excluded): `output = "x[4:7]"`
     "#);
-    for sidecar in [
-        "output = \"x[4:7]\"",
-        "image = \"x[4:7] * 1\"",
-        "output = \"x[0:3]\"",
-    ] {
+    for sidecar in ["output = \"x[4:7]\"", "image = \"x[4:7] * 1\"", "output = \"x[0:3]\""] {
         assert!(message.contains("`output = \"x[4:7]\"`"), "{message}");
         let (_folder, mut enhancer) = stated(&onnx::seven_channels(), sidecar);
         assert_eq!(enhancer.enhance(&image).unwrap(), image, "{sidecar}");
@@ -230,12 +206,8 @@ fn vector_is_given_as_list() {
     "#);
     let image = image(9, 14);
     let (_folder, mut enhancer) = stated(&onnx::times_vector(), "[extra]\nalpha = [1, 0, 1]");
-    let expected: Vec<u8> = image
-        .samples()
-        .iter()
-        .enumerate()
-        .map(|(i, byte)| if i % 3 == 1 { 0 } else { *byte })
-        .collect();
+    let expected: Vec<u8> =
+        image.samples().iter().enumerate().map(|(i, byte)| if i % 3 == 1 { 0 } else { *byte }).collect();
     assert_eq!(enhancer.enhance(&image).unwrap().samples(), expected);
 }
 
@@ -244,10 +216,7 @@ fn tiles_start_where_blocks_do() {
     let image = image(40, 90);
     let (_whole, mut whole) = loaded(&onnx::pooled(40, 90));
     let (_tiled, mut tiled) = loaded(&onnx::pooled(40, 62));
-    assert_eq!(
-        tiled.enhance(&image).unwrap(),
-        whole.enhance(&image).unwrap()
-    );
+    assert_eq!(tiled.enhance(&image).unwrap(), whole.enhance(&image).unwrap());
 }
 
 #[test]

@@ -50,10 +50,7 @@ fn correct_model_confirms_its_ranges() {
     let called = ask(&bench, "");
     assert_eq!(called.code, Some(0), "{called:?}");
     let manifest = manifest(&bench);
-    assert_eq!(
-        stated(&manifest, "range_in"),
-        ("0..1".to_owned(), "assumed".to_owned())
-    );
+    assert_eq!(stated(&manifest, "range_in"), ("0..1".to_owned(), "assumed".to_owned()));
     let note = &manifest["enhancers"]["model"];
     assert_eq!(note["probe"]["outcome"], "plausible");
     assert!(note["judged"]["images"].as_u64().unwrap() > 0, "{note}");
@@ -106,10 +103,7 @@ fn impossible_enhancement_stops_the_run() {
         (onnx::blue_first(), "blue where the frames are red"),
         (onnx::negative(), "bright where the frames are dark"),
         (onnx::flat(), "are flat"),
-        (
-            onnx::mislabelled(),
-            "edges that are not those of the frames",
-        ),
+        (onnx::mislabelled(), "edges that are not those of the frames"),
     ] {
         let bench = bench(&graph, "");
         let called = ask(&bench, "");
@@ -119,16 +113,10 @@ fn impossible_enhancement_stops_the_run() {
         // It is not asked about, but it can be.
         let called = ask(&bench, "--allow bad-enhancer");
         assert_eq!(called.code, Some(0), "{called:?}");
-        assert!(
-            called.stdout.contains("because of --allow bad-enhancer"),
-            "{called:?}"
-        );
+        assert!(called.stdout.contains("because of --allow bad-enhancer"), "{called:?}");
         let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
         assert!(page.contains("because of --allow bad-enhancer"));
-        assert_eq!(
-            manifest(&bench)["enhancers"]["model"]["probe"]["outcome"],
-            "overruled"
-        );
+        assert_eq!(manifest(&bench)["enhancers"]["model"]["probe"]["outcome"], "overruled");
     }
 }
 
@@ -152,22 +140,14 @@ fn odd_outputs_are_named() {
     for (graph, part) in [
         (onnx::noisy(), "draws random numbers (RandomNormalLike)"),
         (onnx::residual(), "`image = \"input + output\"`"),
-        (
-            onnx::light_map(),
-            "`image = \"clip(input / max(output, 0.001), 0, 1)\"`",
-        ),
+        (onnx::light_map(), "`image = \"clip(input / max(output, 0.001), 0, 1)\"`"),
         (onnx::light_beside(), "and \"L\" of the same size is not"),
     ] {
         let bench = bench(&graph, "");
         let called = ask(&bench, "");
         assert_eq!(called.code, Some(0), "{part}: {called:?}");
         assert!(called.stderr.contains(part), "{part}: {called:?}");
-        assert_eq!(
-            manifest(&bench)["enhancers"]["model"]["remarks"]
-                .as_array()
-                .map(Vec::len),
-            Some(1)
-        );
+        assert_eq!(manifest(&bench)["enhancers"]["model"]["remarks"].as_array().map(Vec::len), Some(1));
     }
 }
 
@@ -185,20 +165,14 @@ fn a_normalised_input_is_found() {
         [0.229, 0.224, 0.225]` and `range_out = "0..1"`. `darkqa-eval enhance doctor model.onnx IMAGES… --out DIR`
         tries each value range and colour order; --allow bad-enhancer uses it anyway
     "#);
-    let stated = self::bench(
-        &graph,
-        "mean = [0.485, 0.456, 0.406]\nstd = [0.229, 0.224, 0.225]\n",
-    );
+    let stated = self::bench(&graph, "mean = [0.485, 0.456, 0.406]\nstd = [0.229, 0.224, 0.225]\n");
     let called = ask(&stated, "");
     assert_eq!(called.code, Some(0), "{called:?}");
 }
 
 #[test]
 fn an_output_normalised_like_the_stated_input_is_found() {
-    for [mean, std] in [
-        [[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]],
-        [[0.4, 0.3, 0.3], [0.2, 0.25, 0.2]],
-    ] {
+    for [mean, std] in [[[0.485, 0.456, 0.406], [0.229, 0.224, 0.225]], [[0.4, 0.3, 0.3], [0.2, 0.25, 0.2]]] {
         let graph = onnx::normalised_at_both_ends(mean, std);
         let stated = format!("mean = {mean:?}\nstd = {std:?}\n");
         let called = ask(&bench(&graph, &stated), "");
@@ -217,10 +191,7 @@ fn an_output_normalised_like_the_stated_input_is_found() {
 #[test]
 fn black_and_white_reveal_mixed_ranges() {
     let centred = [-0.5, 0.5];
-    let clip = [
-        [0.481_454_66, 0.457_827_5, 0.408_210_73],
-        [0.268_629_54, 0.261_302_6, 0.275_777_1],
-    ];
+    let clip = [[0.481_454_66, 0.457_827_5, 0.408_210_73], [0.268_629_54, 0.261_302_6, 0.275_777_1]];
     for (graph, lines) in [
         (
             onnx::enhancer_in_ranges(UNIT, centred),
@@ -260,10 +231,7 @@ fn advised(graph: &Graph, lines: &str) {
     let called = ask(&unstated, "");
     assert_eq!(called.code, Some(2), "{lines}: {called:?}");
     for line in lines.lines() {
-        assert!(
-            called.stderr.contains(&format!("`{line}`")),
-            "{line}: {called:?}"
-        );
+        assert!(called.stderr.contains(&format!("`{line}`")), "{line}: {called:?}");
     }
     let stated = bench(graph, lines);
     let called = ask(&stated, "");
@@ -286,7 +254,8 @@ fn images_without_colour_are_refused() {
 
 #[test]
 fn a_wrong_statement_is_found_too() {
-    let right = "model.onnx.toml next to it, replacing the present values: `range_in = \"0..1\"` and `range_out = \"0..1\"`";
+    let right =
+        "model.onnx.toml next to it, replacing the present values: `range_in = \"0..1\"` and `range_out = \"0..1\"`";
     for wrong in [
         "range_in = \"-1..1\"\nrange_out = \"-1..1\"\n",
         "range_in = \"0..255\"\nrange_out = \"0..255\"\n",
@@ -314,10 +283,7 @@ fn idle_model_needs_stated_ranges() {
         `range_out = "0..1"`. `darkqa-eval enhance doctor model.onnx IMAGES… --out DIR` tries each value range and
         colour order; --allow bad-enhancer uses it anyway
     "#);
-    let stated = bench(
-        &onnx::identity(),
-        "range_in = \"0..1\"\nrange_out = \"0..1\"",
-    );
+    let stated = bench(&onnx::identity(), "range_in = \"0..1\"\nrange_out = \"0..1\"");
     let called = ask(&stated, "");
     insta::assert_snapshot!(called.lines_with("not brighter"), @"
     exit code: 0
@@ -349,10 +315,7 @@ fn doctor_finds_wrong_colour_order() {
     assert_eq!(called.code, Some(0), "{called:?}");
     let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
     assert!(page.contains("as set") && page.contains("RGB in the output"));
-    assert!(
-        called.stdout.contains("color_out = \"rgb\"") && !called.stdout.contains("range_in = "),
-        "{called:?}"
-    );
+    assert!(called.stdout.contains("color_out = \"rgb\"") && !called.stdout.contains("range_in = "), "{called:?}");
 }
 
 #[test]
@@ -372,11 +335,7 @@ fn doctor_proposes_sidecar_that_mends_model() {
         let page = fs::read_to_string(bench.path("doctor/doctor.html")).unwrap();
         assert!(page.contains("base64,") && page.contains(" in and "));
         assert!(bench.path("doctor/doctor.png").exists());
-        assert_eq!(
-            bench.path("model.onnx.toml").exists(),
-            settled,
-            "{called:?}"
-        );
+        assert_eq!(bench.path("model.onnx.toml").exists(), settled, "{called:?}");
         if settled && page.contains("range_out = ") {
             // What a run would use stays on the page, beside what is plausible.
             let wrong = "range_in = \"0..255\"\nrange_out = \"-1..1\"\n";
@@ -393,12 +352,7 @@ fn doctor_proposes_sidecar_that_mends_model() {
             // What is stated needs no other line.
             let again = bench.call(&words(line));
             assert_eq!(again.code, Some(0), "{again:?}");
-            assert!(
-                again
-                    .stdout
-                    .contains("not written, because no line is proposed"),
-                "{again:?}"
-            );
+            assert!(again.stdout.contains("not written, because no line is proposed"), "{again:?}");
             // A sidecar is never replaced.
             bench.file("model.onnx.toml", "# mine");
             let again = bench.call(&words(line));
@@ -436,18 +390,13 @@ fn enhance_prints_adapted_sizes() {
     bench.rooms("rooms", 2, "64x48");
     let graph = onnx::enhancer_in_ranges(UNIT, UNIT);
     onnx::of_size(&graph, 1, [32, 32]).write(&bench.path(""), "fixed.onnx");
-    bench.file(
-        "fixed.onnx.toml",
-        "range_in = \"0..1\"\nrange_out = \"0..1\"\n",
-    );
+    bench.file("fixed.onnx.toml", "range_in = \"0..1\"\nrange_out = \"0..1\"\n");
     let called = bench.call(&words("enhance fixed.onnx rooms --out tiles"));
     insta::assert_snapshot!(called.stdout, @"
     tiles: 2 made by fixed
     2 images: in tiles of 32 × 32 with 8 px context (no difference at seams)
     ");
-    let called = bench.call(&words(
-        "enhance fixed.onnx rooms --out resized --llie-options resize",
-    ));
+    let called = bench.call(&words("enhance fixed.onnx rooms --out resized --llie-options resize"));
     insta::assert_snapshot!(called.stdout, @"
     resized: 2 made by fixed
     2 images: resized to 32 × 32 and back
@@ -479,7 +428,8 @@ fn burnt_out_images_are_named() {
     assert_eq!(enhance("model.onnx", &rooms[1], "dark"), "");
     assert_eq!(enhance("lift", &rooms[0], "lifted"), "");
     let doctor = bench.call(&words("enhance doctor model.onnx rooms --out doctor"));
-    let said = "Brighter images are burnt out, with codes of 254 or 255 where the dark ones have detail: 3 of 3 as they are";
+    let said =
+        "Brighter images are burnt out, with codes of 254 or 255 where the dark ones have detail: 3 of 3 as they are";
     assert!(doctor.stdout.contains(said), "{doctor:?}");
     let doctor = bench.call(&words("enhance doctor lift rooms --out doctor"));
     assert!(!doctor.stdout.contains("burnt"), "{doctor:?}");
@@ -488,15 +438,10 @@ fn burnt_out_images_are_named() {
     let called = bench.call(&words(line));
     assert_eq!(called.code, Some(0), "{called:?}");
     let manifest = manifest(&bench);
-    let burnt = manifest["enhancers"]["model"]["burnt_out"]
-        .as_object()
-        .unwrap();
+    let burnt = manifest["enhancers"]["model"]["burnt_out"].as_object().unwrap();
     assert_eq!(burnt.keys().collect::<Vec<_>>(), ["L1-ev+model"]);
     assert_eq!(manifest["enhancers"]["lift"].get("burnt_out"), None);
     let report = bench.call(&words("report run --full"));
-    assert!(
-        report.stdout.contains("! model: images are burnt out"),
-        "{report:?}"
-    );
+    assert!(report.stdout.contains("! model: images are burnt out"), "{report:?}");
     assert!(!report.stdout.contains("! lift: images"), "{report:?}");
 }

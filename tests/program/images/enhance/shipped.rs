@@ -35,11 +35,7 @@ fn the_shipped_enhancer_exposes_for_gray() {
     let mut enhancer = open(&shipped()).unwrap();
     let light = |byte: f64| {
         let x = byte / 255.0;
-        if x < 0.04045 {
-            x / 12.92
-        } else {
-            ((x + 0.055) / 1.055_f64).powf(2.4)
-        }
+        if x < 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055_f64).powf(2.4) }
     };
     let mean = |image: &Rgb| {
         let sum: f64 = image.samples().iter().map(|b| light(f64::from(*b))).sum();
@@ -63,39 +59,22 @@ fn lift() -> Enhancer {
 
 /// The mean square of the difference of two images, as a ratio to the brightest in dB.
 fn psnr(a: &Rgb, b: &Rgb) -> f64 {
-    let sum: f64 = a
-        .samples()
-        .iter()
-        .zip(b.samples())
-        .map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2))
-        .sum();
+    let sum: f64 = a.samples().iter().zip(b.samples()).map(|(a, b)| f64::from(a.abs_diff(*b)).powi(2)).sum();
     10.0 * (255.0_f64.powi(2) * a.samples().len() as f64 / sum.max(1e-9)).log10()
 }
 
 #[test]
 fn trained_enhancer_brings_room_back() {
     let mut enhancer = lift();
-    let rooms = Rooms {
-        frames: 6,
-        seed: 3003,
-        size: [240, 180],
-        ..Rooms::default()
-    };
+    let rooms = Rooms { frames: 6, seed: 3003, size: [240, 180], ..Rooms::default() };
     for (id, room) in rooms.all() {
         let lit = room.frame().unwrap().rgb.clone();
         let (mut negative, key) = (None, NoiseKey::new(0, &id));
         for level in Severity::LADDER {
-            let film = negative
-                .get_or_insert_with(|| Negative::new(&lit, &key, &Synthesis::default(), level));
+            let film = negative.get_or_insert_with(|| Negative::new(&lit, &key, &Synthesis::default(), level));
             for (dark, gain) in [(expose(&lit, level), 8.0), (film.develop(level), 5.0)] {
-                let (before, after) = (
-                    psnr(&dark, &lit),
-                    psnr(&enhancer.enhance(&dark).unwrap(), &lit),
-                );
-                assert!(
-                    after - before > gain,
-                    "{id} {level:?}: {before} dB, then {after} dB"
-                );
+                let (before, after) = (psnr(&dark, &lit), psnr(&enhancer.enhance(&dark).unwrap(), &lit));
+                assert!(after - before > gain, "{id} {level:?}: {before} dB, then {after} dB");
             }
         }
         // What is lit stays nearly as it is. Rooms differ in their mean light, which the enhancer can only guess.
@@ -108,13 +87,7 @@ fn trained_enhancer_brings_room_back() {
 #[test]
 fn the_trained_enhancer_invents_nothing() {
     let mut enhancer = lift();
-    let rows = [
-        [0, 0, 0],
-        [3, 3, 3],
-        [20, 16, 12],
-        [90, 110, 130],
-        [255, 255, 255],
-    ];
+    let rows = [[0, 0, 0], [3, 3, 3], [20, 16, 12], [90, 110, 130], [255, 255, 255]];
     check_rows(rows, |color| {
         let flat = Rgb::new(64, 96, color.repeat(64 * 96)).unwrap();
         let lifted = enhancer.enhance(&flat).unwrap();
@@ -128,21 +101,12 @@ fn the_trained_enhancer_invents_nothing() {
         }
     });
     // One edge in, one edge out.
-    let halves: Vec<u8> = (0..64 * 96)
-        .flat_map(|i| if i % 96 < 48 { [8, 8, 8] } else { [24, 20, 16] })
-        .collect();
-    let lifted = enhancer
-        .enhance(&Rgb::new(64, 96, halves).unwrap())
-        .unwrap();
+    let halves: Vec<u8> = (0..64 * 96).flat_map(|i| if i % 96 < 48 { [8, 8, 8] } else { [24, 20, 16] }).collect();
+    let lifted = enhancer.enhance(&Rgb::new(64, 96, halves).unwrap()).unwrap();
     let row = &lifted.samples()[32 * 96 * 3..33 * 96 * 3];
-    let steps: Vec<u8> = (24..71)
-        .map(|x| row[x * 3].abs_diff(row[x * 3 + 3]))
-        .collect();
+    let steps: Vec<u8> = (24..71).map(|x| row[x * 3].abs_diff(row[x * 3 + 3])).collect();
     let edge = 47 - 24;
     assert!(steps[edge] > 40, "{steps:?}");
-    let away = steps
-        .iter()
-        .enumerate()
-        .filter(|(x, _)| x.abs_diff(edge) > 6);
+    let away = steps.iter().enumerate().filter(|(x, _)| x.abs_diff(edge) > 6);
     assert!(away.clone().all(|(_, step)| *step <= 8), "{steps:?}");
 }

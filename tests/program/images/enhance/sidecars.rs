@@ -40,30 +40,17 @@ fn sidecar_says_which_output_it_is() {
 fn sidecar_says_what_graph_cannot() {
     let image = image(12, 20);
     let rows = [
-        (
-            onnx::identity(),
-            "range_in = \"0..255\"\nrange_out = \"0..255\"",
-        ),
-        (
-            onnx::identity(),
-            "range_in = \"-1..1\"\nrange_out = \"-1..1\"\ncolor = \"bgr\"",
-        ),
+        (onnx::identity(), "range_in = \"0..255\"\nrange_out = \"0..255\""),
+        (onnx::identity(), "range_in = \"-1..1\"\nrange_out = \"-1..1\"\ncolor = \"bgr\""),
         (onnx::ranged(0.0, 255.0), "range_out = \"0..255\""),
         (onnx::ranged(-1.0, 1.0), "range_out = \"-1..1\""),
-        (
-            onnx::ranged(0.5, 1.0),
-            "mean = [0.5, 0.5, 0.5]\nstd = [0.5, 0.5, 0.5]",
-        ),
+        (onnx::ranged(0.5, 1.0), "mean = [0.5, 0.5, 0.5]\nstd = [0.5, 0.5, 0.5]"),
         (onnx::two_inputs(), "[extra]\nexposure = 1"),
     ];
     check_rows(rows, |(graph, sidecar)| {
         let (_folder, mut enhancer) = stated(&graph, sidecar);
         assert_eq!(enhancer.enhance(&image).unwrap(), image, "{sidecar}");
-        assert!(
-            enhancer.describe().contains("sidecar"),
-            "{}",
-            enhancer.describe()
-        );
+        assert!(enhancer.describe().contains("sidecar"), "{}", enhancer.describe());
     });
     let (_folder, mut truncated) = stated(&onnx::gain(0.5), "rounding = \"truncate\"");
     let half: Vec<u8> = image.samples().iter().map(|byte| byte / 2).collect();
@@ -72,10 +59,7 @@ fn sidecar_says_what_graph_cannot() {
 
 #[test]
 fn range_that_nobody_stated_is_checked() {
-    let rows = [
-        (onnx::ranged(0.0, 255.0), "seems to be 0..255"),
-        (onnx::ranged(-1.0, 1.0), "seems to be -1..1"),
-    ];
+    let rows = [(onnx::ranged(0.0, 255.0), "seems to be 0..255"), (onnx::ranged(-1.0, 1.0), "seems to be -1..1")];
     check_rows(rows, |(graph, likely)| {
         let (_folder, mut enhancer) = loaded(&graph);
         let message = enhancer.enhance(&image(12, 20)).unwrap_err().to_string();
@@ -103,23 +87,15 @@ fn preset_says_what_its_authors_do() {
         "18" (float32 [1, 3, height, width]); add to model.onnx.toml next to it the one that is the image: `output
         = "NAME"`
     "#);
-    for names in [
-        ["1", "2", "3"],
-        ["output", "7", "8"],
-        ["a", "enhanced", "c"],
-    ] {
+    for names in [["1", "2", "3"], ["output", "7", "8"], ["a", "enhanced", "c"]] {
         let three = onnx::three_outputs(names).write(folder.path(), "three.onnx");
         let model = PathBuf::from(format!("zero-dce:{}", three.display()));
         let enhanced = open(&model).unwrap().enhance(&image).unwrap();
         assert_eq!(enhanced, map(&image, |x| 2.0 * x), "{names:?}");
     }
     let described = open(&file("sci")).unwrap().describe();
-    assert!(
-        described.contains("preset sci") && described.contains("truncate"),
-        "{described}"
-    );
-    let digests =
-        ["sci", "zero-dce"].map(|preset| ModelFile::read(&file(preset)).unwrap().digest());
+    assert!(described.contains("preset sci") && described.contains("truncate"), "{described}");
+    let digests = ["sci", "zero-dce"].map(|preset| ModelFile::read(&file(preset)).unwrap().digest());
     assert_ne!(digests[0], digests[1]);
     let message = open(&file("nonesuch")).err().unwrap().to_string();
     insta::assert_snapshot!(redacted(&message), @r#"

@@ -68,42 +68,23 @@ fn tiles_are_exact_or_refused() {
             let (_folder, enhancer) = stated(&onnx::blurred(), sidecar);
             let in_parts = enhancer.with_tiling(tiles(side)).enhance(&image).unwrap();
             // A padded image is blurred with what it is padded with.
-            let same = whole
-                .samples()
-                .iter()
-                .zip(in_parts.samples())
-                .filter(|(a, b)| a == b);
-            assert!(
-                same.count() * 10 > whole.samples().len() * 9,
-                "{sidecar} {side}"
-            );
+            let same = whole.samples().iter().zip(in_parts.samples()).filter(|(a, b)| a == b);
+            assert!(same.count() * 10 > whole.samples().len() * 9, "{sidecar} {side}");
             if !sidecar.contains("multiple") {
                 assert_eq!(in_parts, whole, "{sidecar} {side}");
             }
         }
-        let message = enhancer
-            .with_tiling(tiles(4))
-            .enhance(&image)
-            .unwrap_err()
-            .to_string();
+        let message = enhancer.with_tiling(tiles(4)).enhance(&image).unwrap_err().to_string();
         assert!(message.contains("--llie-options tile"), "{message}");
     });
     check_rows([onnx::mean_added(), onnx::blurred()], |graph| {
         // Of the mean every pixel is part; of the blur more than is stated here.
         let (_folder, enhancer) = stated(&graph, "tile = \"exact:0\"");
-        let message = enhancer
-            .with_tiling(tiles(40))
-            .enhance(&image)
-            .unwrap_err()
-            .to_string();
+        let message = enhancer.with_tiling(tiles(40)).enhance(&image).unwrap_err().to_string();
         assert!(message.contains("at their seams"), "{message}");
     });
     let (_folder, enhancer) = stated(&onnx::mean_added(), "tile = \"none\"");
-    let message = enhancer
-        .with_tiling(tiles(40))
-        .enhance(&image)
-        .unwrap_err()
-        .to_string();
+    let message = enhancer.with_tiling(tiles(40)).enhance(&image).unwrap_err().to_string();
     insta::assert_snapshot!(redacted(&message), @r#"
     --llie-options tile: 40 is not possible: model needs the whole image (tile = "none" in its .onnx.toml file or
         preset)

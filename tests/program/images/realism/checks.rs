@@ -114,10 +114,7 @@ fn pair_of_similar_light_warns() {
             codes.map(|code| code - code / 20)
         })
         .collect();
-    RgbImage::from_raw(96, 64, samples)
-        .unwrap()
-        .save(bench.path("pairs/low/a.png"))
-        .unwrap();
+    RgbImage::from_raw(96, 64, samples).unwrap().save(bench.path("pairs/low/a.png")).unwrap();
     let called = bench.call(&["realism", "pairs"]);
     assert_eq!(called.code, Some(0), "{called:?}");
     insta::assert_snapshot!(called.messages(), @"

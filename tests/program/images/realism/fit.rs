@@ -1,4 +1,5 @@
-//! `--fit`: the gain of a known camera comes back, what is not a sensor's noise is refused, and no pair is judged by its own gain.
+//! `--fit`: the gain of a known camera comes back, what is not a sensor's noise is refused, and no pair is judged by
+//! its own gain.
 
 use super::rows::{column, csv};
 use super::*;
@@ -12,12 +13,7 @@ fn number(value: &Value) -> f64 {
 
 /// The fits of a summary under a noise profile, pair by pair.
 fn fits<'s>(summary: &'s Value, reading: &str) -> &'s [Value] {
-    let fit = summary["fits"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|fit| fit["reading"] == reading)
-        .unwrap();
+    let fit = summary["fits"].as_array().unwrap().iter().find(|fit| fit["reading"] == reading).unwrap();
     fit["pairs"].as_array().unwrap()
 }
 
@@ -47,7 +43,8 @@ fn known_gain_fits_every_profile() {
     });
 }
 
-/// A picture that holds linear light is fitted as light, as it is compared: its noise is not that of a picture of its codes.
+/// A picture that holds linear light is fitted as light, as it is compared: its noise is not that of a picture of its
+/// codes.
 #[test]
 fn known_gain_fits_linear_light() {
     let bench = Bench::new();
@@ -63,14 +60,7 @@ fn known_gain_fits_linear_light() {
         }
     });
     light.save(&normal).unwrap();
-    let words = [
-        "--transfer",
-        "linear",
-        "--profile",
-        "physical",
-        "--gain",
-        "0.7746",
-    ];
+    let words = ["--transfer", "linear", "--profile", "physical", "--gain", "0.7746"];
     let words = [&FIXED[..], &words, &["--levels", "L2", "--out", "made"]].concat();
     bench.complete(&[&["synthesize", normal.to_str().unwrap()], &words[..]].concat());
     let low = bench.path("made/a_L2-noise@physical.png");
@@ -100,15 +90,7 @@ fn foreign_noise_is_not_fitted() {
         image::imageops::FilterType::Triangle,
     );
     filtered.save(&path).unwrap();
-    let arguments = [
-        "--fit",
-        "--ev",
-        "4",
-        "--profile",
-        "physical",
-        "--out",
-        "out",
-    ];
+    let arguments = ["--fit", "--ev", "4", "--profile", "physical", "--out", "out"];
     let table = bench.complete(&[&["realism", "pairs"], &arguments[..]].concat());
     insta::assert_snapshot!(lines_with(&table, "smaller K"), @"
     System gain K by the spread of smooth blocks, as saved; a smaller K than the sensor's means that noise was
@@ -116,7 +98,8 @@ fn foreign_noise_is_not_fitted() {
     ");
     let refused = "bare, physical: K 0.02, misfit";
     assert!(table.contains(refused), "{table}");
-    let reason = "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this noise profile";
+    let reason =
+        "no fit, as the ladder of K ends here: the low image's noise is not a sensor's under this noise profile";
     assert!(table.contains(reason), "{table}");
     let rows = csv(&bench, "out/fits.csv");
     assert_eq!(column(&rows, "pair"), ["averaged", "bare"]);
@@ -152,22 +135,20 @@ const FIT: [&str; 5] = ["--fit", "--ev", "4", "--profile", "physical"];
 fn of_pair(bench: &Bench, file: &str, pair: &str, camera: &str) -> Vec<String> {
     let rows = csv(bench, file);
     let cells = ["pair", "camera", "psnr", "ssim", "kl"].map(|name| column(&rows, name));
-    let mut places =
-        (0..rows.len() - 1).filter(|row| cells[0][*row] == pair && cells[1][*row] == camera);
+    let mut places = (0..rows.len() - 1).filter(|row| cells[0][*row] == pair && cells[1][*row] == camera);
     let row = places.next().unwrap();
     cells[2..].iter().map(|cells| cells[row].clone()).collect()
 }
 
-/// With three fitted pairs, a pair is judged by the camera that the other two alone give; not by one that knows its own gain.
+/// With three fitted pairs, a pair is judged by the camera that the other two alone give; not by one that knows its own
+/// gain.
 #[test]
 fn pairs_are_judged_by_others_gain() {
     let bench = Bench::new();
     let others = [("one", 4), ("two", 5)];
     unequal_pairs(&bench, "others", &others);
     unequal_pairs(&bench, "pairs", &[others[0], others[1], ("loud", 6)]);
-    let fit = |folder: &str, out: &str| {
-        bench.complete(&[&["realism", folder, "--out", out], &FIT[..]].concat())
-    };
+    let fit = |folder: &str, out: &str| bench.complete(&[&["realism", folder, "--out", out], &FIT[..]].concat());
     let marked = fit("others", "two");
     insta::assert_snapshot!(lines_with(&marked, "gain fitted"), @"
      with sensor noise, physical, gain fitted to the same pairs   40.69     0.9347   0.001    0.0          0.001
@@ -197,28 +178,13 @@ fn pairs_are_judged_by_others_gain() {
 fn fitted_camera_reproduces_numbers() {
     let bench = Bench::new();
     unequal_pairs(&bench, "pairs", &[("one", 4), ("loud", 5)]);
-    let fit = [
-        "--fit",
-        "--ev",
-        "4",
-        "--profile",
-        "paper,physical",
-        "--out",
-        "out",
-    ];
+    let fit = ["--fit", "--ev", "4", "--profile", "paper,physical", "--out", "out"];
     bench.complete(&[&["realism", "pairs"], &fit[..]].concat());
     for reading in ["paper", "physical"] {
         let camera = format!("out/fitted-{reading}.toml");
         let text = fs::read_to_string(bench.path(&camera)).unwrap();
-        assert!(
-            text.contains(&format!("the noise profile {reading}, as saved;")),
-            "{text}"
-        );
-        assert_eq!(
-            text.contains("ratio = [200.0, 200.0]"),
-            reading == "paper",
-            "{text}"
-        );
+        assert!(text.contains(&format!("the noise profile {reading}, as saved;")), "{text}");
+        assert_eq!(text.contains("ratio = [200.0, 200.0]"), reading == "paper", "{text}");
         let words = ["realism", "pairs", "--ev", "4", "--profile", reading];
         let again = bench.complete(&[&words[..], &["--json", "--camera", &camera]].concat());
         let again: Value = serde_json::from_str(&again).unwrap();
@@ -230,11 +196,7 @@ fn fitted_camera_reproduces_numbers() {
             .iter()
             .find(|row| row["reading"] == reading && row["camera"] == "same-pairs");
         for name in ["psnr", "ssim", "kl", "differences"] {
-            assert_eq!(
-                row.unwrap()[name],
-                again["noise"][0][name],
-                "{reading}, {name}"
-            );
+            assert_eq!(row.unwrap()[name], again["noise"][0][name], "{reading}, {name}");
         }
     }
 }

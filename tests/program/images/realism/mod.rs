@@ -1,5 +1,5 @@
-//! `realism` from the outside, on pairs that the test makes: the dark one by an independent, simple noise ([`pair`]), or by the
-//! program ([`made_pairs`]).
+//! `realism` from the outside, on pairs that the test makes: the dark one by an independent, simple noise ([`pair`]),
+//! or by the program ([`made_pairs`]).
 
 mod checks;
 mod fit;
@@ -15,13 +15,8 @@ use serde_json::Value;
 
 /// A normal image, and the same 2.2 EV darker (so that codes are halved) under noise of a few codes.
 fn pair(bench: &Bench, name: &str, salt: u32) {
-    let normal = RgbImage::from_fn(96, 64, |x, y| {
-        Rgb([
-            (60 + x) as u8,
-            (50 + 2 * y) as u8,
-            (40 + (x + y) % 120) as u8,
-        ])
-    });
+    let normal =
+        RgbImage::from_fn(96, 64, |x, y| Rgb([(60 + x) as u8, (50 + 2 * y) as u8, (40 + (x + y) % 120) as u8]));
     let mut state = salt;
     let low = RgbImage::from_fn(96, 64, |x, y| {
         Rgb(normal.get_pixel(x, y).0.map(|code| {
@@ -33,9 +28,7 @@ fn pair(bench: &Bench, name: &str, salt: u32) {
     });
     for (folder, image) in [("normal", &normal), ("low", &low)] {
         fs::create_dir_all(bench.path(&format!("pairs/{folder}"))).unwrap();
-        image
-            .save(bench.path(&format!("pairs/{folder}/{name}.png")))
-            .unwrap();
+        image.save(bench.path(&format!("pairs/{folder}/{name}.png"))).unwrap();
     }
 }
 
@@ -64,8 +57,8 @@ fn picture(number: u32) -> RgbImage {
     image
 }
 
-/// Pairs of pictures of these names and numbers in a folder; the low-light images are 4 EV darker, as `synthesize` makes them by
-/// these words.
+/// Pairs of pictures of these names and numbers in a folder; the low-light images are 4 EV darker, as `synthesize`
+/// makes them by these words.
 fn made_pairs(bench: &Bench, folder: &str, pictures: &[(&str, u32)], words: &[&str]) {
     for (name, number) in pictures {
         for side in ["normal", "low"] {
@@ -103,10 +96,7 @@ fn noise_resembles_noise() {
     let kl = |row: &Value| row["kl"]["value"].as_f64().unwrap();
     for rules in [&[][..], &["--kl-bins", "kousha"]] {
         let summary = json(&bench, rules);
-        assert!(
-            kl(&summary["noise"][0]) < 0.5 * kl(&summary["exposure"]),
-            "{summary:#}"
-        );
+        assert!(kl(&summary["noise"][0]) < 0.5 * kl(&summary["exposure"]), "{summary:#}");
         let drop = summary["drop"]["value"].as_f64().unwrap();
         assert!((drop - 2.2).abs() < 0.1, "{drop}");
         assert_eq!(summary["pairs"], 3);
@@ -123,50 +113,29 @@ fn files_hold_every_pair() {
     for (salt, name) in ["a", "b", "c"].into_iter().enumerate() {
         pair(&bench, name, salt as u32);
     }
-    fs::copy(
-        bench.path("pairs/low/b.png"),
-        bench.path("pairs/low/stray.png"),
-    )
-    .unwrap();
+    fs::copy(bench.path("pairs/low/b.png"), bench.path("pairs/low/stray.png")).unwrap();
     let table = bench.call(&["realism", "pairs", "--out", "out"]);
     insta::assert_snapshot!(table.messages(), @"
     exit code: 0
      WARN pairs/low/stray.png: no partner in the other light
     ");
-    let rows = [
-        "exposure drop alone",
-        "with sensor noise",
-        "±",
-        "Fu et al. 2023",
-        "other rule: ",
-    ];
+    let rows = ["exposure drop alone", "with sensor noise", "±", "Fu et al. 2023", "other rule: "];
     check_rows(rows, |word| {
         assert!(table.stdout.contains(word), "{word:?}: {}", table.stdout);
     });
     let pairs = fs::read_to_string(bench.path("out/pairs.csv")).unwrap();
     assert_eq!(pairs.lines().count(), 7);
-    assert!(
-        fs::read_to_string(bench.path("out/residuals.svg"))
-            .unwrap()
-            .starts_with("<svg")
-    );
+    assert!(fs::read_to_string(bench.path("out/residuals.svg")).unwrap().starts_with("<svg"));
     assert!(image::open(bench.path("out/crops.png")).unwrap().width() > 700);
     let summary = fs::read_to_string(bench.path("out/summary.json")).unwrap();
-    assert_eq!(
-        serde_json::from_str::<Value>(&summary).unwrap()["unmatched"],
-        1
-    );
+    assert_eq!(serde_json::from_str::<Value>(&summary).unwrap()["unmatched"], 1);
 }
 
 #[test]
 fn equal_images_are_told_as_such() {
     let bench = Bench::new();
     pair(&bench, "a", 1);
-    fs::copy(
-        bench.path("pairs/low/a.png"),
-        bench.path("pairs/normal/a.png"),
-    )
-    .unwrap();
+    fs::copy(bench.path("pairs/low/a.png"), bench.path("pairs/normal/a.png")).unwrap();
     let table = bench.call(&["realism", "pairs", "--ev", "0"]);
     insta::assert_snapshot!(table.lines_with("∞"), @"
     exit code: 0
@@ -187,9 +156,7 @@ fn broken_pair_does_not_stop_others() {
     let bench = Bench::new();
     pair(&bench, "a", 1);
     pair(&bench, "b", 2);
-    RgbImage::new(20, 20)
-        .save(bench.path("pairs/low/b.png"))
-        .unwrap();
+    RgbImage::new(20, 20).save(bench.path("pairs/low/b.png")).unwrap();
     let called = bench.call(&["realism", "pairs"]);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 1
@@ -199,13 +166,8 @@ fn broken_pair_does_not_stop_others() {
     exit code: 1
     1 pair failed
     ");
-    let calls = [
-        "realism nowhere",
-        "realism pairs/low",
-        "realism pairs --ev 99",
-        "realism pairs --kl-bins two",
-        "realism",
-    ];
+    let calls =
+        ["realism nowhere", "realism pairs/low", "realism pairs --ev 99", "realism pairs --kl-bins two", "realism"];
     let errors = each(calls, |call| {
         let refused = bench.call(&words(call));
         assert_eq!(refused.stderr.trim_end().lines().count(), 1, "{refused:?}");

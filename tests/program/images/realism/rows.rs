@@ -9,9 +9,7 @@ fn number(value: &Value) -> f64 {
 /// The rows of a CSV file, by column.
 pub(super) fn csv(bench: &Bench, file: &str) -> Vec<Vec<String>> {
     let text = fs::read_to_string(bench.path(file)).unwrap();
-    text.lines()
-        .map(|line| line.split(',').map(str::to_owned).collect())
-        .collect()
+    text.lines().map(|line| line.split(',').map(str::to_owned).collect()).collect()
 }
 
 /// The cells of a column.
@@ -36,15 +34,9 @@ fn intervals_need_three_paired_differences() {
             let difference = &differences[number_of];
             assert_eq!(difference["n"], count + 1);
             assert_eq!(difference["interval"].is_array(), count == 2, "{summary:#}");
-            assert_eq!(
-                summary["exposure"][number_of]["interval"].is_array(),
-                count == 2
-            );
+            assert_eq!(summary["exposure"][number_of]["interval"].is_array(), count == 2);
             let by_pair = column(&rows, &format!("{number_of}_difference"));
-            let filled: Vec<f64> = by_pair
-                .iter()
-                .filter_map(|cell| cell.parse().ok())
-                .collect();
+            let filled: Vec<f64> = by_pair.iter().filter_map(|cell| cell.parse().ok()).collect();
             assert_eq!(filled.len(), count + 1, "{by_pair:?}");
             let mean = filled.iter().sum::<f64>() / filled.len() as f64;
             assert!((mean - number(&difference["value"])).abs() < 1e-9);
@@ -96,10 +88,7 @@ fn every_light_reading_has_a_row() {
         let rows = together["noise"].as_array().unwrap();
         let row = rows.iter().find(|row| row["reading"] == name).unwrap();
         assert_eq!(alone["noise"].as_array().unwrap().len(), 1);
-        assert_eq!(
-            alone["noise"][0], *row,
-            "a reading does not depend on the others"
-        );
+        assert_eq!(alone["noise"][0], *row, "a reading does not depend on the others");
         assert_eq!(row["camera"], "given");
     });
     let rows = csv(&bench, "out/pairs.csv");

@@ -26,22 +26,10 @@ pub(super) enum Change {
 
 /// The changes that are measured.
 pub(super) const CHANGES: [Change; 8] = [
-    Change::Box {
-        code: 255,
-        share: 0.05,
-    },
-    Change::Box {
-        code: 255,
-        share: 0.10,
-    },
-    Change::Box {
-        code: 255,
-        share: 0.25,
-    },
-    Change::Box {
-        code: 0,
-        share: 0.25,
-    },
+    Change::Box { code: 255, share: 0.05 },
+    Change::Box { code: 255, share: 0.10 },
+    Change::Box { code: 255, share: 0.25 },
+    Change::Box { code: 0, share: 0.25 },
     Change::Text,
     Change::Lamp,
     Change::Gradient,
@@ -64,20 +52,16 @@ impl Change {
                 let size = [width, height].map(|side| (side as f64 * share.sqrt()) as usize);
                 let [left, top] = [draws.below(width - size[0]), draws.below(height - size[1])];
                 let (columns, rows) = (left..left + size[0], top..top + size[1]);
-                mapped(image, |y, x, _, code| {
-                    if columns.contains(&x) && rows.contains(&y) {
-                        f64::from(new)
-                    } else {
-                        code
-                    }
-                })
+                mapped(
+                    image,
+                    |y, x, _, code| {
+                        if columns.contains(&x) && rows.contains(&y) { f64::from(new) } else { code }
+                    },
+                )
             }
             Self::Text => {
                 let ink = Ink::new([width, height], &mut draws);
-                mapped(
-                    image,
-                    |y, x, _, code| if ink.covers(x, y) { 255.0 } else { code },
-                )
+                mapped(image, |y, x, _, code| if ink.covers(x, y) { 255.0 } else { code })
             }
             Self::Lamp => {
                 let [x0, y0] = [draws.unit() * width as f64, draws.unit() * height as f64];
@@ -87,12 +71,8 @@ impl Change {
                     in_light(code, 0.1 + 0.9 * (-0.5 * distance * distance).exp())
                 })
             }
-            Self::Gradient => mapped(image, |_, x, _, code| {
-                in_light(code, 0.05 + 0.95 * x as f64 / width as f64)
-            }),
-            Self::StrayLight => {
-                mapped(image, |_, x, _, code| code + 80.0 * x as f64 / width as f64)
-            }
+            Self::Gradient => mapped(image, |_, x, _, code| in_light(code, 0.05 + 0.95 * x as f64 / width as f64)),
+            Self::StrayLight => mapped(image, |_, x, _, code| code + 80.0 * x as f64 / width as f64),
         }
     }
 }
@@ -117,12 +97,7 @@ impl Ink {
         // A character with its space takes 6 × 10 dots.
         let is_space = |i: usize| i % columns % 6 == 5 || i / columns % 10 > 6;
         let dots = (0..columns * rows).map(|i| draws.unit() < 0.5 && !is_space(i));
-        Self {
-            dot,
-            top,
-            columns,
-            dots: dots.collect(),
-        }
+        Self { dot, top, columns, dots: dots.collect() }
     }
 
     fn covers(&self, x: usize, y: usize) -> bool {
@@ -150,21 +125,14 @@ impl Elsewhere {
                 let changed = change.apply(&asked.image, place as u64);
                 let untouched = untouched(asked, &changed);
                 let looks = [&asked.image, &changed].map(|image| asked.known.observe(image));
-                let about: Vec<&Question> = asked
-                    .questions
-                    .iter()
-                    .filter(|question| is_about(question, &untouched))
-                    .collect();
+                let about: Vec<&Question> =
+                    asked.questions.iter().filter(|question| is_about(question, &untouched)).collect();
                 let sums = looks.each_ref().map(|seen| {
                     let scores = about.iter().map(|question| set.score(seen, question));
                     [scores.sum(), about.len() as f64]
                 });
-                let seen = looks.map(|seen: Observation| {
-                    untouched
-                        .iter()
-                        .filter(|thing| seen.is_seen(**thing))
-                        .count()
-                });
+                let seen =
+                    looks.map(|seen: Observation| untouched.iter().filter(|thing| seen.is_seen(**thing)).count());
                 (sums, seen)
             })
             .collect();
@@ -181,11 +149,7 @@ impl Elsewhere {
 /// Segments without a changed pixel.
 fn untouched(asked: &Asked, changed: &Rgb) -> BTreeSet<u32> {
     let mut segments: BTreeSet<u32> = asked.segments.iter().copied().collect();
-    let pixels = asked
-        .image
-        .samples()
-        .chunks(3)
-        .zip(changed.samples().chunks(3));
+    let pixels = asked.image.samples().chunks(3).zip(changed.samples().chunks(3));
     for ((before, after), segment) in pixels.zip(&asked.segments) {
         if before != after {
             segments.remove(segment);

@@ -1,4 +1,5 @@
-//! Frames with questions and the observer's knowledge of them, images that are spoiled or invented, and their expected scores.
+//! Frames with questions and the observer's knowledge of them, images that are spoiled or invented, and their expected
+//! scores.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -92,20 +93,14 @@ impl Set {
             image: frame.rgb.clone(),
             segments: frame.segments.iter().flatten().copied().collect(),
         });
-        Self {
-            frames: frames.collect(),
-            rules,
-            palette,
-        }
+        Self { frames: frames.collect(), rules, palette }
     }
 
     /// The frame that is another scene's, for each frame.
     pub(super) fn other(&self, place: usize) -> &Asked {
         let scene = |place: usize| self.frames[place].id.0.split('/').next().unwrap();
         let count = self.frames.len();
-        let other = (1..count)
-            .map(|step| (place + step) % count)
-            .find(|other| scene(*other) != scene(place));
+        let other = (1..count).map(|step| (place + step) % count).find(|other| scene(*other) != scene(place));
         &self.frames[other.unwrap()]
     }
 
@@ -123,10 +118,7 @@ impl Set {
         image: impl Fn(usize, &Asked) -> Rgb + Sync,
         answer: impl Fn(&Asked, &Observation, &Question) -> Option<usize> + Sync,
     ) -> Outcome {
-        self.judged_by(
-            |place, asked| asked.known.observe(&image(place, asked)),
-            answer,
-        )
+        self.judged_by(|place, asked| asked.known.observe(&image(place, asked)), answer)
     }
 
     fn judged_by(
@@ -163,10 +155,7 @@ impl Set {
             })
             .collect();
         let count = |of: fn(&Observation) -> usize| looks.iter().map(|(_, seen)| of(seen)).sum();
-        let explained: f64 = looks
-            .iter()
-            .map(|(_, seen)| seen.explained_variance())
-            .sum();
+        let explained: f64 = looks.iter().map(|(_, seen)| seen.explained_variance()).sum();
         Outcome {
             score: interval(&sums, n),
             chance: all().map(|(_, guess, _)| guess).sum::<f64>() / n as f64,
@@ -179,11 +168,7 @@ impl Set {
     }
 
     /// The same, with another share of an outline that must be confirmed.
-    pub(super) fn look_with(
-        &self,
-        share: f64,
-        image: impl Fn(usize, &Asked) -> Rgb + Sync,
-    ) -> Outcome {
+    pub(super) fn look_with(&self, share: f64, image: impl Fn(usize, &Asked) -> Rgb + Sync) -> Outcome {
         self.judged_by(
             |place, asked| asked.known.observe_with(&image(place, asked), share),
             |_, seen, question| seen.answer(question, &self.rules, &self.palette),
@@ -198,7 +183,8 @@ impl Set {
         }
     }
 
-    /// The scores by frame of two kinds of image, the second less the first, with the interval of their paired difference.
+    /// The scores by frame of two kinds of image, the second less the first, with the interval of their paired
+    /// difference.
     pub(super) fn gain(
         &self,
         before: impl Fn(usize, &Asked) -> Rgb + Sync,
@@ -212,8 +198,8 @@ impl Set {
                 let looks = [before(place, asked), after(place, asked)];
                 let [before, after] = looks.map(|image| asked.known.observe(&image));
                 let questions = asked.questions.iter();
-                let differences = questions
-                    .map(|question| self.score(&after, question) - self.score(&before, question));
+                let differences =
+                    questions.map(|question| self.score(&after, question) - self.score(&before, question));
                 [differences.sum(), asked.questions.len() as f64]
             })
             .collect();
@@ -235,12 +221,7 @@ pub(super) fn interval(sums: &[[f64; 2]], n: usize) -> Estimate {
         })
         .collect();
     means.sort_by(f64::total_cmp);
-    Estimate {
-        value: mean(&mut sums.iter()),
-        low: means[50],
-        high: means[1949],
-        n,
-    }
+    Estimate { value: mean(&mut sums.iter()), low: means[50], high: means[1949], n }
 }
 
 impl Outcome {
@@ -256,13 +237,7 @@ pub(super) fn degraded(asked: &Asked, how: &str, reading: &Synthesis) -> Rgb {
         return asked.image.clone();
     }
     let how: Degradation = how.parse().unwrap();
-    degrade(
-        &asked.image,
-        Some(&how),
-        &NoiseKey::new(0, &asked.id),
-        reading,
-    )
-    .unwrap()
+    degrade(&asked.image, Some(&how), &NoiseKey::new(0, &asked.id), reading).unwrap()
 }
 
 /// Random numbers: `SplitMix64`.
@@ -319,25 +294,14 @@ pub(super) fn smoothed(image: &Rgb, side: usize) -> Vec<f64> {
         }
         out
     };
-    let values: Vec<f64> = image
-        .samples()
-        .iter()
-        .map(|code| f64::from(*code))
-        .collect();
+    let values: Vec<f64> = image.samples().iter().map(|code| f64::from(*code)).collect();
     let across = pass(&values, 3, width, &|i| i / 3 % width);
     pass(&across, 3 * width, height, &|i| i / 3 / width)
 }
 
 /// Enhancers that invent something, applied to a dark image; each first brightens it so that its mean is 110.
-pub(super) const INVENTING: [&str; 7] = [
-    "gain alone",
-    "blotches",
-    "stripes",
-    "unsharp mask",
-    "own-noise edges",
-    "foreign edges",
-    "half blend",
-];
+pub(super) const INVENTING: [&str; 7] =
+    ["gain alone", "blotches", "stripes", "unsharp mask", "own-noise edges", "foreign edges", "half blend"];
 
 /// A dark image after an enhancer of this name. `other` is the untouched image of another room.
 pub(super) fn invented(name: &str, dark: &Rgb, other: &Rgb, seed: u64) -> Rgb {
@@ -359,39 +323,20 @@ pub(super) fn invented(name: &str, dark: &Rgb, other: &Rgb, seed: u64) -> Rgb {
         "gain alone" => bright,
         "blotches" => {
             let columns = width / 24 + 2;
-            let knots: Vec<f64> = (0..columns * (dark.height() / 24 + 2) * 3)
-                .map(|_| 40.0 * draws.normal())
-                .collect();
-            mapped(&bright, |y, x, c, code| {
-                code + knots[(y / 24 * columns + x / 24) * 3 + c]
-            })
+            let knots: Vec<f64> = (0..columns * (dark.height() / 24 + 2) * 3).map(|_| 40.0 * draws.normal()).collect();
+            mapped(&bright, |y, x, c, code| code + knots[(y / 24 * columns + x / 24) * 3 + c])
         }
-        "stripes" => mapped(&bright, |_, x, _, code| {
-            code + 60.0 * (std::f64::consts::TAU * x as f64 / 9.0).sin()
-        }),
+        "stripes" => mapped(&bright, |_, x, _, code| code + 60.0 * (std::f64::consts::TAU * x as f64 / 9.0).sin()),
         "unsharp mask" => {
             let smooth = smoothed(&bright, 9);
-            mapped(&bright, |y, x, c, code| {
-                code + 3.0 * (code - smooth[(y * width + x) * 3 + c])
-            })
+            mapped(&bright, |y, x, c, code| code + 3.0 * (code - smooth[(y * width + x) * 3 + c]))
         }
         "own-noise edges" => {
             let smooth = smoothed(&bright, 3);
             let smooth = mapped(&bright, |y, x, c, _| smooth[(y * width + x) * 3 + c]);
-            mapped(&bright, |y, x, _, code| {
-                if edges(&smooth, y, x) > 40.0 {
-                    0.0
-                } else {
-                    code
-                }
-            })
+            mapped(&bright, |y, x, _, code| if edges(&smooth, y, x) > 40.0 { 0.0 } else { code })
         }
-        "foreign edges" => mapped(
-            &bright,
-            |y, x, _, code| {
-                if edges(other, y, x) > 20.0 { 0.0 } else { code }
-            },
-        ),
+        "foreign edges" => mapped(&bright, |y, x, _, code| if edges(other, y, x) > 20.0 { 0.0 } else { code }),
         _ => mapped(&bright, |y, x, c, code| {
             let foreign = f64::from(other.samples()[(y * width + x) * 3 + c]);
             f64::midpoint(code, foreign)

@@ -1,6 +1,6 @@
-//! The figures of `src/docs/observer.md` that no command of the program makes: enhancers that invent, the share of the outline,
-//! and photographs. They take minutes, and are asked for by name:
-//! `cargo test --release --test program observer::measure -- --ignored --nocapture`.
+//! The figures of `src/docs/observer.md` that no command of the program makes: enhancers that invent, the share of the
+//! outline, and photographs. They take minutes, and are asked for by name: `cargo test --release --test program
+//! observer::measure -- --ignored --nocapture`.
 
 #![expect(clippy::print_stdout, reason = "the measured figures")]
 
@@ -13,12 +13,7 @@ use super::{physical, spoiled};
 
 /// The eye views of forty rooms.
 fn rooms() -> Set {
-    let rooms = Rooms {
-        frames: 80,
-        seed: 7,
-        size: [640, 480],
-        ..Rooms::default()
-    };
+    let rooms = Rooms { frames: 80, seed: 7, size: [640, 480], ..Rooms::default() };
     Set::rooms(rooms, |id| id.0.ends_with("/eye"))
 }
 
@@ -54,17 +49,10 @@ fn enhancers_that_invent() {
     head("Inventing enhancers on physical L5", &set);
     row("raw", &set.look(|_, asked| dark(asked)));
     for name in INVENTING {
-        let image = |place: usize, asked: &Asked| {
-            invented(name, &dark(asked), &set.other(place).image, place as u64)
-        };
+        let image = |place: usize, asked: &Asked| invented(name, &dark(asked), &set.other(place).image, place as u64);
         row(name, &set.look(image));
         let gain = set.gain(|_, asked| dark(asked), image);
-        println!(
-            "{name} less raw: {:.1} [{:.1}, {:.1}]",
-            100.0 * gain.value,
-            100.0 * gain.low,
-            100.0 * gain.high
-        );
+        println!("{name} less raw: {:.1} [{:.1}, {:.1}]", 100.0 * gain.value, 100.0 * gain.low, 100.0 * gain.high);
     }
 }
 
@@ -77,12 +65,7 @@ fn the_share_of_the_outline() {
     for share in [0.3, 0.4, 0.5, 0.6, 0.7] {
         let dark = set.look_with(share, |_, asked| degraded(asked, "L5-noise", &physical));
         row(&format!("{share}, physical L5"), &dark);
-        for control in [
-            Control::OtherRoom,
-            Control::Mosaic12,
-            Control::RandomMasks,
-            Control::Shift4,
-        ] {
+        for control in [Control::OtherRoom, Control::Mosaic12, Control::RandomMasks, Control::Shift4] {
             let found = set.look_with(share, |place, asked| spoiled(&set, place, asked, control));
             row(&format!("{share}, {control}"), &found);
         }
@@ -93,12 +76,7 @@ fn the_share_of_the_outline() {
 #[test]
 #[ignore = "measures"]
 fn local_changes_match_reference() {
-    let rooms = Rooms {
-        frames: 96,
-        seed: 7,
-        size: [640, 480],
-        ..Rooms::default()
-    };
+    let rooms = Rooms { frames: 96, seed: 7, size: [640, 480], ..Rooms::default() };
     let set = Set::rooms(rooms, |_| true);
     head("Local changes", &set);
     row("none", &set.look(|_, asked| asked.image.clone()));
@@ -114,14 +92,12 @@ fn local_changes_match_reference() {
             let [value, low, high] = [score.value, score.low, score.high].map(percent);
             format!("{value} [{low}, {high}]")
         });
-        println!(
-            "| {change:?} | {n} | {} | {} | {} | {} |",
-            scores[0], scores[1], seen[0], seen[1]
-        );
+        println!("| {change:?} | {n} | {} | {} | {} | {} |", scores[0], scores[1], seen[0], seen[1]);
     }
 }
 
-/// The controls, and with a local change: the image of another room with a box in it is still the image of another room.
+/// The controls, and with a local change: the image of another room with a box in it is still the image of another
+/// room.
 #[test]
 #[ignore = "measures"]
 fn controls_with_local_changes() {
@@ -132,8 +108,7 @@ fn controls_with_local_changes() {
         row(control.name(), &set.look(image));
         if [Control::OtherRoom, Control::Mirrored].contains(&control) {
             for change in CHANGES {
-                let image =
-                    |place: usize, asked: &Asked| change.apply(&image(place, asked), place as u64);
+                let image = |place: usize, asked: &Asked| change.apply(&image(place, asked), place as u64);
                 row(&format!("{control}, {change:?}"), &set.look(image));
             }
         }

@@ -1,4 +1,5 @@
-//! The observer answers from the pixels and not from the labels: what it must not see, what it must, and what changes nothing.
+//! The observer answers from the pixels and not from the labels: what it must not see, what it must, and what changes
+//! nothing.
 
 mod local;
 mod made;
@@ -19,12 +20,7 @@ use made::{Asked, Outcome, Set, degraded, invented, mapped};
 
 /// Forty-eight small frames with some two hundred questions.
 static SMALL: LazyLock<Set> = LazyLock::new(|| {
-    let rooms = Rooms {
-        frames: 48,
-        seed: 7,
-        size: [160, 120],
-        ..Rooms::default()
-    };
+    let rooms = Rooms { frames: 48, seed: 7, size: [160, 120], ..Rooms::default() };
     Set::rooms(rooms, |_| true)
 });
 
@@ -37,12 +33,7 @@ fn spoiled(set: &Set, place: usize, asked: &Asked, control: Control) -> Rgb {
     let key = Digest::from_bytes(asked.id.0.as_bytes());
     match control {
         Control::OtherRoom => set.other(place).image.clone(),
-        control => darkqa_questions::observer::controls::control_image(
-            control,
-            &asked.image,
-            &asked.known,
-            &key,
-        ),
+        control => darkqa_questions::observer::controls::control_image(control, &asked.image, &asked.known, &key),
     }
 }
 
@@ -51,9 +42,7 @@ fn without_the_right_image_it_guesses() {
     let set = &*SMALL;
     let n: usize = set.frames.iter().map(|frame| frame.questions.len()).sum();
     assert!(n >= 150, "{n}");
-    let controls = Control::ALL
-        .into_iter()
-        .filter(|control| control.removes_all_information());
+    let controls = Control::ALL.into_iter().filter(|control| control.removes_all_information());
     check_rows(controls, |control| {
         let found = set.look(|place, asked| spoiled(set, place, asked, control));
         assert!(found.is_chance(), "{control}: {found:?}");
@@ -111,16 +100,10 @@ fn more_noise_leaves_no_more() {
     let falls = |bright: &Outcome, dark: &Outcome| dark.score.low <= bright.score.high;
     assert!(falls(&dark, &noisy), "{dark:?} {noisy:?}");
     assert!(falls(&noisy, &levels[2]), "{noisy:?} {levels:?}");
-    assert!(
-        levels.windows(2).all(|pair| falls(&pair[0], &pair[1])),
-        "{levels:?}"
-    );
+    assert!(levels.windows(2).all(|pair| falls(&pair[0], &pair[1])), "{levels:?}");
     let seen = levels.map(|level| level.seen);
     assert!(seen[0] > seen[1] && seen[1] > seen[2], "{seen:?}");
-    assert!(
-        levels[2].score.value > 2.0 * levels[2].chance / 1.5,
-        "{levels:?}"
-    );
+    assert!(levels[2].score.value > 2.0 * levels[2].chance / 1.5, "{levels:?}");
 }
 
 #[test]
@@ -128,16 +111,13 @@ fn what_is_invented_adds_nothing() {
     let set = &*SMALL;
     let physical = physical();
     let dark = |asked: &Asked| degraded(asked, "L4-noise", &physical);
-    check_rows(
-        ["blotches", "stripes", "unsharp mask", "foreign edges"],
-        |name| {
-            let gain = set.gain(
-                |_, asked| dark(asked),
-                |place, asked| invented(name, &dark(asked), &set.other(place).image, place as u64),
-            );
-            assert!(gain.low <= 0.0, "{name}: {gain:?}");
-        },
-    );
+    check_rows(["blotches", "stripes", "unsharp mask", "foreign edges"], |name| {
+        let gain = set.gain(
+            |_, asked| dark(asked),
+            |place, asked| invented(name, &dark(asked), &set.other(place).image, place as u64),
+        );
+        assert!(gain.low <= 0.0, "{name}: {gain:?}");
+    });
 }
 
 #[test]
@@ -156,13 +136,10 @@ fn a_covered_part_hides_nothing_elsewhere() {
 #[test]
 fn uneven_light_hides_little() {
     let set = &*SMALL;
-    check_rows(
-        [Change::Lamp, Change::Gradient, Change::StrayLight],
-        |change| {
-            let found = set.look(|place, asked| change.apply(&asked.image, place as u64));
-            assert!(found.score.value >= 0.85, "{change:?}: {found:?}");
-        },
-    );
+    check_rows([Change::Lamp, Change::Gradient, Change::StrayLight], |change| {
+        let found = set.look(|place, asked| change.apply(&asked.image, place as u64));
+        assert!(found.score.value >= 0.85, "{change:?}: {found:?}");
+    });
 }
 
 #[test]
@@ -176,27 +153,20 @@ fn foreign_local_changes_show_nothing() {
     });
 }
 
-/// A thing that is painted in another colour has that colour, and not the one that is known: its own light does not hide it.
+/// A thing that is painted in another colour has that colour, and not the one that is known: its own light does not
+/// hide it.
 #[test]
 fn a_repainted_thing_loses_its_colour() {
     let set = &*SMALL;
     let repainted = |asked: &Asked| {
-        let colored = asked
-            .questions
-            .iter()
-            .find(|question| question.family == Family::Color)?;
+        let colored = asked.questions.iter().find(|question| question.family == Family::Color)?;
         let id = colored.evidence["segments"][0]["id"].as_u64()?;
         let image = mapped(&asked.image, |y, x, channel, code| {
             let own = u64::from(asked.segments[y * asked.image.width() + x]) == id;
             let painted = [0.3, 0.7, 1.0][channel] * code;
             if own { painted } else { code }
         });
-        let answer = |image: &Rgb| {
-            asked
-                .known
-                .observe(image)
-                .answer(colored, &set.rules, &set.palette)
-        };
+        let answer = |image: &Rgb| asked.known.observe(image).answer(colored, &set.rules, &set.palette);
         Some([&asked.image, &image].map(|image| answer(image) == colored.choices.truth()))
     };
     let found: Vec<[bool; 2]> = set.frames.iter().filter_map(repainted).collect();
@@ -211,11 +181,7 @@ fn observer_accepts_any_size() {
     let asked = &SMALL.frames[0];
     for [height, width] in [[1, 1], [3, 2], [120, 160], [240, 320], [50, 350]] {
         let seen = asked.known.observe(&Rgb::black(height, width));
-        assert_eq!(
-            (seen.seen_count(), seen.detected_count()),
-            (0, 0),
-            "{height} × {width}"
-        );
+        assert_eq!((seen.seen_count(), seen.detected_count()), (0, 0), "{height} × {width}");
     }
     // A frame of twice the size, by repeated pixels, is the same frame.
     let mut large = Rgb::black(240, 320);
@@ -223,12 +189,6 @@ fn observer_accepts_any_size() {
         let from = (i / 320 / 2 * 160 + i % 320 / 2) * 3;
         pixel.copy_from_slice(&asked.image.samples()[from..from + 3]);
     }
-    let (own, twice) = (
-        asked.known.observe(&asked.image),
-        asked.known.observe(&large),
-    );
-    assert_eq!(
-        (own.seen_count(), own.explained_variance()),
-        (twice.seen_count(), twice.explained_variance())
-    );
+    let (own, twice) = (asked.known.observe(&asked.image), asked.known.observe(&large));
+    assert_eq!((own.seen_count(), own.explained_variance()), (twice.seen_count(), twice.explained_variance()));
 }

@@ -35,25 +35,17 @@ fn control_sees_another_scene() {
         guess among k choices counts 1/k
     ");
     let all = records(&bench.path("run"));
-    let of = |model: &str| -> Vec<&Value> {
-        all.iter()
-            .filter(|record| record["model"] == model)
-            .collect()
-    };
+    let of = |model: &str| -> Vec<&Value> { all.iter().filter(|record| record["model"] == model).collect() };
     let (own, other) = (of("observer"), of("observer:other-room"));
-    assert_eq!(
-        (own.len(), own.len() + other.len()),
-        (other.len(), all.len())
-    );
+    assert_eq!((own.len(), own.len() + other.len()), (other.len(), all.len()));
     let scene = |frame: &str| frame.split('/').next().unwrap().to_owned();
     let image = |record: &Value| record["image"]["digest"].to_string();
     for record in &other {
         let [frame, shown] = ["frame", "shown_frame"].map(|field| text(record, field));
         assert_ne!(scene(frame), scene(shown), "{record}");
         // It is the very image that the questions about that frame are asked with, in the same condition.
-        let theirs = own.iter().find(|own| {
-            own["frame"] == record["shown_frame"] && own["condition"] == record["condition"]
-        });
+        let theirs =
+            own.iter().find(|own| own["frame"] == record["shown_frame"] && own["condition"] == record["condition"]);
         assert_eq!(image(record), image(theirs.unwrap()), "{record}");
         assert_eq!(record["observed"]["from"], "guess", "{record}");
     }
@@ -61,36 +53,23 @@ fn control_sees_another_scene() {
         let observed = &record["observed"];
         assert!(record.get("shown_frame").is_none(), "{record}");
         let outlines = observed["outlines"].as_object().unwrap();
-        let seen = outlines
-            .values()
-            .filter(|share| share.as_u64().unwrap() >= 50);
+        let seen = outlines.values().filter(|share| share.as_u64().unwrap() >= 50);
         assert_eq!(observed["seen"], seen.count(), "{record}");
         assert_eq!(observed["things"], outlines.len(), "{record}");
     }
     // The control is a row of nothing but its own table.
-    for file in [
-        "summary.csv",
-        "comparisons.csv",
-        "flips.csv",
-        "figures/accuracy.svg",
-    ] {
+    for file in ["summary.csv", "comparisons.csv", "flips.csv", "figures/accuracy.svg"] {
         let text = fs::read_to_string(bench.path("run").join(file)).unwrap();
         assert!(!text.contains("other-room"), "{file}");
     }
     let observer = fs::read_to_string(bench.path("run/observer.csv")).unwrap();
-    assert!(
-        observer.contains("\nobserver:other-room,L3-noise,"),
-        "{observer}"
-    );
+    assert!(observer.contains("\nobserver:other-room,L3-noise,"), "{observer}");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains("control in % [95 %]"));
     // `show` makes the image of the other frame again, too.
     let shown = bench.complete(&["show", "run", text(other[0], "question")]);
     let frame = text(other[0], "shown_frame");
-    assert!(
-        shown.contains(&format!("with the image of {frame}:")),
-        "{shown}"
-    );
+    assert!(shown.contains(&format!("with the image of {frame}:")), "{shown}");
     assert!(!shown.contains("NOT the bytes"), "{shown}");
 }
 
@@ -107,10 +86,7 @@ fn parts_and_interruptions_change_nothing() {
     let (whole, merged) = (bench.path("whole"), bench.path("merged"));
     assert_eq!(by_key(&whole), by_key(&merged));
     assert!(assert_same_products(&whole, &merged) > 8);
-    let models: BTreeSet<String> = by_key(&whole)
-        .values()
-        .map(|record| text(record, "model").to_owned())
-        .collect();
+    let models: BTreeSet<String> = by_key(&whole).values().map(|record| text(record, "model").to_owned()).collect();
     assert_eq!(models.len(), 17, "{models:?}");
     // Half of the records are lost; the same command asks the others again.
     let path = whole.join("records.jsonl");
@@ -143,9 +119,7 @@ fn single_scene_control_shuffles_tiles() {
     // Without the control, the observer is not shown.
     let path = bench.path("run/records.jsonl");
     let records = fs::read_to_string(&path).unwrap();
-    let own = records
-        .lines()
-        .filter(|line| !line.contains("observer:tiles"));
+    let own = records.lines().filter(|line| !line.contains("observer:tiles"));
     fs::write(&path, own.collect::<Vec<_>>().join("\n") + "\n").unwrap();
     let hidden = bench.call(&words("report run --full"));
     insta::assert_snapshot!(hidden, @"
@@ -185,17 +159,11 @@ fn rules_make_questions_and_answers_alike() {
     let bench = Bench::new();
     bench.rooms("frames", 6, "160x120");
     let rules = include_str!("../../../../src/questions/rules.toml");
-    let own = rules.replace(
-        "Is there {article} {object} in the image?",
-        "Can {article} {object} be seen?",
-    );
+    let own = rules.replace("Is there {article} {object} in the image?", "Can {article} {object} be seen?");
     assert_ne!(rules, own);
     bench.file("own.toml", own);
     let evidence = |run: &str| -> usize {
-        records(&bench.path(run))
-            .into_iter()
-            .filter(|record| record["observed"]["from"] == "evidence")
-            .count()
+        records(&bench.path(run)).into_iter().filter(|record| record["observed"]["from"] == "evidence").count()
     };
     bench.complete(&words(&format!("{RUN} --out built-in")));
     bench.complete(&words(&format!("{RUN} --rules own.toml --out own")));
@@ -205,10 +173,7 @@ fn rules_make_questions_and_answers_alike() {
     bench.complete(&words("questions frames --rules own.toml --out own.jsonl"));
     let line = "--model observer --data frames --questions own.jsonl --levels L0 --out again";
     let called = bench.call(&words(line));
-    assert!(
-        called.code == Some(2) && called.stderr.contains("name that with --rules"),
-        "{called:?}"
-    );
+    assert!(called.code == Some(2) && called.stderr.contains("name that with --rules"), "{called:?}");
     bench.complete(&words(&format!("{line} --rules own.toml")));
 }
 
@@ -238,10 +203,7 @@ fn biased_control_hides_observer() {
     assert_eq!(called.code, Some(0), "{called:?}");
     let reason = "the observer is not shown: its control observer:other-room over all";
     assert_eq!(called.stdout.matches(reason).count(), 1, "{called:?}");
-    let rows = called
-        .stdout
-        .lines()
-        .filter(|line| line.starts_with(" observer"));
+    let rows = called.stdout.lines().filter(|line| line.starts_with(" observer"));
     assert_eq!(rows.count(), 0, "{called:?}");
     insta::assert_snapshot!(called.lines_with("random"), @"
     exit code: 0
@@ -250,10 +212,7 @@ fn biased_control_hides_observer() {
     ");
     for file in ["tables.tex", "figures/accuracy.svg"] {
         let text = fs::read_to_string(bench.path("report").join(file)).unwrap();
-        assert!(
-            !text.contains("observer") && text.contains("random"),
-            "{file}: {text}"
-        );
+        assert!(!text.contains("observer") && text.contains("random"), "{file}: {text}");
     }
     let page = fs::read_to_string(bench.path("report/report.html")).unwrap();
     assert!(page.contains(reason) && !page.contains("<td class=\"text\">observer</td>"));
@@ -263,18 +222,11 @@ fn biased_control_hides_observer() {
     }
     let summary = fs::read(bench.path("report/summary.json")).unwrap();
     let summary: Value = serde_json::from_slice(&summary).unwrap();
-    let models: BTreeSet<&str> = summary["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|row| row["model"].as_str().unwrap())
-        .collect();
+    let models: BTreeSet<&str> =
+        summary["rows"].as_array().unwrap().iter().map(|row| row["model"].as_str().unwrap()).collect();
     assert_eq!(Vec::from_iter(models), ["chance", "random"]);
     // Against an old run, too.
     let called = bench.call(&["report", "run", "--baseline", "run", "--full"]);
-    let rows = called
-        .stdout
-        .lines()
-        .filter(|line| line.starts_with(" observer"));
+    let rows = called.stdout.lines().filter(|line| line.starts_with(" observer"));
     assert_eq!(rows.count(), 0, "{called:?}");
 }

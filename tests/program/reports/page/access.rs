@@ -1,6 +1,8 @@
-//! Whether everybody can use the pages: the rules of axe-core, room at every width, and colours that can be told from the ground.
+//! Whether everybody can use the pages: the rules of axe-core, room at every width, and colours that can be told from
+//! the ground.
 //!
-//! Needs `axe.min.js` of axe-core, which `AXE` names and `.ci/axe` gets; where there is none, or no browser, the test says so.
+//! Needs `axe.min.js` of axe-core, which `AXE` names and `.ci/axe` gets; where there is none, or no browser, the test
+//! says so.
 
 use std::path::PathBuf;
 
@@ -48,14 +50,7 @@ fn open_questions() -> (House, String) {
     house.0.file("other.jsonl", "{\"default\": \"a bed\"}\n");
     house.0.file("j.jsonl", "{\"default\": \"4\"}\n");
     let mut line = vec!["--model", SAID, "--model", "script:other.jsonl"];
-    line.extend([
-        "--judge",
-        "script:j.jsonl",
-        "--levels",
-        "L0,L4",
-        "--out",
-        "run",
-    ]);
+    line.extend(["--judge", "script:j.jsonl", "--levels", "L0,L4", "--out", "run"]);
     let called = house.call(&line);
     assert_eq!(called.code, Some(0), "{called:?}");
     let url = format!("file://{}", house.0.path("run/report.html").display());
@@ -98,21 +93,10 @@ fn overflow(browser: &mut Browser) -> Value {
 fn luminance(colour: &str) -> f64 {
     let numbers = colour.trim_start_matches("rgb(").trim_end_matches(')');
     let linear = numbers.split(',').map(|number| {
-        let share = number
-            .trim()
-            .parse::<f64>()
-            .unwrap_or_else(|e| panic!("{colour}: {e}"))
-            / 255.0;
-        if share <= 0.040_45 {
-            share / 12.92
-        } else {
-            ((share + 0.055) / 1.055).powf(2.4)
-        }
+        let share = number.trim().parse::<f64>().unwrap_or_else(|e| panic!("{colour}: {e}")) / 255.0;
+        if share <= 0.040_45 { share / 12.92 } else { ((share + 0.055) / 1.055).powf(2.4) }
     });
-    linear
-        .zip([0.2126, 0.7152, 0.0722])
-        .map(|(share, weight)| share * weight)
-        .sum()
+    linear.zip([0.2126, 0.7152, 0.0722]).map(|(share, weight)| share * weight).sum()
 }
 
 fn contrast(a: &str, b: &str) -> f64 {
@@ -120,7 +104,8 @@ fn contrast(a: &str, b: &str) -> f64 {
     (a.max(b) + 0.05) / (a.min(b) + 0.05)
 }
 
-/// The colours of lines that cannot be told from the ground: those of the style sheet, and those of every line and mark drawn.
+/// The colours of lines that cannot be told from the ground: those of the style sheet, and those of every line and mark
+/// drawn.
 fn faint(browser: &mut Browser) -> Vec<String> {
     let script = "(() => {
         const probe = document.body.appendChild(document.createElement('i'));
@@ -175,9 +160,7 @@ fn everybody_can_use_the_pages() {
 /// A field without its label, a colour near that of the ground and a thing that sticks out are found.
 fn the_check_finds_what_is_broken(browser: &mut Browser, rules: &str, page: &str) {
     open(browser, page, 1280, "light");
-    browser.evaluate(
-        "(() => { const s = document.querySelector('#f-model'); s.closest('label').replaceWith(s); })()",
-    );
+    browser.evaluate("(() => { const s = document.querySelector('#f-model'); s.closest('label').replaceWith(s); })()");
     let broken = broken(browser, rules);
     assert_eq!(broken[0][0], "select-name", "{broken}");
     assert_eq!(broken[0][1], "critical", "{broken}");
@@ -192,8 +175,5 @@ fn contrast_is_that_of_wcag() {
     let near = |a: f64, b: f64| (a - b).abs() < 0.005;
     assert!(near(contrast("rgb(0, 0, 0)", "rgb(255, 255, 255)"), 21.0));
     // #777 on white is the known near miss of 4.5.
-    assert!(near(
-        contrast("rgb(119, 119, 119)", "rgb(255, 255, 255)"),
-        4.48
-    ));
+    assert!(near(contrast("rgb(119, 119, 119)", "rgb(255, 255, 255)"), 4.48));
 }

@@ -14,8 +14,7 @@ use serde_json::{Value, json};
 
 /// The model that says what it is told.
 const SAID: &str = "script:said.jsonl";
-const WIDEST_CHART: &str =
-    "Math.max(...[...document.querySelectorAll('.panel svg')].map((s) => s.clientWidth))";
+const WIDEST_CHART: &str = "Math.max(...[...document.querySelectorAll('.panel svg')].map((s) => s.clientWidth))";
 
 /// Replies that would break a page which trusted them.
 fn hostile() -> String {
@@ -47,8 +46,7 @@ fn the_page_works_in_a_browser() {
     };
     let bench = Bench::with_questions(40);
     bench.file("said.jsonl", hostile());
-    let line =
-        format!("--data set.jsonl --model {SAID} --model random --blind-model random --out run");
+    let line = format!("--data set.jsonl --model {SAID} --model random --blind-model random --out run");
     let called = bench.call(&words(&line));
     assert_eq!(called.code, Some(0), "{called:?}");
     let url = format!("file://{}", bench.path("run/report.html").display());
@@ -76,30 +74,16 @@ fn the_page_works_in_a_browser() {
     assert_eq!(browser.complaints(&url), Vec::<String>::new());
 }
 
-/// The first screen has the finding about darkness, a chart, and a frame with the answers of the model on it; the one wrong answer is
-/// marked where it was given.
+/// The first screen has the finding about darkness, a chart, and a frame with the answers of the model on it; the one
+/// wrong answer is marked where it was given.
 fn first_screen(browser: &mut Browser) {
-    assert_eq!(
-        browser.evaluate("document.querySelector('h1').textContent"),
-        format!("{SAID} in the dark")
-    );
-    let texts = |selector: &str| {
-        format!("[...document.querySelectorAll('{selector}')].map(e => e.textContent)")
-    };
+    assert_eq!(browser.evaluate("document.querySelector('h1').textContent"), format!("{SAID} in the dark"));
+    let texts = |selector: &str| format!("[...document.querySelectorAll('{selector}')].map(e => e.textContent)");
     let groups = browser.evaluate(&texts(".first-findings th"));
-    assert_eq!(
-        groups,
-        json!(["Darkness", "Noise", "Without images", "Sample"])
-    );
-    assert_eq!(
-        browser.evaluate("document.querySelectorAll('#figure-head .panel svg').length"),
-        1
-    );
+    assert_eq!(groups, json!(["Darkness", "Noise", "Without images", "Sample"]));
+    assert_eq!(browser.evaluate("document.querySelectorAll('#figure-head .panel svg').length"), 1);
     let levels = browser.evaluate(&texts(".strip thead th"));
-    assert_eq!(
-        levels,
-        json!(["treatment", "L0", "L1", "L2", "L3", "L4", "L5"])
-    );
+    assert_eq!(levels, json!(["treatment", "L0", "L1", "L2", "L3", "L4", "L5"]));
     let wrong = browser.evaluate(&texts(".strip .answer.wrong"));
     assert_eq!(wrong, json!(["✗ red"]));
     let facts = browser.evaluate("document.querySelector('#facts').textContent");
@@ -116,8 +100,7 @@ fn count(browser: &mut Browser) -> Value {
 /// Level and light of the items are those that some model was asked at: the one that was not chosen follows.
 fn level_follows_light(browser: &mut Browser) {
     let shown = |browser: &mut Browser| {
-        browser
-            .evaluate("['level', 'light'].map(name => document.querySelector('#f-' + name).value)")
+        browser.evaluate("['level', 'light'].map(name => document.querySelector('#f-' + name).value)")
     };
     assert_eq!(shown(browser), json!(["L0", "untouched"]));
     browser.choose("#f-light", "with noise");
@@ -152,10 +135,7 @@ fn filters(browser: &mut Browser) {
     assert_eq!(count(browser), "1 of 40 items");
     browser.choose("#f-state", "lost since L0");
     assert_eq!(count(browser), "1 of 40 items");
-    assert_eq!(
-        browser.evaluate("document.querySelector('#i-id').textContent.split(' ')[0]"),
-        "q3"
-    );
+    assert_eq!(browser.evaluate("document.querySelector('#i-id').textContent.split(' ')[0]"), "q3");
     // Held against another subject, item by item.
     browser.choose("#f-against", &format!("{SAID} L4-ev"));
     browser.choose("#f-state", "wrong here, right there");
@@ -185,24 +165,13 @@ fn charts(browser: &mut Browser, bench: &Bench) {
     let drawn = "document.querySelectorAll('figure.chart.drawn .panel svg').length";
     assert!(browser.evaluate(drawn).as_u64().unwrap() >= 2);
     // The built-in model is off at first, as there is another.
-    let pressed = "[...document.querySelectorAll('#models button')].map(b => [b.title, b.getAttribute('aria-pressed')])";
-    assert_eq!(
-        browser.evaluate(pressed),
-        json!([["random", "false"], [SAID, "true"]])
-    );
-    let rows =
-        format!("[...{first}.querySelectorAll('.values tbody tr')].map(r => r.firstChild.title)");
+    let pressed =
+        "[...document.querySelectorAll('#models button')].map(b => [b.title, b.getAttribute('aria-pressed')])";
+    assert_eq!(browser.evaluate(pressed), json!([["random", "false"], [SAID, "true"]]));
+    let rows = format!("[...{first}.querySelectorAll('.values tbody tr')].map(r => r.firstChild.title)");
     assert_eq!(browser.evaluate(&rows), json!([SAID, "chance"]));
     browser.evaluate("document.querySelector('#models button[title=random]').click()");
-    assert_eq!(
-        browser.evaluate(&rows),
-        json!([
-            SAID,
-            "random (reference)",
-            "random without images",
-            "chance"
-        ])
-    );
+    assert_eq!(browser.evaluate(&rows), json!([SAID, "random (reference)", "random without images", "chance"]));
     let csv = std::fs::read_to_string(bench.path("run/summary.csv")).unwrap();
     let csv: Vec<Vec<&str>> = csv.lines().map(|line| line.split(',').collect()).collect();
     let column = |name: &str| csv[0].iter().position(|head| *head == name).unwrap();
@@ -210,9 +179,7 @@ fn charts(browser: &mut Browser, bench: &Bench) {
         browser.evaluate(&format!(
             "(() => {{ const s = {first}.querySelector('.cursor input'); s.value = {place}; s.dispatchEvent(new Event('input')); }})()"
         ));
-        let cell = format!(
-            "{first}.querySelector('.values tbody tr[data-line^=random] td:last-child').textContent"
-        );
+        let cell = format!("{first}.querySelector('.values tbody tr[data-line^=random] td:last-child').textContent");
         let shown = browser.evaluate(&cell);
         let kind = if level == "L0" { "none" } else { "noise" };
         let row = csv.iter().find(|row| {
@@ -223,14 +190,8 @@ fn charts(browser: &mut Browser, bench: &Bench) {
                 && row[column("enhancer")].is_empty()
         });
         let row = row.unwrap_or_else(|| panic!("{level}: {csv:?}"));
-        let percent =
-            |name: &str| format!("{:.1}", 100.0 * row[column(name)].parse::<f64>().unwrap());
-        let expected = format!(
-            "{} [{}, {}]",
-            percent("value"),
-            percent("low"),
-            percent("high")
-        );
+        let percent = |name: &str| format!("{:.1}", 100.0 * row[column(name)].parse::<f64>().unwrap());
+        let expected = format!("{} [{}, {}]", percent("value"), percent("low"), percent("high"));
         assert_eq!(shown, expected, "{level}");
     }
     browser.evaluate("document.querySelector('#models button[title=random]').click()");
@@ -242,9 +203,8 @@ fn points(browser: &mut Browser) {
     let links = "[...document.querySelectorAll('#figure-accuracy g.to-items')].filter(g => g.dataset.address.includes('light=with%20noise&level=L5'))";
     browser.choose("#f-level", "L0");
     browser.choose("#f-state", "wrong");
-    browser.evaluate(&format!(
-        "{links}[0].dispatchEvent(new MouseEvent('click', {{ bubbles: true, cancelable: true }}))"
-    ));
+    browser
+        .evaluate(&format!("{links}[0].dispatchEvent(new MouseEvent('click', {{ bubbles: true, cancelable: true }}))"));
     browser.wait("document.querySelector('#f-level').value === 'L5'");
     let chosen = |of: &str| format!("document.querySelector('#f-{of}').value");
     assert_eq!(browser.evaluate(&chosen("model")), SAID);
@@ -260,12 +220,8 @@ fn slider(browser: &mut Browser) {
     browser.press("[");
     let images = browser.evaluate(shown);
     assert_eq!(images, json!(["L0", "L4-ev", "L4-noise"]));
-    assert_eq!(
-        browser.evaluate("document.querySelector('#f-level').value"),
-        "L4"
-    );
-    let crop = browser
-        .evaluate("document.querySelector('#i-images figure:nth-child(2) figcaption').textContent");
+    assert_eq!(browser.evaluate("document.querySelector('#f-level').value"), "L4");
+    let crop = browser.evaluate("document.querySelector('#i-images figure:nth-child(2) figcaption').textContent");
     assert_eq!(crop, "L4-ev; below, its middle, light × 181 (7.5 EV)");
     let loaded = "[...document.querySelectorAll('#i-images img')].every(i => i.complete && i.naturalWidth > 0)";
     browser.wait(loaded);
@@ -293,30 +249,19 @@ fn keyboard(browser: &mut Browser) {
     browser.press("k");
     assert_eq!(browser.evaluate(item), first);
     browser.press("k");
-    assert_eq!(
-        browser.evaluate(item),
-        first,
-        "there is none before the first"
-    );
+    assert_eq!(browser.evaluate(item), first, "there is none before the first");
     browser.click("#next");
     assert_eq!(browser.evaluate(item), second);
 }
 
 fn hostile_replies(browser: &mut Browser) {
     let open = |browser: &mut Browser, id: &str| {
-        browser.evaluate(&format!(
-            "location.hash = 'item={id}&model={SAID}&light=untouched&level=L0'"
-        ));
-        browser.wait(&format!(
-            "document.querySelector('#i-id').textContent.startsWith('{id} ')"
-        ));
+        browser.evaluate(&format!("location.hash = 'item={id}&model={SAID}&light=untouched&level=L0'"));
+        browser.wait(&format!("document.querySelector('#i-id').textContent.startsWith('{id} ')"));
         browser.evaluate("document.querySelector('#r-text').textContent")
     };
     let markup = open(browser, "q0");
-    assert!(
-        markup.as_str().unwrap().starts_with("</script><script>"),
-        "{markup}"
-    );
+    assert!(markup.as_str().unwrap().starts_with("</script><script>"), "{markup}");
     browser.shot("hostile.png", false);
     let turned = open(browser, "q1");
     assert_eq!(turned, "A⟨U+202E⟩evitcele⟨U+202C⟩⟨U+200B⟩");
@@ -325,17 +270,12 @@ fn hostile_replies(browser: &mut Browser) {
     assert!(long.contains("cut here after 20000 of 1000000 characters"));
     assert!(long.len() < 21_000);
     assert_ne!(browser.evaluate("document.title"), "owned");
-    assert_eq!(
-        browser.evaluate("document.querySelectorAll('script:not([type])').length"),
-        1
-    );
+    assert_eq!(browser.evaluate("document.querySelectorAll('script:not([type])').length"), 1);
 }
 
 fn deep_link(browser: &mut Browser, url: &str) {
     browser.go("about:blank");
-    browser.go(&format!(
-        "{url}#item=q3&model={SAID}&light=with%20noise&level=L5&show=wrong"
-    ));
+    browser.go(&format!("{url}#item=q3&model={SAID}&light=with%20noise&level=L5&show=wrong"));
     browser.wait("document.documentElement?.dataset.ready === 'true'");
     assert_eq!(count(browser), "1 of 40 items");
     assert_eq!(browser.evaluate("window.scrollY > 0"), true);
@@ -360,21 +300,13 @@ fn themes(browser: &mut Browser) {
     let dark = browser.evaluate(ground);
     assert_eq!(dark, "rgb(20, 23, 27)");
     let words = "getComputedStyle(document.querySelector('.drawing text')).fill";
-    assert_eq!(
-        browser.evaluate(words),
-        "rgb(230, 233, 237)",
-        "figures have the theme's ink"
-    );
+    assert_eq!(browser.evaluate(words), "rgb(230, 233, 237)", "figures have the theme's ink");
     browser.shot("dark.png", true);
     browser.click("#theme");
     assert_eq!(browser.evaluate(ground), light);
     browser.window(1400, 900, "dark");
     browser.evaluate("delete document.documentElement.dataset.theme");
-    assert_eq!(
-        browser.evaluate(ground),
-        dark,
-        "the system's theme is the first one"
-    );
+    assert_eq!(browser.evaluate(ground), dark, "the system's theme is the first one");
     browser.call("Emulation.setEmulatedMedia", &json!({"media": "print"}));
     assert_eq!(browser.evaluate(ground), light, "paper is white");
     browser.call("Emulation.setEmulatedMedia", &json!({"media": ""}));
@@ -401,10 +333,7 @@ fn paper(browser: &mut Browser) {
     browser.evaluate("dispatchEvent(new Event('beforeprint'))");
     let printed = browser.evaluate(WIDEST_CHART).as_f64().unwrap();
     // A4 has 718 pixels between margins of 10 mm.
-    assert!(
-        printed <= 718.0 && printed < before.as_f64().unwrap(),
-        "{printed} {before}"
-    );
+    assert!(printed <= 718.0 && printed < before.as_f64().unwrap(), "{printed} {before}");
     let note = browser.evaluate(noted);
     assert_eq!(note, "Not drawn, as they are switched off: random. ");
     browser.evaluate("dispatchEvent(new Event('afterprint'))");
@@ -413,12 +342,7 @@ fn paper(browser: &mut Browser) {
     let is_shown = |browser: &mut Browser, of: &str| {
         browser.evaluate(&format!("document.querySelector('{of}').checkVisibility()"))
     };
-    for (of, expected) in [
-        ("header .paper-only", true),
-        (".plot", true),
-        ("nav", false),
-        ("#items", false),
-    ] {
+    for (of, expected) in [("header .paper-only", true), (".plot", true), ("nav", false), ("#items", false)] {
         assert_eq!(is_shown(browser, of), expected, "{of}");
     }
     browser.call("Emulation.setEmulatedMedia", &json!({"media": ""}));
@@ -438,40 +362,23 @@ fn unlabelled_page_works_in_browser() {
     browser.window(1400, 900, "light");
     browser.go(&url);
     browser.wait("document.documentElement?.dataset.ready === 'true'");
-    let states = browser
-        .evaluate("[...document.querySelector('#f-state').options].map((o) => o.value).join(', ')");
+    let states = browser.evaluate("[...document.querySelector('#f-state').options].map((o) => o.value).join(', ')");
     let states = states.as_str().unwrap().to_owned();
-    assert!(
-        states.contains("as at L0, not as at L0") && !states.contains("right"),
-        "{states}"
-    );
+    assert!(states.contains("as at L0, not as at L0") && !states.contains("right"), "{states}");
     browser.choose("#f-light", "exposure drop");
     browser.choose("#f-level", "L5");
     let mut counts = [0, 0];
     for (count_of, state) in counts.iter_mut().zip(["as at L0", "not as at L0"]) {
         browser.choose("#f-state", state);
         let text = count(&mut browser);
-        *count_of = text
-            .as_str()
-            .unwrap()
-            .split(' ')
-            .next()
-            .unwrap()
-            .parse()
-            .unwrap();
+        *count_of = text.as_str().unwrap().split(' ').next().unwrap().parse().unwrap();
     }
     // Nine questions at L5, and random answers some of them as before and some not.
-    assert!(
-        counts[0] > 0 && counts[1] > 0 && counts[0] + counts[1] == 9,
-        "{counts:?}"
-    );
+    assert!(counts[0] > 0 && counts[1] > 0 && counts[0] + counts[1] == 9, "{counts:?}");
     let title = browser.evaluate("document.querySelector('#i-choices .before').title");
     assert_eq!(title, "its answer at L0");
     let reading = browser.evaluate("document.querySelector('#r-mark').textContent");
-    assert!(
-        reading.as_str().unwrap().ends_with("not as at L0"),
-        "{reading}"
-    );
+    assert!(reading.as_str().unwrap().ends_with("not as at L0"), "{reading}");
     let head = browser.evaluate("document.querySelector('#c-table th').textContent");
     assert_eq!(head, "at L0 ↓ given →");
     browser.shot("without-truths.png", true);

@@ -20,36 +20,17 @@ fn open_page_works_in_browser() {
         json!({"question": "q2", "condition": "L4-noise", "reply": "in the dark"}),
         json!({"default": "a sofa"}),
     ];
-    house.0.file(
-        "said.jsonl",
-        replies.map(|line| format!("{line}\n")).concat(),
-    );
+    house.0.file("said.jsonl", replies.map(|line| format!("{line}\n")).concat());
     let mark = |prompt: &str| {
-        if prompt.ends_with("in the dark") {
-            "1"
-        } else {
-            "5"
-        }
+        if prompt.ends_with("in the dark") { "1" } else { "5" }
     };
     let judge = MockEndpoint::answering(move |request| {
-        let prompt = request["messages"][0]["content"]
-            .as_str()
-            .unwrap_or_default();
+        let prompt = request["messages"][0]["content"].as_str().unwrap_or_default();
         Answer::text(mark(prompt))
     });
     let base = judge.base_url();
-    let called = house.call(&[
-        "--model",
-        SAID,
-        "--judge",
-        "j",
-        "--judge-base-url",
-        &base,
-        "--levels",
-        "L0,L4",
-        "--out",
-        "run",
-    ]);
+    let called =
+        house.call(&["--model", SAID, "--judge", "j", "--judge-base-url", &base, "--levels", "L0,L4", "--out", "run"]);
     assert_eq!(called.code, Some(0), "{called:?}");
     let url = format!("file://{}", house.0.path("run/report.html").display());
     browser.window(1200, 900, "light");
@@ -66,18 +47,9 @@ fn open_page_works_in_browser() {
     assert_eq!(browser.evaluate(item), "q2");
     browser.choose("#f-light", "with noise");
     browser.choose("#f-level", "L4");
-    for (state, items) in [
-        ("lower than at L0", 1),
-        ("mark below 5", 1),
-        ("mark 5", 2),
-        ("higher than at L0", 0),
-    ] {
+    for (state, items) in [("lower than at L0", 1), ("mark below 5", 1), ("mark 5", 2), ("higher than at L0", 0)] {
         browser.choose("#f-state", state);
-        assert_eq!(
-            count(&mut browser),
-            format!("{items} of 3 items"),
-            "{state}"
-        );
+        assert_eq!(count(&mut browser), format!("{items} of 3 items"), "{state}");
     }
     browser.choose("#f-state", "all");
     browser.choose("#f-family", "world knowledge");
@@ -86,13 +58,11 @@ fn open_page_works_in_browser() {
     assert_eq!(browser.complaints(&url), Vec::<String>::new());
 }
 
-/// The address names an item: its right answers, the answers of all models, and what the judge said are there, and nothing in an
-/// answer is taken for markup.
+/// The address names an item: its right answers, the answers of all models, and what the judge said are there, and
+/// nothing in an answer is taken for markup.
 fn open_item(browser: &mut Browser, url: &str) {
     browser.go("about:blank");
-    browser.go(&format!(
-        "{url}#item=q1&model={SAID}&light=untouched&level=L0"
-    ));
+    browser.go(&format!("{url}#item=q1&model={SAID}&light=untouched&level=L0"));
     browser.wait("document.documentElement?.dataset.ready === 'true'");
     let revealed = "</script><img src=x onerror=alert(1)>⟨U+202E⟩dna.⟨U+0000⟩";
     let text = |browser: &mut Browser, of: &str| {
@@ -116,9 +86,6 @@ fn open_item(browser: &mut Browser, url: &str) {
     assert_eq!(browser.evaluate(images), 2);
     browser.evaluate("location.hash = 'item=q2'");
     browser.wait("document.querySelector('#i-id').textContent.startsWith('q2 ')");
-    assert!(
-        text(browser, "#i-choices")
-            .starts_with("right: Near the café's door ✓also right: By the stairs ✓")
-    );
+    assert!(text(browser, "#i-choices").starts_with("right: Near the café's door ✓also right: By the stairs ✓"));
     browser.evaluate("location.hash = ''");
 }

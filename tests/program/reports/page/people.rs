@@ -12,9 +12,7 @@ fn people_can_answer() {
         return;
     };
     let bench = Bench::with_questions(6);
-    bench.complete(&words(
-        "--model random --data set.jsonl --levels L0,L3 --out run",
-    ));
+    bench.complete(&words("--model random --data set.jsonl --levels L0,L3 --out run"));
     bench.complete(&["study", "pack", "run", "--out", "pack"]);
     let url = format!("file://{}", bench.path("pack/study.html").display());
     browser.window(1200, 800, "light");
@@ -40,18 +38,14 @@ fn people_can_answer() {
     assert_eq!(browser.evaluate(place), "0 of 6");
     browser.press("A");
     assert_eq!(browser.evaluate(seen), json!(["L3-ev"]));
-    // What was answered is there after the page was left. It is left for another first: a browser that is busy may load a page again before
-    // it has stored what the old one wrote.
+    // What was answered is there after the page was left. It is left for another first: a browser that is busy may load
+    // a page again before it has stored what the old one wrote.
     browser.go("about:blank");
     browser.wait("location.href === 'about:blank'");
     browser.go(&url);
     browser.wait("document.querySelector('#count')?.textContent === '3 of 6'");
     let images = format!("{}/images/", bench.path("pack").display());
-    let strange: Vec<String> = browser
-        .complaints(&url)
-        .into_iter()
-        .filter(|url| !url.contains(&images))
-        .collect();
+    let strange: Vec<String> = browser.complaints(&url).into_iter().filter(|url| !url.contains(&images)).collect();
     assert_eq!(strange, Vec::<String>::new());
 }
 
@@ -68,13 +62,7 @@ fn people_may_answer_freely() {
     browser.go(&url);
     browser.wait("document.querySelector('#image')?.naturalWidth > 0");
     let frame = "document.querySelector('#place').textContent";
-    assert!(
-        browser
-            .evaluate(frame)
-            .as_str()
-            .unwrap()
-            .starts_with("1 / ")
-    );
+    assert!(browser.evaluate(frame).as_str().unwrap().starts_with("1 / "));
     browser.click("#play");
     browser.wait("document.querySelector('#place').textContent.startsWith('2 / ')");
     browser.click("#play");
@@ -84,23 +72,18 @@ fn people_may_answer_freely() {
     browser.click("#none");
     let place = "document.querySelector('#count').textContent";
     assert_eq!(browser.evaluate(place), "2 of 3");
-    let saved = browser.evaluate("JSON.stringify(order.filter((i) => items[i].id in answers).map((i) => answers[items[i].id]))");
+    let saved = browser
+        .evaluate("JSON.stringify(order.filter((i) => items[i].id in answers).map((i) => answers[items[i].id]))");
     // What the page saves is what the program takes.
     house.0.file("answers.json", saved.as_str().unwrap());
     house.0.file("j.jsonl", "{\"default\": \"5\"}");
-    let called = house.call(&words(
-        "--answers human=answers.json --judge script:j.jsonl --out run",
-    ));
+    let called = house.call(&words("--answers human=answers.json --judge script:j.jsonl --out run"));
     insta::assert_snapshot!(called.lines_with("answer"), @r#"
     exit code: 0
     2 of 2 answers scored
     1 without an answer (none in a file, only thoughts, no "A:" of a blind model):
     "#);
     let images = format!("{}/images/", house.0.path("study").display());
-    let strange: Vec<String> = browser
-        .complaints(&url)
-        .into_iter()
-        .filter(|url| !url.contains(&images))
-        .collect();
+    let strange: Vec<String> = browser.complaints(&url).into_iter().filter(|url| !url.contains(&images)).collect();
     assert_eq!(strange, Vec::<String>::new());
 }

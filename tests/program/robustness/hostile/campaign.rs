@@ -51,10 +51,7 @@ impl Summary {
             self.named += usize::from(is_named);
             if !is_named {
                 let example = || (0, format!("{}\n{}", trial.words(), verdict.stderr));
-                self.unnamed
-                    .entry(trial.case.line)
-                    .or_insert_with(example)
-                    .0 += 1;
+                self.unnamed.entry(trial.case.line).or_insert_with(example).0 += 1;
             }
         }
     }
@@ -68,22 +65,10 @@ impl fmt::Display for Summary {
             write!(f, "{kind} {}, ", count(kind))?;
         }
         let (control, output) = (count("control character"), count("output with code 2"));
-        writeln!(
-            f,
-            "control character {control}, output with code 2 {output}"
-        )?;
+        writeln!(f, "control character {control}, output with code 2 {output}")?;
         writeln!(f, "exit codes {:?}", self.codes)?;
-        writeln!(
-            f,
-            "most memory {} MB, longest {:.1} s",
-            self.memory >> 20,
-            self.longest.as_secs_f64()
-        )?;
-        writeln!(
-            f,
-            "errors that name the file: {} of {}",
-            self.named, self.errors
-        )?;
+        writeln!(f, "most memory {} MB, longest {:.1} s", self.memory >> 20, self.longest.as_secs_f64())?;
+        writeln!(f, "errors that name the file: {} of {}", self.named, self.errors)?;
         for folder in &self.failures {
             writeln!(f, "failure: {}", folder.display())?;
         }
@@ -94,15 +79,9 @@ impl fmt::Display for Summary {
 /// Runs the trials with these numbers; the calls that contain these words take turns.
 pub(crate) fn run(seed: u64, numbers: Range<usize>, words: &str) -> Summary {
     let seeds = Seeds::make();
-    let cases: Vec<&Case> = CASES
-        .iter()
-        .filter(|case| case.line.contains(words))
-        .collect();
+    let cases: Vec<&Case> = CASES.iter().filter(|case| case.line.contains(words)).collect();
     let next = AtomicUsize::new(numbers.start);
-    let summary = Mutex::new(Summary {
-        seed,
-        ..Summary::default()
-    });
+    let summary = Mutex::new(Summary { seed, ..Summary::default() });
     thread::scope(|scope| {
         for _ in 0..AT_ONCE {
             scope.spawn(|| {
@@ -121,18 +100,8 @@ pub(crate) fn run(seed: u64, numbers: Range<usize>, words: &str) -> Summary {
     summary.into_inner().unwrap()
 }
 
-#[expect(
-    clippy::print_stderr,
-    reason = "a long campaign says what it finds at once"
-)]
-fn one(
-    seed: u64,
-    number: usize,
-    cases: &[&'static Case],
-    seeds: &Seeds,
-    folder: &Path,
-    summary: &Mutex<Summary>,
-) {
+#[expect(clippy::print_stderr, reason = "a long campaign says what it finds at once")]
+fn one(seed: u64, number: usize, cases: &[&'static Case], seeds: &Seeds, folder: &Path, summary: &Mutex<Summary>) {
     let case = cases[number % cases.len()];
     let trial = Trial::draw(case, seeds, &mut Random::of_run(seed, number));
     let verdict = trial.run(seeds, folder);
@@ -152,10 +121,7 @@ fn reduced<'a>(trial: &Trial<'a>, kind: &str, seeds: &Seeds, folder: &Path) -> T
         && steps.len() > 1
     {
         let (first, second) = steps.split_at(steps.len() / 2);
-        let halves = [first, second].map(|half| Trial {
-            damage: Damage::Steps(half.to_vec()),
-            ..trial.clone()
-        });
+        let halves = [first, second].map(|half| Trial { damage: Damage::Steps(half.to_vec()), ..trial.clone() });
         let shows = |half: &Trial<'_>| {
             let verdict = half.run(seeds, folder);
             verdict.faults.iter().any(|fault| fault.kind() == kind)

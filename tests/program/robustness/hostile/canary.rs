@@ -1,4 +1,5 @@
-//! A folder beside the working folder that the program has no business with: it must stay as it is, and nothing of it may be sent.
+//! A folder beside the working folder that the program has no business with: it must stay as it is, and nothing of it
+//! may be sent.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -76,9 +77,7 @@ fn entries(folder: &Path) -> Vec<Entry> {
 /// A picture of its own size and pixels.
 fn picture() -> Vec<u8> {
     let (width, height) = SIZE;
-    png(&RgbImage::from_fn(width, height, |x, y| {
-        Rgb([(x * 11) as u8, (y * 8) as u8, 201])
-    }))
+    png(&RgbImage::from_fn(width, height, |x, y| Rgb([(x * 11) as u8, (y * 8) as u8, 201])))
 }
 
 /// Whether bytes that were sent hold the word or the picture of the folder, as it is or as it was made anew.

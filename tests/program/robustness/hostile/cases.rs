@@ -11,27 +11,17 @@ pub(crate) struct Case {
 }
 
 impl Case {
-    const fn new(
-        line: &'static str,
-        reads: &'static [&'static str],
-        needs: &'static [&'static str],
-    ) -> Self {
+    const fn new(line: &'static str, reads: &'static [&'static str], needs: &'static [&'static str]) -> Self {
         Self { line, reads, needs }
     }
 
     /// The exit codes that the documentation has for it.
     pub(crate) fn codes(&self) -> &'static [i32] {
-        if self.line.contains("--max-cost") {
-            &[0, 1, 2, 3, 130]
-        } else {
-            &[0, 1, 2, 130]
-        }
+        if self.line.contains("--max-cost") { &[0, 1, 2, 3, 130] } else { &[0, 1, 2, 130] }
     }
 
     pub(crate) fn asks(&self) -> bool {
-        self.line.contains("URL")
-            || self.reads.contains(&"models.toml")
-            || self.reads.contains(&"submitted")
+        self.line.contains("URL") || self.reads.contains(&"models.toml") || self.reads.contains(&"submitted")
     }
 
     pub(crate) fn serves(&self) -> bool {
@@ -48,72 +38,28 @@ impl Case {
 /// Every subcommand, and every kind of file.
 pub(crate) const CASES: &[Case] = &[
     // Data of evaluations.
-    Case::new(
-        "--model random --data frames --levels L0,L3 --out out",
-        &["frames"],
-        &[],
-    ),
-    Case::new(
-        "--model observer --data frames --levels L0,L3 --out out",
-        &["frames"],
-        &[],
-    ),
-    Case::new(
-        "--model random --data set.jsonl --levels L0,L3 --out out",
-        &["set.jsonl", "a.png", "b.png"],
-        &[],
-    ),
+    Case::new("--model random --data frames --levels L0,L3 --out out", &["frames"], &[]),
+    Case::new("--model observer --data frames --levels L0,L3 --out out", &["frames"], &[]),
+    Case::new("--model random --data set.jsonl --levels L0,L3 --out out", &["set.jsonl", "a.png", "b.png"], &[]),
     Case::new(
         "--model random --data set.jsonl --levels L0 --ask-per-image 1 --ask bank.jsonl --out out",
         &["bank.jsonl"],
         &["set.jsonl", "a.png", "b.png"],
     ),
-    Case::new(
-        "--model random --data set.json --rows items --levels L0 --out out",
-        &["set.json"],
-        &["a.png"],
-    ),
-    Case::new(
-        "--model random --data set.tsv --levels L0 --out out",
-        &["set.tsv"],
-        &[],
-    ),
-    Case::new(
-        "--model random --data set.csv --levels L0 --out out",
-        &["set.csv"],
-        &["a.png"],
-    ),
-    Case::new(
-        "--model random --data set.parquet --levels L0 --out out",
-        &["set.parquet"],
-        &[],
-    ),
-    Case::new(
-        "--model random --data labelled --label-folders What? --levels L0,L5 --out out",
-        &["labelled"],
-        &[],
-    ),
+    Case::new("--model random --data set.json --rows items --levels L0 --out out", &["set.json"], &["a.png"]),
+    Case::new("--model random --data set.tsv --levels L0 --out out", &["set.tsv"], &[]),
+    Case::new("--model random --data set.csv --levels L0 --out out", &["set.csv"], &["a.png"]),
+    Case::new("--model random --data set.parquet --levels L0 --out out", &["set.parquet"], &[]),
+    Case::new("--model random --data labelled --label-folders What? --levels L0,L5 --out out", &["labelled"], &[]),
     Case::new(
         "--model random --pairs pairs --questions paired.jsonl --levels L0 --out out",
         &["pairs", "paired.jsonl"],
         &[],
     ),
-    Case::new(
-        "--model random --data photos --ask bank.jsonl --levels L0,L3 --out out",
-        &["photos", "bank.jsonl"],
-        &[],
-    ),
-    Case::new(
-        "--model random --data asked --levels L0,L3,T66.67 --variant all --out out",
-        &["asked"],
-        &[],
-    ),
+    Case::new("--model random --data photos --ask bank.jsonl --levels L0,L3 --out out", &["photos", "bank.jsonl"], &[]),
+    Case::new("--model random --data asked --levels L0,L3,T66.67 --variant all --out out", &["asked"], &[]),
     // Settings of evaluations.
-    Case::new(
-        "--model random --data frames --rules rules.toml --levels L0 --out out",
-        &["rules.toml"],
-        &["frames"],
-    ),
+    Case::new("--model random --data frames --rules rules.toml --levels L0 --out out", &["rules.toml"], &["frames"]),
     Case::new(
         "--model random --data set.jsonl --config darkqa.toml --out out",
         &["darkqa.toml"],
@@ -194,39 +140,19 @@ pub(crate) const CASES: &[Case] = &[
     Case::new("bundle run --out out.zip", &["run"], &[]),
     Case::new("site run other --out out", &["run"], &["other"]),
     Case::new("report merge parts --out out", &["parts"], &[]),
-    Case::new(
-        "show run q0 --out out",
-        &["run", "set.jsonl", "a.png", "b.png"],
-        &[],
-    ),
-    Case::new(
-        "show run q0 --sheet out.png",
-        &["run"],
-        &["set.jsonl", "a.png", "b.png"],
-    ),
+    Case::new("show run q0 --out out", &["run", "set.jsonl", "a.png", "b.png"], &[]),
+    Case::new("show run q0 --sheet out.png", &["run"], &["set.jsonl", "a.png", "b.png"]),
     Case::new("cache store", &["store"], &[]),
     Case::new("cache store --clear", &["store"], &[]),
-    Case::new(
-        "study pack run --out out",
-        &["run"],
-        &["set.jsonl", "a.png", "b.png"],
-    ),
-    Case::new(
-        "study read run answers.jsonl --out out",
-        &["answers.jsonl", "run"],
-        &[],
-    ),
+    Case::new("study pack run --out out", &["run"], &["set.jsonl", "a.png", "b.png"]),
+    Case::new("study read run answers.jsonl --out out", &["answers.jsonl", "run"], &[]),
     // Batches.
     Case::new(
         "batch export --data set.jsonl --model m --levels L0,L3 --out batched --base-url http://127.0.0.1:9/v1",
         &["batched"],
         &["set.jsonl", "a.png", "b.png"],
     ),
-    Case::new(
-        "batch import batched output.jsonl",
-        &["output.jsonl", "batched"],
-        &[],
-    ),
+    Case::new("batch import batched output.jsonl", &["output.jsonl", "batched"], &[]),
     Case::new(
         "batch run --data set.jsonl --model m --levels L0 --out out --poll 0.02 --no-scout --retries 0 --timeout 2 --base-url URL",
         &[
@@ -240,59 +166,30 @@ pub(crate) const CASES: &[Case] = &[
     Case::new(
         "batch status submitted",
         &["submitted"],
-        &[
-            "reply/GET-batches-id.json",
-            "reply/GET-files-id-content.jsonl",
-        ],
+        &["reply/GET-batches-id.json", "reply/GET-files-id-content.jsonl"],
     ),
     Case::new(
         "batch fetch submitted",
         &["submitted"],
-        &[
-            "reply/GET-batches-id.json",
-            "reply/GET-files-id-content.jsonl",
-        ],
+        &["reply/GET-batches-id.json", "reply/GET-files-id-content.jsonl"],
     ),
     Case::new(
         "batch cancel submitted --poll 0.02",
         &["submitted"],
-        &[
-            "reply/GET-batches-id.json",
-            "reply/GET-files-id-content.jsonl",
-        ],
+        &["reply/GET-batches-id.json", "reply/GET-files-id-content.jsonl"],
     ),
     // Images and models.
     Case::new("check asked --deep --levels L0", &["asked"], &[]),
-    Case::new(
-        "check photos --deep --ask bank.jsonl",
-        &["photos"],
-        &["bank.jsonl"],
-    ),
+    Case::new("check photos --deep --ask bank.jsonl", &["photos"], &["bank.jsonl"]),
     Case::new("synthesize photos --levels L3 --out out", &["photos"], &[]),
-    Case::new(
-        "synthesize frames --levels L3,T66.67 --variant all --out out",
-        &["frames"],
-        &[],
-    ),
+    Case::new("synthesize frames --levels L3,T66.67 --variant all --out out", &["frames"], &[]),
     Case::new("synthesize check made", &["made"], &[]),
-    Case::new(
-        "synthesize from made/a_L3-ev.json a.png --out out",
-        &["made/a_L3-ev.json", "a.png"],
-        &[],
-    ),
+    Case::new("synthesize from made/a_L3-ev.json a.png --out out", &["made/a_L3-ev.json", "a.png"], &[]),
     Case::new("realism pairs --out out", &["pairs"], &[]),
-    Case::new(
-        "calibrate recording --white 16383 --out out.toml",
-        &["recording"],
-        &[],
-    ),
+    Case::new("calibrate recording --white 16383 --out out.toml", &["recording"], &[]),
     Case::new(
         "enhance lift photos/whole.webp photos/turned.jpg photos/palette.png --out out",
-        &[
-            "photos/whole.webp",
-            "photos/turned.jpg",
-            "photos/palette.png",
-        ],
+        &["photos/whole.webp", "photos/turned.jpg", "photos/palette.png"],
         &[],
     ),
     Case::new(
@@ -310,11 +207,7 @@ pub(crate) const CASES: &[Case] = &[
         &["models/external.onnx", "models/factor.bin"],
         &["a.png"],
     ),
-    Case::new(
-        "enhance describe models/gain.onnx --offline",
-        &["models/gain.onnx"],
-        &[],
-    ),
+    Case::new("enhance describe models/gain.onnx --offline", &["models/gain.onnx"], &[]),
     Case::new(
         "enhance doctor models/gain.onnx a.png --offline --llie-timeout 5 --out out",
         &["models/gain.onnx"],
@@ -323,65 +216,25 @@ pub(crate) const CASES: &[Case] = &[
     // The other subcommands.
     Case::new("questions frames --out out.jsonl", &["frames"], &[]),
     Case::new("init out --frames photos", &["photos"], &[]),
-    Case::new(
-        "plan --data frames --model random --levels L0 --out out",
-        &["frames"],
-        &[],
-    ),
+    Case::new("plan --data frames --model random --levels L0 --out out", &["frames"], &[]),
     Case::new("import habitat --src habitat --out out", &["habitat"], &[]),
     Case::new("import scannet --src scannet --out out", &["scannet"], &[]),
-    Case::new(
-        "import nyu --src nyu --labels nyu40-1 --depth-scale 0.0002 --out out",
-        &["nyu"],
-        &[],
-    ),
+    Case::new("import nyu --src nyu --labels nyu40-1 --depth-scale 0.0002 --out out", &["nyu"], &[]),
     Case::new("import sunrgbd --src sunrgbd --out out", &["sunrgbd"], &[]),
     Case::new("import thor --src thor --hfov 90 --out out", &["thor"], &[]),
-    Case::new(
-        "import folder --src home --labels nyu40 --out out",
-        &["home"],
-        &[],
-    ),
+    Case::new("import folder --src home --labels nyu40 --out out", &["home"], &[]),
     Case::new("import folder --src frames --out out", &["frames"], &[]),
     Case::new("import mcap drive.mcap", &["drive.mcap"], &[]),
-    Case::new(
-        "import mcap drive.mcap --topic /front/image_raw --max-frames 3 --out out",
-        &["drive.mcap"],
-        &[],
-    ),
+    Case::new("import mcap drive.mcap --topic /front/image_raw --max-frames 3 --out out", &["drive.mcap"], &[]),
     Case::new("import lerobot robot3", &["robot3/meta"], &["robot3/data"]),
-    Case::new(
-        "import lerobot robot3 --camera observation.images.front --every 0 --out out",
-        &["robot3"],
-        &[],
-    ),
-    Case::new(
-        "import lerobot robot2 --camera observation.images.wrist --max-frames 2 --out out",
-        &["robot2"],
-        &[],
-    ),
-    Case::new(
-        "import script habitat --config plain.toml",
-        &["plain.toml"],
-        &[],
-    ),
-    Case::new(
-        "export vlmevalkit set.jsonl --levels L0 --out out",
-        &["set.jsonl", "a.png", "b.png"],
-        &[],
-    ),
+    Case::new("import lerobot robot3 --camera observation.images.front --every 0 --out out", &["robot3"], &[]),
+    Case::new("import lerobot robot2 --camera observation.images.wrist --max-frames 2 --out out", &["robot2"], &[]),
+    Case::new("import script habitat --config plain.toml", &["plain.toml"], &[]),
+    Case::new("export vlmevalkit set.jsonl --levels L0 --out out", &["set.jsonl", "a.png", "b.png"], &[]),
     Case::new("export llava asked --levels L3 --out out", &["asked"], &[]),
-    Case::new(
-        "export imagefolder set.parquet --levels L3 --out out",
-        &["set.parquet"],
-        &[],
-    ),
+    Case::new("export imagefolder set.parquet --levels L3 --out out", &["set.parquet"], &[]),
     Case::new("rooms --config rooms.toml --out out", &["rooms.toml"], &[]),
-    Case::new(
-        "models models.toml --check",
-        &["models.toml"],
-        &["reply/chat.json"],
-    ),
+    Case::new("models models.toml --check", &["models.toml"], &["reply/chat.json"]),
     Case::new(
         "openeqa --questions questions.json --frames walks --num-frames 2 --image-size 32 --levels L0,L3 --model script:script.jsonl --judge script:judge.jsonl --out out",
         &["questions.json", "walks", "judge.jsonl"],
@@ -397,21 +250,9 @@ pub(crate) const CASES: &[Case] = &[
         &["walked"],
         &["questions.json", "walks", "script.jsonl", "judge.jsonl"],
     ),
-    Case::new(
-        "serve --data frames --port 0",
-        &["frames"],
-        &["request/body.json"],
-    ),
-    Case::new(
-        "serve --data frames --port 0",
-        &["request/whole.http"],
-        &["frames"],
-    ),
-    Case::new(
-        "serve --data frames --port 0",
-        &["request/body.json"],
-        &["frames"],
-    ),
+    Case::new("serve --data frames --port 0", &["frames"], &["request/body.json"]),
+    Case::new("serve --data frames --port 0", &["request/whole.http"], &["frames"]),
+    Case::new("serve --data frames --port 0", &["request/body.json"], &["frames"]),
     Case::new("completions bash --config plain.toml", &["plain.toml"], &[]),
     Case::new("man out --config plain.toml", &["plain.toml"], &[]),
     Case::new("help report", &["plain.toml"], &[]),

@@ -16,11 +16,7 @@ fn subcommands(bench: &Bench, above: &str) -> Vec<String> {
     let mut all = Vec::new();
     for name in names {
         let command = format!("{above} {name}").trim().to_owned();
-        let inner = if name == "help" {
-            Vec::new()
-        } else {
-            subcommands(bench, &command)
-        };
+        let inner = if name == "help" { Vec::new() } else { subcommands(bench, &command) };
         if inner.is_empty() {
             all.push(command);
         }
@@ -38,8 +34,7 @@ fn every_subcommand_has_a_case() {
     assert!(all.len() > 25, "{all:?}");
     let is_covered = |command: &&String| {
         let begin = format!("{command} ");
-        READ_NOTHING.contains(&command.as_str())
-            || CASES.iter().any(|case| case.line.starts_with(&begin))
+        READ_NOTHING.contains(&command.as_str()) || CASES.iter().any(|case| case.line.starts_with(&begin))
     };
     let missing: Vec<&String> = all.iter().filter(|command| !is_covered(command)).collect();
     assert!(missing.is_empty(), "without a case: {missing:?}");
@@ -59,10 +54,7 @@ fn undamaged_calls_are_sound() {
         let is_sound = verdict.code.is_some_and(|code| expected.contains(&code));
         if !is_sound || !verdict.faults.is_empty() {
             let faults = verdict.faults;
-            wrong.push(format!(
-                "{}\n{:?} {faults:?}\n{}",
-                case.line, verdict.code, verdict.stderr
-            ));
+            wrong.push(format!("{}\n{:?} {faults:?}\n{}", case.line, verdict.code, verdict.stderr));
         }
     }
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));

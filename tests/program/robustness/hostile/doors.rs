@@ -75,10 +75,7 @@ fn damaged_data_are_opened_or_refused() {
             Ok(is_open) => opened += usize::from(is_open),
             Err(_) => panics.push((number, damaged.clone())),
         }
-        assert!(
-            start.elapsed() < Duration::from_secs(20),
-            "{number}: {damaged:?}"
-        );
+        assert!(start.elapsed() < Duration::from_secs(20), "{number}: {damaged:?}");
         fs::remove_dir_all(work).unwrap();
     }
     assert!(panics.is_empty(), "{panics:?}");

@@ -19,10 +19,7 @@ fn pipe(path: &Path) {
 #[test]
 fn pipes_and_devices_are_refused() {
     let rows = [
-        (
-            "asked/questions.jsonl",
-            "export llava asked --levels L3 --out out",
-        ),
+        ("asked/questions.jsonl", "export llava asked --levels L3 --out out"),
         (
             "walks/hm3d-v0/000-a/00000-rgb.png",
             "openeqa --questions questions.json --frames walks --num-frames 5 --image-size 32 --levels L0 --model script:script.jsonl --judge script:judge.jsonl --out out",
@@ -30,27 +27,12 @@ fn pipes_and_devices_are_refused() {
         ("run/records.jsonl", "show run q0 --out out"),
         ("run/records.jsonl", "bundle run --out out.zip"),
         ("run/manifest.json", "report run"),
-        (
-            "run/questions.jsonl",
-            "--model random --data set.jsonl --levels L0,L3 --out run",
-        ),
+        ("run/questions.jsonl", "--model random --data set.jsonl --levels L0,L3 --out run"),
         ("other/thumbnails.jsonl", "report run --baseline other"),
-        (
-            "recording/iso100/flat-3/0.png",
-            "calibrate recording --white 16383 --out out.toml",
-        ),
-        (
-            "scannet/scannetv2-labels.combined.tsv",
-            "import scannet --src scannet --out out",
-        ),
-        (
-            "models/two.onnx.toml",
-            "enhance models/two.onnx a.png --offline --out out",
-        ),
-        (
-            "store/v1/.lock",
-            "--data frames --model random --levels L0,L3 --llie lift --images-cache store --out stored",
-        ),
+        ("recording/iso100/flat-3/0.png", "calibrate recording --white 16383 --out out.toml"),
+        ("scannet/scannetv2-labels.combined.tsv", "import scannet --src scannet --out out"),
+        ("models/two.onnx.toml", "enhance models/two.onnx a.png --offline --out out"),
+        ("store/v1/.lock", "--data frames --model random --levels L0,L3 --llie lift --images-cache store --out stored"),
         (
             "prompts/blind.txt",
             "--model m --base-url http://127.0.0.1:9/v1 --prompts prompts --data set.jsonl --out out",
@@ -69,21 +51,12 @@ fn pipes_and_devices_are_refused() {
             }
             let called = bench.call(&words(line));
             // One walk that cannot be shown costs its questions alone, and thumbnails are left out of a report.
-            let expected = if file.ends_with("thumbnails.jsonl") {
-                0..=0
-            } else {
-                1..=2
-            };
-            assert!(
-                called.code.is_some_and(|code| expected.contains(&code)),
-                "{file}, {line}: {called:?}"
-            );
+            let expected = if file.ends_with("thumbnails.jsonl") { 0..=0 } else { 1..=2 };
+            assert!(called.code.is_some_and(|code| expected.contains(&code)), "{file}, {line}: {called:?}");
             let name = path.file_name().unwrap().to_string_lossy();
-            let is_link =
-                called.stderr.contains("is a link") || called.stderr.contains("leads out of");
+            let is_link = called.stderr.contains("is a link") || called.stderr.contains("leads out of");
             assert!(
-                called.stderr.contains(&*name)
-                    && (called.stderr.contains("a pipe or a device") || is_link),
+                called.stderr.contains(&*name) && (called.stderr.contains("a pipe or a device") || is_link),
                 "{file}, {line}: {called:?}"
             );
         }

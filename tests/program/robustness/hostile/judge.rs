@@ -13,10 +13,7 @@ pub(crate) struct Limits {
 }
 
 impl Limits {
-    pub(crate) const PROGRAM: Self = Self {
-        time: Duration::from_secs(20),
-        memory: 1 << 30,
-    };
+    pub(crate) const PROGRAM: Self = Self { time: Duration::from_secs(20), memory: 1 << 30 };
 }
 
 /// Fault of a process.

@@ -1,4 +1,5 @@
-//! Small files and replies that would fill the memory: each is refused or read within it, and what is honest beside them is taken.
+//! Small files and replies that would fill the memory: each is refused or read within it, and what is honest beside
+//! them is taken.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -30,11 +31,7 @@ fn call(bench: &Bench, line: &str) -> Finished {
     let finished = Running::start(&mut command, log.path()).end(Duration::from_mins(5), None);
     assert!(!finished.is_late, "{line}");
     assert_eq!(finished.signal, None, "{line}");
-    assert!(
-        finished.memory < MOST,
-        "{line}: {} MB",
-        finished.memory >> 20
-    );
+    assert!(finished.memory < MOST, "{line}: {} MB", finished.memory >> 20);
     finished
 }
 
@@ -68,10 +65,8 @@ fn nested_small_values_are_read() {
     ];
     for (at, (status, body, code)) in rows.into_iter().enumerate() {
         let mock = MockEndpoint::answering(move |_| Answer::new(status, body.clone()));
-        let line = format!(
-            "--model m --base-url {} --data set.jsonl --levels L0 --retries 0 --out run{at}",
-            mock.base_url()
-        );
+        let line =
+            format!("--model m --base-url {} --data set.jsonl --levels L0 --retries 0 --out run{at}", mock.base_url());
         let finished = call(&bench, &line);
         assert_eq!(finished.code, Some(code), "{at}: {}", stderr(&finished));
         let record = &records(&bench.path(&format!("run{at}")))[0];
@@ -88,10 +83,7 @@ fn record_keeps_ends_of_long_reply() {
     let bench = Bench::with_questions(1);
     let long = format!("I look. {}The answer is (C).", "Hm. ".repeat(1 << 20));
     let mock = MockEndpoint::answering(move |_| Answer::text(&long));
-    let line = format!(
-        "--model m --base-url {} --data set.jsonl --levels L0 --retries 0 --out run",
-        mock.base_url()
-    );
+    let line = format!("--model m --base-url {} --data set.jsonl --levels L0 --retries 0 --out run", mock.base_url());
     assert_eq!(call(&bench, &line).code, Some(0));
     let record = &records(&bench.path("run"))[0];
     let text = record["reply"].as_str().unwrap();
@@ -134,8 +126,7 @@ fn oversized_sets_are_refused() {
     let mut archive = zip::ZipWriter::new(File::create(bench.path("large.zip")).unwrap());
     let options = zip::write::SimpleFileOptions::default();
     archive.start_file("set.jsonl", options).unwrap();
-    let row =
-        json!({"image": "a.png", "question": "Is it?", "choices": ["yes", "no"], "answer": "no"});
+    let row = json!({"image": "a.png", "question": "Is it?", "choices": ["yes", "no"], "answer": "no"});
     let rows = format!("{row}\n").repeat(10_000);
     for _ in 0..120 {
         archive.write_all(rows.as_bytes()).unwrap();
@@ -146,10 +137,7 @@ fn oversized_sets_are_refused() {
         let finished = call(&bench, &line);
         assert_eq!(finished.code, Some(2), "{name}");
         let text = stderr(&finished);
-        assert!(
-            text.contains("more than 1000000 rows") && text.contains(name),
-            "{text}"
-        );
+        assert!(text.contains("more than 1000000 rows") && text.contains(name), "{text}");
     }
     let line = "--model random --data small.parquet --levels L0 --out small";
     let finished = call(&bench, line);
@@ -159,22 +147,11 @@ fn oversized_sets_are_refused() {
 #[test]
 fn many_rows_of_lerobot_are_refused() {
     for (rows, problem) in [
-        (
-            5_000_001,
-            "5000001 rows; at most 5000000 in a file are read",
-        ),
-        (
-            4_900_000,
-            "4900000 frames of observation.images.front left out",
-        ),
+        (5_000_001, "5000001 rows; at most 5000000 in a file are read"),
+        (4_900_000, "4900000 frames of observation.images.front left out"),
     ] {
         let bench = Bench::new();
-        let set = Set {
-            version: "v2.1",
-            lengths: vec![rows],
-            videos: true,
-            ..Set::default()
-        };
+        let set = Set { version: "v2.1", lengths: vec![rows], videos: true, ..Set::default() };
         set.write_tables(&bench.path("set"));
         let line = "import lerobot set --camera observation.images.front --every 0 --out out";
         let finished = call(&bench, line);
@@ -211,10 +188,7 @@ fn oversized_archives_are_refused() {
     archive.extend([0xFF; 12]);
     archive.extend([0, 0]);
     bench.file("set.zip", archive);
-    let finished = call(
-        &bench,
-        "--model random --data set.zip --levels L0 --out run",
-    );
+    let finished = call(&bench, "--model random --data set.zip --levels L0 --out run");
     assert_eq!(finished.code, Some(2));
     let text = stderr(&finished);
     insta::assert_snapshot!(
@@ -234,10 +208,7 @@ fn sparse_files_are_not_read() {
     let line = "--model random --data set.jsonl --levels L3 --images-cache store --out run1";
     assert_eq!(call(&bench, line).code, Some(0));
     let stored = files(&bench.path("store"));
-    let images: Vec<_> = stored
-        .iter()
-        .filter(|path| path.extension().is_some_and(|end| end == "img"))
-        .collect();
+    let images: Vec<_> = stored.iter().filter(|path| path.extension().is_some_and(|end| end == "img")).collect();
     assert!(!images.is_empty());
     for image in images {
         let end = fs::read(image).unwrap();
@@ -265,10 +236,7 @@ fn sparse_files_are_not_read() {
     assert_eq!(first, second);
     for name in ["a.png", "set.jsonl"] {
         enlarge(&bench.path(name));
-        let finished = call(
-            &bench,
-            "--model random --data set.jsonl --levels L0 --out run3",
-        );
+        let finished = call(&bench, "--model random --data set.jsonl --levels L0 --out run3");
         assert_eq!(finished.code, Some(2), "{name}");
         assert!(stderr(&finished).contains(name), "{}", stderr(&finished));
     }
@@ -310,9 +278,7 @@ fn slow_loading_model_is_refused() {
     onnx::slow_to_load().write(&bench.path(""), "slow.onnx");
     onnx::gain(0.5).write(&bench.path(""), "quick.onnx");
     let line = |model: &str, seconds: u32| {
-        format!(
-            "enhance {model}.onnx a.png --offline --llie-anyway --llie-timeout {seconds} --out {model}"
-        )
+        format!("enhance {model}.onnx a.png --offline --llie-anyway --llie-timeout {seconds} --out {model}")
     };
     let finished = call(&bench, &line("slow", 1));
     assert_eq!(finished.code, Some(2), "{}", stderr(&finished));

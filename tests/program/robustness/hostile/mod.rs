@@ -1,11 +1,12 @@
-//! Hostile files: the program is called with damaged files of every kind that it reads, and with damaged replies and requests. It may
-//! refuse them, but not panic, end by a signal, hang, take memory without bound, move the terminal, or touch a file beside its
-//! working folder.
+//! Hostile files: the program is called with damaged files of every kind that it reads, and with damaged replies and
+//! requests. It may refuse them, but not panic, end by a signal, hang, take memory without bound, move the terminal, or
+//! touch a file beside its working folder.
 //!
 //! The short form runs with the other tests. The long form is
-//! `HOSTILE_RUNS=100000 HOSTILE_SEED=7 cargo test --test program hostile:: -- --ignored --nocapture`; it writes each failure as a
-//! folder into `target/tmp/hostile`, named by its seed and number. `HOSTILE_FIRST` is the number of its first run (default: 0),
-//! so that one run is done again by its number. `HOSTILE_CALLS` are words of the calls to try, such as `import lerobot` (default: all).
+//! `HOSTILE_RUNS=100000 HOSTILE_SEED=7 cargo test --test program hostile:: -- --ignored --nocapture`; it writes each
+//! failure as a folder into `target/tmp/hostile`, named by its seed and number. `HOSTILE_FIRST` is the number of its
+//! first run (default: 0), so that one run is done again by its number. `HOSTILE_CALLS` are words of the calls to try,
+//! such as `import lerobot` (default: all).
 
 #![cfg(unix)]
 

@@ -21,15 +21,9 @@ pub(crate) enum Place {
     Closed,
 }
 
-/// What a user may not have in the place of a file that the command line names. A pipe, a device and a link of the user's own are
-/// read there.
-const OF_TYPED: [Place; 5] = [
-    Place::LinkTo("loop"),
-    Place::Folder,
-    Place::Nothing,
-    Place::Empty,
-    Place::Closed,
-];
+/// What a user may not have in the place of a file that the command line names. A pipe, a device and a link of the
+/// user's own are read there.
+const OF_TYPED: [Place; 5] = [Place::LinkTo("loop"), Place::Folder, Place::Nothing, Place::Empty, Place::Closed];
 
 const ALL: [Place; 15] = [
     Place::LinkTo("CANARY/private.txt"),

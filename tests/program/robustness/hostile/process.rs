@@ -13,21 +13,15 @@ use crate::support::run::PROGRAM;
 /// The most bytes of a stream that are looked at.
 const MOST_BYTES: usize = 16 << 20;
 
-/// The time that counts between two looks at a process at most. A longer one means that the machine stood still, and the process
-/// with it.
+/// The time that counts between two looks at a process at most. A longer one means that the machine stood still, and
+/// the process with it.
 const LONGEST_LOOK: Duration = Duration::from_secs(1);
 
 /// The program in a folder, with the few variables that it needs.
 pub(crate) fn program(work: &Path) -> Command {
     let mut command = Command::new(PROGRAM);
     command.current_dir(work).env_clear();
-    let kept = [
-        "PATH",
-        "HOME",
-        "XDG_CACHE_HOME",
-        "ORT_DYLIB_PATH",
-        "LD_LIBRARY_PATH",
-    ];
+    let kept = ["PATH", "HOME", "XDG_CACHE_HOME", "ORT_DYLIB_PATH", "LD_LIBRARY_PATH"];
     for name in kept {
         if let Some(value) = std::env::var_os(name) {
             command.env(name, value);
@@ -62,10 +56,7 @@ impl<'a> Running<'a> {
         let stream = |name: &str| File::create(folder.join(name)).unwrap();
         command.stdin(Stdio::null());
         command.stdout(stream("stdout")).stderr(stream("stderr"));
-        Self {
-            child: command.spawn().unwrap(),
-            folder,
-        }
+        Self { child: command.spawn().unwrap(), folder }
     }
 
     /// Output so far.
@@ -80,7 +71,8 @@ impl<'a> Running<'a> {
         file.is_ok_and(|file| file.len() > 0)
     }
 
-    /// Waits for its end; after the `limit` it is killed. After `patience` it is asked to end by a signal, if that is given.
+    /// Waits for its end; after the `limit` it is killed. After `patience` it is asked to end by a signal, if that is
+    /// given.
     pub(crate) fn end(mut self, limit: Duration, patience: Option<Duration>) -> Finished {
         let (mut is_late, mut is_asked) = (false, patience.is_none());
         let (mut took, mut look) = (Duration::ZERO, Instant::now());
@@ -100,11 +92,7 @@ impl<'a> Running<'a> {
                 is_late = true;
                 crate::support::process::signal(&self.child, "-9");
             }
-            thread::sleep(Duration::from_millis(if took.as_millis() < 500 {
-                1
-            } else {
-                10
-            }));
+            thread::sleep(Duration::from_millis(if took.as_millis() < 500 { 1 } else { 10 }));
         };
         let stream = |name: &str| {
             let mut bytes = fs::read(self.folder.join(name)).unwrap_or_default();
@@ -123,12 +111,11 @@ impl<'a> Running<'a> {
     }
 }
 
-/// Peak resident memory of a running process in bytes. The resource usage that `wait4` gives for a process begins with the memory of
-/// this test program, which started it.
+/// Peak resident memory of a running process in bytes. The resource usage that `wait4` gives for a process begins with
+/// the memory of this test program, which started it.
 fn peak_memory(id: u32) -> u64 {
     let status = fs::read_to_string(format!("/proc/{id}/status")).unwrap_or_default();
     let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    let kilobytes =
-        peak.and_then(|peak| peak.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
+    let kilobytes = peak.and_then(|peak| peak.trim().strip_suffix("kB")?.trim().parse::<u64>().ok());
     kilobytes.unwrap_or_default() * 1024
 }

@@ -23,21 +23,11 @@ fn answer(folder: &Path, request: &Request) -> Answer {
     let route = format!("{method}-{}", parts.join("-"));
     let endings = ["http", "json", "jsonl"];
     let file = |name: &str| -> Option<PathBuf> {
-        endings
-            .map(|ending| folder.join(format!("{name}.{ending}")))
-            .into_iter()
-            .find(|path| path.is_file())
+        endings.map(|ending| folder.join(format!("{name}.{ending}"))).into_iter().find(|path| path.is_file())
     };
-    let Some(path) = file(&route)
-        .or_else(|| file("refusal"))
-        .or_else(|| file("chat"))
-    else {
+    let Some(path) = file(&route).or_else(|| file("refusal")).or_else(|| file("chat")) else {
         return Answer::new(404, "");
     };
     let bytes = fs::read(&path).unwrap_or_default();
-    if path.extension().is_some_and(|ending| ending == "http") {
-        Answer::raw(bytes)
-    } else {
-        Answer::new(200, bytes)
-    }
+    if path.extension().is_some_and(|ending| ending == "http") { Answer::raw(bytes) } else { Answer::new(200, bytes) }
 }

@@ -15,8 +15,8 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// How long an answer is waited for.
 const WAIT: Duration = Duration::from_millis(800);
 
-/// Sends the request in the folder `request` to a server once it listens; the answer, empty if there is none. A body alone is sent
-/// with a sound head.
+/// Sends the request in the folder `request` to a server once it listens; the answer, empty if there is none. A body
+/// alone is sent with a sound head.
 pub(crate) fn send(server: &Running<'_>, folder: &Path) -> Vec<u8> {
     let Some(address) = address(server) else {
         return Vec::new();

@@ -1,4 +1,5 @@
-//! Texts of strangers, and keys in them: nothing hidden is written to files, nothing moves a terminal, and no key is stored.
+//! Texts of strangers, and keys in them: nothing hidden is written to files, nothing moves a terminal, and no key is
+//! stored.
 
 use std::fs;
 
@@ -21,12 +22,7 @@ fn quiet_run_writes_no_colours() {
     let run = |out: &str, more: &[&str], variables: &[(&str, &str)]| {
         let url = mock.base_url();
         let args = [&model_args(&url, line)[..], &[out], more].concat();
-        called(
-            bench
-                .command(&args)
-                .envs(variables.iter().copied())
-                .env("OPENAI_API_KEY", KEY),
-        )
+        called(bench.command(&args).envs(variables.iter().copied()).env("OPENAI_API_KEY", KEY))
     };
     let rows = [
         ("--quiet", None),
@@ -46,8 +42,7 @@ fn quiet_run_writes_no_colours() {
 /// The hidden characters of a text.
 fn hidden(text: &str) -> Vec<char> {
     let is_hidden = |c: &char| {
-        (c.is_control() && *c != '\n' && *c != '\t')
-            || "\u{202e}\u{2066}\u{200b}\u{2028}\u{3164}".contains(*c)
+        (c.is_control() && *c != '\n' && *c != '\t') || "\u{202e}\u{2066}\u{200b}\u{2028}\u{3164}".contains(*c)
     };
     text.chars().filter(is_hidden).collect()
 }
@@ -56,13 +51,10 @@ fn hidden(text: &str) -> Vec<char> {
 fn captions_and_readme_escape_hidden_text() {
     let strange = r"a\u001b[31m\u009b2J\r\u202e\u2066\u200b\u2028\u3164\\input{/etc/passwd}%&.png";
     let bench = Bench::with_questions(9);
-    bench.complete(&words(
-        "--model random --data set.jsonl --levels L0,L3,L5 --out run",
-    ));
+    bench.complete(&words("--model random --data set.jsonl --levels L0,L3,L5 --out run"));
     for path in files(&bench.path("run")) {
         let text = fs::read_to_string(&path).unwrap_or_default();
-        if path.extension().is_some_and(|end| end == "jsonl") || path.ends_with("run/manifest.json")
-        {
+        if path.extension().is_some_and(|end| end == "jsonl") || path.ends_with("run/manifest.json") {
             let text = text.replace("a.png", strange);
             fs::write(&path, text.replace("\"paper\"", "\"paper\\u202e\"")).unwrap();
         }
@@ -98,18 +90,9 @@ fn unusable_proxy_is_an_error() {
         let line = format!("--data set.jsonl --levels L0 --retries 0 --allow-http --out {more}");
         // Reserved by RFC 5737: nobody answers there.
         let args = model_args("http://192.0.2.1:9/v1", &line);
-        called(
-            bench
-                .command(&args)
-                .env("HTTP_PROXY", proxy)
-                .env("OPENAI_API_KEY", KEY),
-        )
+        called(bench.command(&args).env("HTTP_PROXY", proxy).env("OPENAI_API_KEY", KEY))
     };
-    for wrong in [
-        "socks5://user:word@127.0.0.1:1080",
-        "127.0.0.1:port",
-        "http//proxy",
-    ] {
+    for wrong in ["socks5://user:word@127.0.0.1:1080", "127.0.0.1:port", "http//proxy"] {
         let called = run(wrong, "refused").ended(2);
         assert!(called.stderr.contains("HTTP_PROXY"), "{called:?}");
         assert!(!called.stderr.contains("word"), "{called:?}");
@@ -124,11 +107,7 @@ fn unusable_proxy_is_an_error() {
 #[test]
 fn encoded_key_is_never_stored() {
     let encoded = STANDARD.encode(format!("Bearer {KEY}"));
-    let reply = format!(
-        "brown {KEY} {encoded} {} and {}",
-        PARTS[0],
-        PARTS[1].replace('-', " ")
-    );
+    let reply = format!("brown {KEY} {encoded} {} and {}", PARTS[0], PARTS[1].replace('-', " "));
     let bench = Bench::with_questions(2);
     let run = |line: &str, answer: Answer| {
         let mock = MockEndpoint::answering(move |_| answer.clone());
@@ -149,8 +128,5 @@ fn encoded_key_is_never_stored() {
         assert_eq!(found, None, "{text}");
     }
     let records = fs::read_to_string(bench.path("run/records.jsonl")).unwrap();
-    assert!(
-        records.contains("brown [secret]") && records.contains("[secret] and [secret]"),
-        "{records}"
-    );
+    assert!(records.contains("brown [secret]") && records.contains("[secret] and [secret]"), "{records}");
 }

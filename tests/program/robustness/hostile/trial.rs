@@ -51,15 +51,10 @@ impl<'a> Trial<'a> {
     pub(crate) fn draw(case: &'a Case, seeds: &Seeds, random: &mut Random) -> Self {
         let files = seeds.files(case.reads);
         let file = random.pick(&files).clone();
-        let is_ours = ["reply", "request"]
-            .iter()
-            .any(|folder| file.starts_with(folder));
+        let is_ours = ["reply", "request"].iter().any(|folder| file.starts_with(folder));
         // What a mock sends stays a file.
         let damage = if !is_ours && random.percent(8) {
-            let is_typed = case
-                .line
-                .split(' ')
-                .any(|word| file.to_str() == word.rsplit(':').next());
+            let is_typed = case.line.split(' ').any(|word| file.to_str() == word.rsplit(':').next());
             Damage::Replaced(Place::draw(random, is_typed))
         } else {
             let steps = 1 + random.below(4);
@@ -70,11 +65,7 @@ impl<'a> Trial<'a> {
 
     /// The call without damage.
     pub(crate) fn sound(case: &'a Case) -> Self {
-        Self {
-            case,
-            file: PathBuf::new(),
-            damage: Damage::Steps(Vec::new()),
-        }
+        Self { case, file: PathBuf::new(), damage: Damage::Steps(Vec::new()) }
     }
 
     /// Writes the folders `work` and `canary` into an empty folder.
@@ -153,9 +144,7 @@ impl<'a> Trial<'a> {
             }
         }
         let file = self.file.to_string_lossy();
-        let is_of_user = !["reply", "request"]
-            .iter()
-            .any(|folder| file.starts_with(folder));
+        let is_of_user = !["reply", "request"].iter().any(|folder| file.starts_with(folder));
         Verdict {
             code: finished.code,
             faults,
@@ -184,8 +173,7 @@ fn command(line: &str, url: &str, work: &Path) -> Command {
 /// Writes the port of the endpoint into the files that name it.
 fn name_port(work: &Path, port: &str) {
     for path in files(work) {
-        let is_file =
-            fs::symlink_metadata(&path).is_ok_and(|meta| meta.is_file() && meta.len() > 0);
+        let is_file = fs::symlink_metadata(&path).is_ok_and(|meta| meta.is_file() && meta.len() > 0);
         if is_file && let Ok(bytes) = fs::read(&path) {
             let named = requests::with_port(&bytes, port);
             if named != bytes {

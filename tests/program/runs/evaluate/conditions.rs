@@ -39,13 +39,9 @@ fn built_in_rooms_run_without_anything() {
             .count()
     };
     assert!(right("L0") * 10 >= blind.len() * 9, "{table}");
-    let conditions: BTreeSet<&str> = records
-        .iter()
-        .map(|record| text(record, "condition"))
-        .collect();
+    let conditions: BTreeSet<&str> = records.iter().map(|record| text(record, "condition")).collect();
     assert_eq!(conditions.len(), 11);
-    let manifest: Value =
-        serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
     assert_eq!(
         (&manifest["status"], &manifest["counts"]["answered"]),
         // Eleven conditions and none, and the observer's control in the eleven.
@@ -58,9 +54,7 @@ fn every_condition_runs_raw_and_enhanced() {
     let bench = Bench::with_frames();
     onnx::gain(3.0).write(&bench.path(""), "bright.onnx");
     onnx::gamma(0.5).write(&bench.path(""), "curve.onnx");
-    let args = words(
-        "--data frames --model random --llie bright.onnx --llie curve.onnx --llie-anyway --out run",
-    );
+    let args = words("--data frames --model random --llie bright.onnx --llie curve.onnx --llie-anyway --out run");
     let table = bench.complete(&args);
     insta::assert_snapshot!(lines_with(&table, "with noise"), @"
     with noise            0.0   33.3   66.7   66.7   33.3   33.3   −65.4 +98.4
@@ -71,31 +65,14 @@ fn every_condition_runs_raw_and_enhanced() {
     // L0, five of each variant, five for each enhancer on noise.
     assert_eq!(records.len(), 3 * (1 + 5 + 5 + 5 + 5));
     let digest = |condition: &str, frame: &str| {
-        let of = |record: &&Value| {
-            text(record, "condition") == condition && text(record, "frame") == frame
-        };
-        let digests: BTreeSet<String> = records
-            .iter()
-            .filter(of)
-            .map(|record| record["image"]["digest"].to_string())
-            .collect();
-        assert_eq!(
-            digests.len(),
-            1,
-            "one image for all questions of {condition}"
-        );
+        let of = |record: &&Value| text(record, "condition") == condition && text(record, "frame") == frame;
+        let digests: BTreeSet<String> =
+            records.iter().filter(of).map(|record| record["image"]["digest"].to_string()).collect();
+        assert_eq!(digests.len(), 1, "one image for all questions of {condition}");
         digests.into_iter().next().unwrap()
     };
-    let digests: BTreeSet<String> = [
-        "L0",
-        "L1-ev",
-        "L1-noise",
-        "L1-noise+bright",
-        "L1-noise+curve",
-    ]
-    .iter()
-    .map(|c| digest(c, "b.png"))
-    .collect();
+    let digests: BTreeSet<String> =
+        ["L0", "L1-ev", "L1-noise", "L1-noise+bright", "L1-noise+curve"].iter().map(|c| digest(c, "b.png")).collect();
     assert_eq!(digests.len(), 5, "five different images");
 }
 
@@ -111,10 +88,7 @@ fn threads_and_order_change_no_byte() {
             .iter()
             .map(|r| (r["key"].to_string(), r["image"]["digest"].to_string()))
             .collect();
-        (
-            digests,
-            fs::read(bench.path(run).join("summary.csv")).unwrap(),
-        )
+        (digests, fs::read(bench.path(run).join("summary.csv")).unwrap())
     };
     assert_eq!(images("one", "1", "1"), images("many", "5", "16"));
 }
@@ -129,10 +103,7 @@ fn parallel_enhancement_keeps_images() {
              --threads {threads} --out {run}"
         )));
         let records = records(&bench.path(run));
-        records
-            .iter()
-            .map(|r| (r["key"].to_string(), r["image"]["digest"].to_string()))
-            .collect()
+        records.iter().map(|r| (r["key"].to_string(), r["image"]["digest"].to_string())).collect()
     };
     let one = images("one", "1");
     assert!(one.len() > 24, "{}", one.len());
@@ -148,24 +119,14 @@ fn parallel_enhancement_keeps_images() {
 #[test]
 fn the_reference_run_is_made_again() {
     let bench = Bench::new();
-    bench.complete(&words(
-        "--model observer --data rooms:frames=12,size=320x240 --levels L0,L3 --out run",
-    ));
+    bench.complete(&words("--model observer --data rooms:frames=12,size=320x240 --levels L0,L3 --out run"));
     let reference = Path::new(env!("CARGO_MANIFEST_DIR")).join("results/reference");
     let by_key = |run: &Path| -> BTreeMap<String, Value> {
-        records(run)
-            .into_iter()
-            .map(|record| (record["key"].to_string(), record))
-            .collect()
+        records(run).into_iter().map(|record| (record["key"].to_string(), record)).collect()
     };
     // Trials, choices, replies and the very files that were sent, whatever machine made them.
     assert_eq!(by_key(&bench.path("run")), by_key(&reference));
-    let names = [
-        "summary.csv",
-        "comparisons.csv",
-        "thresholds.csv",
-        "figures/accuracy.svg",
-    ];
+    let names = ["summary.csv", "comparisons.csv", "thresholds.csv", "figures/accuracy.svg"];
     check_rows(names, |name| {
         let file = |run: &Path| fs::read_to_string(run.join(name)).unwrap();
         assert_eq!(file(&bench.path("run")), file(&reference), "{name}");
@@ -179,40 +140,24 @@ fn ready_made_sets_are_read() {
     bench.file("set/one.png", png(20));
     bench.file("set/paths.tsv", "index\tquestion\thint\tA\tB\tC\tanswer\tcategory\timage_path\n1\t\"What,\nnow?\"\tLook closely.\tred\t\tblue\tC\tcolor\tone.png\n2\tAnd?\t\tyes\tno\t\tA\tOCR\tone.png\n");
     let file = base64::engine::general_purpose::STANDARD.encode(png(50));
-    bench.file("set/base64.tsv", format!("index\timage\tquestion\tA\tB\tanswer\n7\t{file}\tWhat?\tred\tblue\tB\n8\t7\tAnd?\tyes\tno\tA\n"));
+    bench.file(
+        "set/base64.tsv",
+        format!("index\timage\tquestion\tA\tB\tanswer\n7\t{file}\tWhat?\tred\tblue\tB\n8\t7\tAnd?\tyes\tno\tA\n"),
+    );
     bench.file("set/lines.jsonl", "{\"id\":1,\"image\":\"one.png\",\"question\":\"What?\",\"choices\":[\"red\",\"blue\"],\"answer\":\"blue\",\"family\":\"color\"}\n");
     bench.file("script.jsonl", "{\"default\":\"B\"}\n");
-    let rows = [
-        ("paths.tsv", 2, 1),
-        ("base64.tsv", 2, 1),
-        ("lines.jsonl", 1, 1),
-    ];
+    let rows = [("paths.tsv", 2, 1), ("base64.tsv", 2, 1), ("lines.jsonl", 1, 1)];
     check_rows(rows, |(set, n, right)| {
-        bench.complete(&words(&format!(
-            "--data set/{set} --model script:script.jsonl --levels L0,L3 --out {set}"
-        )));
+        bench.complete(&words(&format!("--data set/{set} --model script:script.jsonl --levels L0,L3 --out {set}")));
         let records = records(&bench.path(set));
         assert_eq!(records.len(), n * 3, "{set}");
-        let seen = records
-            .iter()
-            .filter(|r| r["condition"] == "L3-noise" && r["outcome"] == "right")
-            .count();
+        let seen = records.iter().filter(|r| r["condition"] == "L3-noise" && r["outcome"] == "right").count();
         assert_eq!(seen, right, "{set}");
-        assert!(
-            records.iter().all(|record| record["image"]["width"] == 24),
-            "{set}"
-        );
+        assert!(records.iter().all(|record| record["image"]["width"] == 24), "{set}");
     });
     let of_paths = records(&bench.path("paths.tsv"));
-    let first = of_paths
-        .iter()
-        .find(|record| record["question"] == "1")
-        .unwrap();
-    assert_eq!(
-        first["choices"],
-        json!(["red", "blue"]),
-        "an empty cell is no choice"
-    );
+    let first = of_paths.iter().find(|record| record["question"] == "1").unwrap();
+    assert_eq!(first["choices"], json!(["red", "blue"]), "an empty cell is no choice");
 }
 
 #[test]
@@ -221,8 +166,6 @@ fn equal_scripts_are_two_models() {
     for script in ["one.jsonl", "two.jsonl"] {
         bench.file(script, "{\"default\":\"A\"}\n");
     }
-    bench.complete(&words(
-        "--data frames --model script:one.jsonl --model script:two.jsonl --levels L0 --out run",
-    ));
+    bench.complete(&words("--data frames --model script:one.jsonl --model script:two.jsonl --levels L0 --out run"));
     assert_eq!(records(&bench.path("run")).len(), 6);
 }

@@ -21,18 +21,12 @@ fn broken_image_is_found_early() {
     let mut corrupt = whole.clone();
     let middle = corrupt.len() / 2;
     corrupt[middle] ^= 0x40;
-    let rows = [
-        (&whole[..whole.len() - 40], "ends before"),
-        (&corrupt, "checksum"),
-    ];
+    let rows = [(&whole[..whole.len() - 40], "ends before"), (&corrupt, "checksum")];
     check_rows(rows, |(broken, message)| {
         bench.file("frames/a.png", broken);
         let run = bench.call(&model_args(&url, "--data frames --levels L0 --out run"));
         assert_eq!(run.code, Some(2), "{run:?}");
-        assert!(
-            run.stderr.contains("a.png: not a whole image") && run.stderr.contains(message),
-            "{run:?}"
-        );
+        assert!(run.stderr.contains("a.png: not a whole image") && run.stderr.contains(message), "{run:?}");
     });
     assert_eq!(endpoint.requests().len(), 0);
 }
@@ -62,9 +56,8 @@ fn unknown_model_stops_alone() {
     let bench = Bench::with_frames();
     let endpoint = MockEndpoint::start([Answer::error(404, "model_not_found", "no such model")]);
     let url = endpoint.base_url();
-    let run = bench.call(&words(&format!(
-        "--data frames --model random --model gone --base-url {url} --levels L0-L2 --out run"
-    )));
+    let run = bench
+        .call(&words(&format!("--data frames --model random --model gone --base-url {url} --levels L0-L2 --out run")));
     insta::assert_snapshot!(run.lines_with("gone"), @"
     exit code: 1
     ! not asked any further: http://127.0.0.1:[PORT]/v1: gone: http://127.0.0.1:[PORT]/v1 answered 404: no such
@@ -72,24 +65,15 @@ fn unknown_model_stops_alone() {
         the same command continues)
     ");
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
-    assert!(
-        csv.contains("random,image,L2,noise,,all,strict,3,") && !csv.contains("gone"),
-        "{csv}"
-    );
+    assert!(csv.contains("random,image,L2,noise,,all,strict,3,") && !csv.contains("gone"), "{csv}");
 }
 
 #[test]
 fn missing_endpoint_is_noticed_soon() {
     let bench = Bench::with_frames();
-    let free = std::net::TcpListener::bind("127.0.0.1:0")
-        .unwrap()
-        .local_addr()
-        .unwrap();
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     let url = format!("http://{free}/v1");
-    let run = bench.call(&model_args(
-        &url,
-        "--data frames --retries 0 --concurrency 1 --out run",
-    ));
+    let run = bench.call(&model_args(&url, "--data frames --retries 0 --concurrency 1 --out run"));
     insta::assert_snapshot!(run.messages(), @"
     exit code: 2
     error: http://127.0.0.1:[PORT]/v1: m: 5 trials in a row failed: error sending request: client error (Connect):
@@ -103,10 +87,8 @@ fn first_failure_is_described() {
     let bench = Bench::with_frames();
     let page = Answer::new(200, "<html><title>Sign in</title></html>".to_owned());
     let endpoint = MockEndpoint::start([page, Answer::text("A")]);
-    let run = bench.call(&model_args(
-        &endpoint.base_url(),
-        "--data frames --retries 0 --concurrency 1 --levels L0 --out run",
-    ));
+    let run = bench
+        .call(&model_args(&endpoint.base_url(), "--data frames --retries 0 --concurrency 1 --levels L0 --out run"));
     insta::assert_snapshot!(run.messages(), @r#"
     exit code: 1
      WARN m: a trial about a.png failed: http://127.0.0.1:[PORT]/v1 answered with an HTML page titled "Sign in"
@@ -128,14 +110,11 @@ fn changed_image_is_not_mixed() {
         bench.call(&model_args(&url, "--data frames --concurrency 1 --out run"))
     });
     assert_eq!(run.code, Some(1), "{run:?}");
-    let of_b: Vec<Value> = records(&bench.path("run"))
-        .into_iter()
-        .filter(|record| record["frame"] == "b.png")
-        .collect();
+    let of_b: Vec<Value> =
+        records(&bench.path("run")).into_iter().filter(|record| record["frame"] == "b.png").collect();
     assert_eq!(of_b.len(), 11);
     assert!(
-        of_b.iter()
-            .all(|record| text(&record["failure"], "message").contains("changed during the run")),
+        of_b.iter().all(|record| text(&record["failure"], "message").contains("changed during the run")),
         "{of_b:?}"
     );
 }

@@ -24,10 +24,7 @@ fn an_interrupt_keeps_what_was_answered() {
     // The first asks to stop; the request that is never answered is given up by the second alone.
     signal(&program, "-INT");
     thread::sleep(Duration::from_millis(300));
-    assert!(
-        program.try_wait().unwrap().is_none(),
-        "what is on the wire is waited for"
-    );
+    assert!(program.try_wait().unwrap().is_none(), "what is on the wire is waited for");
     signal(&program, "-INT");
     assert_eq!(program.wait().unwrap().code(), Some(130));
     assert_eq!(records(&bench.path("run")).len(), 1);
@@ -53,10 +50,7 @@ fn interrupt_abandons_requests_after_grace() {
     wait_until(|| endpoint.requests().len() >= 2);
     signal(&program, "-TERM");
     thread::sleep(Duration::from_millis(300));
-    assert!(
-        program.try_wait().unwrap().is_none(),
-        "what is on the wire is waited for"
-    );
+    assert!(program.try_wait().unwrap().is_none(), "what is on the wire is waited for");
     // Would take 100,000 s otherwise, and the run of the tests with it.
     let output = program.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130), "{output:?}");
@@ -112,11 +106,7 @@ fn interrupt_does_not_wait_for_retries() {
     run: run
     report: run/report.html
     ");
-    assert_eq!(
-        records(&bench.path("run")).len(),
-        1,
-        "what was given up has not failed"
-    );
+    assert_eq!(records(&bench.path("run")).len(), 1, "what was given up has not failed");
 }
 
 /// A closed terminal asks to stop, as SIGTERM does; under `nohup` it does not.
@@ -139,10 +129,7 @@ fn closed_terminal_interrupts_unless_ignored() {
     is_signalled.store(true, Ordering::SeqCst);
     assert_eq!(program.wait().unwrap().code(), Some(130));
     let kept = records(&bench.path("run")).len();
-    assert!(
-        (1..3).contains(&kept),
-        "what is on the wire is waited for: {kept}"
-    );
+    assert!((1..3).contains(&kept), "what is on the wire is waited for: {kept}");
 
     let mut ignoring = Command::new("sh")
         .args(["-c", "trap '' HUP; exec \"$0\" \"$@\""])
@@ -167,10 +154,7 @@ fn a_closed_standard_error_ends_nothing() {
     let endpoint = MockEndpoint::start([Answer::error(500, "broken", "no"), Answer::text("A")]);
     let url = endpoint.base_url();
     let line = "--data frames --levels L0 --concurrency 1 --out run --image jpeg:95";
-    for (args, code) in [
-        (model_args(&url, line), 0),
-        (vec!["--model", "random", "--data", "none"], 2),
-    ] {
+    for (args, code) in [(model_args(&url, line), 0), (vec!["--model", "random", "--data", "none"], 2)] {
         let status = Command::new("sh")
             .args(["-c", "\"$0\" \"$@\" 2>&-"])
             .arg(PROGRAM)

@@ -14,24 +14,15 @@ use crate::support::table::check_rows;
 fn record_and_row_keep_contract() {
     let bench = Bench::with_frames();
     bench.file("script.jsonl", "{\"question\":\"a1\",\"reply\":\"No.\"}\n{\"question\":\"b1\",\"condition\":\"L1-ev\",\"reply\":\"too dark to see\"}\n{\"default\":\"**A**\"}\n");
-    let table = bench.complete(&words(
-        "--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run --full",
-    ));
+    let table = bench
+        .complete(&words("--data frames --model script:script.jsonl --levels L0,L1 --variant ev --out run --full"));
     insta::assert_snapshot!(
         lines_with(&table, "(66.7)"),
         @"script:script.jsonl   untouched       33.3 (66.7)          3      2 (0)        0   −33.1 +65.4"
     );
     let records = records(&bench.path("run"));
-    let record = records
-        .iter()
-        .find(|r| text(r, "question") == "b1" && text(r, "condition") == "L1-ev")
-        .unwrap();
-    let keys: Vec<&str> = record
-        .as_object()
-        .unwrap()
-        .keys()
-        .map(String::as_str)
-        .collect();
+    let record = records.iter().find(|r| text(r, "question") == "b1" && text(r, "condition") == "L1-ev").unwrap();
+    let keys: Vec<&str> = record.as_object().unwrap().keys().map(String::as_str).collect();
     let rows = [
         "key",
         "question",
@@ -60,14 +51,7 @@ fn record_and_row_keep_contract() {
     check_rows(rows, |key| {
         assert!(keys.contains(&key), "{key} of {keys:?}");
     });
-    assert_eq!(
-        (
-            text(record, "level"),
-            text(record, "variant"),
-            text(record, "outcome")
-        ),
-        ("L1", "ev", "unparsed")
-    );
+    assert_eq!((text(record, "level"), text(record, "variant"), text(record, "outcome")), ("L1", "ev", "unparsed"));
     assert_eq!(record["ev"], 2.0);
     assert_eq!(record["reading"], Value::Null);
     assert_eq!(record["strict"], json!({"chosen": null, "why": "refused"}));
@@ -81,26 +65,10 @@ fn record_and_row_keep_contract() {
     );
     let all: Vec<&str> = lines.filter(|line| line.contains(",all,")).collect();
     // a1 is right both times; a2 and b1 say **A**, which is not strict: b1's A is right in the lenient parsing.
-    assert!(
-        all.iter()
-            .any(|line| line.contains(",L0,none,,all,strict,3,1,2,0,0.333")),
-        "{csv}"
-    );
-    assert!(
-        all.iter()
-            .any(|line| line.contains(",L0,none,,all,lenient,3,2,0,0,0.666")),
-        "{csv}"
-    );
-    assert!(
-        all.iter()
-            .any(|line| line.contains(",L1,ev,,all,lenient,3,1,1,0,0.333")),
-        "{csv}"
-    );
-    assert!(
-        all.iter()
-            .any(|line| line.starts_with("chance,,,none,,all,strict,3,,0,0,0.4444")),
-        "{csv}"
-    );
+    assert!(all.iter().any(|line| line.contains(",L0,none,,all,strict,3,1,2,0,0.333")), "{csv}");
+    assert!(all.iter().any(|line| line.contains(",L0,none,,all,lenient,3,2,0,0,0.666")), "{csv}");
+    assert!(all.iter().any(|line| line.contains(",L1,ev,,all,lenient,3,1,1,0,0.333")), "{csv}");
+    assert!(all.iter().any(|line| line.starts_with("chance,,,none,,all,strict,3,,0,0,0.4444")), "{csv}");
 }
 
 #[test]
@@ -130,10 +98,8 @@ fn router_providers_are_counted() {
         let mock = MockEndpoint::start(providers.map(reply));
         let line = "--data set.jsonl --levels L0 --out run --full";
         let printed = bench.complete(&model_args(&mock.base_url(), line));
-        let mut kept: Vec<String> = records(&bench.path("run"))
-            .iter()
-            .map(|record| text(record, "provider").to_owned())
-            .collect();
+        let mut kept: Vec<String> =
+            records(&bench.path("run")).iter().map(|record| text(record, "provider").to_owned()).collect();
         kept.sort();
         assert_eq!(kept, ["a", providers[1], providers[1]]);
         let printed = on_one_line(&printed);

@@ -53,10 +53,7 @@ fn probability_of_each_choice_is_kept() {
     }
     for request in mock.requests() {
         let body = request.json();
-        assert_eq!(
-            (&body["logprobs"], &body["top_logprobs"]),
-            (&json!(true), &json!(20))
-        );
+        assert_eq!((&body["logprobs"], &body["top_logprobs"]), (&json!(true), &json!(20)));
     }
     // Without the flag nothing is asked, and what a server states is not kept.
     let mock = MockEndpoint::start([Answer::text("C")]);
@@ -99,29 +96,17 @@ fn unstated_probabilities_are_not_invented() {
 #[test]
 fn probabilities_are_dropped_if_unsupported() {
     let mock = MockEndpoint::answering(|body| match body.get("logprobs") {
-        Some(_) => Answer::error(
-            400,
-            "400",
-            "Logprobs is not enabled for models/gemini-3-flash",
-        ),
+        Some(_) => Answer::error(400, "400", "Logprobs is not enabled for models/gemini-3-flash"),
         None => Answer::text("C"),
     });
-    assert!(
-        kept(&mock, ASKED)
-            .iter()
-            .all(|record| record["reply"] == "C")
-    );
+    assert!(kept(&mock, ASKED).iter().all(|record| record["reply"] == "C"));
     assert_eq!(mock.requests().len(), 4);
     // One that states fewer is asked for fewer.
     let mock = MockEndpoint::answering(|body| match body["top_logprobs"].as_u64() {
         Some(6..) => Answer::error(422, "validation", "top_logprobs must be at most 5"),
         _ => Answer::json(200, &sure()),
     });
-    assert!(
-        kept(&mock, ASKED)
-            .iter()
-            .all(|record| record["options"].is_object())
-    );
+    assert!(kept(&mock, ASKED).iter().all(|record| record["options"].is_object()));
     assert_eq!(mock.requests().len(), 4);
 }
 
@@ -132,14 +117,9 @@ fn the_report_sets_confidence_against_accuracy() {
     let mock = MockEndpoint::start([Answer::json(200, &sure())]);
     let asked = format!("{ASKED} --full").replace("L0", "L0,L3");
     let printed = bench.complete(&model_args(&mock.base_url(), &asked));
-    assert!(
-        printed.contains("Confidence (mean greatest probability"),
-        "{printed}"
-    );
+    assert!(printed.contains("Confidence (mean greatest probability"), "{printed}");
     let table = std::fs::read_to_string(bench.path("run/calibration.csv")).unwrap();
-    let mut lines = table
-        .lines()
-        .map(|line| line.split(',').collect::<Vec<_>>());
+    let mut lines = table.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let head = lines.next().unwrap();
     let rows: Vec<Vec<&str>> = lines.collect();
     // L0, and L3 by exposure drop alone and with noise.
@@ -182,9 +162,7 @@ fn the_report_sets_confidence_against_accuracy() {
         }
     }
     let figure = std::fs::read_to_string(bench.path("run/figures/reliability.svg")).unwrap();
-    assert!(
-        figure.contains(">confidence in %</text>") && page.contains("Is a model as often right")
-    );
+    assert!(figure.contains(">confidence in %</text>") && page.contains("Is a model as often right"));
     let not_shown = "m was not detected to be surer than it is right at L3: its mean confidence is 77.8 %, and 100.0 % of its replies";
     let said = |bench: &Bench| std::fs::read_to_string(bench.path("run/summary.json")).unwrap();
     assert!(said(&bench).contains(not_shown), "{printed}");
@@ -251,25 +229,11 @@ fn the_image_may_stand_first() {
     let requests: Vec<Value> = mock.requests().iter().map(Request::json).collect();
     let kinds = |body: &Value| -> Vec<String> {
         let parts = body["messages"][0]["content"].as_array();
-        parts
-            .into_iter()
-            .flatten()
-            .map(|part| text(part, "type").to_owned())
-            .collect()
+        parts.into_iter().flatten().map(|part| text(part, "type").to_owned()).collect()
     };
-    let shown: Vec<Vec<String>> = requests
-        .iter()
-        .map(kinds)
-        .filter(|kinds| !kinds.is_empty())
-        .collect();
-    assert_eq!(
-        shown[..3],
-        vec![["text", "image_url"].map(str::to_owned).to_vec(); 3]
-    );
-    assert_eq!(
-        shown[3..],
-        vec![["image_url", "text"].map(str::to_owned).to_vec(); 3]
-    );
+    let shown: Vec<Vec<String>> = requests.iter().map(kinds).filter(|kinds| !kinds.is_empty()).collect();
+    assert_eq!(shown[..3], vec![["text", "image_url"].map(str::to_owned).to_vec(); 3]);
+    assert_eq!(shown[3..], vec![["image_url", "text"].map(str::to_owned).to_vec(); 3]);
     for (last, first) in last.iter().zip(&first) {
         let same = text(last, "view") == "blind";
         assert_eq!(last["key"] == first["key"], same, "{first}");

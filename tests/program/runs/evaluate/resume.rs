@@ -25,27 +25,16 @@ fn stopped_run_resumes() {
         set OPENAI_API_KEY, or name another variable or a file with --api-key-env or --api-key-file) (replies so
         far are stored; the same command continues)
     ");
-    let runs: Vec<_> = fs::read_dir(bench.path("results"))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .collect();
+    let runs: Vec<_> = fs::read_dir(bench.path("results")).unwrap().map(|entry| entry.unwrap().path()).collect();
     assert_eq!((runs.len(), records(&runs[0]).len()), (1, 4));
 
     bench.complete(&args);
-    assert_eq!(
-        endpoint.requests().len(),
-        15 + 1,
-        "3 questions in 5 conditions, and the one that was refused"
-    );
+    assert_eq!(endpoint.requests().len(), 15 + 1, "3 questions in 5 conditions, and the one that was refused");
     assert_eq!(records(&runs[0]).len(), 15);
 
     let table = bench.complete(&args);
     insta::assert_snapshot!(lines_with(&table, "exposure drop"), @"exposure drop   0.0    0.0   66.7   −65.4 +98.4");
-    assert_eq!(
-        endpoint.requests().len(),
-        15 + 1,
-        "a complete run asks nothing"
-    );
+    assert_eq!(endpoint.requests().len(), 15 + 1, "a complete run asks nothing");
 }
 
 #[test]
@@ -83,15 +72,9 @@ fn only_torn_record_is_repeated() {
     let stored = fs::read(&path).unwrap();
     fs::write(&path, &stored[..stored.len() - 20]).unwrap();
     let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
-    bench.file(
-        "run/manifest.json",
-        manifest.replace("\"complete\"", "\"started\""),
-    );
+    bench.file("run/manifest.json", manifest.replace("\"complete\"", "\"started\""));
     bench.complete(&args);
-    assert_eq!(
-        (records(&bench.path("run")).len(), endpoint.requests().len()),
-        (3, 4)
-    );
+    assert_eq!((records(&bench.path("run")).len(), endpoint.requests().len()), (3, 4));
 }
 
 #[test]
@@ -104,24 +87,11 @@ fn failed_trials_are_counted_and_repeated() {
     let first = bench.call(&args);
     assert_eq!(first.code, Some(1), "{first:?}");
     let csv = fs::read_to_string(bench.path("run/summary.csv")).unwrap();
-    assert!(
-        csv.contains("m,image,L0,none,,all,strict,2,2,0,1,1"),
-        "{csv}"
-    );
-    let failed = records(&bench.path("run"))
-        .into_iter()
-        .find(|record| record["outcome"] == "failed")
-        .unwrap();
-    assert_eq!(
-        (&failed["failure"]["status"], &failed["strict"]),
-        (&json!(413), &Value::Null)
-    );
+    assert!(csv.contains("m,image,L0,none,,all,strict,2,2,0,1,1"), "{csv}");
+    let failed = records(&bench.path("run")).into_iter().find(|record| record["outcome"] == "failed").unwrap();
+    assert_eq!((&failed["failure"]["status"], &failed["strict"]), (&json!(413), &Value::Null));
     bench.complete(&args);
-    assert_eq!(
-        endpoint.requests().len(),
-        4,
-        "only the failed one is asked again"
-    );
+    assert_eq!(endpoint.requests().len(), 4, "only the failed one is asked again");
 }
 
 #[test]
@@ -133,10 +103,7 @@ fn other_configuration_is_refused() {
     check_rows(rows, |(field, value)| {
         let refused = bench.call(&[&args[..], &[field, value]].concat());
         assert_eq!(refused.code, Some(2), "{refused:?}");
-        assert!(
-            refused.stderr.contains(&format!("another {field}")),
-            "{refused:?}"
-        );
+        assert!(refused.stderr.contains(&format!("another {field}")), "{refused:?}");
     });
 }
 
@@ -161,10 +128,7 @@ fn showing_a_complete_run_changes_nothing() {
     let before = ["manifest.json", "summary.json", "records.jsonl"].map(file);
     let more = [&args[..], &["--concurrency", "3"]].concat();
     assert_eq!(bench.complete(&more), table);
-    assert_eq!(
-        ["manifest.json", "summary.json", "records.jsonl"].map(file),
-        before
-    );
+    assert_eq!(["manifest.json", "summary.json", "records.jsonl"].map(file), before);
 }
 
 #[test]
@@ -175,10 +139,7 @@ fn dry_run_refuses_what_run_refuses() {
     for more in ["--seed 3", "--seed 3 --dry-run"] {
         let called = bench.call(&words(&format!("{line} {more}")));
         assert_eq!(called.code, Some(2), "{more}: {called:?}");
-        assert!(
-            called.stderr.contains("another --seed"),
-            "{more}: {called:?}"
-        );
+        assert!(called.stderr.contains("another --seed"), "{more}: {called:?}");
     }
     let deeper = line.replace("L0,L3", "L0,L3,L5 --dry-run");
     let more = bench.complete(&words(&deeper));

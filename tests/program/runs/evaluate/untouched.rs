@@ -1,4 +1,5 @@
-//! The untouched images, enhanced: what is asked, shown and compared at `L0+NAME`, and the calls in which no image would be enhanced.
+//! The untouched images, enhanced: what is asked, shown and compared at `L0+NAME`, and the calls in which no image
+//! would be enhanced.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -12,8 +13,8 @@ use crate::support::run::{Bench, records, words};
 use crate::support::snapshot::{lines_with, redacted};
 use crate::support::table::check_rows;
 
-/// A folder `photos` with three photographs whose codes reach up to `light`, and a question about each. The script answers by light:
-/// raw L0 is right, all else as the word says.
+/// A folder `photos` with three photographs whose codes reach up to `light`, and a question about each. The script
+/// answers by light: raw L0 is right, all else as the word says.
 fn photos(light: u32) -> Bench {
     let bench = Bench::new();
     let mut questions = Vec::new();
@@ -33,9 +34,7 @@ fn photos(light: u32) -> Bench {
     }
     bench.file("photos/questions.jsonl", questions.join("\n"));
     let answers: Vec<String> = (0..3)
-        .map(|index| {
-            json!({"question": format!("q{index}"), "condition": "L0", "reply": "yes"}).to_string()
-        })
+        .map(|index| json!({"question": format!("q{index}"), "condition": "L0", "reply": "yes"}).to_string())
         .chain([json!({"default": "no"}).to_string()])
         .collect();
     bench.file("answers.jsonl", answers.join("\n"));
@@ -46,13 +45,8 @@ const ASK: &str = "--model script:answers.jsonl --data photos --llie lift --out 
 
 /// The words that follow the name of a row in the table on standard output.
 fn row<'t>(table: &'t str, name: &str) -> Vec<&'t str> {
-    let line = table
-        .lines()
-        .map(str::trim_start)
-        .find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
-    line.unwrap_or_else(|| panic!("no row {name:?}: {table}"))
-        .split_whitespace()
-        .collect()
+    let line = table.lines().map(str::trim_start).find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+    line.unwrap_or_else(|| panic!("no row {name:?}: {table}")).split_whitespace().collect()
 }
 
 /// The number of records in each condition.
@@ -60,10 +54,7 @@ fn asked(bench: &Bench) -> BTreeSet<(String, usize)> {
     let records = records(&bench.path("run"));
     let conditions: Vec<&str> = records.iter().map(|r| text(r, "condition")).collect();
     let count = |name: &&str| conditions.iter().filter(|other| other == &name).count();
-    conditions
-        .iter()
-        .map(|name| ((*name).to_owned(), count(name)))
-        .collect()
+    conditions.iter().map(|name| ((*name).to_owned(), count(name))).collect()
 }
 
 fn mean(image: &image::RgbImage) -> f64 {
@@ -92,10 +83,7 @@ fn dark_photographs_are_asked_and_enhanced() {
         (&enhanced["level"], &enhanced["variant"], &enhanced["ev"]),
         (&json!("L0"), &json!("none"), &json!(0.0))
     );
-    assert_eq!(
-        (&raw["enhancer"], &enhanced["enhancer"]),
-        (&Value::Null, &json!("lift"))
-    );
+    assert_eq!((&raw["enhancer"], &enhanced["enhancer"]), (&Value::Null, &json!("lift")));
 
     // The first image was made for the probe too, and counts once.
     let manifest = fs::read_to_string(bench.path("run/manifest.json")).unwrap();
@@ -117,12 +105,7 @@ fn dark_photographs_are_asked_and_enhanced() {
     "#);
     let open = |path: &str| image::open(bench.path(path)).unwrap().to_rgb8();
     let (photo, lifted) = (open("photos/1.png"), open("run/shown/1_L0+lift.png"));
-    assert!(
-        mean(&lifted) > 1.5 * mean(&photo),
-        "{} {}",
-        mean(&lifted),
-        mean(&photo)
-    );
+    assert!(mean(&lifted) > 1.5 * mean(&photo), "{} {}", mean(&lifted), mean(&photo));
 
     // The set for other tools holds the same pixels.
     let flags = "--levels L0 --llie lift --llie-on l0 --out sets";
@@ -191,8 +174,7 @@ fn report_has_untouched_images_enhanced() {
     assert!(read("report.html").contains(caption));
     let other = photos(220);
     other.complete(&words(&format!("{ASK} --levels L0,L3 --llie-on both")));
-    let figure =
-        |bench: &Bench| fs::read_to_string(bench.path("run/figures/enhancers.svg")).unwrap();
+    let figure = |bench: &Bench| fs::read_to_string(bench.path("run/figures/enhancers.svg")).unwrap();
     assert_ne!(figure(&bench), figure(&other));
     let report = fs::read_to_string(other.path("run/report.html")).unwrap();
     assert!(!report.contains("untouched + lift") && !report.contains(caption));
@@ -206,19 +188,10 @@ fn enhancer_without_image_is_error() {
         ("--levels L0", only),
         ("--levels L0 --dry-run", only),
         ("--levels L0 --llie-on both", only),
-        (
-            "--variant ev",
-            "--llie-on noise is not among the images asked; --llie-on ev is",
-        ),
+        ("--variant ev", "--llie-on noise is not among the images asked; --llie-on ev is"),
         ("--levels L3 --llie-on l0", "--llie-on both is"),
-        (
-            "--llie-on dark",
-            "--llie-on dark is not among the images asked; the data have no photographs in the dark",
-        ),
-        (
-            "--llie-on dusk",
-            "is not one of l0, ev, noise, auto, motion, both, dark, all",
-        ),
+        ("--llie-on dark", "--llie-on dark is not among the images asked; the data have no photographs in the dark"),
+        ("--llie-on dusk", "is not one of l0, ev, noise, auto, motion, both, dark, all"),
     ];
     check_rows(rows, |(flags, problem)| {
         let called = bench.call(&words(&format!("{ASK} {flags}")));
@@ -226,9 +199,7 @@ fn enhancer_without_image_is_error() {
         assert!(called.stderr.contains(problem), "{called:?}");
         assert!(!bench.path("run").exists());
     });
-    let called = bench.call(&words(
-        "export llava photos --out sets --llie lift --levels L0",
-    ));
+    let called = bench.call(&words("export llava photos --out sets --llie lift --levels L0"));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 2
     error: --llie: the enhancer would never be used: only L0 is asked; --llie-on l0 enhances the untouched images
@@ -270,9 +241,7 @@ fn dark_images_are_noticed_once() {
     ];
     check_rows(rows, |(light, flags, times)| {
         let bench = photos(light);
-        let called = bench.call(&words(&format!(
-            "--model random --data photos {flags} --out run"
-        )));
+        let called = bench.call(&words(&format!("--model random --data photos {flags} --out run")));
         assert_eq!(called.code, Some(0), "{called:?}");
         assert_eq!(called.stderr.matches(hint).count(), times, "{called:?}");
         assert_eq!(called.stderr.matches(advice).count(), times, "{called:?}");
@@ -294,16 +263,9 @@ fn dark_images_are_noticed_once() {
     }
     // Built-in rooms are lit, and a model that sees no image needs no advice.
     let bench = photos(40);
-    for flags in [
-        "--model random --levels L0,L3 --out rooms",
-        "--blind-model random --data photos --out blind",
-    ] {
+    for flags in ["--model random --levels L0,L3 --out rooms", "--blind-model random --data photos --out blind"] {
         let called = bench.call(&words(flags));
-        assert_eq!(
-            (called.code, called.stderr.contains(hint)),
-            (Some(0), false),
-            "{called:?}"
-        );
+        assert_eq!((called.code, called.stderr.contains(hint)), (Some(0), false), "{called:?}");
     }
 }
 
@@ -333,9 +295,7 @@ fn open_questions_cover_untouched_enhanced() {
     assert_eq!(scores(&after, "with noise + bright"), (2, 2), "{after}");
     assert_eq!(scores(&after, "with noise "), (2, 1), "{after}");
     assert!(!after.contains("untouched"), "{after}");
-    let conditions: BTreeSet<String> = records(&house.0.path("run"))
-        .iter()
-        .map(|record| text(record, "condition").to_owned())
-        .collect();
+    let conditions: BTreeSet<String> =
+        records(&house.0.path("run")).iter().map(|record| text(record, "condition").to_owned()).collect();
     assert!(conditions.contains("L0+bright"), "{conditions:?}");
 }

@@ -11,30 +11,17 @@ fn open_dry_run_sends_nothing() {
     let house = House::new();
     let silent = MockEndpoint::start([Answer::error(400, "bad", "must not be asked")]);
     let base = silent.base_url();
-    let called = house.call(&words(&format!(
-        "--model gpt-4o --base-url {base} --judge gpt-4o-mini --out run --dry-run --json"
-    )));
+    let called =
+        house.call(&words(&format!("--model gpt-4o --base-url {base} --judge gpt-4o-mini --out run --dry-run --json")));
     assert_eq!(called.code, Some(0), "{called:?}");
     let estimate: Value = serde_json::from_str(&called.stdout).unwrap();
     // Three questions at three levels, and as many marks.
-    assert_eq!(
-        (
-            &estimate["lines"][0]["requests"],
-            &estimate["lines"][1]["requests"]
-        ),
-        (&json!(9), &json!(9))
-    );
+    assert_eq!((&estimate["lines"][0]["requests"], &estimate["lines"][1]["requests"]), (&json!(9), &json!(9)));
     assert_eq!(estimate["lines"][1]["model"], "gpt-4o-mini (judge)");
-    assert_eq!(
-        (&estimate["trials"], &estimate["images"]),
-        (&json!(18), &json!(15))
-    );
+    assert_eq!((&estimate["trials"], &estimate["images"]), (&json!(18), &json!(15)));
     // Each of the nine requests about a walk has its three frames.
     assert_eq!(estimate["images_sent"], json!(27));
-    assert_eq!(
-        estimate["few_sources"],
-        json!({"number": 2, "needed": 8, "of": "walk"})
-    );
+    assert_eq!(estimate["few_sources"], json!({"number": 2, "needed": 8, "of": "walk"}));
     // More frames than a walk has are shown several times, and made once.
     let short = house.0.call(&words(&format!(
         "openeqa --questions questions.json --frames walks --num-frames 7 --image-size 48 --levels L0,L2,L4 --variant noise --model gpt-4o \
@@ -42,10 +29,7 @@ fn open_dry_run_sends_nothing() {
     )));
     assert_eq!(short.code, Some(0), "{short:?}");
     let repeated: Value = serde_json::from_str(&short.stdout).unwrap();
-    assert_eq!(
-        (&repeated["images_sent"], &repeated["images"]),
-        (&json!(63), &json!(21))
-    );
+    assert_eq!((&repeated["images_sent"], &repeated["images"]), (&json!(63), &json!(21)));
     insta::assert_snapshot!(short.messages(), @"
     exit code: 0
      WARN 2 of 2 walks have fewer frames than --num-frames 7: they are shown several times in a request, as
@@ -87,8 +71,7 @@ fn file_model_cost_counts_for_marks() {
     let mock = MockEndpoint::start([Answer::json(200, &body)]);
     let base = mock.base_url();
     // The name in tables has no price; the id costs 0.25 dollars a reply.
-    let models =
-        format!("[[model]]\nname = \"A name\"\nid = \"gpt-4o\"\nendpoints = [\"{base}\"]\n");
+    let models = format!("[[model]]\nname = \"A name\"\nid = \"gpt-4o\"\nendpoints = [\"{base}\"]\n");
     house.0.file("models.toml", models);
     let called = house.call(&words(&format!(
         "--models models.toml --judge gpt-4o --judge-base-url {base} --levels L0 --out run --max-cost 1.1"
@@ -97,7 +80,8 @@ fn file_model_cost_counts_for_marks() {
     assert_eq!(mock.requests().len(), 4);
 }
 
-/// Groq takes 5 images in a request: said by the estimate, and refused before anything is sent. A blind model is shown none.
+/// Groq takes 5 images in a request: said by the estimate, and refused before anything is sent. A blind model is shown
+/// none.
 #[test]
 fn excess_images_per_vendor_are_refused() {
     let house = House::new();

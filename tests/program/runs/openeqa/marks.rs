@@ -33,14 +33,9 @@ fn marks_come_to_upstreams_score() {
         judge.base_url()
     )));
     assert_eq!(called.code, Some(0), "{called:?}");
-    let degraded: Vec<Value> = records(&house.0.path("run"))
-        .into_iter()
-        .filter(|record| record["level"] == "L2")
-        .collect();
-    assert_eq!(
-        (&degraded[0]["ev"], &degraded[0]["reading"]),
-        (&json!(4.0), &json!("paper"))
-    );
+    let degraded: Vec<Value> =
+        records(&house.0.path("run")).into_iter().filter(|record| record["level"] == "L2").collect();
+    assert_eq!((&degraded[0]["ev"], &degraded[0]["reading"]), (&json!(4.0), &json!("paper")));
     // What was answered alike at L2 is not judged again.
     assert_eq!(judge.requests().len(), 4);
     let summary = house.read("run/summary.json");
@@ -54,16 +49,10 @@ fn marks_come_to_upstreams_score() {
             .clone()
     };
     let clean = row("L0");
-    assert_eq!(
-        (&clean["value"], &clean["n"], &clean["null"]),
-        (&json!(0.5), &json!(5), &json!(1))
-    );
+    assert_eq!((&clean["value"], &clean["n"], &clean["null"]), (&json!(0.5), &json!(5), &json!(1)));
     let degraded = row("L2");
     // The first question alone is there in both: 1 against (1 + 0) / 2.
-    assert_eq!(
-        (&degraded["change"], &degraded["change_n"]),
-        (&json!(0.5), &json!(1))
-    );
+    assert_eq!((&degraded["change"], &degraded["change_n"]), (&json!(0.5), &json!(1)));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
      WARN people.json: 1 of 7 answers are to questions that are not asked: strange
@@ -117,14 +106,9 @@ fn missing_answers_are_counted() {
     let house = House::new();
     fs::remove_dir_all(house.0.path("walks/scannet-v0")).unwrap();
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
-    house.0.file(
-        "j.jsonl",
-        "{\"question\": \"q1\", \"reply\": \"**4**\"}\n{\"default\": \"Quite good.\"}",
-    );
+    house.0.file("j.jsonl", "{\"question\": \"q1\", \"reply\": \"**4**\"}\n{\"default\": \"Quite good.\"}");
     house.0.file("ids.json", "[\"q1\", \"q2\", \"q3\", \"q9\"]");
-    let args = words(
-        "--model script:a.jsonl --judge script:j.jsonl --levels L0,L2 --subset ids.json --out run",
-    );
+    let args = words("--model script:a.jsonl --judge script:j.jsonl --levels L0,L2 --subset ids.json --out run");
     let called = house.call(&args);
     assert_eq!(called.code, Some(1), "{called:?}");
     let notes = [
@@ -134,11 +118,7 @@ fn missing_answers_are_counted() {
     check_rows(notes, |note| {
         assert!(called.stderr.contains(note), "{note}: {}", called.stderr);
     });
-    let counts = [
-        "0 of 6 answers scored",
-        "2 not answered",
-        "4 without a mark in the judge's reply",
-    ];
+    let counts = ["0 of 6 answers scored", "2 not answered", "4 without a mark in the judge's reply"];
     check_rows(counts, |count| {
         assert!(called.stdout.contains(count), "{count}: {}", called.stdout);
     });
@@ -158,9 +138,7 @@ fn missing_answers_are_counted() {
     // The walk is found again: its question is asked, the others are not.
     let path = house.0.path("walks/scannet-v0/001-b/00000-rgb.png");
     fs::create_dir_all(path.parent().unwrap()).unwrap();
-    RgbImage::from_pixel(96, 64, Rgb([9; 3]))
-        .save(&path)
-        .unwrap();
+    RgbImage::from_pixel(96, 64, Rgb([9; 3])).save(&path).unwrap();
     let called = house.call(&args);
     insta::assert_snapshot!(called.lines_with("without a mark"), @"
     exit code: 1
@@ -169,10 +147,7 @@ fn missing_answers_are_counted() {
     assert!(!called.stdout.contains("not answered"), "{}", called.stdout);
     let more = records(&house.0.path("run"));
     let new: Vec<&Value> = more[after.len()..].iter().collect();
-    assert!(
-        new.iter().all(|record| record["question"] == "q3"),
-        "{new:?}"
-    );
+    assert!(new.iter().all(|record| record["question"] == "q3"), "{new:?}");
     assert_eq!(new.len(), 3);
 
     fs::remove_dir_all(house.0.path("walks")).unwrap();
@@ -195,9 +170,8 @@ fn lost_model_does_not_block_marks() {
         }
     });
     let base = mock.base_url();
-    let called = house.call(&words(&format!(
-        "--model gone --model m --judge j --base-url {base} --levels L0 --out run"
-    )));
+    let called =
+        house.call(&words(&format!("--model gone --model m --judge j --base-url {base} --levels L0 --out run")));
     insta::assert_snapshot!(called.lines_with("no such model"), @"
     exit code: 1
     ! not asked any further: http://127.0.0.1:[PORT]/v1: gone: http://127.0.0.1:[PORT]/v1 answered 404: no such
@@ -205,12 +179,7 @@ fn lost_model_does_not_block_marks() {
         the same command continues)
     ");
     let summary = house.read("run/summary.json");
-    let row = summary["rows"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .find(|row| row["model"] == "m" && row["by"] == "all")
-        .unwrap();
+    let row = summary["rows"].as_array().unwrap().iter().find(|row| row["model"] == "m" && row["by"] == "all").unwrap();
     assert_eq!((&row["value"], &row["n"]), (&json!(1.0), &json!(3)));
 }
 
@@ -231,11 +200,7 @@ fn study_page_hides_answers() {
     let page = fs::read_to_string(house.0.path("study/study.html")).unwrap();
     assert!(!page.contains("café") && page.contains("What colour is it?"));
     let images = fs::read_dir(house.0.path("study/images")).unwrap();
-    assert!(
-        images
-            .map(|entry| entry.unwrap().file_name())
-            .all(|name| !name.to_string_lossy().contains('L'))
-    );
+    assert!(images.map(|entry| entry.unwrap().file_name()).all(|name| !name.to_string_lossy().contains('L')));
 }
 
 /// A judge that thinks before it marks.
@@ -274,11 +239,7 @@ fn larger_limit_repeats_truncated_marks() {
     ");
 
     let grown = call("--judge-max-tokens 200");
-    assert_eq!(
-        (grown.code, judge.requests().len()),
-        (Some(0), 4),
-        "{grown:?}"
-    );
+    assert_eq!((grown.code, judge.requests().len()), (Some(0), 4), "{grown:?}");
     insta::assert_snapshot!(grown.messages(), @"
     exit code: 0
      WARN --levels: no effect: no model is shown an image

@@ -20,38 +20,20 @@ fn prompt_text(request: &Value) -> String {
     if let Some(text) = content.as_str() {
         return text.to_owned();
     }
-    content
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(|part| part["text"].as_str().unwrap_or("[image]"))
-        .collect()
+    content.as_array().unwrap().iter().map(|part| part["text"].as_str().unwrap_or("[image]")).collect()
 }
 
 fn check_prompts(requests: &[Value]) {
     let queries = ["What colour is it?", "Where's the {sofa}?", "Is it “safe”?"];
     for (request, query) in requests.iter().zip(queries) {
-        assert_eq!(
-            prompt_text(request),
-            format!("{VISION}[image][image][image]User Query: {query}")
-        );
-        let fields: Vec<&str> = request
-            .as_object()
-            .unwrap()
-            .keys()
-            .map(|key| &**key)
-            .collect();
+        assert_eq!(prompt_text(request), format!("{VISION}[image][image][image]User Query: {query}"));
+        let fields: Vec<&str> = request.as_object().unwrap().keys().map(|key| &**key).collect();
         assert_eq!(
             fields.into_iter().collect::<BTreeSet<_>>(),
             ["model", "temperature", "seed", "max_tokens", "messages"].into()
         );
         assert_eq!(
-            json!([
-                request["model"],
-                request["temperature"],
-                request["seed"],
-                request["max_tokens"]
-            ]),
+            json!([request["model"], request["temperature"], request["seed"], request["max_tokens"]]),
             json!(["m", 0.2, 1234, 128])
         );
     }
@@ -59,10 +41,7 @@ fn check_prompts(requests: &[Value]) {
     let greys = |request: &Value| -> Vec<u8> {
         let images = images(request);
         assert!(images.iter().all(|image| image.dimensions() == (48, 32)));
-        images
-            .iter()
-            .map(|image| image.get_pixel(9, 9)[0])
-            .collect()
+        images.iter().map(|image| image.get_pixel(9, 9)[0]).collect()
     };
     assert_eq!(greys(&requests[0]), [100, 140, 180]);
     assert_eq!(greys(&requests[2]), [100, 100, 120]);
@@ -78,16 +57,9 @@ fn check_judge_prompts(requests: &[Value]) {
     for (request, end) in requests.iter().zip(ends) {
         let prompt = prompt_text(request);
         assert!(prompt.ends_with(end), "{prompt}");
-        assert!(
-            prompt.starts_with("You are an AI assistant who will help me to evaluate the response")
-        );
+        assert!(prompt.starts_with("You are an AI assistant who will help me to evaluate the response"));
         assert_eq!(
-            json!([
-                request["model"],
-                request["temperature"],
-                request["seed"],
-                request["max_tokens"]
-            ]),
+            json!([request["model"], request["temperature"], request["seed"], request["max_tokens"]]),
             json!(["j", 0.2, 1234, 32])
         );
     }
@@ -96,16 +68,8 @@ fn check_judge_prompts(requests: &[Value]) {
 #[test]
 fn prompts_match_upstream() {
     let house = House::new();
-    let model = MockEndpoint::start([
-        Answer::text("It's brown. It may"),
-        Answer::text("Near it"),
-        Answer::text("No"),
-    ]);
-    let judge = MockEndpoint::start([
-        Answer::text("5"),
-        Answer::text("Your mark: 3"),
-        Answer::text("1"),
-    ]);
+    let model = MockEndpoint::start([Answer::text("It's brown. It may"), Answer::text("Near it"), Answer::text("No")]);
+    let judge = MockEndpoint::start([Answer::text("5"), Answer::text("Your mark: 3"), Answer::text("1")]);
     let called = house.call(&words(&format!(
         "--model m --base-url {} --judge j --judge-base-url {} --levels L0 --concurrency 1 --out run",
         model.base_url(),
@@ -124,10 +88,7 @@ fn prompts_match_upstream() {
             {"question_id": "q3", "answer": "No"},
         ])
     );
-    assert_eq!(
-        house.read("run/upstream/m-L0-j-metrics.json"),
-        json!({"q1": 5, "q2": 3, "q3": 1})
-    );
+    assert_eq!(house.read("run/upstream/m-L0-j-metrics.json"), json!({"q1": 5, "q2": 3, "q3": 1}));
     insta::assert_snapshot!(called.lines_with("cut after"), @"
     exit code: 0
     1 cut after their last full stop before they were judged, as upstream does
@@ -142,10 +103,8 @@ fn blind_models_follow_upstream() {
         Answer::text("I cannot see."),
         Answer::text("A: yes"),
     ]);
-    let line = format!(
-        "--blind-model m --base-url {} --concurrency 1 --judge script:j.jsonl --out run",
-        model.base_url()
-    );
+    let line =
+        format!("--blind-model m --base-url {} --concurrency 1 --judge script:j.jsonl --out run", model.base_url());
     let called = house.call(&words(&line));
     assert_eq!(called.code, Some(2), "{called:?}");
     house.0.file("j.jsonl", "{\"default\": \"5\"}");
@@ -167,12 +126,6 @@ fn blind_models_follow_upstream() {
     run: run
     report: run/report.html
     "#);
-    assert_eq!(
-        house.read("run/upstream/m-blind.json")[1]["answer"],
-        Value::Null
-    );
-    assert_eq!(
-        house.read("run/upstream/m-blind-script_j.jsonl-metrics.json")["q2"],
-        0
-    );
+    assert_eq!(house.read("run/upstream/m-blind.json")[1]["answer"], Value::Null);
+    assert_eq!(house.read("run/upstream/m-blind-script_j.jsonl-metrics.json")["q2"], 0);
 }

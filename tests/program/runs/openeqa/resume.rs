@@ -42,11 +42,7 @@ fn batch_replies_are_imported_on_resume() {
         assert!(called.stdout.contains("imported, 0 failed"), "{called:?}");
     };
     let line: Value = serde_json::from_str(
-        fs::read_to_string(house.0.path("run/batch/1-m-001.jsonl"))
-            .unwrap()
-            .lines()
-            .next()
-            .unwrap(),
+        fs::read_to_string(house.0.path("run/batch/1-m-001.jsonl")).unwrap().lines().next().unwrap(),
     )
     .unwrap();
     assert_eq!(images(&line["body"]).len(), 3);
@@ -79,16 +75,9 @@ fn batch_replies_are_imported_on_resume() {
     assert_eq!(house.call(&args).stdout, called.stdout);
     // Another judge marks the same answers.
     house.0.file("j.jsonl", "{\"default\": \"1\"}");
-    let other = [
-        &args[..4],
-        &words("--judge script:j.jsonl --levels L0,L4 --out run"),
-    ]
-    .concat();
+    let other = [&args[..4], &words("--judge script:j.jsonl --levels L0,L4 --out run")].concat();
     let called = house.call(&other);
-    assert!(
-        called.stdout.contains("0.0 (0.0)") && silent.requests().is_empty(),
-        "{called:?}"
-    );
+    assert!(called.stdout.contains("0.0 (0.0)") && silent.requests().is_empty(), "{called:?}");
 }
 
 #[test]

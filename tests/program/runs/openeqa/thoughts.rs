@@ -32,30 +32,17 @@ fn judges_see_answers_without_thoughts() {
             json!({"question": "q2", "reply": "<think>It is dark. At the door"}),
             json!({"question": "q3", "reply": "<|begin_of_box|>No<|end_of_box|>"}),
         ];
-        house
-            .0
-            .file("a.jsonl", replies.map(|line| line.to_string()).join("\n"));
-        house.0.file(
-            "j.jsonl",
-            "{\"default\": \"<think>Your mark: 1</think>\\nYour mark: 5\"}",
-        );
-        let line = format!(
-            "--model script:a.jsonl --judge script:j.jsonl --levels L0 --protocol {protocol} --out run"
-        );
+        house.0.file("a.jsonl", replies.map(|line| line.to_string()).join("\n"));
+        house.0.file("j.jsonl", "{\"default\": \"<think>Your mark: 1</think>\\nYour mark: 5\"}");
+        let line = format!("--model script:a.jsonl --judge script:j.jsonl --levels L0 --protocol {protocol} --out run");
         let called = house.call(&words(&line));
         assert_eq!(called.code, Some(0), "{called:?}");
         let records = records(&house.0.path("run"));
-        let judged: BTreeSet<&str> = records
-            .iter()
-            .filter_map(|record| record["judged"].as_str())
-            .collect();
+        let judged: BTreeSet<&str> = records.iter().filter_map(|record| record["judged"].as_str()).collect();
         assert_eq!(judged, BTreeSet::from(["No", "brown"]));
         let is_raw = |record: &Value| record["reply"].as_str().unwrap().starts_with('<');
         assert!(records.iter().all(is_raw), "stored as they came");
-        let marks: BTreeSet<i64> = records
-            .iter()
-            .filter_map(|record| record[protocol].as_i64())
-            .collect();
+        let marks: BTreeSet<i64> = records.iter().filter_map(|record| record[protocol].as_i64()).collect();
         assert_eq!(marks, BTreeSet::from([5]));
         insta::allow_duplicates! { insta::assert_snapshot!(called.lines_with("without an answer"), @r#"
         exit code: 0
@@ -79,11 +66,7 @@ fn unread_marks_name_the_tolerant_protocol() {
         tolerant reads most of them; only answers that the upstream protocol shortened are judged again
     ");
     let again = house.call(&judged_by(&base, "--protocol tolerant"));
-    assert_eq!(
-        (again.code, judge.requests().len()),
-        (Some(0), 6),
-        "{again:?}"
-    );
+    assert_eq!((again.code, judge.requests().len()), (Some(0), 6), "{again:?}");
     assert!(!again.messages().contains("have no mark"), "{again:?}");
     let summary = house.read("run/summary.json");
     assert_eq!(summary["rows"][0]["value"], json!(0.75));

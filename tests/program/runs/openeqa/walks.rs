@@ -13,9 +13,7 @@ use crate::support::run::{called, model_args, records, words};
 #[test]
 fn broken_frame_removes_only_walk() {
     let house = House::new();
-    house
-        .0
-        .file("walks/hm3d-v0/000-a/00002-rgb.png", "no image");
+    house.0.file("walks/hm3d-v0/000-a/00002-rgb.png", "no image");
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
     let called = house.call(&words("--model script:a.jsonl --levels L0 --out run"));
     insta::assert_snapshot!(called.messages(), @"
@@ -28,17 +26,9 @@ fn broken_frame_removes_only_walk() {
         TIFF, BMP or OpenEXR expected
     ");
     let failed = records(&house.0.path("run"));
-    let failed: Vec<&Value> = failed
-        .iter()
-        .filter(|record| !record["failure"].is_null())
-        .collect();
+    let failed: Vec<&Value> = failed.iter().filter(|record| !record["failure"].is_null()).collect();
     assert_eq!(failed.len(), 2);
-    assert!(
-        failed
-            .iter()
-            .all(|record| record["failure"]["kind"] == "image"),
-        "{failed:?}"
-    );
+    assert!(failed.iter().all(|record| record["failure"]["kind"] == "image"), "{failed:?}");
 }
 
 #[test]
@@ -68,10 +58,7 @@ fn walk_has_one_camera() {
     assert_eq!(means[0], [100.0, 140.0, 180.0]);
     // Darker at each level, and lighter frames stay lighter: they are the same ones.
     for at in 0..3 {
-        assert!(
-            means[0][at] > means[1][at] && means[1][at] > means[2][at],
-            "{means:?}"
-        );
+        assert!(means[0][at] > means[1][at] && means[1][at] > means[2][at], "{means:?}");
     }
     // The same in any order and by another run; other noise by another state of the camera or after the scaling.
     assert_eq!(requests("b", "--levels L2")[0], all[1]);
@@ -86,19 +73,12 @@ fn single_frame_is_repeated() {
     let house = House::new();
     fs::remove_file(house.0.path("walks/scannet-v0/001-b/00001-rgb.png")).unwrap();
     let mock = MockEndpoint::start([Answer::text("an answer")]);
-    let called = house.call(&model_args(
-        &mock.base_url(),
-        "--levels L0,L2 --splits scannet-v0 --out run",
-    ));
+    let called = house.call(&model_args(&mock.base_url(), "--levels L0,L2 --splits scannet-v0 --out run"));
     assert_eq!(called.code, Some(0), "{called:?}");
     for request in sent(&mock) {
         let parts = request["messages"][0]["content"].as_array().unwrap();
         let images = parts.iter().filter(|part| part["type"] == "image_url");
-        assert_eq!(
-            images.count(),
-            3,
-            "as upstream samples one frame three times"
-        );
+        assert_eq!(images.count(), 3, "as upstream samples one frame three times");
     }
 }
 
@@ -108,11 +88,7 @@ fn array_task_asks_own_walks() {
     house.0.file("a.jsonl", "{\"default\": \"an answer\"}");
     let args = flags(&words("--model script:a.jsonl --levels L0 --out run"));
     let mut command = house.0.command(&args);
-    command.envs([
-        ("SLURM_ARRAY_TASK_ID", "1"),
-        ("SLURM_ARRAY_TASK_MIN", "0"),
-        ("SLURM_ARRAY_TASK_COUNT", "2"),
-    ]);
+    command.envs([("SLURM_ARRAY_TASK_ID", "1"), ("SLURM_ARRAY_TASK_MIN", "0"), ("SLURM_ARRAY_TASK_COUNT", "2")]);
     let called = called(&mut command);
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0

@@ -2,9 +2,7 @@
 
 use super::*;
 use crate::support::made::record;
-use darkqa_base::types::{
-    Condition, Digest, Family, ImageFacts, ImageFidelity, ParsedAnswer, Record,
-};
+use darkqa_base::types::{Condition, Digest, Family, ImageFacts, ImageFidelity, ParsedAnswer, Record};
 use darkqa_score::cluster::Clusters;
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::grid::Grid;
@@ -19,7 +17,8 @@ const QUESTIONS: usize = 5;
 enum Shared {
     /// Effects of the frame and of the question, each with this standard deviation in logits.
     Effects(f64),
-    /// Effects with a standard deviation of 1, and the luck of each question too: its reply changes only with the condition's mean.
+    /// Effects with a standard deviation of 1, and the luck of each question too: its reply changes only with the
+    /// condition's mean.
     Luck,
 }
 
@@ -47,8 +46,7 @@ impl AucDesign {
         let names = ["L{}-noise", "L{}-ev", "L{}-noise+e"]
             .into_iter()
             .flat_map(|variant| (1..=5).map(move |level| (variant, level)));
-        let names =
-            names.map(|(variant, level)| variant.replace("{}", &f64::to_string(&level.into())));
+        let names = names.map(|(variant, level)| variant.replace("{}", &f64::to_string(&level.into())));
         let names = names.map(|name| name.parse().unwrap());
         names.take(self.conditions).collect()
     }
@@ -68,10 +66,7 @@ impl AucDesign {
             Shared::Effects(spread) => (10.0 * spread) as u64,
             Shared::Luck => 99,
         };
-        (self.conditions as u64) << 40
-            | (self.scenes as u64) << 30
-            | shared << 20
-            | (100.0 * self.slope) as u64
+        (self.conditions as u64) << 40 | (self.scenes as u64) << 30 | shared << 20 | (100.0 * self.slope) as u64
     }
 
     /// The true AUC, of pairs from different scenes: each condition's, weighted by its pairs. From a million replies.
@@ -153,30 +148,19 @@ impl MadeRun {
             let scene = index / FRAMES % design.scenes;
             ((*image.frame).clone(), format!("s{scene:03}"))
         });
-        let ties = FrameTies {
-            scenes: scenes.collect(),
-            ..FrameTies::default()
-        };
-        let asked = records
-            .iter()
-            .map(|record| (&record.question, &record.detail.frame));
+        let ties = FrameTies { scenes: scenes.collect(), ..FrameTies::default() };
+        let asked = records.iter().map(|record| (&record.question, &record.detail.frame));
         let clusters = Clusters::new(asked, &ties);
         assert_eq!(clusters.count(), design.scenes);
-        Self {
-            design,
-            records,
-            measured,
-            clusters,
-        }
+        Self { design, records, measured, clusters }
     }
 
-    /// Draws all numbers and replies anew. The rank of a frame's PSNR is nearly the same in each condition; half of its variance is of
-    /// the scene.
+    /// Draws all numbers and replies anew. The rank of a frame's PSNR is nearly the same in each condition; half of its
+    /// variance is of the scene.
     fn draw(&mut self, random: &mut StdRng) {
         let AucDesign { scenes, shared, .. } = self.design;
         let (frames, questions) = (scenes * FRAMES, scenes * FRAMES * QUESTIONS);
-        let mut normals =
-            |n: usize| -> Vec<f64> { (0..n).map(|_| StandardNormal.sample(random)).collect() };
+        let mut normals = |n: usize| -> Vec<f64> { (0..n).map(|_| StandardNormal.sample(random)).collect() };
         let of_scene = normals(scenes);
         let psnr: Vec<f64> = normals(frames)
             .iter()
@@ -233,12 +217,7 @@ fn auc_rates(design: AucDesign, runs: usize) -> AucRates {
     }
     assert!(2 * made > runs, "{design:?}: {made}");
     let percent = 100.0 / made as f64;
-    AucRates {
-        truth,
-        held: percent * held as f64,
-        rejected: percent * rejected as f64,
-        mean: sum / made as f64,
-    }
+    AucRates { truth, held: percent * held as f64, rejected: percent * rejected as f64, mean: sum / made as f64 }
 }
 
 #[test]
@@ -250,19 +229,11 @@ fn auc_coverage_over_conditions() {
     for slope in [0.0, 0.3, 0.6] {
         for conditions in [1, 5, 15] {
             for scenes in [8, 24, 52] {
-                designs.extend(shared.iter().map(|shared| AucDesign {
-                    conditions,
-                    scenes,
-                    shared: *shared,
-                    slope,
-                }));
+                designs.extend(shared.iter().map(|shared| AucDesign { conditions, scenes, shared: *shared, slope }));
             }
         }
     }
-    let rates: Vec<AucRates> = designs
-        .par_iter()
-        .map(|design| auc_rates(*design, 1000))
-        .collect();
+    let rates: Vec<AucRates> = designs.par_iter().map(|design| auc_rates(*design, 1000)).collect();
     println!(
         "\n| slope | conditions | scenes | shared | true AUC | mean AUC | interval holds the truth | p < 0.05 |\n|---|---|---|---|---|---|---|---|"
     );
@@ -283,15 +254,7 @@ fn auc_coverage_over_conditions() {
 
 #[test]
 fn repeated_scenes_add_no_evidence() {
-    let rates = auc_rates(
-        AucDesign {
-            conditions: 15,
-            scenes: 24,
-            shared: Shared::Effects(1.0),
-            slope: 0.0,
-        },
-        150,
-    );
+    let rates = auc_rates(AucDesign { conditions: 15, scenes: 24, shared: Shared::Effects(1.0), slope: 0.0 }, 150);
     // Replies of different conditions taken as independent would reject in every other run.
     assert!(rates.rejected < 9.0 && rates.held > 91.0, "{rates:?}");
 }

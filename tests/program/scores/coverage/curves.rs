@@ -17,8 +17,7 @@ fn levels() -> Vec<AxisLevel> {
 /// Right-rate of a cluster at each level, from its luck in standard deviations: half-way to chance at 6.4 EV.
 fn curve(design: &Design, luck: f64) -> Vec<f64> {
     // The intraclass correlation of logits, whose own variance is π² / 3.
-    let spread =
-        std::f64::consts::PI.powi(2) / 3.0 * design.correlation / (1.0 - design.correlation);
+    let spread = std::f64::consts::PI.powi(2) / 3.0 * design.correlation / (1.0 - design.correlation);
     let rate = |level: AxisLevel| {
         let p = CHANCE + (design.mean - CHANCE) / (1.0 + ((level.value() - 6.4) / 0.8).exp());
         let logit = (p / (1.0 - p)).ln() + spread.sqrt() * luck;
@@ -44,16 +43,10 @@ fn true_curve(design: &Design) -> (f64, f64) {
     }
     let drops: Vec<f64> = levels().into_iter().map(AxisLevel::value).collect();
     let segments = drops.windows(2).zip(means.windows(2));
-    let area = segments
-        .clone()
-        .map(|(d, m)| (d[1] - d[0]) * f64::midpoint(m[0], m[1]))
-        .sum::<f64>()
-        / 9.0;
+    let area = segments.clone().map(|(d, m)| (d[1] - d[0]) * f64::midpoint(m[0], m[1])).sum::<f64>() / 9.0;
     let middle = f64::midpoint(means[0], CHANCE);
     let crossing = segments.into_iter().find(|(_, m)| m[1] <= middle);
-    let threshold = crossing.map_or(f64::INFINITY, |(d, m)| {
-        d[0] + (m[0] - middle) / (m[0] - m[1]) * (d[1] - d[0])
-    });
+    let threshold = crossing.map_or(f64::INFINITY, |(d, m)| d[0] + (m[0] - middle) / (m[0] - m[1]) * (d[1] - d[0]));
     (threshold, area)
 }
 
@@ -67,30 +60,17 @@ fn level_counts(random: &mut StdRng, design: &Design) -> LevelCounts {
         }
         guesses.push(replies as f32 / 3.0);
     });
-    LevelCounts {
-        levels: levels(),
-        counts,
-        missing: vec![Vec::new(); 6],
-        guesses,
-        missing_guesses: Vec::new(),
-    }
+    LevelCounts { levels: levels(), counts, missing: vec![Vec::new(); 6], guesses, missing_guesses: Vec::new() }
 }
 
 /// The area and the threshold of one run.
-pub(super) fn curve_of(
-    random: &mut StdRng,
-    design: &Design,
-    draws: &Resamples,
-) -> [Option<bool>; 2] {
+pub(super) fn curve_of(random: &mut StdRng, design: &Design, draws: &Resamples) -> [Option<bool>; 2] {
     let Some(summary) = level_counts(random, design).summary(draws) else {
         return [None; 2];
     };
     let truth = true_curve(design);
     let threshold = summary.threshold.ok();
-    [
-        summary.area.map(|area| holds(area, truth.1)),
-        threshold.map(|found| (found.low..=found.high).contains(&truth.0)),
-    ]
+    [summary.area.map(|area| holds(area, truth.1)), threshold.map(|found| (found.low..=found.high).contains(&truth.0))]
 }
 
 #[test]

@@ -52,13 +52,7 @@ fn coverage_of_differences_of_six_models() {
 #[test]
 fn undetected_differences_are_not_excluded() {
     // Most runs of so few clusters lose nothing, or all of it in one cluster.
-    let design = Design {
-        clusters: 8,
-        size: 6,
-        shape: Shape::Even,
-        mean: 0.9,
-        correlation: 0.4,
-    };
+    let design = Design { clusters: 8, size: 6, shape: Shape::Even, mean: 0.9, correlation: 0.4 };
     let held = coverage(paired, &design, 2000)[0].unwrap();
     // 82 % if the two added pairs count as independent ones.
     assert!(held > 94.0, "{held}");

@@ -1,5 +1,5 @@
-//! Intervals of few clusters: scenes that react differently to the light, one scene with most of the replies, and an enhancer that ruins
-//! one scene in ten.
+//! Intervals of few clusters: scenes that react differently to the light, one scene with most of the replies, and an
+//! enhancer that ruins one scene in ten.
 
 use super::curves::curve_of;
 use super::shares::share;
@@ -9,16 +9,13 @@ use darkqa_score::comparisons::paired::difference;
 /// Share of replies that are the same in two conditions with equal rates.
 const KEPT: f64 = 0.7;
 
-/// The net number of replies that a change of conditions makes right, and the number that it changes. `rates` are those after and before.
+/// The net number of replies that a change of conditions makes right, and the number that it changes. `rates` are those
+/// after and before.
 fn changed(random: &mut StdRng, replies: u32, rates: [f64; 2]) -> (f64, f64) {
     let (mut net, mut changes) = (0.0, 0.0);
     for _ in 0..replies {
         let before = random.random_range(0.0..1.0);
-        let after = if random.random_bool(KEPT) {
-            before
-        } else {
-            random.random_range(0.0..1.0)
-        };
+        let after = if random.random_bool(KEPT) { before } else { random.random_range(0.0..1.0) };
         let [after, before] = [after < rates[0], before < rates[1]];
         net += f64::from(u8::from(after)) - f64::from(u8::from(before));
         changes += f64::from(u8::from(after != before));
@@ -43,7 +40,8 @@ fn without_effect(
     [Some(holds(difference(&sums, squares, pairs), 0.0))]
 }
 
-/// Two conditions to which scenes react differently: normal shifts of their logits with the intraclass correlation of the design.
+/// Two conditions to which scenes react differently: normal shifts of their logits with the intraclass correlation of
+/// the design.
 fn reacting(random: &mut StdRng, design: &Design, _: &Resamples) -> [Option<bool>; 1] {
     let variance = std::f64::consts::PI.powi(2) / 3.0;
     let spread = (variance * design.correlation / (1.0 - design.correlation)).sqrt();
@@ -60,35 +58,17 @@ fn reacting(random: &mut StdRng, design: &Design, _: &Resamples) -> [Option<bool
 fn ruined(random: &mut StdRng, design: &Design, _: &Resamples) -> [Option<bool>; 1] {
     const GAIN: f64 = 0.03;
     without_effect(random, design, |random| {
-        let change = if random.random_bool(0.1) {
-            -9.0 * GAIN
-        } else {
-            GAIN
-        };
+        let change = if random.random_bool(0.1) { -9.0 * GAIN } else { GAIN };
         [design.mean + change, design.mean]
     })
 }
 
 /// Designs of few scenes with many questions, and accuracies of a model that sees something.
 fn few(shape: Shape, clusters: &[(usize, u32)]) -> Designs<'_> {
-    Designs {
-        shape,
-        clusters,
-        means: &[0.5, 0.75, 0.9],
-    }
+    Designs { shape, clusters, means: &[0.5, 0.75, 0.9] }
 }
 
-const FEW: [(usize, u32); 9] = [
-    (2, 40),
-    (3, 40),
-    (4, 40),
-    (5, 40),
-    (6, 40),
-    (7, 40),
-    (8, 40),
-    (12, 40),
-    (20, 40),
-];
+const FEW: [(usize, u32); 9] = [(2, 40), (3, 40), (4, 40), (5, 40), (6, 40), (7, 40), (8, 40), (12, 40), (20, 40)];
 
 #[test]
 #[ignore = "takes a minute; prints a table of src/docs/numbers.md"]
@@ -96,11 +76,7 @@ fn the_coverage_of_few_scenes() {
     let few = few(Shape::Even, &FEW);
     few.print(["share, few scenes"], share, 1000);
     few.print(["paired difference, few scenes"], reacting, 1000);
-    few.print(
-        ["area, few scenes", "threshold, few scenes"],
-        curve_of,
-        1000,
-    );
+    few.print(["area, few scenes", "threshold, few scenes"], curve_of, 1000);
 }
 
 #[test]
@@ -117,21 +93,12 @@ fn the_coverage_of_one_scene_with_most_replies() {
 #[ignore = "takes a minute; prints a table of src/docs/numbers.md"]
 fn the_coverage_of_one_ruined_scene_in_ten() {
     let clusters = [(5, 40), (8, 40), (12, 40), (20, 40), (30, 40), (42, 40)];
-    let designs = Designs {
-        means: &[0.7],
-        ..few(Shape::Even, &clusters)
-    };
+    let designs = Designs { means: &[0.7], ..few(Shape::Even, &clusters) };
     designs.print(["an enhancer that ruins one scene in ten"], ruined, 1000);
 }
 
 fn design(shape: Shape, clusters: usize, size: u32, correlation: f64) -> Design {
-    Design {
-        clusters,
-        size,
-        shape,
-        mean: 0.75,
-        correlation,
-    }
+    Design { clusters, size, shape, mean: 0.75, correlation }
 }
 
 /// How often an interval holds the truth, in percent.
@@ -146,10 +113,7 @@ fn two_to_seven_scenes_are_covered() {
             let design = design(Shape::Even, clusters, 40, correlation);
             let found = [share, reacting].map(|simulate| held(simulate, &design));
             // With two scenes and Student's t alone, 86 % of the shares.
-            assert!(
-                found.iter().all(|held| *held > 93.0),
-                "{design:?}: {found:?}"
-            );
+            assert!(found.iter().all(|held| *held > 93.0), "{design:?}: {found:?}");
         }
     }
 }
@@ -170,10 +134,7 @@ fn one_scene_with_most_replies_is_covered() {
         let design = design(Shape::Most, clusters, 12, 0.1);
         let found = [share, reacting].map(|simulate| held(simulate, &design));
         // 70 to 76 % with the variance of the clusters alone.
-        assert!(
-            found.iter().all(|held| *held > 93.0),
-            "{design:?}: {found:?}"
-        );
+        assert!(found.iter().all(|held| *held > 93.0), "{design:?}: {found:?}");
     }
 }
 
@@ -181,7 +142,8 @@ fn one_scene_with_most_replies_is_covered() {
 fn rarely_ruined_scenes_are_covered() {
     for (clusters, least) in [(5, 95.0), (8, 95.0), (12, 94.0), (20, 92.0)] {
         let found = held(ruined, &design(Shape::Even, clusters, 40, 0.0));
-        // With the variance of the clusters alone, 90 % of 8 and 12 scenes. Of 20 scenes, 12 % of samples have no ruined one.
+        // With the variance of the clusters alone, 90 % of 8 and 12 scenes. Of 20 scenes, 12 % of samples have no
+        // ruined one.
         assert!(found > least, "{clusters}: {found}");
     }
 }

@@ -1,13 +1,10 @@
 //! How often each interval holds the truth, and how often each test rejects, in simulated runs whose truth is known.
 //!
 //! The short tests run always. The long ones print the tables from which `src/docs/numbers.md` is written:
-//! `cargo test --test program coverage:: -- --ignored --nocapture`, or one of them by its name. Draws are fixed by each design, so
-//! that no run differs from another, whichever tests run.
+//! `cargo test --test program coverage:: -- --ignored --nocapture`, or one of them by its name. Draws are fixed by each
+//! design, so that no run differs from another, whichever tests run.
 
-#![expect(
-    clippy::print_stdout,
-    reason = "the long tests print the tables of the documentation"
-)]
+#![expect(clippy::print_stdout, reason = "the long tests print the tables of the documentation")]
 
 use darkqa_score::bootstrap::Resamples;
 use darkqa_score::estimate::ClusterCount;
@@ -70,11 +67,7 @@ impl Design {
         match self.shape {
             Shape::Even => vec![self.size; self.clusters],
             Shape::Third | Shape::Most => {
-                let share = if self.shape == Shape::Most {
-                    0.9
-                } else {
-                    1.0 / 3.0
-                };
+                let share = if self.shape == Shape::Most { 0.9 } else { 1.0 / 3.0 };
                 let large = (self.clusters as f64 * mean * share).round();
                 let others = (1.0 / share - 1.0) * large / (self.clusters - 1) as f64;
                 let mut sizes = vec![others.round().max(1.0) as u32; self.clusters];
@@ -92,11 +85,7 @@ impl Design {
     }
 
     /// Something of each cluster, from its number of questions.
-    fn clusters<T>(
-        &self,
-        random: &mut StdRng,
-        mut of: impl FnMut(&mut StdRng, u32) -> T,
-    ) -> Vec<T> {
+    fn clusters<T>(&self, random: &mut StdRng, mut of: impl FnMut(&mut StdRng, u32) -> T) -> Vec<T> {
         let sizes = self.sizes(random);
         sizes.into_iter().map(|size| of(random, size)).collect()
     }
@@ -128,20 +117,14 @@ fn holds(estimate: Estimate, truth: f64) -> bool {
 /// One simulated run: whether each of N intervals holds its truth; `None` if the run has no interval.
 type Simulation<const N: usize> = fn(&mut StdRng, &Design, &Resamples) -> [Option<bool>; N];
 
-/// How often an interval holds the truth in a design, in percent; `None` if fewer than half of the runs have the interval.
-fn coverage<const N: usize>(
-    simulate: Simulation<N>,
-    design: &Design,
-    runs: usize,
-) -> [Option<f64>; N] {
+/// How often an interval holds the truth in a design, in percent; `None` if fewer than half of the runs have the
+/// interval.
+fn coverage<const N: usize>(simulate: Simulation<N>, design: &Design, runs: usize) -> [Option<f64>; N] {
     let mut random = StdRng::seed_from_u64(design.seed());
     let draws = Resamples::new(design.clusters);
     let (mut made, mut held) = ([0_usize; N], [0_usize; N]);
     for _ in 0..runs {
-        for (index, outcome) in simulate(&mut random, design, &draws)
-            .into_iter()
-            .enumerate()
-        {
+        for (index, outcome) in simulate(&mut random, design, &draws).into_iter().enumerate() {
             made[index] += usize::from(outcome.is_some());
             held[index] += usize::from(outcome == Some(true));
         }
@@ -181,15 +164,10 @@ impl Designs<'_> {
             };
             self.means.iter().map(design)
         };
-        let cells = self
-            .clusters
-            .iter()
-            .flat_map(|cell| CORRELATIONS.map(|correlation| (*cell, correlation)));
+        let cells = self.clusters.iter().flat_map(|cell| CORRELATIONS.map(|correlation| (*cell, correlation)));
         let designs: Vec<Design> = cells.flat_map(|(cell, icc)| means(cell, icc)).collect();
         let held = designs.par_iter();
-        let held: Vec<[Option<f64>; N]> = held
-            .map(|design| coverage(simulate, design, runs))
-            .collect();
+        let held: Vec<[Option<f64>; N]> = held.map(|design| coverage(simulate, design, runs)).collect();
         for (index, name) in names.into_iter().enumerate() {
             let name = match self.shape {
                 Shape::Even => name.to_owned(),
@@ -229,9 +207,5 @@ fn summary(name: &str, held: &[Option<f64>], runs: usize) -> String {
     let mean = sorted.iter().sum::<f64>() / n as f64;
     let low = sorted.iter().filter(|held| **held < 93.0).count();
     let high = sorted.iter().filter(|held| **held > 97.0).count();
-    format!(
-        "| {name} | {n} × {runs} | {mean:.1} | {:.1} | {:.1} | {low} | {high} |",
-        sorted[0],
-        sorted[n / 20]
-    )
+    format!("| {name} | {n} × {runs} | {mean:.1} | {:.1} | {:.1} | {low} | {high} |", sorted[0], sorted[n / 20])
 }

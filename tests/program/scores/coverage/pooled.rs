@@ -12,7 +12,8 @@ use darkqa_score::comparisons::{PooledKind, pooled};
 use darkqa_score::grid::Grid;
 use darkqa_score::significance::Significance;
 
-/// Clusters, the standard deviation of a scene's effect in logits, and the share of right replies that is lost in the dark.
+/// Clusters, the standard deviation of a scene's effect in logits, and the share of right replies that is lost in the
+/// dark.
 struct PooledDesign {
     clusters: usize,
     size: u32,
@@ -32,13 +33,8 @@ impl PooledDesign {
 
     /// The cluster of each question.
     fn clusters(&self, random: &mut StdRng) -> Vec<usize> {
-        let design = Design {
-            clusters: self.clusters,
-            size: self.size,
-            shape: self.shape,
-            mean: 0.5,
-            correlation: 0.0,
-        };
+        let design =
+            Design { clusters: self.clusters, size: self.size, shape: self.shape, mean: 0.5, correlation: 0.0 };
         let sizes = design.sizes(random).into_iter().enumerate();
         let of = |(cluster, size)| std::iter::repeat_n(cluster, size as usize);
         sizes.flat_map(of).collect()
@@ -56,8 +52,8 @@ struct PooledRates {
     held: f64,
 }
 
-/// Six models in the same clusters, on items of different difficulty. In the dark each model is right less often by `effect`, and
-/// each condition has a scene effect with a standard deviation in logits.
+/// Six models in the same clusters, on items of different difficulty. In the dark each model is right less often by
+/// `effect`, and each condition has a scene effect with a standard deviation in logits.
 fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
     const MODELS: usize = 6;
     let mut random = StdRng::seed_from_u64(design.seed());
@@ -72,9 +68,7 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
             }
         }
     }
-    let asked = records
-        .iter()
-        .map(|record| (&record.question, &record.detail.frame));
+    let asked = records.iter().map(|record| (&record.question, &record.detail.frame));
     let units = Clusters::new(asked, &FrameTies::default());
     let mut rates = PooledRates::default();
     for _ in 0..runs {
@@ -96,11 +90,7 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
         assert_ne!(finding.strict.verdict, Significance::TooFewClusters);
     }
     let percent = 100.0 / runs as f64;
-    for rate in [
-        &mut rates.rejected,
-        &mut rates.rejected_by_one,
-        &mut rates.held,
-    ] {
+    for rate in [&mut rates.rejected, &mut rates.rejected_by_one, &mut rates.held] {
         *rate *= percent;
     }
     rates
@@ -113,15 +103,12 @@ fn answer(random: &mut StdRng, records: &mut [Record], clusters: &[usize], desig
         let drawn: f64 = StandardNormal.sample(random);
         spread * drawn
     };
-    let shifts: Vec<[f64; 2]> = (0..design.clusters)
-        .map(|_| [normal(scene_effect), normal(scene_effect)])
-        .collect();
+    let shifts: Vec<[f64; 2]> = (0..design.clusters).map(|_| [normal(scene_effect), normal(scene_effect)]).collect();
     let scenes: Vec<f64> = (0..design.clusters).map(|_| normal(0.5)).collect();
     let difficulties: Vec<f64> = (0..items).map(|_| normal(0.8)).collect();
     for (index, record) in records.iter_mut().enumerate() {
         let (item, side) = (index % items, index / items % 2);
-        let logit =
-            1.0 + scenes[clusters[item]] + difficulties[item] + shifts[clusters[item]][side];
+        let logit = 1.0 + scenes[clusters[item]] + difficulties[item] + shifts[clusters[item]][side];
         let p = 1.0 / (1.0 + (-logit).exp()) - if side == 0 { effect } else { 0.0 };
         let right = random.random_bool(p.clamp(0.0, 1.0));
         let chosen = Some(usize::from(!right));
@@ -140,19 +127,10 @@ fn size_and_power_of_pooled_test() {
     let mut designs = Vec::new();
     for ((clusters, size), shape) in even.into_iter().chain(third) {
         for scene_effect in [0.0, 0.5] {
-            designs.extend([0.0, 0.06].map(|effect| PooledDesign {
-                clusters,
-                size,
-                shape,
-                scene_effect,
-                effect,
-            }));
+            designs.extend([0.0, 0.06].map(|effect| PooledDesign { clusters, size, shape, scene_effect, effect }));
         }
     }
-    let rates: Vec<PooledRates> = designs
-        .par_iter()
-        .map(|design| pooled_rates(design, 1000))
-        .collect();
+    let rates: Vec<PooledRates> = designs.par_iter().map(|design| pooled_rates(design, 1000)).collect();
     for (design, rates) in designs.iter().zip(rates) {
         println!(
             "| {} × {}, {:?} | {} | {:.0} | {:.1} | {:.1} | {:.1} |",
@@ -170,19 +148,11 @@ fn size_and_power_of_pooled_test() {
 
 #[test]
 fn pooled_test_beats_single_models() {
-    let design = |scene_effect, effect| PooledDesign {
-        clusters: 25,
-        size: 8,
-        shape: Shape::Even,
-        scene_effect,
-        effect,
-    };
+    let design =
+        |scene_effect, effect| PooledDesign { clusters: 25, size: 8, shape: Shape::Even, scene_effect, effect };
     let none = pooled_rates(&design(0.5, 0.0), 250);
     // 5 %, give or take 2.8 % (two standard errors).
     assert!(none.rejected < 7.8 && none.held > 92.0, "{none:?}");
     let real = pooled_rates(&design(0.0, 0.06), 100);
-    assert!(
-        real.rejected > 75.0 && real.rejected_by_one < 45.0,
-        "{real:?}"
-    );
+    assert!(real.rejected > 75.0 && real.rejected_by_one < 45.0, "{real:?}");
 }

@@ -64,7 +64,8 @@ fn llm_match(random: &mut StdRng, design: &Design, _: &Resamples) -> [Option<boo
     score(&sums, 4.0, truth)
 }
 
-/// Two models that give the same answer to three in ten items, and else answer independently at the rate of the cluster.
+/// Two models that give the same answer to three in ten items, and else answer independently at the rate of the
+/// cluster.
 fn kappa(random: &mut StdRng, design: &Design, _: &Resamples) -> [Option<bool>; 1] {
     const SAME: f64 = 0.3;
     let (p, rho) = (design.mean, design.correlation);
@@ -110,15 +111,10 @@ fn the_coverage_of_kappa() {
 
 #[test]
 fn extreme_shares_are_covered_when_clumped() {
-    let strong = |clusters, size| Design {
-        clusters,
-        size,
-        shape: Shape::Even,
-        mean: 0.98,
-        correlation: 0.4,
-    };
+    let strong = |clusters, size| Design { clusters, size, shape: Shape::Even, mean: 0.98, correlation: 0.4 };
     for design in [strong(25, 8), strong(52, 20), strong(52, 180)] {
-        // Half of the degrees of freedom by Satterthwaite give 91.7 % at the worst of 350 cells; C − 1 of them give 83 % here.
+        // Half of the degrees of freedom by Satterthwaite give 91.7 % at the worst of 350 cells; C − 1 of them give 83
+        // % here.
         let held = coverage(share, &design, 1500)[0].unwrap();
         assert!((91.0..=99.5).contains(&held), "{design:?}: {held}");
     }

@@ -12,10 +12,7 @@ pub(super) struct Dice(pub(super) u64);
 
 impl Dice {
     pub(super) fn throw(&mut self) -> f64 {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (self.0 >> 11) as f64 / (1_u64 << 53) as f64
     }
 }
@@ -31,7 +28,8 @@ pub(super) enum Limit {
     Fixed(usize),
     /// Random refusal of this share of the requests.
     Random(f64),
-    /// Random failure of this share of the requests that reveals nothing about a rate: status 500, or a truncated reply.
+    /// Random failure of this share of the requests that reveals nothing about a rate: status 500, or a truncated
+    /// reply.
     Broken(f64),
 }
 
@@ -63,15 +61,7 @@ impl MockServer {
             Limit::Bucket { store, .. } => store,
             _ => 0.0,
         };
-        Self {
-            limit,
-            wait,
-            start: now,
-            level,
-            last: now,
-            accepted: Vec::new(),
-            dice: Dice(seed),
-        }
+        Self { limit, wait, start: now, level, last: now, accepted: Vec::new(), dice: Dice(seed) }
     }
 
     /// Accepts a request, or returns the stated wait as the error.
@@ -79,11 +69,7 @@ impl MockServer {
         let minute = Duration::from_mins(1);
         let exact = match self.limit {
             Limit::Random(share) | Limit::Broken(share) => {
-                return if self.dice.throw() < share {
-                    Err(None)
-                } else {
-                    Ok(())
-                };
+                return if self.dice.throw() < share { Err(None) } else { Ok(()) };
             }
             Limit::Bucket { rate, store } => {
                 let filled = self.level + (now - self.last).as_secs_f64() * rate;
@@ -104,8 +90,7 @@ impl MockServer {
             }
             Limit::Fixed(max) => {
                 let current = minute_of(self.start, now);
-                self.accepted
-                    .retain(|accepted| minute_of(self.start, *accepted) == current);
+                self.accepted.retain(|accepted| minute_of(self.start, *accepted) == current);
                 if self.accepted.len() < max {
                     self.accepted.push(now);
                     return Ok(());
@@ -134,10 +119,7 @@ impl Simulation {
         self.sent
             .iter()
             .map(|first| {
-                self.sent
-                    .iter()
-                    .filter(|sent| *sent >= first && **sent - *first < Duration::from_mins(1))
-                    .count()
+                self.sent.iter().filter(|sent| *sent >= first && **sent - *first < Duration::from_mins(1)).count()
             })
             .max()
             .unwrap_or(0)
@@ -145,19 +127,10 @@ impl Simulation {
 }
 
 /// Sends `items` requests to a server, 16 at once, and repeats refused ones. Replies take 50 to 200 ms.
-pub(super) async fn simulate(
-    limit: Limit,
-    wait: StatedWait,
-    items: usize,
-    quota: Quota,
-    seed: u64,
-) -> Simulation {
+pub(super) async fn simulate(limit: Limit, wait: StatedWait, items: usize, quota: Quota, seed: u64) -> Simulation {
     let gate = Arc::new(Gate::new(quota));
     let server = Arc::new(Mutex::new(MockServer::new(limit, wait, seed)));
-    let (left, refused) = (
-        Arc::new(AtomicUsize::new(items)),
-        Arc::new(AtomicUsize::new(0)),
-    );
+    let (left, refused) = (Arc::new(AtomicUsize::new(items)), Arc::new(AtomicUsize::new(0)));
     let sent_at = Arc::new(Mutex::new(Vec::new()));
     let start = Instant::now();
     let mut asking = tokio::task::JoinSet::new();
@@ -166,10 +139,7 @@ pub(super) async fn simulate(
         let (refused, sent_at) = (refused.clone(), sent_at.clone());
         let mut dice = Dice(seed * 100 + worker);
         asking.spawn(async move {
-            while left
-                .fetch_update(Relaxed, Relaxed, |n| n.checked_sub(1))
-                .is_ok()
-            {
+            while left.fetch_update(Relaxed, Relaxed, |n| n.checked_sub(1)).is_ok() {
                 let default_wait = Duration::from_millis(250);
                 loop {
                     let sent = gate.pass().await;
@@ -195,11 +165,7 @@ pub(super) async fn simulate(
     }
     while asking.join_next().await.is_some() {}
     let sent = sent_at.lock().unwrap().clone();
-    Simulation {
-        seconds: start.elapsed().as_secs_f64(),
-        refused: refused.load(Relaxed),
-        sent,
-    }
+    Simulation { seconds: start.elapsed().as_secs_f64(), refused: refused.load(Relaxed), sent }
 }
 
 fn minute_of(start: Instant, at: Instant) -> u64 {

@@ -23,7 +23,8 @@ pub(super) struct Ending {
     pub(super) via: Via,
     /// The reason why no reply came, with the HTTP status; `None` if a reply came.
     pub(super) failure: Option<(FailureKind, Option<u16>)>,
-    /// The word for a reply that the server ended early, or for a generation that broke off; `None` for other failures and for whole replies.
+    /// The word for a reply that the server ended early, or for a generation that broke off; `None` for other failures
+    /// and for whole replies.
     pub(super) ended_by: Option<String>,
     /// Number of requests that were sent.
     pub(super) attempts: u32,

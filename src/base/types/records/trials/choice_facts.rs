@@ -1,13 +1,12 @@
-//! [`ChoiceFacts`]: the facts that reports keep of a trial with choices, and the tables that they refer to ([`ChoiceTables`]).
+//! [`ChoiceFacts`]: the facts that reports keep of a trial with choices, and the tables that they refer to
+//! ([`ChoiceTables`]).
 
 use std::collections::BTreeMap;
 
 use super::interner::Interner;
 use super::sent_images::SentImages;
 use crate::types::questions::{UnreadReason, letter};
-use crate::types::{
-    ChoiceDetail, FrameId, Observed, OptionProbabilities, ParsedAnswer, Record, TrialOutcome,
-};
+use crate::types::{ChoiceDetail, FrameId, Observed, OptionProbabilities, ParsedAnswer, Record, TrialOutcome};
 
 /// The index that means "no entry".
 const NONE: u32 = u32::MAX;
@@ -44,10 +43,7 @@ impl From<ParsedAnswer> for PackedAnswer {
 impl From<PackedAnswer> for ParsedAnswer {
     fn from(reading: PackedAnswer) -> Self {
         match reading {
-            PackedAnswer::Chosen(index) => Self {
-                chosen: Some(usize::from(index)),
-                why: None,
-            },
+            PackedAnswer::Chosen(index) => Self { chosen: Some(usize::from(index)), why: None },
             PackedAnswer::Unread(why) => Self { chosen: None, why },
         }
     }
@@ -73,8 +69,7 @@ impl ChoiceTables {
     /// Extracts the facts of a record that reports need.
     pub fn extract_facts(&mut self, record: &Record<ChoiceDetail>) -> ChoiceFacts {
         let detail = &record.detail;
-        let images =
-            SentImages::from_detail(detail).map_or(NONE, |images| self.images.intern(images));
+        let images = SentImages::from_detail(detail).map_or(NONE, |images| self.images.intern(images));
         let observed = detail.observed.as_ref().map(|observed| Observed {
             from: observed.from,
             things: observed.things,
@@ -113,10 +108,7 @@ impl ChoiceTables {
             return NONE;
         }
         let number = self.options.len() as u32;
-        self.rare.push(RareFacts {
-            observed,
-            options: options.as_ref().map_or(NONE, |_| number),
-        });
+        self.rare.push(RareFacts { observed, options: options.as_ref().map_or(NONE, |_| number) });
         self.options.extend(options);
         self.rare.len() as u32 - 1
     }
@@ -163,12 +155,7 @@ impl ChoiceFacts {
             Some(ParsedAnswer { chosen: None, .. }) => TrialOutcome::Unparsed,
             Some(_) => TrialOutcome::Wrong,
         };
-        Self {
-            images: NONE,
-            rare: NONE,
-            outcome,
-            ..self
-        }
+        Self { images: NONE, rare: NONE, outcome, ..self }
     }
 }
 

@@ -15,11 +15,7 @@ pub(super) struct Interner<T> {
 
 impl<T> Default for Interner<T> {
     fn default() -> Self {
-        Self {
-            all: Vec::new(),
-            numbers: HashTable::new(),
-            hashes: DefaultHashBuilder::default(),
-        }
+        Self { all: Vec::new(), numbers: HashTable::new(), hashes: DefaultHashBuilder::default() }
     }
 }
 
@@ -35,24 +31,16 @@ impl<T: Hash + Eq> Interner<T> {
     /// The number of the value for which `is_equal` returns true. `key` must have the same hash as that value.
     pub(super) fn find(&self, key: &impl Hash, is_equal: impl Fn(&T) -> bool) -> Option<u32> {
         let hash = self.hashes.hash_one(key);
-        self.numbers
-            .find(hash, |number| is_equal(self.get(*number)))
-            .copied()
+        self.numbers.find(hash, |number| is_equal(self.get(*number))).copied()
     }
 
     /// Adds a value that is known to be new, and returns its number.
     pub(super) fn push(&mut self, value: T) -> u32 {
-        let Self {
-            all,
-            numbers,
-            hashes,
-        } = self;
+        let Self { all, numbers, hashes } = self;
         let number = all.len() as u32;
         let hash = hashes.hash_one(&value);
         all.push(value);
-        numbers.insert_unique(hash, number, |number| {
-            hashes.hash_one(&all[*number as usize])
-        });
+        numbers.insert_unique(hash, number, |number| hashes.hash_one(&all[*number as usize]));
         number
     }
 }
@@ -88,12 +76,7 @@ mod tests {
     fn equal_values_share_a_number() {
         let mut values = Interner::default();
         let numbers: Vec<u32> = (0..3000).map(|n| values.intern(n % 1000)).collect();
-        assert!(
-            numbers
-                .iter()
-                .zip(0..)
-                .all(|(number, n)| *number == n % 1000)
-        );
+        assert!(numbers.iter().zip(0..).all(|(number, n)| *number == n % 1000));
         assert_eq!((values.len(), *values.get(7)), (1000, 7));
     }
 }

@@ -1,7 +1,7 @@
 //! A compact table of the trials of runs for reports: [`Trials`], with a view of one trial ([`TrialRef`]).
 //!
-//! Facts that many trials share are stored once, and the texts of replies stay in the file of the run. A trial with choices therefore takes
-//! 60 bytes, and 16 more while its key is needed.
+//! Facts that many trials share are stored once, and the texts of replies stay in the file of the run. A trial with
+//! choices therefore takes 60 bytes, and 16 more while its key is needed.
 
 mod asked_item;
 mod asked_model;
@@ -31,9 +31,7 @@ use trial_facts::{TrialFacts, hash_reply};
 use crate::error::Error;
 
 use super::record::{Record, StoredDetail};
-use crate::types::{
-    ChoiceDetail, Condition, Distinct, Family, Finish, FrameId, LostAttempts, QuestionId, TrialKey,
-};
+use crate::types::{ChoiceDetail, Condition, Distinct, Family, Finish, FrameId, LostAttempts, QuestionId, TrialKey};
 
 /// Trials with the tables that they refer to.
 #[derive(Debug, Clone)]
@@ -89,11 +87,8 @@ impl<D: StoredDetail> Trials<D> {
         let facts = D::extract_facts(&record, &mut self.tables);
         let reply = hash_reply(record.reply.as_deref(), record.refusal.as_deref());
         let item = self.intern_item(&record.question, &record.detail.asked());
-        let asked = self.asked.intern(AskedModel {
-            model: record.model,
-            view: record.view,
-            condition: record.condition,
-        });
+        let asked =
+            self.asked.intern(AskedModel { model: record.model, view: record.view, condition: record.condition });
         let failure = record.failure.map(|failure| (failure.kind, failure.status));
         let ended_by = ended_by(record.finish, record.refusal.as_deref(), failure.is_some());
         let ending = self.endings.intern(Ending {
@@ -155,9 +150,7 @@ impl<D: StoredDetail> Trials<D> {
     }
 
     /// All trials in order.
-    pub fn iter(
-        &self,
-    ) -> impl DoubleEndedIterator<Item = TrialRef<'_, D>> + ExactSizeIterator + Clone {
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = TrialRef<'_, D>> + ExactSizeIterator + Clone {
         (0..self.facts.len()).map(|place| TrialRef::new(self, place))
     }
 
@@ -184,20 +177,12 @@ impl<D: StoredDetail> Trials<D> {
         for facts in &self.facts {
             is_used[facts.item as usize] = true;
         }
-        self.items
-            .all()
-            .iter()
-            .zip(is_used)
-            .map(|(item, is_used)| is_used.then_some(item))
-            .collect()
+        self.items.all().iter().zip(is_used).map(|(item, is_used)| is_used.then_some(item)).collect()
     }
 
     /// The questions that were asked, with their frames; a question may occur several times.
     pub fn questions(&self) -> impl Iterator<Item = (&QuestionId, &FrameId)> {
-        self.items()
-            .into_iter()
-            .flatten()
-            .map(|item| (&*item.question, &*item.frame))
+        self.items().into_iter().flatten().map(|item| (&*item.question, &*item.frame))
     }
 
     /// The models and conditions that were asked, by number; `None` for an unused one, as in [`items`](Self::items).
@@ -255,10 +240,7 @@ impl<D: StoredDetail> Trials<D> {
     /// Removes the trials that `is_taken` accepts and returns them.
     #[must_use]
     pub fn extract(&mut self, is_taken: impl Fn(TrialRef<'_, D>) -> bool) -> Self {
-        let mut taken = Self {
-            logs: self.logs,
-            ..Self::default()
-        };
+        let mut taken = Self { logs: self.logs, ..Self::default() };
         for trial in self.iter().filter(|trial| is_taken(*trial)) {
             taken.copy(trial, 0);
         }
@@ -308,8 +290,8 @@ impl<D: StoredDetail> Trials<D> {
         item
     }
 
-    /// Keeps one trial of each key. `choose` decides between two trials with the same key, in the order of their addition. The cost of a
-    /// dropped trial is added to the kept one if both are in the same file.
+    /// Keeps one trial of each key. `choose` decides between two trials with the same key, in the order of their
+    /// addition. The cost of a dropped trial is added to the kept one if both are in the same file.
     ///
     /// # Errors
     /// Errors of `choose`.
@@ -358,22 +340,14 @@ impl<D: StoredDetail> Trials<D> {
         Ok(())
     }
 
-    /// Sorts the trials by the places of their questions, their conditions, the places of their models, and repeats. Questions without a
-    /// place come first.
-    pub fn sort(
-        &mut self,
-        question: impl Fn(&QuestionId) -> Option<usize>,
-        model: impl Fn(&str) -> (usize, usize),
-    ) {
+    /// Sorts the trials by the places of their questions, their conditions, the places of their models, and repeats.
+    /// Questions without a place come first.
+    pub fn sort(&mut self, question: impl Fn(&QuestionId) -> Option<usize>, model: impl Fn(&str) -> (usize, usize)) {
         let (items, asked) = (self.items.all(), self.asked.all());
-        let questions: Vec<u32> = items
-            .iter()
-            .map(|item| question(&item.question).map_or(0, |place| place as u32 + 1))
-            .collect();
-        let places: Vec<_> = asked
-            .iter()
-            .map(|asked| (asked.condition.as_ref(), model(&asked.model), &*asked.model))
-            .collect();
+        let questions: Vec<u32> =
+            items.iter().map(|item| question(&item.question).map_or(0, |place| place as u32 + 1)).collect();
+        let places: Vec<_> =
+            asked.iter().map(|asked| (asked.condition.as_ref(), model(&asked.model), &*asked.model)).collect();
         let mut distinct = places.clone();
         distinct.sort_unstable();
         distinct.dedup();
@@ -422,20 +396,13 @@ impl<D: StoredDetail> Trials<D> {
 }
 
 impl Trials<ChoiceDetail> {
-    /// Adds a copy of a trial that is scored against the choice `reference` instead of the truth; its images are dropped.
-    pub fn add_scored_against(
-        &mut self,
-        trial: TrialRef<'_, ChoiceDetail>,
-        repeat: u32,
-        reference: usize,
-    ) {
+    /// Adds a copy of a trial that is scored against the choice `reference` instead of the truth; its images are
+    /// dropped.
+    pub fn add_scored_against(&mut self, trial: TrialRef<'_, ChoiceDetail>, repeat: u32, reference: usize) {
         let other = trial.trials();
         let facts = trial.facts();
-        let item = self.share_texts(AskedItem {
-            truth: Some(reference),
-            repeat,
-            ..other.items.get(facts.item).clone()
-        });
+        let item =
+            self.share_texts(AskedItem { truth: Some(reference), repeat, ..other.items.get(facts.item).clone() });
         let new = TrialFacts {
             item: self.items.intern(item),
             asked: self.asked.intern(other.asked.get(facts.asked).clone()),
@@ -469,10 +436,11 @@ fn ended_by(finish: Option<Finish>, refusal: Option<&str>, has_failed: bool) -> 
         Finish::Other(word) => Some(word),
         _ if has_failed => None,
         Finish::Length => Some("length".to_owned()),
-        _ => Some(refusal.and_then(refused_status).map_or_else(
-            || "content_filter".to_owned(),
-            |status| format!("status {status}"),
-        )),
+        _ => Some(
+            refusal
+                .and_then(refused_status)
+                .map_or_else(|| "content_filter".to_owned(), |status| format!("status {status}")),
+        ),
     }
 }
 

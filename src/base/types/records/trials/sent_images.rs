@@ -47,9 +47,7 @@ impl SentImages {
     /// The digest of the file, or of all files in order.
     #[must_use]
     pub fn digest(&self) -> Digest {
-        self.several
-            .as_ref()
-            .map_or(self.first, |several| several.1)
+        self.several.as_ref().map_or(self.first, |several| several.1)
     }
 }
 

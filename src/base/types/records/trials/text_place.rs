@@ -12,20 +12,13 @@ impl TextPlace {
     /// A place at an offset in the first file.
     #[must_use]
     pub fn new(start: u64) -> Self {
-        Self {
-            log: 0,
-            high: (start >> 32) as u16,
-            low: start as u32,
-        }
+        Self { log: 0, high: (start >> 32) as u16, low: start as u32 }
     }
 
     /// The same offset in the file with the index `log`.
     #[must_use]
     pub fn in_log(self, log: usize) -> Self {
-        Self {
-            log: log as u16,
-            ..self
-        }
+        Self { log: log as u16, ..self }
     }
 
     /// Index of the file among those of all runs.
@@ -42,10 +35,7 @@ impl TextPlace {
 
     /// The same offset, with the file index raised by `logs`, the number of files of the runs before.
     pub(super) fn after(self, logs: usize) -> Self {
-        Self {
-            log: self.log + logs as u16,
-            ..self
-        }
+        Self { log: self.log + logs as u16, ..self }
     }
 }
 

@@ -30,10 +30,7 @@ pub(super) fn hash_reply(reply: Option<&str>, refusal: Option<&str>) -> [u32; 2]
         hasher.update(text.unwrap_or_default().as_bytes());
     }
     let [a, b, c, d, e, f, g, h, ..] = *hasher.finalize().as_bytes();
-    [
-        u32::from_le_bytes([a, b, c, d]).max(1),
-        u32::from_le_bytes([e, f, g, h]),
-    ]
+    [u32::from_le_bytes([a, b, c, d]).max(1), u32::from_le_bytes([e, f, g, h])]
 }
 
 #[cfg(test)]
@@ -48,14 +45,9 @@ mod tests {
 
     #[test]
     fn replies_and_refusals_have_different_hashes() {
-        let digests = [
-            (None, None),
-            (Some(""), None),
-            (None, Some("")),
-            (Some("a"), Some("b")),
-            (Some("ab"), Some("")),
-        ]
-        .map(|(reply, refusal)| hash_reply(reply, refusal));
+        let digests =
+            [(None, None), (Some(""), None), (None, Some("")), (Some("a"), Some("b")), (Some("ab"), Some(""))]
+                .map(|(reply, refusal)| hash_reply(reply, refusal));
         for (place, one) in digests.iter().enumerate() {
             assert!(!digests[place + 1..].contains(one));
         }

@@ -5,8 +5,8 @@ use super::trial_facts::TrialFacts;
 use super::{AskedItem, KeptTrial, SentImages, TextPlace, Trials};
 use crate::types::records::record::{FailureKind, StoredDetail, Via, View};
 use crate::types::{
-    ChoiceDetail, Condition, Digest, Family, FrameId, LostAttempts, Observed, OpenDetail,
-    OptionProbabilities, ParsedAnswer, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
+    ChoiceDetail, Condition, Digest, Family, FrameId, LostAttempts, Observed, OpenDetail, OptionProbabilities,
+    ParsedAnswer, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
 };
 
 /// A view of one trial in [`Trials`].
@@ -16,10 +16,7 @@ pub struct TrialRef<'t, D: StoredDetail = ChoiceDetail> {
     place: usize,
 }
 
-#[expect(
-    clippy::expl_impl_clone_on_copy,
-    reason = "a derived impl would require `D: Clone`"
-)]
+#[expect(clippy::expl_impl_clone_on_copy, reason = "a derived impl would require `D: Clone`")]
 impl<D: StoredDetail> Clone for TrialRef<'_, D> {
     fn clone(&self) -> Self {
         *self
@@ -135,8 +132,8 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().ended_by.as_deref().filter(|_| self.failed())
     }
 
-    /// The word for a reply that the server ended early: its finish reason, or the status by which it refused the content; `None` for
-    /// whole replies and for failures.
+    /// The word for a reply that the server ended early: its finish reason, or the status by which it refused the
+    /// content; `None` for whole replies and for failures.
     #[must_use]
     pub fn ended_early(self) -> Option<&'t str> {
         self.ending().ended_by.as_deref().filter(|_| !self.failed())
@@ -189,7 +186,8 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().attempts
     }
 
-    /// The attempts that were charged and gave no reply, or a truncated reply that was replaced by one with a larger token limit.
+    /// The attempts that were charged and gave no reply, or a truncated reply that was replaced by one with a larger
+    /// token limit.
     #[must_use]
     pub fn lost(self) -> LostAttempts {
         self.ending().lost
@@ -204,15 +202,11 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
     /// Chooses between this trial and one with the same key that was stored later: a failure does not replace a reply.
     #[must_use]
     pub fn or_later(self, later: Self) -> KeptTrial {
-        if later.failed() && !self.failed() {
-            KeptTrial::First
-        } else {
-            KeptTrial::Later
-        }
+        if later.failed() && !self.failed() { KeptTrial::First } else { KeptTrial::Later }
     }
 
-    /// Cost of this trial in addition to that of `other`, which has the same key and replaces it. If both have the same token limit and a
-    /// reply, it is one reply that was parsed twice: the cost is zero.
+    /// Cost of this trial in addition to that of `other`, which has the same key and replaces it. If both have the same
+    /// token limit and a reply, it is one reply that was parsed twice: the cost is zero.
     pub(super) fn paid_besides(self, other: Self) -> LostAttempts {
         let is_asked_again = self.max_tokens() != other.max_tokens();
         let mut paid = LostAttempts::default();
@@ -289,9 +283,7 @@ impl<'t> TrialRef<'t, ChoiceDetail> {
     /// The frame whose image was shown.
     #[must_use]
     pub fn sent_frame(self) -> &'t FrameId {
-        self.images()
-            .and_then(|images| images.shown_frame.as_ref())
-            .unwrap_or(self.frame())
+        self.images().and_then(|images| images.shown_frame.as_ref()).unwrap_or(self.frame())
     }
 
     /// The observer's view, without the outlines of single objects.
@@ -316,10 +308,6 @@ impl TrialRef<'_, OpenDetail> {
     /// The record of an open question, with the names that its model and condition have among these trials.
     #[must_use]
     pub fn record(self) -> Record<OpenDetail> {
-        Record {
-            model: self.model().to_owned(),
-            condition: self.condition().cloned(),
-            ..(*self.facts().facts).clone()
-        }
+        Record { model: self.model().to_owned(), condition: self.condition().cloned(), ..(*self.facts().facts).clone() }
     }
 }

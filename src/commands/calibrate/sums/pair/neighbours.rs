@@ -56,13 +56,7 @@ impl RowNeighbours {
 
     fn from_sites(site: Site, next: Site) -> Self {
         let [[a, b], [next_a, next_b]] = [site, next].map(|site| site.map(u64::from));
-        Self {
-            count: 1,
-            both: [a + next_a, b + next_b],
-            aa: a * next_a,
-            ab: a * next_b + next_a * b,
-            bb: b * next_b,
-        }
+        Self { count: 1, both: [a + next_a, b + next_b], aa: a * next_a, ab: a * next_b + next_a * b, bb: b * next_b }
     }
 
     /// Removes two neighbours that were added.
@@ -91,20 +85,11 @@ impl RowNeighbours {
 impl NeighbourSums {
     /// Empty sums for this number of planes.
     pub(super) fn none(planes: usize) -> Self {
-        Self {
-            planes: vec![PlaneSums::default(); planes],
-        }
+        Self { planes: vec![PlaneSums::default(); planes] }
     }
 
     /// Adds a part of a row with `count` sites, the means of A and of B, and the squares around them.
-    pub(super) fn add(
-        &mut self,
-        plane: usize,
-        row: RowNeighbours,
-        count: f64,
-        means: [f64; 2],
-        squares: Scatter,
-    ) {
+    pub(super) fn add(&mut self, plane: usize, row: RowNeighbours, count: f64, means: [f64; 2], squares: Scatter) {
         let plane = &mut self.planes[plane];
         // Scale the products to the number of squares.
         let products = row.about(means).times(count / row.count as f64);
@@ -114,8 +99,8 @@ impl NeighbourSums {
         plane.rows += 1.0;
     }
 
-    /// Correlation of neighbours of a plane within rows of A − ratio · B, which is 0 for independent noise. `ratios` are the light of A
-    /// over the light of B, by plane.
+    /// Correlation of neighbours of a plane within rows of A − ratio · B, which is 0 for independent noise. `ratios`
+    /// are the light of A over the light of B, by plane.
     pub(crate) fn correlation(&self, ratios: &[f64]) -> f64 {
         let [mut products, mut squares, mut sites, mut rows] = [0.0; 4];
         for (plane, ratio) in self.planes.iter().zip(ratios) {

@@ -48,11 +48,7 @@ impl Products {
     /// The sums around the means of `count` sites, from the sums of A and of B.
     pub(super) fn about_means(self, count: u64, [a, b]: [u64; 2]) -> Scatter {
         let [n, a, b] = [count, a, b].map(|sum| sum as f64);
-        Scatter {
-            aa: self.aa as f64 - a * a / n,
-            ab: self.ab as f64 - a * b / n,
-            bb: self.bb as f64 - b * b / n,
-        }
+        Scatter { aa: self.aa as f64 - a * a / n, ab: self.ab as f64 - a * b / n, bb: self.bb as f64 - b * b / n }
     }
 }
 
@@ -66,11 +62,7 @@ impl Scatter {
 
     /// Multiplies all sums by a factor.
     pub(super) fn times(self, factor: f64) -> Self {
-        Self {
-            aa: factor * self.aa,
-            ab: factor * self.ab,
-            bb: factor * self.bb,
-        }
+        Self { aa: factor * self.aa, ab: factor * self.ab, bb: factor * self.bb }
     }
 
     /// Sum of D² around its mean, with D = A − ratio · B; for products of neighbours, the sum of D · D′.

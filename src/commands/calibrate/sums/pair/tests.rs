@@ -1,11 +1,7 @@
 use super::*;
 use crate::commands::calibrate::layout::Cfa;
 
-const BAYER: Layout = Layout {
-    cfa: Cfa::Rggb,
-    height: 64,
-    width: 48,
-};
+const BAYER: Layout = Layout { cfa: Cfa::Rggb, height: 64, width: 48 };
 
 /// Pseudorandom numbers from 0 to 2³² − 1.
 struct Numbers(u64);
@@ -14,10 +10,7 @@ impl Iterator for Numbers {
     type Item = u32;
 
     fn next(&mut self) -> Option<u32> {
-        self.0 = self
-            .0
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1);
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
         Some((self.0 >> 32) as u32)
     }
 }
@@ -33,11 +26,7 @@ fn frame(layout: Layout, seed: u64, level: u16, spread: u32) -> Vec<u16> {
 /// Noise by its definition, with loops over sites, for a pair of frames without hot pixels.
 fn noise_by_sites(layout: Layout, a: &[u16], b: &[u16]) -> [f64; 2] {
     let planes = layout.cfa.planes();
-    let mut d: Vec<f64> = a
-        .iter()
-        .zip(b)
-        .map(|(a, b)| f64::from(*a) - f64::from(*b))
-        .collect();
+    let mut d: Vec<f64> = a.iter().zip(b).map(|(a, b)| f64::from(*a) - f64::from(*b)).collect();
     for wanted in 0..planes {
         let sites: Vec<usize> = (0..d.len())
             .filter(|site| {
@@ -85,8 +74,7 @@ fn fixed_pattern_cancels_and_rows_are_row_noise() {
     let (a, b) = (frame(BAYER, 3, 500, 9), frame(BAYER, 4, 500, 9));
     let plain = PairSums::new(BAYER, [&a, &b], &hot).noise();
     let pattern = frame(BAYER, 5, 1000, 400);
-    let with =
-        |frame: &[u16]| -> Vec<u16> { frame.iter().zip(&pattern).map(|(a, b)| a + b).collect() };
+    let with = |frame: &[u16]| -> Vec<u16> { frame.iter().zip(&pattern).map(|(a, b)| a + b).collect() };
     let fixed = PairSums::new(BAYER, [&with(&a), &with(&b)], &hot).noise();
     assert_eq!(plain, fixed);
     let rows: Vec<u16> = b
@@ -132,11 +120,7 @@ fn hot_pixels_are_left_out() {
 
 #[test]
 fn smoothing_causes_correlation() {
-    let layout = Layout {
-        height: 256,
-        width: 256,
-        ..BAYER
-    };
+    let layout = Layout { height: 256, width: 256, ..BAYER };
     let hot = HotPixels::none(layout.plane_rows());
     let frames = [9, 10].map(|seed| frame(layout, seed, 500, 90));
     let smoothed: [Vec<u16>; 2] = [0, 1].map(|i: usize| {
@@ -171,11 +155,7 @@ fn tiles_have_local_light_and_noise() {
         // Four rows of three sites; each row has its own mean.
         assert_eq!((tile.plane, tile.count, tile.free), (index / 64, 12.0, 8.0));
         let level = if index == 127 { 800.0 } else { 500.0 };
-        assert!(
-            (tile.mean() - level).abs() < 5.0,
-            "{index}: {}",
-            tile.mean()
-        );
+        assert!((tile.mean() - level).abs() < 5.0, "{index}: {}", tile.mean());
     }
     let variance = mean_variance(&tiles, 1.0);
     assert!((variance - 30.0).abs() < 2.0, "{variance}");
@@ -197,15 +177,11 @@ fn mean_variance(tiles: &[TileSums], ratio: f64) -> f64 {
     tiles.iter().map(|tile| tile.variance(ratio)).sum::<f64>() / tiles.len() as f64
 }
 
-/// Two frames with the same pattern of light, the second with 5 % more light. With the ratio of their light the pattern does not affect
-/// the variance and the correlation of neighbours; without the ratio it does.
+/// Two frames with the same pattern of light, the second with 5 % more light. With the ratio of their light the pattern
+/// does not affect the variance and the correlation of neighbours; without the ratio it does.
 #[test]
 fn light_patterns_cancel_with_the_ratio_of_light() {
-    let layout = Layout {
-        height: 256,
-        width: 256,
-        ..BAYER
-    };
+    let layout = Layout { height: 256, width: 256, ..BAYER };
     let hot = HotPixels::none(layout.plane_rows());
     let [a, b]: [Vec<u16>; 2] = [(15, 1.0), (16, 1.05)].map(|(seed, factor)| {
         frame(layout, seed, 500, 9)

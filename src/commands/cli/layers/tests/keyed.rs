@@ -13,10 +13,7 @@ fn a_keyed_flag_sets_what_the_hidden_flags_set() {
     all.build();
     for keyed in &KEYED_FLAGS {
         for (key, flag) in keyed.keys.iter().filter(|(key, _)| !key.is_empty()) {
-            let arg = all
-                .get_arguments()
-                .find(|arg| name_of(arg) == *flag)
-                .unwrap();
+            let arg = all.get_arguments().find(|arg| name_of(arg) == *flag).unwrap();
             let sample = sample(arg);
             let (hidden, setting) = if arg.get_action().takes_values() {
                 (format!("--{flag}={sample}"), format!("{key}={sample}"))
@@ -28,14 +25,8 @@ fn a_keyed_flag_sets_what_the_hidden_flags_set() {
             let variable = variable_name(keyed.name);
             let line = format!("{} = {setting:?}", keyed.name);
             for (way, matches) in [
-                (
-                    "words",
-                    parsed(&[&format!("--{}", keyed.name), &setting], &[], ""),
-                ),
-                (
-                    "word",
-                    parsed(&[&format!("--{}={setting}", keyed.name)], &[], ""),
-                ),
+                ("words", parsed(&[&format!("--{}", keyed.name), &setting], &[], "")),
+                ("word", parsed(&[&format!("--{}={setting}", keyed.name)], &[], "")),
                 ("variable", parsed(&[], &[(&variable, &setting)], "")),
                 ("file", parsed(&[], &[], &line)),
             ] {
@@ -51,12 +42,7 @@ fn keys_of_several_layers_are_joined() {
     let variables = [("DARKQA_NOISE", "gain=0.5,fixed"), ("DARKQA_RATIO", "120")];
     let file = "noise = [\"gain=1\", \"ratio=150\", \"tone=none\"]\n";
     let matches = parsed(&["--noise", "camera=c.toml"], &variables, file).unwrap();
-    for (id, expected) in [
-        ("camera", "c.toml"),
-        ("gain", "0.5"),
-        ("ratio", "120"),
-        ("tone", "none"),
-    ] {
+    for (id, expected) in [("camera", "c.toml"), ("gain", "0.5"), ("ratio", "120"), ("tone", "none")] {
         assert_eq!(values(&matches, id), [expected], "{id}");
     }
     assert!(matches.get_flag("fixed"));
@@ -64,11 +50,7 @@ fn keys_of_several_layers_are_joined() {
 
 #[test]
 fn a_value_without_a_key_may_have_keys_after_it() {
-    let words = [
-        "--image",
-        "jpeg:90,max-side=512,first",
-        "--images-cache=a,b",
-    ];
+    let words = ["--image", "jpeg:90,max-side=512,first", "--images-cache=a,b"];
     let matches = parsed(&words, &[], "").unwrap();
     assert_eq!(values(&matches, "image"), ["jpeg:90"]);
     assert_eq!(values(&matches, "max_side"), ["512"]);
@@ -96,57 +78,17 @@ fn a_key_of_one_value_needs_none() {
 #[test]
 fn errors_of_keys_name_the_keyed_flag() {
     for (words, file, part) in [
-        (
-            &["--noise", "gian=3"][..],
-            "",
-            "--noise: unknown key \"gian\"; did you mean gain?",
-        ),
-        (
-            &["--noise", "gain"],
-            "",
-            "--noise: gain has no value; write gain=K",
-        ),
-        (
-            &["--noise", "fixed=3"],
-            "",
-            "--noise: fixed takes true or false, not \"3\"",
-        ),
-        (
-            &["--noise", "gain=x"],
-            "",
-            "invalid value 'x' for '--noise gain=<K>'",
-        ),
-        (
-            &["--gain", "x"],
-            "",
-            "invalid value 'x' for '--noise gain=<K>'",
-        ),
-        (
-            &["--noise", "tone=nne"],
-            "",
-            "a similar value exists: 'none'",
-        ),
-        (
-            &["--noise", "gain=1", "--gain", "2"],
-            "",
-            "'--noise gain=<K>' cannot be used multiple",
-        ),
+        (&["--noise", "gian=3"][..], "", "--noise: unknown key \"gian\"; did you mean gain?"),
+        (&["--noise", "gain"], "", "--noise: gain has no value; write gain=K"),
+        (&["--noise", "fixed=3"], "", "--noise: fixed takes true or false, not \"3\""),
+        (&["--noise", "gain=x"], "", "invalid value 'x' for '--noise gain=<K>'"),
+        (&["--gain", "x"], "", "invalid value 'x' for '--noise gain=<K>'"),
+        (&["--noise", "tone=nne"], "", "a similar value exists: 'none'"),
+        (&["--noise", "gain=1", "--gain", "2"], "", "'--noise gain=<K>' cannot be used multiple"),
         (&["--gian", "2"], "", "'--gian' found"),
-        (
-            &[],
-            "noise = \"gain=x\"",
-            "c.toml, noise: invalid value 'x' for '--noise gain=<K>'",
-        ),
-        (
-            &[],
-            "noise = \"gian=x\"",
-            "c.toml, noise: unknown key \"gian\"",
-        ),
-        (
-            &[],
-            "gain = 1\nnoise = \"gain=2\"",
-            "--noise gain is set twice, by",
-        ),
+        (&[], "noise = \"gain=x\"", "c.toml, noise: invalid value 'x' for '--noise gain=<K>'"),
+        (&[], "noise = \"gian=x\"", "c.toml, noise: unknown key \"gian\""),
+        (&[], "gain = 1\nnoise = \"gain=2\"", "--noise gain is set twice, by"),
     ] {
         let error = parsed(words, &[], file).unwrap_err();
         assert!(error.contains(part), "{part}: {error}");
@@ -158,35 +100,17 @@ fn errors_of_keys_name_the_keyed_flag() {
 fn earlier_forms_call_the_subcommands() {
     for (earlier, now) in [
         ("synthesize --check d", "synthesize check d"),
-        (
-            "synthesize a --from f --out b",
-            "synthesize from f a --out b",
-        ),
-        (
-            "enhance m --describe --tile 64",
-            "enhance describe m --llie-options tile=64",
-        ),
-        (
-            "enhance --doctor m a --out b --write",
-            "enhance doctor m a --out b --write",
-        ),
+        ("synthesize a --from f --out b", "synthesize from f a --out b"),
+        ("enhance m --describe --tile 64", "enhance describe m --llie-options tile=64"),
+        ("enhance --doctor m a --out b --write", "enhance doctor m a --out b --write"),
         ("import habitat --script", "import script habitat"),
     ] {
         let [earlier, now] = [earlier, now].map(|line| {
             let words: Vec<&str> = line.split(' ').collect();
             let matches = parsed(&words, &[], "").unwrap();
             let (path, own) = called_command(&matches);
-            let set = [
-                "model", "inputs", "input", "file", "folder", "kind", "out", "tile",
-            ]
-            .map(|id| {
-                own.try_get_raw(id)
-                    .ok()
-                    .flatten()
-                    .into_iter()
-                    .flatten()
-                    .map(OsString::from)
-                    .collect::<Vec<_>>()
+            let set = ["model", "inputs", "input", "file", "folder", "kind", "out", "tile"].map(|id| {
+                own.try_get_raw(id).ok().flatten().into_iter().flatten().map(OsString::from).collect::<Vec<_>>()
             });
             (path, set)
         });
@@ -198,10 +122,6 @@ fn earlier_forms_call_the_subcommands() {
 fn a_subcommand_ignores_the_flags_of_the_command_around_it() {
     let file = "[synthesize]\nlevels = \"L3\"\n";
     assert!(parsed(&["synthesize", "check", "d"], &[], file).is_ok());
-    let problem = parsed(
-        &["synthesize", "check", "d"],
-        &[],
-        "[synthesize]\nlevles = 1\n",
-    );
+    let problem = parsed(&["synthesize", "check", "d"], &[], "[synthesize]\nlevles = 1\n");
     assert!(problem.unwrap_err().contains("--levles"));
 }

@@ -10,10 +10,7 @@ use darkqa_light::KindSettings;
 
 fn recipe() -> Recipe {
     Recipe {
-        enhancers: vec![(
-            EnhancerName::new("one").unwrap(),
-            Digest::from_bytes(b"one"),
-        )],
+        enhancers: vec![(EnhancerName::new("one").unwrap(), Digest::from_bytes(b"one"))],
         ..Recipe::lossless(&KindSettings::default(), &[])
     }
 }
@@ -30,11 +27,7 @@ fn frame() -> SourceFrame {
 }
 
 fn sizes() -> SizeArgs {
-    SizeArgs {
-        tile: darkqa_enhance::Tiling::Auto,
-        llie_max_side: None,
-        llie_resize: false,
-    }
+    SizeArgs { tile: darkqa_enhance::Tiling::Auto, llie_max_side: None, llie_resize: false }
 }
 
 fn runtime(version: &str) -> (String, String) {
@@ -44,13 +37,7 @@ fn runtime(version: &str) -> (String, String) {
 /// Digest of the store key of a frame in a condition.
 fn key(recipe: &Recipe, frame: &SourceFrame, condition: &str, maker: &Maker) -> Digest {
     let folder = tempfile::tempdir().unwrap();
-    let store = ImageStore::open(
-        folder.path(),
-        FolderAccess::Private,
-        StoredKinds::All,
-        1 << 20,
-    )
-    .unwrap();
+    let store = ImageStore::open(folder.path(), FolderAccess::Private, StoredKinds::All, 1 << 20).unwrap();
     let source = FrameId("walk".to_owned());
     let condition = condition.parse().unwrap();
     let stored = StoredImages::new(&store, maker);
@@ -64,24 +51,14 @@ const CONDITION: &str = "L3-noise+one";
 fn key_with_recipe(change: impl FnOnce(&mut Recipe)) -> Digest {
     let mut recipe = recipe();
     change(&mut recipe);
-    key(
-        &recipe,
-        &frame(),
-        CONDITION,
-        &Maker::new(Some(runtime("1")), &sizes()),
-    )
+    key(&recipe, &frame(), CONDITION, &Maker::new(Some(runtime("1")), &sizes()))
 }
 
 /// The key with this version of the runtime and changed sizes.
 fn key_with_maker(version: &str, change: impl FnOnce(&mut SizeArgs)) -> Digest {
     let mut sizes = sizes();
     change(&mut sizes);
-    key(
-        &recipe(),
-        &frame(),
-        CONDITION,
-        &Maker::new(Some(runtime(version)), &sizes),
-    )
+    key(&recipe(), &frame(), CONDITION, &Maker::new(Some(runtime(version)), &sizes))
 }
 
 #[test]
@@ -109,12 +86,7 @@ fn every_fact_that_decides_an_image_changes_its_key() {
         key(&recipe(), &frame(), "L3-ev+one", &maker),
         key(&recipe(), &frame(), "L3-noise", &maker),
         key(&recipe(), &SourceFrame { id, ..frame() }, CONDITION, &maker),
-        key(
-            &recipe(),
-            &SourceFrame { digest, ..frame() },
-            CONDITION,
-            &maker,
-        ),
+        key(&recipe(), &SourceFrame { digest, ..frame() }, CONDITION, &maker),
     ];
     for (index, other) in others.iter().enumerate() {
         assert_ne!(*other, same, "{index}");
@@ -123,14 +95,8 @@ fn every_fact_that_decides_an_image_changes_its_key() {
 
 #[test]
 fn enhancer_settings_do_not_change_keys_of_degraded_images() {
-    let whole = SizeArgs {
-        tile: darkqa_enhance::Tiling::Whole,
-        ..sizes()
-    };
-    let [without, with] = [
-        Maker::new(None, &sizes()),
-        Maker::new(Some(runtime("1")), &whole),
-    ]
-    .map(|maker| key(&recipe(), &frame(), "L3-noise", &maker));
+    let whole = SizeArgs { tile: darkqa_enhance::Tiling::Whole, ..sizes() };
+    let [without, with] = [Maker::new(None, &sizes()), Maker::new(Some(runtime("1")), &whole)]
+        .map(|maker| key(&recipe(), &frame(), "L3-noise", &maker));
     assert_eq!(with, without);
 }

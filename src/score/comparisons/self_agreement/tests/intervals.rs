@@ -5,8 +5,8 @@ use crate::comparisons::self_agreement::evidence::NoEvidence;
 use crate::statistics::split_mix::SplitMix;
 use darkqa_base::types::Record;
 
-/// Records of 30 images with eight questions each. The share of its answers that a model keeps differs from image to image, evenly from 0 to
-/// 1, so that items of an image are far from independent; asked again it keeps 95 %.
+/// Records of 30 images with eight questions each. The share of its answers that a model keeps differs from image to
+/// image, evenly from 0 to 1, so that items of an image are far from independent; asked again it keeps 95 %.
 fn clustered(seed: u64) -> Vec<Record> {
     let mut draws = Draws(SplitMix(seed));
     let mut records = Vec::new();
@@ -15,13 +15,8 @@ fn clustered(seed: u64) -> Vec<Record> {
         for question in 0..8 {
             let light = draws.yes(0.4);
             records.push(record(question, image, "L0", 0, Some(light)));
-            for (condition, repeat, kept) in [("L0", 1, 0.95), ("", 0, 0.0), ("L5-noise", 0, kept)]
-            {
-                let chosen = if draws.next() < kept {
-                    light
-                } else {
-                    draws.yes(0.4)
-                };
+            for (condition, repeat, kept) in [("L0", 1, 0.95), ("", 0, 0.0), ("L5-noise", 0, kept)] {
+                let chosen = if draws.next() < kept { light } else { draws.yes(0.4) };
                 records.push(record(question, image, condition, repeat, Some(chosen)));
             }
         }
@@ -37,10 +32,7 @@ fn intervals_of_evidence_and_kappa_hold_the_truth() {
     let mut held = [0_u32; 2];
     for seed in 0..RUNS {
         let dark = cell(&clustered(seed), "L5-noise");
-        let intervals = [
-            (dark.evidence.unwrap().unwrap(), evidence),
-            (dark.kappa.unwrap(), kappa),
-        ];
+        let intervals = [(dark.evidence.unwrap().unwrap(), evidence), (dark.kappa.unwrap(), kappa)];
         for (held, (interval, truth)) in held.iter_mut().zip(intervals) {
             *held += u32::from(interval.low <= truth && truth <= interval.high);
         }
@@ -49,8 +41,8 @@ fn intervals_of_evidence_and_kappa_hold_the_truth() {
     assert!(held.iter().all(|held| *held >= 52), "{held:?}");
 }
 
-/// One image with four questions: the model agrees with itself at L0, and without the image for half of the questions. In many draws of
-/// the bootstrap floor and ceiling are the same.
+/// One image with four questions: the model agrees with itself at L0, and without the image for half of the questions.
+/// In many draws of the bootstrap floor and ceiling are the same.
 #[test]
 fn no_share_is_given_of_a_distance_that_may_be_nothing() {
     let mut records = Vec::new();
@@ -61,9 +53,5 @@ fn no_share_is_given_of_a_distance_that_may_be_nothing() {
         records.push(record(question, 0, "L5-noise", 0, Some(question / 2)));
     }
     let dark = cell(&records, "L5-noise");
-    assert!(
-        matches!(dark.evidence, Some(Err(NoEvidence::Unsure(low))) if low <= 0.0),
-        "{:?}",
-        dark.evidence
-    );
+    assert!(matches!(dark.evidence, Some(Err(NoEvidence::Unsure(low))) if low <= 0.0), "{:?}", dark.evidence);
 }

@@ -18,11 +18,7 @@ fn uninformative_questions_are_named_and_left_out_of_one_share() {
     let mut records = Vec::new();
     for image in 0..IMAGES {
         for question in 0..QUESTIONS {
-            let light = if question < 5 {
-                0
-            } else {
-                usize::from((image + question) % 2 == 0)
-            };
+            let light = if question < 5 { 0 } else { usize::from((image + question) % 2 == 0) };
             let dark = if question < 5 { 1 } else { light };
             records.push(record(question, image, "L0", 0, Some(light)));
             records.push(record(question, image, "L5-noise", 0, Some(dark)));
@@ -36,10 +32,7 @@ fn uninformative_questions_are_named_and_left_out_of_one_share() {
             .map(|question| &*question.bank_id)
             .collect();
         assert_eq!(without, ["q00", "q01", "q02", "q03", "q04"]);
-        assert_eq!(
-            (&*found.questions[0].top, found.questions[0].top_share),
-            ("yes", 1.0)
-        );
+        assert_eq!((&*found.questions[0].top, found.questions[0].top_share), ("yes", 1.0));
         let dark = at(found, "L5-noise");
         assert!((dark.agreement.unwrap().value - 0.8).abs() < 1e-12);
         let informative = dark.informative.unwrap();
@@ -54,11 +47,8 @@ fn only_questions_with_an_answer_in_the_light_are_references_and_an_unread_reply
     for image in 0..IMAGES {
         // The first question has no answer in the light; the second none in the dark; the third has both.
         let (yes, no) = (Some(0), Some(1));
-        let answers = [
-            (None, yes),
-            (if image % 2 == 0 { yes } else { no }, None),
-            (if image % 2 == 0 { yes } else { no }, yes),
-        ];
+        let answers =
+            [(None, yes), (if image % 2 == 0 { yes } else { no }, None), (if image % 2 == 0 { yes } else { no }, yes)];
         for (question, (light, dark)) in answers.into_iter().enumerate() {
             records.push(record(question, image, "L0", 0, light));
             records.push(record(question, image, "L5-noise", 0, dark));
@@ -82,12 +72,7 @@ fn the_threshold_is_where_half_of_the_evidence_is_lost() {
         if d.next() < 0.5 { light } else { d.yes(0.4) }
     };
     let guess: Answer = |_, d| d.yes(0.4);
-    let model = Simulated {
-        yes: 0.4,
-        blind: guess,
-        again: keep,
-        dark: guess,
-    };
+    let model = Simulated { yes: 0.4, blind: guess, again: keep, dark: guess };
     let records = model.records(&[("L1-noise", keep), ("L3-noise", half)]);
     found(&records, |found| {
         let threshold = found.curves[0].threshold.unwrap();
@@ -102,12 +87,7 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
     let half: Answer = |light, d| {
         if d.next() < 0.5 { light } else { d.yes(0.4) }
     };
-    let model = Simulated {
-        yes: 0.4,
-        blind: |_, d| d.yes(0.4),
-        again: keep,
-        dark: half,
-    };
+    let model = Simulated { yes: 0.4, blind: |_, d| d.yes(0.4), again: keep, dark: half };
     let records = model.records(&[("L5-noise+lift", keep), ("L0+lift", half)]);
     found(&records, |found| {
         // An enhancer that harms in the light is compared with the same images asked again.
@@ -123,61 +103,35 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
                 .find(|c| c.kind == kind && c.family.is_none() && c.first.condition() == condition)
                 .unwrap()
         });
-        assert_eq!(
-            (dark.second.condition(), dark.strict.significance),
-            ("L0".into(), Significance::Worse)
-        );
-        assert_eq!(
-            (dark.strict.paired.second, dark.strict.paired.gained),
-            (1.0, 0)
-        );
-        assert_eq!(
-            (lifted.strict.significance, lifted.strict.paired.lost),
-            (Significance::Better, 0)
-        );
+        assert_eq!((dark.second.condition(), dark.strict.significance), ("L0".into(), Significance::Worse));
+        assert_eq!((dark.strict.paired.second, dark.strict.paired.gained), (1.0, 0));
+        assert_eq!((lifted.strict.significance, lifted.strict.paired.lost), (Significance::Better, 0));
         assert!(lifted.strict.holm < 0.001 && lifted.strict.paired.mcnemar < 0.001);
         assert_eq!(harmed.strict.significance, Significance::Worse);
-        assert!(
-            found
-                .comparisons
-                .iter()
-                .all(|c| c.kind != ComparisonKind::Model)
-        );
+        assert!(found.comparisons.iter().all(|c| c.kind != ComparisonKind::Model));
     });
 }
 
 #[test]
 fn two_models_are_held_against_each_other_in_the_light_alone() {
-    let model = Simulated {
-        yes: 0.4,
-        blind: keep,
-        again: keep,
-        dark: keep,
-    };
+    let model = Simulated { yes: 0.4, blind: keep, again: keep, dark: keep };
     let records = model.records(&[]);
-    let other = records
-        .iter()
-        .cloned()
-        .enumerate()
-        .map(|(index, mut record)| {
-            record.model = "n".into();
-            if record.detail.repeat == 0 && index % 10 == 0 {
-                record.detail.strict = record.detail.strict.map(|reading| ParsedAnswer {
-                    chosen: reading.chosen.map(|chosen| 1 - chosen),
-                    ..reading
-                });
-            }
-            record
-        });
+    let other = records.iter().cloned().enumerate().map(|(index, mut record)| {
+        record.model = "n".into();
+        if record.detail.repeat == 0 && index % 10 == 0 {
+            record.detail.strict = record
+                .detail
+                .strict
+                .map(|reading| ParsedAnswer { chosen: reading.chosen.map(|chosen| 1 - chosen), ..reading });
+        }
+        record
+    });
     let both: Vec<Record> = records.iter().cloned().chain(other).collect();
     found(&both, |found| {
         assert_eq!(found.models(), ["m", "n"]);
         let pair = &found.between[0];
         assert_eq!((&*pair.first, &*pair.second, pair.same.n), ("m", "n", 1800));
-        assert!(
-            pair.same.value < 0.9 && pair.kappa.unwrap().value < 0.85,
-            "{pair:?}"
-        );
+        assert!(pair.same.value < 0.9 && pair.kappa.unwrap().value < 0.85, "{pair:?}");
         // Each has its own reference.
         for model in ["m", "n"] {
             let mut cells = found.whole().filter(|cell| cell.subject.model == model);
@@ -189,33 +143,14 @@ fn two_models_are_held_against_each_other_in_the_light_alone() {
 #[test]
 fn nothing_without_a_truth_is_scored_as_an_accuracy() {
     use crate::findings::Findings;
-    let model = Simulated {
-        yes: 0.4,
-        blind: keep,
-        again: keep,
-        dark: keep,
-    };
+    let model = Simulated { yes: 0.4, blind: keep, again: keep, dark: keep };
     let records = model.records(&[]);
     let trials = records.iter().cloned().collect();
     let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
     assert!(findings.grid.items.is_empty());
-    assert!(
-        findings
-            .summary
-            .cells
-            .iter()
-            .all(|cell| cell.accuracy.is_none() && cell.right == 0)
-    );
+    assert!(findings.summary.cells.iter().all(|cell| cell.accuracy.is_none() && cell.right == 0));
     found(&records, |found| {
         assert!(!found.grid.items.is_empty());
-        assert_eq!(
-            found
-                .grid
-                .counts(0, None, ParsingMode::Strict)
-                .iter()
-                .map(|c| c.right)
-                .sum::<u32>(),
-            0
-        );
+        assert_eq!(found.grid.counts(0, None, ParsingMode::Strict).iter().map(|c| c.right).sum::<u32>(), 0);
     });
 }

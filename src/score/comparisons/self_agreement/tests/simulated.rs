@@ -8,8 +8,8 @@ use crate::comparisons::self_agreement::cell::AgreementCell;
 use crate::statistics::split_mix::SplitMix;
 use darkqa_base::types::questions::BANK_ID;
 use darkqa_base::types::{
-    ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId,
-    Record, RunQuestion, TrialOutcome, UnreadReason,
+    ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId, Record, RunQuestion,
+    TrialOutcome, UnreadReason,
 };
 
 /// 72 images with 25 questions each: 1,800 items.
@@ -33,7 +33,8 @@ impl Draws {
 /// The answer of a model: its answer in the light, and random numbers.
 pub(super) type Answer = fn(usize, &mut Draws) -> usize;
 
-/// A simulated model: its share of “yes” in the light, and its answers without an image, asked again in the light, and in the dark.
+/// A simulated model: its share of “yes” in the light, and its answers without an image, asked again in the light, and
+/// in the dark.
 pub(super) struct Simulated {
     pub(super) yes: f64,
     pub(super) blind: Answer,
@@ -45,18 +46,9 @@ pub(super) fn keep(light: usize, _: &mut Draws) -> usize {
     light
 }
 
-pub(super) fn record(
-    question: usize,
-    image: usize,
-    condition: &str,
-    repeat: u32,
-    chosen: Option<usize>,
-) -> Record {
+pub(super) fn record(question: usize, image: usize, condition: &str, repeat: u32, chosen: Option<usize>) -> Record {
     let condition: Option<Condition> = (!condition.is_empty()).then(|| condition.parse().unwrap());
-    let reading = ParsedAnswer {
-        chosen,
-        why: chosen.is_none().then_some(UnreadReason::Refused),
-    };
+    let reading = ParsedAnswer { chosen, why: chosen.is_none().then_some(UnreadReason::Refused) };
     let detail = ChoiceDetail {
         frame: FrameId(format!("i{image:03}")),
         family: [Family::Presence, Family::Other("light".into())][question % 2].clone(),
@@ -72,8 +64,7 @@ pub(super) fn record(
         observed: None,
         options: None,
     };
-    let key =
-        Digest::from_bytes(format!("{question} {image} {condition:?} {repeat}").as_bytes()).into();
+    let key = Digest::from_bytes(format!("{question} {image} {condition:?} {repeat}").as_bytes()).into();
     let id = QuestionId(format!("q{question:02}@i{image:03}"));
     Record::blank(key, id, "m", condition, detail)
 }
@@ -109,11 +100,9 @@ impl Simulated {
             for question in 0..QUESTIONS {
                 let light = draws.yes(self.yes);
                 records.push(record(question, image, "L0", 0, Some(light)));
-                for (condition, repeat, answer) in [
-                    ("L0", 1, self.again),
-                    ("", 0, self.blind),
-                    ("L5-noise", 0, self.dark),
-                ] {
+                for (condition, repeat, answer) in
+                    [("L0", 1, self.again), ("", 0, self.blind), ("L5-noise", 0, self.dark)]
+                {
                     let chosen = Some(answer(light, &mut draws));
                     records.push(record(question, image, condition, repeat, chosen));
                 }
@@ -132,12 +121,7 @@ pub(super) fn found<T>(records: &[Record], read: impl FnOnce(&SelfAgreement<'_>)
     let questions = questions();
     let listing = ModelListing::default();
     let trials = records.iter().cloned().collect();
-    read(&SelfAgreement::new(
-        &trials,
-        &FrameTies::default(),
-        &questions,
-        &listing,
-    ))
+    read(&SelfAgreement::new(&trials, &FrameTies::default(), &questions, &listing))
 }
 
 pub(super) fn cell(records: &[Record], condition: &str) -> AgreementCell {
@@ -147,7 +131,5 @@ pub(super) fn cell(records: &[Record], condition: &str) -> AgreementCell {
 /// The cell of a condition.
 pub(super) fn at<'f>(found: &'f SelfAgreement<'_>, condition: &str) -> &'f AgreementCell {
     let mut cells = found.whole();
-    cells
-        .find(|cell| cell.subject.condition() == condition)
-        .unwrap()
+    cells.find(|cell| cell.subject.condition() == condition).unwrap()
 }

@@ -12,13 +12,7 @@ use crate::support::endpoint::Answer;
 use crate::support::table::check_rows;
 
 /// A name, what is asked for, the answer, what comes of it, and words of the message.
-type Case = (
-    &'static str,
-    Parameters,
-    Answer,
-    (FailureKind, Reach),
-    &'static [&'static str],
-);
+type Case = (&'static str, Parameters, Answer, (FailureKind, Reach), &'static [&'static str]);
 
 /// Failures that neither waiting nor another request solves: one request, and the remedy.
 #[test]
@@ -26,19 +20,10 @@ type Case = (
 fn vendor_failure_wordings_are_recognized() {
     use FailureKind::{Filtered, RateLimit, Request, Server};
     use Reach::{Endpoint, Trial};
-    let effort = || Parameters {
-        reasoning_effort: Some("minimal".into()),
-        ..plain()
-    };
-    let constrained = || Parameters {
-        constrain: Constrain::Json,
-        ..plain()
-    };
+    let effort = || Parameters { reasoning_effort: Some("minimal".into()), ..plain() };
+    let constrained = || Parameters { constrain: Constrain::Json, ..plain() };
     let own = |body: Value| Parameters {
-        extra: ExtraFields {
-            body: body.as_object().unwrap().clone(),
-            ..ExtraFields::default()
-        },
+        extra: ExtraFields { body: body.as_object().unwrap().clone(), ..ExtraFields::default() },
         ..plain()
     };
     let cases: Vec<Case> = vec![
@@ -65,10 +50,7 @@ fn vendor_failure_wordings_are_recognized() {
         (
             "OpenAI, a wait beyond --max-wait",
             plain(),
-            routed(
-                429,
-                "Rate limit reached on requests per min (RPM). Please try again in 7m12s.",
-            ),
+            routed(429, "Rate limit reached on requests per min (RPM). Please try again in 7m12s."),
             (RateLimit, Endpoint),
             &["432 s", "--retries max-wait"],
         ),
@@ -108,10 +90,7 @@ fn vendor_failure_wordings_are_recognized() {
         (
             "OpenRouter, credits",
             plain(),
-            Answer::json(
-                402,
-                &json!({"error": {"code": 402, "message": "Insufficient credits"}}),
-            ),
+            Answer::json(402, &json!({"error": {"code": 402, "message": "Insufficient credits"}})),
             (Request, Endpoint),
             &["credit"],
         ),
@@ -179,33 +158,21 @@ fn vendor_failure_wordings_are_recognized() {
         (
             "DashScope, no money",
             plain(),
-            Answer::error(
-                400,
-                "Arrearage",
-                "Access denied, please make sure your account is in good standing.",
-            ),
+            Answer::error(400, "Arrearage", "Access denied, please make sure your account is in good standing."),
             (Request, Endpoint),
             &["credit"],
         ),
         (
             "DashScope, a moderator",
             plain(),
-            Answer::error(
-                400,
-                "data_inspection_failed",
-                "Input data may contain inappropriate content.",
-            ),
+            Answer::error(400, "data_inspection_failed", "Input data may contain inappropriate content."),
             (Filtered, Trial),
             &["inappropriate"],
         ),
         (
             "DashScope, a moderator with a dash",
             plain(),
-            Answer::error(
-                400,
-                "DataInspectionFailed",
-                "Input data may contain inappropriate content.",
-            ),
+            Answer::error(400, "DataInspectionFailed", "Input data may contain inappropriate content."),
             (Filtered, Trial),
             &["inappropriate"],
         ),
@@ -267,11 +234,7 @@ fn vendor_failure_wordings_are_recognized() {
     check_rows(cases, |(name, parameters, answer, expected, words)| {
         let outcome = ask_with(vec![answer], none_spent(), parameters);
         let error = outcome.result.unwrap_err();
-        assert_eq!(
-            (error.failure.kind, error.reach),
-            expected,
-            "{name}: {error}"
-        );
+        assert_eq!((error.failure.kind, error.reach), expected, "{name}: {error}");
         assert_eq!((error.attempts, outcome.requests.len()), (1, 1), "{name}");
         assert!(outcome.time < Duration::from_secs(2), "{name}");
         for word in words {

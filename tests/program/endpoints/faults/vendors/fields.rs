@@ -9,20 +9,15 @@ use crate::support::endpoint::Answer;
 use crate::support::table::check_rows;
 
 fn by_stream() -> Parameters {
-    Parameters {
-        wire: WireSetting::ChatStream,
-        ..plain()
-    }
+    Parameters { wire: WireSetting::ChatStream, ..plain() }
 }
 
 fn with_probabilities() -> Parameters {
-    Parameters {
-        probabilities: true,
-        ..plain()
-    }
+    Parameters { probabilities: true, ..plain() }
 }
 
-/// A field that is left to the program: each server's words of refusal cost one request, and the field is sent otherwise then.
+/// A field that is left to the program: each server's words of refusal cost one request, and the field is sent
+/// otherwise then.
 #[test]
 #[expect(clippy::too_many_lines, reason = "a table")]
 fn vendor_refusals_cost_one_request() {
@@ -53,12 +48,7 @@ fn vendor_refusals_cost_one_request() {
         (
             "OpenAI, probabilities",
             with_probabilities(),
-            of_field(
-                403,
-                &none(),
-                &none(),
-                "You are not allowed to request logprobs from this model.",
-            ),
+            of_field(403, &none(), &none(), "You are not allowed to request logprobs from this model."),
             ("logprobs", none()),
         ),
         (
@@ -124,12 +114,7 @@ fn vendor_refusals_cost_one_request() {
         (
             "Together, more probabilities than it states",
             with_probabilities(),
-            of_field(
-                400,
-                &json!("top_logprobs"),
-                &none(),
-                "20 is greater than the maximum of 5 - 'top_logprobs'",
-            ),
+            of_field(400, &json!("top_logprobs"), &none(), "20 is greater than the maximum of 5 - 'top_logprobs'"),
             ("top_logprobs", json!(5)),
         ),
         (
@@ -155,10 +140,7 @@ fn vendor_refusals_cost_one_request() {
         (
             "DashScope, QwQ",
             plain(),
-            routed(
-                400,
-                "This model only support stream mode, please enable the stream parameter to access the model.",
-            ),
+            routed(400, "This model only support stream mode, please enable the stream parameter to access the model."),
             ("stream", json!(true)),
         ),
         (
@@ -170,10 +152,7 @@ fn vendor_refusals_cost_one_request() {
         (
             "DashScope, a model that thinks",
             plain(),
-            routed(
-                400,
-                "parameter.enable_thinking must be set to false for non-streaming calls",
-            ),
+            routed(400, "parameter.enable_thinking must be set to false for non-streaming calls"),
             ("stream", json!(true)),
         ),
         (
@@ -203,10 +182,6 @@ fn vendor_refusals_cost_one_request() {
         assert!(sent.len() == 2, "{name}: {:?}", outcome.result);
         let now = sent[1].get(field).cloned().unwrap_or_default();
         assert_eq!(now, expected, "{name}: {field}");
-        assert_ne!(
-            sent[0].get(field).cloned().unwrap_or_default(),
-            now,
-            "{name}"
-        );
+        assert_ne!(sent[0].get(field).cloned().unwrap_or_default(), now, "{name}");
     });
 }

@@ -18,8 +18,7 @@ fn plain() -> Parameters {
 
 /// An error of OpenAI with the name of the field.
 fn of_field(status: u16, param: &Value, code: &Value, message: &str) -> Answer {
-    let error =
-        json!({"message": message, "type": "invalid_request_error", "param": param, "code": code});
+    let error = json!({"message": message, "type": "invalid_request_error", "param": param, "code": code});
     Answer::json(status, &json!({ "error": error }))
 }
 
@@ -30,9 +29,5 @@ fn routed(status: u16, message: &str) -> Answer {
 
 /// No retry at all: what is answered nevertheless spent none. Nothing is turned away for long.
 fn none_spent() -> Sending {
-    Sending {
-        retries: 0,
-        patience: Duration::from_secs(2),
-        ..sending()
-    }
+    Sending { retries: 0, patience: Duration::from_secs(2), ..sending() }
 }

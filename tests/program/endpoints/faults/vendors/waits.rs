@@ -152,14 +152,9 @@ fn each_vendor_states_its_waits() {
     ];
     check_rows_at_once(cases, |(name, answer, least)| {
         let outcome = ask_with(vec![answer, Answer::text("B")], none_spent(), plain());
-        let reply = outcome
-            .result
-            .unwrap_or_else(|error| panic!("{name}: {error}"));
+        let reply = outcome.result.unwrap_or_else(|error| panic!("{name}: {error}"));
         assert_eq!((reply.attempts, outcome.requests.len()), (2, 2), "{name}");
         let waited = outcome.time.as_millis();
-        assert!(
-            (least..least + 900).contains(&waited),
-            "{name}: {waited} ms"
-        );
+        assert!((least..least + 900).contains(&waited), "{name}: {waited} ms");
     });
 }

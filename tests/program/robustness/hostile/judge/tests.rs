@@ -9,10 +9,7 @@ use crate::robustness::hostile::canary::Canary;
 use crate::robustness::hostile::process::Running;
 use crate::support::table::check_rows;
 
-const LIMITS: Limits = Limits {
-    time: Duration::from_secs(2),
-    memory: 300 << 20,
-};
+const LIMITS: Limits = Limits { time: Duration::from_secs(2), memory: 300 << 20 };
 
 /// The kinds of the faults of a line of the shell, and whether the canary folder changed.
 fn judged(line: &str) -> (Vec<&'static str>, bool) {
@@ -34,10 +31,7 @@ fn each_fault_is_found() {
         ("true", &[]),
         ("printf 'a\\tb\\n'; exit 1", &[]),
         ("echo 'a.json, line 3: no' >&2; exit 2", &[]),
-        (
-            "echo \"thread 'main' panicked at src/main.rs:1:1:\" >&2; exit 101",
-            &["panic", "exit code"],
-        ),
+        ("echo \"thread 'main' panicked at src/main.rs:1:1:\" >&2; exit 101", &["panic", "exit code"]),
         ("exit 3", &["exit code"]),
         ("kill -SEGV $$", &["signal"]),
         ("exec sleep 60", &["hang"]),
@@ -45,10 +39,7 @@ fn each_fault_is_found() {
         ("printf '\\177' >&2", &["control character"]),
         ("printf 'a\\302\\2332J'", &["control character"]),
         ("echo result; exit 2", &["output with code 2"]),
-        (
-            "exec dd if=/dev/zero of=/dev/null bs=400M count=1 2>&1",
-            &["memory"],
-        ),
+        ("exec dd if=/dev/zero of=/dev/null bs=400M count=1 2>&1", &["memory"]),
     ];
     check_rows(rows, |(line, expected)| {
         assert_eq!(judged(line), (expected.to_vec(), false), "{line}");

@@ -65,17 +65,13 @@ fn splice(file: &mut Vec<u8>, random: &mut Random) {
 
 /// Exchanges a number that is written in digits; false if there is none.
 pub(super) fn change_number(file: &mut Vec<u8>, random: &mut Random) -> bool {
-    let is_start = |at: &usize| {
-        file[*at].is_ascii_digit() && (*at == 0 || !file[at - 1].is_ascii_alphanumeric())
-    };
+    let is_start = |at: &usize| file[*at].is_ascii_digit() && (*at == 0 || !file[at - 1].is_ascii_alphanumeric());
     let starts: Vec<usize> = (0..file.len()).filter(is_start).collect();
     if starts.is_empty() {
         return false;
     }
     let start = *random.pick(&starts);
-    let digits = file[start..]
-        .iter()
-        .take_while(|byte| byte.is_ascii_digit());
+    let digits = file[start..].iter().take_while(|byte| byte.is_ascii_digit());
     let end = start + digits.count();
     file.splice(start..end, words::number(random).bytes());
     true

@@ -13,14 +13,7 @@ pub(super) fn mutate(file: &mut Vec<u8>, random: &mut Random) -> bool {
     let start = end.saturating_sub(length);
     match random.below(6) {
         0 => {
-            let lie: u32 = *random.pick(&[
-                0,
-                1,
-                7,
-                (length as u32).wrapping_add(1),
-                0x7FFF_FFFF,
-                u32::MAX,
-            ]);
+            let lie: u32 = *random.pick(&[0, 1, 7, (length as u32).wrapping_add(1), 0x7FFF_FFFF, u32::MAX]);
             file[end..end + 4].copy_from_slice(&lie.to_le_bytes());
         }
         // The numbers of the footer are varints: a set high bit joins two.
@@ -41,13 +34,7 @@ pub(super) fn mutate(file: &mut Vec<u8>, random: &mut Random) -> bool {
 }
 
 /// Changes one byte of a part of a file.
-fn set(
-    file: &mut [u8],
-    start: usize,
-    end: usize,
-    random: &mut Random,
-    change: impl Fn(u8, &mut Random) -> u8,
-) {
+fn set(file: &mut [u8], start: usize, end: usize, random: &mut Random, change: impl Fn(u8, &mut Random) -> u8) {
     let at = start + random.below(end.saturating_sub(start));
     if let Some(byte) = file.get_mut(at) {
         *byte = change(*byte, random);

@@ -89,25 +89,13 @@ fn change(value: &mut Value, random: &mut Random) {
             *value = Value::Array(vec![value.clone(); times.min(300_000 / size)]);
         }
         _ => {
-            *value = json!(
-                random
-                    .pick(&["a", "\u{0}", "é", "1", "\u{1b}", "[["])
-                    .repeat(20_000)
-            );
+            *value = json!(random.pick(&["a", "\u{0}", "é", "1", "\u{1b}", "[["]).repeat(20_000));
         }
     }
 }
 
 fn other_type(random: &mut Random) -> Value {
-    let all = [
-        Value::Null,
-        json!(true),
-        json!(1.5),
-        json!(""),
-        json!([]),
-        json!({}),
-        json!({"": {"": null}}),
-    ];
+    let all = [Value::Null, json!(true), json!(1.5), json!(""), json!([]), json!({}), json!({"": {"": null}})];
     random.pick(&all).clone()
 }
 

@@ -1,4 +1,5 @@
-//! Damage to files: one step at a time, each from its own number, so that a case can be made again from some of its steps.
+//! Damage to files: one step at a time, each from its own number, so that a case can be made again from some of its
+//! steps.
 
 mod bytes;
 mod footer;

@@ -58,11 +58,7 @@ fn chunks(file: &[u8]) -> Vec<Chunk> {
         let Some((checksum, after)) = after.split_first_chunk::<4>() else {
             break;
         };
-        chunks.push(Chunk {
-            length: *length,
-            body: body.to_vec(),
-            checksum: *checksum,
-        });
+        chunks.push(Chunk { length: *length, body: body.to_vec(), checksum: *checksum });
         rest = after;
     }
     chunks
@@ -84,10 +80,8 @@ fn change_header(body: &mut [u8], random: &mut Random) {
 
 /// A chunk that says something about the colours or the orientation, or that grows when it is read.
 fn further(random: &mut Random) -> Chunk {
-    let kinds: [[u8; 4]; 10] = [
-        *b"gAMA", *b"cHRM", *b"sRGB", *b"cICP", *b"tRNS", *b"PLTE", *b"sBIT", *b"tEXt", *b"acTL",
-        *b"IDAT",
-    ];
+    let kinds: [[u8; 4]; 10] =
+        [*b"gAMA", *b"cHRM", *b"sRGB", *b"cICP", *b"tRNS", *b"PLTE", *b"sBIT", *b"tEXt", *b"acTL", *b"IDAT"];
     let data: Vec<u8> = (0..random.below(40)).map(|_| random.next() as u8).collect();
     let bytes = match random.below(4) {
         0 => profile_chunk(&vec![0; 4 << 20]),

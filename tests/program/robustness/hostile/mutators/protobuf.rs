@@ -20,18 +20,7 @@ enum Value {
 }
 
 /// Integers at the ends of what a varint may be.
-const NUMBERS: [u64; 10] = [
-    0,
-    1,
-    2,
-    7,
-    255,
-    65_536,
-    0x7FFF_FFFF,
-    0xFFFF_FFFF,
-    1 << 62,
-    u64::MAX,
-];
+const NUMBERS: [u64; 10] = [0, 1, 2, 7, 255, 65_536, 0x7FFF_FFFF, 0xFFFF_FFFF, 1 << 62, u64::MAX];
 
 /// Damages one field of a message or of a message in it; false if the file is no message.
 pub(super) fn mutate(file: &mut Vec<u8>, random: &mut Random) -> bool {
@@ -63,11 +52,7 @@ fn message(mut bytes: &[u8], depth: usize) -> Option<Vec<Field>> {
                 let length = varint(&mut bytes)?;
                 let (inner, rest) = bytes.split_at_checked(usize::try_from(length).ok()?)?;
                 bytes = rest;
-                let fields = if depth < 12 {
-                    message(inner, depth + 1)
-                } else {
-                    None
-                };
+                let fields = if depth < 12 { message(inner, depth + 1) } else { None };
                 match fields {
                     Some(fields) if !fields.is_empty() => Value::Message(fields),
                     _ => Value::Bytes(inner.to_vec()),

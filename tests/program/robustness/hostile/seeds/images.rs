@@ -33,8 +33,7 @@ pub(super) fn make(bench: &Bench) {
     onnx::two_outputs().write(&folder, "models/two.onnx");
     onnx::external_gain("factor.bin").write(&folder, "models/external.onnx");
     bench.file("models/factor.bin", 0.5_f32.to_le_bytes());
-    let sidecar =
-        "output = 1\nrange_in = \"0..1\"\nrange_out = \"0..1\"\nmultiple = 8\npad = \"reflect\"\n";
+    let sidecar = "output = 1\nrange_in = \"0..1\"\nrange_out = \"0..1\"\nmultiple = 8\npad = \"reflect\"\n";
     bench.file("models/two.onnx.toml", sidecar);
     bench.complete(&words("rooms --frames 2 --size 32x32 --out frames"));
     recording(bench);
@@ -52,21 +51,9 @@ fn forms(bench: &Bench, picture: &RgbImage) {
         image.write_to(&mut file, format).unwrap();
         bench.file(&format!("photos/{name}"), file.into_inner());
     };
-    save(
-        "grey.png",
-        &DynamicImage::ImageLuma8(colour.to_luma8()),
-        ImageFormat::Png,
-    );
-    save(
-        "deep.png",
-        &DynamicImage::ImageRgb16(colour.to_rgb16()),
-        ImageFormat::Png,
-    );
-    save(
-        "alpha.png",
-        &DynamicImage::ImageRgba8(colour.to_rgba8()),
-        ImageFormat::Png,
-    );
+    save("grey.png", &DynamicImage::ImageLuma8(colour.to_luma8()), ImageFormat::Png);
+    save("deep.png", &DynamicImage::ImageRgb16(colour.to_rgb16()), ImageFormat::Png);
+    save("alpha.png", &DynamicImage::ImageRgba8(colour.to_rgba8()), ImageFormat::Png);
     save("plain.bmp", &colour, ImageFormat::Bmp);
     bench.file("photos/palette.png", palette());
     let profile = rgb_profile("Display P3", DISPLAY_P3, &srgb_curve());
@@ -74,10 +61,7 @@ fn forms(bench: &Bench, picture: &RgbImage) {
     bench.file("photos/turned.jpg", turned_jpeg(&jpeg(picture), 6));
     bench.file("photos/mirrored.webp", turned_webp(picture, 5));
     bench.file("photos/whole.webp", encoded(picture, ImageFormat::WebP));
-    bench.file(
-        "photos/page.tiff",
-        tiff(Order::Little, &[Page::rgb(picture)]),
-    );
+    bench.file("photos/page.tiff", tiff(Order::Little, &[Page::rgb(picture)]));
     let mut progressive = Vec::new();
     let mut encoder = jpeg_encoder::Encoder::new(&mut progressive, 80);
     encoder.set_progressive(true);
@@ -125,9 +109,4 @@ fn recording(bench: &Bench) {
 }
 
 /// The bias frames and the flats of a recording, by the light above black.
-const LIGHTS: [(&str, f64); 4] = [
-    ("bias", 0.0),
-    ("flat-1", 300.0),
-    ("flat-2", 1500.0),
-    ("flat-3", 6000.0),
-];
+const LIGHTS: [(&str, f64); 4] = [("bias", 0.0), ("flat-1", 300.0), ("flat-2", 1500.0), ("flat-3", 6000.0)];

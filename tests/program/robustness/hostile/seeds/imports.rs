@@ -13,10 +13,7 @@ const HEIGHT: u32 = 6;
 pub(super) fn make(bench: &Bench) {
     bench.file("drive.mcap", drive(2, Compression::Zstd));
     for (folder, version) in [("robot3", "v3.0"), ("robot2", "v2.1")] {
-        let set = Set {
-            version,
-            ..Set::default()
-        };
+        let set = Set { version, ..Set::default() };
         set.write(&bench.path(folder));
     }
     habitat(bench);
@@ -71,14 +68,8 @@ fn scannet(bench: &Bench) {
     bench.file(&at("label-filt/0.png"), deep(1191, 1));
     bench.file(&at("instance-filt/0.png"), shallow(4, 0));
     bench.file(&at("pose/0.txt"), "1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1");
-    bench.file(
-        &at("scene0000_00.txt"),
-        "axisAlignment = 1\nsceneType = Bedroom / Hotel\n",
-    );
-    bench.file(
-        &at("intrinsic/intrinsic_color.txt"),
-        "4 0 3.5 0\n0 4 2.5 0\n0 0 1 0\n0 0 0 1\n",
-    );
+    bench.file(&at("scene0000_00.txt"), "axisAlignment = 1\nsceneType = Bedroom / Hotel\n");
+    bench.file(&at("intrinsic/intrinsic_color.txt"), "4 0 3.5 0\n0 4 2.5 0\n0 0 1 0\n0 0 0 1\n");
 }
 
 fn sunrgbd(bench: &Bench) {
@@ -100,16 +91,12 @@ fn picture() -> RgbImage {
 
 /// A 16-bit map: `left` in the left half, `right` in the right.
 fn deep(left: u16, right: u16) -> Vec<u8> {
-    let map = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, _| {
-        Luma([if x < WIDTH / 2 { left } else { right }])
-    });
+    let map = ImageBuffer::from_fn(WIDTH, HEIGHT, |x, _| Luma([if x < WIDTH / 2 { left } else { right }]));
     map_file(&image::DynamicImage::ImageLuma16(map))
 }
 
 fn shallow(left: u8, right: u8) -> Vec<u8> {
-    let map = GrayImage::from_fn(WIDTH, HEIGHT, |x, _| {
-        Luma([if x < WIDTH / 2 { left } else { right }])
-    });
+    let map = GrayImage::from_fn(WIDTH, HEIGHT, |x, _| Luma([if x < WIDTH / 2 { left } else { right }]));
     map_file(&image::DynamicImage::ImageLuma8(map))
 }
 
@@ -126,8 +113,7 @@ fn metres() -> Vec<u8> {
 
 /// An array as NumPy writes it.
 fn npy(kind: &str, value: impl Fn(u32) -> [u8; 4]) -> Vec<u8> {
-    let header =
-        format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({HEIGHT}, {WIDTH}), }}\n");
+    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': ({HEIGHT}, {WIDTH}), }}\n");
     let mut file = b"\x93NUMPY\x01\x00".to_vec();
     file.extend((header.len() as u16).to_le_bytes());
     file.extend(header.bytes());

@@ -39,10 +39,7 @@ impl Seeds {
         }
         all.sort();
         let top = self.0.path("");
-        all.iter()
-            .map(|path| path.strip_prefix(&top).unwrap())
-            .map(Path::to_owned)
-            .collect()
+        all.iter().map(|path| path.strip_prefix(&top).unwrap()).map(Path::to_owned).collect()
     }
 
     pub(crate) fn bench(&self) -> &Bench {

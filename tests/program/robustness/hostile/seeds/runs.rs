@@ -12,29 +12,17 @@ use crate::support::run::{Bench, files, records, words};
 
 pub(super) fn make(bench: &Bench) {
     let set = "--data set.jsonl --levels L0,L3 --no-parquet";
-    bench.complete(&words(&format!(
-        "{set} --model random --blind-model random --out run"
-    )));
-    bench.complete(&words(&format!(
-        "{set} --model script:script.jsonl --out other"
-    )));
+    bench.complete(&words(&format!("{set} --model random --blind-model random --out run")));
+    bench.complete(&words(&format!("{set} --model script:script.jsonl --out other")));
     for part in ["1/2", "2/2"] {
-        bench.complete(&words(&format!(
-            "{set} --model random --out parts --shard {part}"
-        )));
+        bench.complete(&words(&format!("{set} --model random --out parts --shard {part}")));
     }
-    bench.complete(&words(
-        "plan --data set.jsonl --levels L0,L3 --model random --out planned",
-    ));
+    bench.complete(&words("plan --data set.jsonl --levels L0,L3 --model random --out planned"));
     bench.complete(&words(
         "--data frames --model random --levels L0,L3 --llie lift --images-cache store --no-parquet --out cached",
     ));
-    bench.complete(&words(
-        "synthesize asked --levels L3 --variant ev --out dark",
-    ));
-    bench.complete(&words(
-        "synthesize a.png --levels L3 --variant ev --out made",
-    ));
+    bench.complete(&words("synthesize asked --levels L3 --variant ev --out dark"));
+    bench.complete(&words("synthesize a.png --levels L3 --variant ev --out made"));
     bench.complete(&words("report run --out old --no-parquet"));
     fs::create_dir_all(bench.path("site")).unwrap();
     batches(bench);
@@ -46,15 +34,7 @@ pub(super) fn make(bench: &Bench) {
     });
     bench.file("answers.jsonl", answers.collect::<String>());
     walked(bench);
-    for run in [
-        "run",
-        "other",
-        "parts",
-        "cached",
-        "batched",
-        "submitted",
-        "walked",
-    ] {
+    for run in ["run", "other", "parts", "cached", "batched", "submitted", "walked"] {
         without_products(bench, run);
     }
 }
@@ -70,15 +50,18 @@ fn batches(bench: &Bench) {
         requests.extend(lines.filter(|line: &Value| line.get("custom_id").is_some()));
     }
     assert!(requests.len() > 3);
-    let output: String = requests.iter().map(|request| {
-        let body = json!({
-            "model": "m-1", "choices": [{"message": {"content": "C"}, "finish_reason": "stop"}],
-            "usage": {"prompt_tokens": 90, "completion_tokens": 1},
-        });
-        let response = json!({"status_code": 200, "request_id": "r", "body": body});
-        let line = json!({"id": "b", "custom_id": request["custom_id"], "response": response, "error": null});
-        format!("{line}\n")
-    }).collect();
+    let output: String = requests
+        .iter()
+        .map(|request| {
+            let body = json!({
+                "model": "m-1", "choices": [{"message": {"content": "C"}, "finish_reason": "stop"}],
+                "usage": {"prompt_tokens": 90, "completion_tokens": 1},
+            });
+            let response = json!({"status_code": 200, "request_id": "r", "body": body});
+            let line = json!({"id": "b", "custom_id": request["custom_id"], "response": response, "error": null});
+            format!("{line}\n")
+        })
+        .collect();
     bench.file("output.jsonl", &output);
     bench.file("reply/GET-files-id-content.jsonl", output);
 }

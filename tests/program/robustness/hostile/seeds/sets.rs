@@ -49,16 +49,14 @@ pub(super) fn make(bench: &Bench) {
         json!({"id": "b1", "frame": "b.png", "question": "Is it dark?", "choices": ["yes", "no"], "answer": "no"}),
     ];
     bench.file("paired.jsonl", lines(paired));
-    let bank = json!({"id": "lamp", "question": "Is there a lamp in it?", "choices": ["yes", "no"], "family": "presence"});
+    let bank =
+        json!({"id": "lamp", "question": "Is there a lamp in it?", "choices": ["yes", "no"], "family": "presence"});
     bench.file("bank.jsonl", lines([bank]));
     bench.file("subset.json", "[\"q1\", \"q3\"]");
 }
 
 fn lines(values: impl IntoIterator<Item = Value>) -> String {
-    values
-        .into_iter()
-        .map(|value| value.to_string() + "\n")
-        .collect()
+    values.into_iter().map(|value| value.to_string() + "\n").collect()
 }
 
 /// A file of two rows with an image in each.
@@ -69,14 +67,8 @@ fn parquet() -> Vec<u8> {
     let properties = Arc::new(WriterProperties::builder().build());
     let mut writer = SerializedFileWriter::new(&mut file, schema, properties).unwrap();
     let picture = frames::png(80);
-    let columns: [[&[u8]; 2]; 6] = [
-        [b"1", b"2"],
-        [b"Which?", b"Which one?"],
-        [&picture, &picture],
-        [b"x", b"x"],
-        [b"y", b"y"],
-        [b"A", b"B"],
-    ];
+    let columns: [[&[u8]; 2]; 6] =
+        [[b"1", b"2"], [b"Which?", b"Which one?"], [&picture, &picture], [b"x", b"x"], [b"y", b"y"], [b"A", b"B"]];
     let mut group = writer.next_row_group().unwrap();
     for values in columns {
         let values = values.map(|value| ByteArray::from(value.to_vec()));

@@ -13,14 +13,9 @@ pub(super) fn make(bench: &Bench) {
     bench.file("camera.toml", source("src/light/camera/nikon-d850.toml"));
     bench.file("prompts/choice.txt", source("prompts/choice.txt"));
     bench.file("prompts/blind.txt", source("prompts/blind.txt"));
-    bench.file(
-        "darkqa.toml",
-        "levels = \"L0,L3\"\nseed = 7\ngain = 1.5\nvariant = \"both\"\nquiet = true\nlimit = 3\n",
-    );
-    bench.file(
-        "rooms.toml",
-        "quiet = true\n\n[rooms]\nframes = 2\nsize = \"32x32\"\nseed = 9\n",
-    );
+    bench
+        .file("darkqa.toml", "levels = \"L0,L3\"\nseed = 7\ngain = 1.5\nvariant = \"both\"\nquiet = true\nlimit = 3\n");
+    bench.file("rooms.toml", "quiet = true\n\n[rooms]\nframes = 2\nsize = \"32x32\"\nseed = 9\n");
     bench.file("plain.toml", "quiet = true\ncolor = \"never\"\n");
     bench.file(
         "prices.toml",
@@ -60,7 +55,8 @@ fn chat_request() -> Value {
 
 /// Replies of an endpoint: of chats, of a Batch API, and refusals.
 fn replies(bench: &Bench) {
-    let alternatives = json!([{"token": "A", "logprob": -0.1}, {"token": "B", "logprob": -2.5}, {"token": " C", "logprob": -9.0}]);
+    let alternatives =
+        json!([{"token": "A", "logprob": -0.1}, {"token": "B", "logprob": -2.5}, {"token": " C", "logprob": -9.0}]);
     let token = json!({"token": "A", "logprob": -0.1, "top_logprobs": alternatives});
     let chat = json!({
         "id": "chatcmpl-1", "object": "chat.completion", "created": 1, "model": "mock-1", "system_fingerprint": "fp",
