@@ -1,5 +1,4 @@
-//! Thumbnails of sent images for the report: [`thumbnail`] and [`thumbnail_of_all`] make them, [`MissingThumbnails`]
-//! lists the missing ones.
+//! Thumbnails of sent images for the report: [`thumbnail`] and [`thumbnail_of_all`] make them.
 
 use std::borrow::Cow;
 use std::num::NonZeroU32;
