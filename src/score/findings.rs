@@ -151,7 +151,11 @@ impl<'a> Findings<'a> {
         let draws = Resamples::new(clusters.count());
         let mut findings = Self::for_sentences(grid, clusters, questions, observer, measured);
         let grid = &findings.grid;
-        findings.curves = grid.groups().into_iter().flat_map(|family| curves(grid, &draws, family)).collect();
+        findings.curves = grid
+            .groups()
+            .into_iter()
+            .flat_map(|family| curves(grid, &draws, family, &findings.summary.unbalanced))
+            .collect();
         findings.first_failures = first_failures(grid);
         findings.agreements = agreements(grid);
         findings.light_agreements = light_agreements(grid);

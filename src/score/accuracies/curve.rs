@@ -21,7 +21,7 @@ pub struct Curve {
     pub enhancer: Option<EnhancerName>,
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
-    /// What the floor is the accuracy of.
+    /// Source of the floor.
     pub floor: FloorKind,
     /// Threshold and area in the strict parsing, which is the main result.
     pub summary: CurveSummary,
@@ -29,7 +29,7 @@ pub struct Curve {
     pub lenient: CurveSummary,
 }
 
-/// Answers that need no image: half of the distance from them to accuracy at L0 is lost at the threshold.
+/// Source of the floor of a curve: answers without the image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FloorKind {
     /// A guess among the choices.
@@ -118,16 +118,15 @@ impl CurvePoints {
 }
 
 /// Computes all curves of a grid: each model in each variant, raw and with each enhancer. A curve needs L0 and at least
-/// one degraded level.
+/// one degraded level. `unbalanced` are the families of the grid with a common answer.
 #[must_use]
-pub fn curves(grid: &Grid<'_>, draws: &Resamples, family: Option<&Family>) -> Vec<Curve> {
-    let mut unbalanced = UnbalancedFamily::all(grid);
-    // Where one answer is true of all questions, no reply differs from it, and a threshold would not exist.
-    unbalanced.retain(|one| one.count < one.questions);
-    CurvePoints::all(grid)
-        .into_par_iter()
-        .filter_map(|points| curve(grid, draws, family, &unbalanced, points))
-        .collect()
+pub fn curves(
+    grid: &Grid<'_>,
+    draws: &Resamples,
+    family: Option<&Family>,
+    unbalanced: &[UnbalancedFamily],
+) -> Vec<Curve> {
+    CurvePoints::all(grid).into_par_iter().filter_map(|points| curve(grid, draws, family, unbalanced, points)).collect()
 }
 
 fn curve(
@@ -140,23 +139,19 @@ fn curve(
     let subjects = &points.subjects;
     let missing: Vec<Vec<u32>> = subjects.iter().map(|(_, subject)| grid.failed(*subject, family)).collect();
     let blind = grid.find_up_to_group(&ModelInCondition::new(&points.model, None));
+    let [guessing, common] =
+        [&[], unbalanced].map(|unbalanced| Floor::from_choices(grid, subjects[0].1, family, unbalanced));
     let [(strict, floor), (lenient, _)] = ParsingMode::ALL.map(|mode| {
         let counts: Vec<Vec<ClusterCount>> =
             subjects.iter().map(|(_, subject)| grid.counts(*subject, family, mode)).collect();
-        let of_choices = |unbalanced| Floor::of_choices(grid, subjects[0].1, family, unbalanced);
-        let guessing = of_choices(&[]);
         let seeing_nothing =
-            blind.and_then(|blind| Floor::of_blind(&grid.counts(blind, family, mode), &counts[0], &missing[0]));
+            blind.and_then(|blind| Floor::from_blind(&grid.counts(blind, family, mode), &counts[0], &missing[0]));
         // Only what images add can be lost in the dark; without an image the model may still be worse than a guess.
         let (floor, kind) = match seeing_nothing {
             Some(blind) if blind.total() > guessing.total() => (blind, FloorKind::Blind),
-            Some(_) => (guessing, FloorKind::Guessing),
-            // What the model knows of the answers without an image is not known, so it is assumed to know which is
-            // common.
-            None => match of_choices(unbalanced) {
-                common if common == guessing => (guessing, FloorKind::Guessing),
-                common => (common, FloorKind::CommonAnswer),
-            },
+            // Without a blind run, the model is assumed to know which answer is common.
+            None if common != guessing => (common.clone(), FloorKind::CommonAnswer),
+            _ => (guessing.clone(), FloorKind::Guessing),
         };
         let levels = LevelCounts {
             levels: subjects.iter().map(|(level, _)| *level).collect(),
@@ -180,7 +175,7 @@ fn curve(
 }
 
 /// Expected numbers of right replies at L0 without the image, by cluster.
-#[derive(Debug, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Floor {
     /// Among the replies.
     pub(crate) replies: Vec<f32>,
@@ -189,8 +184,9 @@ pub(crate) struct Floor {
 }
 
 impl Floor {
-    /// The floor of an answer without the image: the common one in these unbalanced families, a guess in others.
-    fn of_choices(grid: &Grid<'_>, clean: usize, family: Option<&Family>, unbalanced: &[UnbalancedFamily]) -> Self {
+    /// The floor of an answer without the image: the common one in these unbalanced families, a guess in others. If an
+    /// answer is true of all questions of a family, it counts as a guess, because a floor of 100 % leaves no threshold.
+    fn from_choices(grid: &Grid<'_>, clean: usize, family: Option<&Family>, unbalanced: &[UnbalancedFamily]) -> Self {
         let (mut replies, mut missing) = (vec![0.0; grid.clusters], vec![0.0; grid.clusters]);
         for (item, result) in grid.family_items(clean, family) {
             let of_result = match result {
@@ -198,7 +194,7 @@ impl Floor {
                 TrialResult::Failed => &mut missing,
                 TrialResult::Read { .. } => &mut replies,
             };
-            let common = unbalanced.iter().find(|one| one.family == *item.asked.family);
+            let common = unbalanced.iter().find(|one| one.count < one.questions && one.family == *item.asked.family);
             of_result[item.cluster as usize] += match common {
                 Some(common) => f32::from(u8::from(common.is_true_of(item))),
                 None => 1.0 / item.asked.choices.len() as f32,
@@ -209,7 +205,7 @@ impl Floor {
 
     /// The floor of a model that was asked without images, scaled to its number of replies at L0 (`clean`). `missing`
     /// is the number of missing replies at L0. `None` without a reply.
-    pub(crate) fn of_blind(blind: &[ClusterCount], clean: &[ClusterCount], missing: &[u32]) -> Option<Self> {
+    pub(crate) fn from_blind(blind: &[ClusterCount], clean: &[ClusterCount], missing: &[u32]) -> Option<Self> {
         let sum = |counts: &[ClusterCount], count: fn(&ClusterCount) -> u32| -> f64 {
             counts.iter().map(|one| f64::from(count(one))).sum()
         };

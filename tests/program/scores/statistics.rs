@@ -303,7 +303,7 @@ fn thresholds_are_recovered() {
         let clusters = clusters_of(&records);
         let trials = records.iter().cloned().collect();
         let grid = Grid::new(&trials, &clusters);
-        let made = curves(&grid, &Resamples::new(clusters.count()), None);
+        let made = curves(&grid, &Resamples::new(clusters.count()), None, &[]);
         let threshold = made[0].summary.threshold.unwrap();
         sum += threshold.value;
         let area = made[0].summary.area.unwrap();

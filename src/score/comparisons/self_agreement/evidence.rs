@@ -194,7 +194,7 @@ pub(super) fn curves(grid: &Grid<'_>, draws: &Resamples) -> Vec<EvidenceCurve> {
                     let subjects = points.subjects.iter();
                     let missing: Vec<Vec<u32>> =
                         subjects.clone().map(|(_, subject)| grid.failed(*subject, None)).collect();
-                    let floor = Floor::of_blind(&bounds.blind, &bounds.again, &missing[0])?;
+                    let floor = Floor::from_blind(&bounds.blind, &bounds.again, &missing[0])?;
                     let counts = LevelCounts {
                         levels: subjects.clone().map(|(level, _)| *level).collect(),
                         counts: subjects.map(|(_, subject)| grid.counts(*subject, None, mode)).collect(),
