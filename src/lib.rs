@@ -82,7 +82,7 @@
 //! # The map
 //!
 //! Twelve rooms, in the order of the data. A room is a folder of `src`; a folder with a `Cargo.toml` is a crate of its
-//! own, because it needs nothing of this one and then builds beside it:
+//! own, because it needs nothing of this one and then builds beside it. The main arrows; the table below has all:
 //!
 //! ```text
 //! base ─┬─ pictures ─┬─ data ──────────┐

@@ -89,8 +89,7 @@ impl<'a> ChoiceSetup<'a> {
                 .collect()
         };
         if let Some(plan) = &config.plan {
-            let images = sources.iter();
-            plan.check_images(images.filter_map(|source| Some((&source.name, source.digest()?))))?;
+            plan.check_images(sources.iter().filter_map(|source| Some((&source.name, source.digest()?))))?;
         }
         if !job.light.matches.is_empty() {
             photographs::measure(&*dataset, &mut sources)?;

@@ -1,6 +1,5 @@
 //! Text: counts with nouns, enum values as words, escaping of untrusted text, spelling suggestions and shell quoting.
 
-mod amounts;
 mod count;
 mod escape;
 #[cfg(feature = "program")]
@@ -11,8 +10,7 @@ mod shell;
 mod toml_fault;
 pub mod words;
 
-pub use amounts::{bytes, hours, money};
-pub use count::{counted, plural};
+pub use count::{bytes, counted, hours, money, plural};
 pub use escape::{escape_hidden, escape_hidden_except_styles, escape_where, excerpt, is_hidden};
 pub use shell::shell_word;
 pub use toml_fault::{TomlFault, line_at};
