@@ -135,4 +135,4 @@ fn about_answers(findings: &Findings<'_>, variant: &Variant) -> Vec<Sentence> {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

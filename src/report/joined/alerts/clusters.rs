@@ -130,31 +130,15 @@ pub(super) fn rare_loss_alert(findings: &Findings<'_>) -> Option<Alert> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{ChoiceDetail, Condition, Family, ParsedAnswer, QuestionId, Record, TrialOutcome};
+    use crate::report::sentences::tests::records::{answer, record, unanswered};
+    use crate::types::{Family, Record};
     use darkqa_score::cluster::FrameTies;
 
     /// The record of an answer to a question whose first choice is true.
-    fn record(item: usize, condition: &str, is_right: bool) -> Record {
-        let condition: Condition = condition.parse().unwrap();
-        let key = Digest::from_bytes(format!("{item} {condition}").as_bytes()).into();
-        let answer = Some(ParsedAnswer { chosen: Some(usize::from(!is_right)), why: None });
-        let detail = ChoiceDetail {
-            frame: FrameId(format!("f{:02}", item / 4)),
-            family: Family::Color,
-            choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
-            truth: Some(0),
-            repeat: 0,
-            strict: answer,
-            lenient: answer,
-            outcome: if is_right { TrialOutcome::Right } else { TrialOutcome::Wrong },
-            image: None,
-            more_images: Vec::new(),
-            shown_frame: None,
-            observed: None,
-            options: None,
-        };
-        let question = QuestionId(format!("q{item:04}"));
-        Record::blank(key, question, "model", Some(condition), detail)
+    fn answered(item: usize, condition: &str, is_right: bool) -> Record {
+        let mut detail = unanswered(format!("f{:02}", item / 4), Family::Color, &["a", "b", "c"]);
+        answer(&mut detail, usize::from(!is_right));
+        record(item, "model", Some(condition.parse().unwrap()), detail)
     }
 
     /// The alert about an enhancer that makes a share of the wrong answers right, with a number of frames.
@@ -163,9 +147,9 @@ mod tests {
         let trials = items
             .flat_map(|item| {
                 [
-                    record(item, "L0", true),
-                    record(item, "L3-ev", item % 4 == 0),
-                    record(item, "L3-ev+lift", item % 4 == 0 || better),
+                    answered(item, "L0", true),
+                    answered(item, "L3-ev", item % 4 == 0),
+                    answered(item, "L3-ev+lift", item % 4 == 0 || better),
                 ]
             })
             .collect();

@@ -3,10 +3,10 @@
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 
-use super::records::{record, unanswered};
+use super::records::{answer, record, unanswered};
 use super::simulation::{percent, runs};
 use crate::report::sentences::sentences;
-use crate::types::{Condition, Family, ParsedAnswer, Record, TrialOutcome};
+use crate::types::{Condition, Family, Record};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 
@@ -46,10 +46,8 @@ impl Design {
                 };
                 let frame = format!("f{:02}", item / QUESTIONS);
                 let mut detail = unanswered(frame, Family::RoomType, &ROOMS);
-                let parsed = Some(ParsedAnswer { chosen: Some(chosen), why: None });
-                (detail.strict, detail.lenient) = (parsed, parsed);
                 detail.truth = Some(*truth);
-                detail.outcome = if chosen == *truth { TrialOutcome::Right } else { TrialOutcome::Wrong };
+                answer(&mut detail, chosen);
                 records.push(record(item, "m", condition.clone(), detail));
             }
         }

@@ -3,10 +3,10 @@
 use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 
-use super::records::{record, unanswered};
+use super::records::{answer, record, unanswered};
 use super::simulation::{percent, runs};
 use crate::report::sentences::{Tone, sentences};
-use crate::types::{Condition, Family, ParsedAnswer, Record, TrialOutcome};
+use crate::types::{Condition, Family, Record, TrialOutcome};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::findings::Findings;
@@ -67,10 +67,7 @@ impl Design {
                 if random.random_bool(share_of_outcome.min(1.0)) {
                     detail.outcome = TrialOutcome::Failed;
                 } else {
-                    let chosen = usize::from(!is_right) * random.random_range(1..4);
-                    let parsed = Some(ParsedAnswer { chosen: Some(chosen), why: None });
-                    (detail.strict, detail.lenient) = (parsed, parsed);
-                    detail.outcome = if is_right { TrialOutcome::Right } else { TrialOutcome::Wrong };
+                    answer(&mut detail, usize::from(!is_right) * random.random_range(1..4));
                 }
                 records.push(record(item, "m", condition.clone(), detail));
             }

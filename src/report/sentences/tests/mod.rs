@@ -8,7 +8,7 @@ mod habit;
 mod hallucination;
 mod missing;
 mod real;
-mod records;
+pub(crate) mod records;
 mod simulation;
 
 use super::sentence::{Sentence, level_runs};

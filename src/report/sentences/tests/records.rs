@@ -20,17 +20,9 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
         let condition: Option<Condition> = (*name != "blind").then(|| name.parse().unwrap());
         for item in 0..2 * frames {
             let wrong = usize::from(((item / 2 % 2) as f64) >= 2.0 * share);
-            let reading = Some(ParsedAnswer { chosen: Some(wrong), why: None });
-            let detail = ChoiceDetail {
-                strict: reading,
-                lenient: reading,
-                outcome: if wrong == 0 { TrialOutcome::Right } else { TrialOutcome::Wrong },
-                ..unanswered(
-                    format!("f{:02}", item / 2),
-                    [Family::Color, Family::RoomType][item % 2].clone(),
-                    &["a", "b", "c"],
-                )
-            };
+            let family = [Family::Color, Family::RoomType][item % 2].clone();
+            let mut detail = unanswered(format!("f{:02}", item / 2), family, &["a", "b", "c"]);
+            answer(&mut detail, wrong);
             records.push(record(item, model, condition.clone(), detail));
         }
     }
@@ -38,14 +30,14 @@ fn asked(model: &str, frames: usize, conditions: &[(&str, f64)]) -> Vec<Record> 
 }
 
 /// The record of a model about an item in a condition, or without an image.
-pub(super) fn record(item: usize, model: &str, condition: Option<Condition>, detail: ChoiceDetail) -> Record {
+pub(crate) fn record(item: usize, model: &str, condition: Option<Condition>, detail: ChoiceDetail) -> Record {
     let name = condition.as_ref().map_or_else(String::new, ToString::to_string);
     let key = Digest::from_bytes(format!("{item} {model} {name}").as_bytes()).into();
     Record::blank(key, QuestionId(format!("q{item:04}")), model, condition, detail)
 }
 
 /// A question about a frame whose first choice is true, without an answer.
-pub(super) fn unanswered(frame: String, family: Family, choices: &[&str]) -> ChoiceDetail {
+pub(crate) fn unanswered(frame: String, family: Family, choices: &[&str]) -> ChoiceDetail {
     ChoiceDetail {
         frame: FrameId(frame),
         family,
@@ -61,6 +53,13 @@ pub(super) fn unanswered(frame: String, family: Family, choices: &[&str]) -> Cho
         observed: None,
         options: None,
     }
+}
+
+/// Answers a question with a choice, in both parsings.
+pub(crate) fn answer(detail: &mut ChoiceDetail, chosen: usize) {
+    let parsed = Some(ParsedAnswer { chosen: Some(chosen), why: None });
+    (detail.strict, detail.lenient) = (parsed, parsed);
+    detail.outcome = if detail.truth == Some(chosen) { TrialOutcome::Right } else { TrialOutcome::Wrong };
 }
 
 /// All sentences about records.

@@ -6,11 +6,9 @@ use rand::rngs::StdRng;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution, StandardNormal};
 
-use super::records::{record, unanswered};
+use super::records::{answer, record, unanswered};
 use crate::report::sentences::{Sentence, Tone, sentences};
-use crate::types::{
-    ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, ParsedAnswer, QuestionId, Record, TrialOutcome,
-};
+use crate::types::{ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, QuestionId, Record};
 use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::comparisons::{PooledKind, baseline_rows};
@@ -131,9 +129,7 @@ pub(super) fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
     let is_right = drawn < p;
     let chosen = if is_right { 0 } else { 1 + ((drawn - p) / (1.0 - p) * (choices - 1) as f64) as usize };
     let chosen = chosen.min(choices - 1);
-    let reading = Some(ParsedAnswer { chosen: Some(chosen), why: None });
-    (detail.strict, detail.lenient) = (reading, reading);
-    detail.outcome = if is_right { TrialOutcome::Right } else { TrialOutcome::Wrong };
+    answer(detail, chosen);
     // A model with less than half of the probability could have chosen another answer.
     let confidence = p.clamp(0.51, 0.99);
     let rest = (1.0 - confidence) / (choices - 1) as f64;
