@@ -9,8 +9,8 @@ pub mod ask {
 }
 
 pub mod dataset {
-    pub use crate::data::picture::Picture;
-    pub use crate::data::{DataPlace, Dataset, SetArgs};
+    pub use crate::data::maps::Picture;
+    pub use crate::data::{DataPlace, Dataset, SetArgs, open_frames};
 }
 
 pub mod report {

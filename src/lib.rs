@@ -154,7 +154,7 @@
 
 mod ask;
 mod commands;
-mod data;
+pub(crate) mod data;
 mod engine;
 #[doc(hidden)]
 pub mod internals;

@@ -9,42 +9,43 @@
 
 pub(crate) mod batch;
 pub(crate) mod batch_api;
-mod batch_interface;
+pub(crate) mod bounded_json;
 mod costs;
 mod endpoints;
 mod failures;
 mod models;
 mod pace;
 pub(crate) mod prompts;
-mod replies;
 mod requests;
 mod secrets;
-mod vendors;
+pub(crate) mod vendors;
 mod wire;
 mod wire_kind;
 
-pub(crate) use batch_interface::BatchInterface;
+#[cfg(test)]
+pub(crate) use pace::PaceCause;
+
+pub(crate) use batch::BatchInterface;
 pub(crate) use costs::{
     ChargeRatios, ImageTokenCheck, Price, PricedRequest, Prices, ReplyExcess, Reservation, Spending, TokenBound,
     Unpriced, scaling_image_tokens, stated_charge,
 };
-pub use endpoints::{Access, BaseUrl, Endpoint, Sending};
 pub(crate) use endpoints::{AccessArgs, OPENAI_KEY, Server, sleep_running, vendor_variables};
 pub(crate) use failures::QuotaRefusal;
-pub use failures::{AskError, Reach};
 pub(crate) use models::{Local, LocalAnswer};
-pub use models::{Model, Random, Remote, Script};
-#[cfg(test)]
-pub(crate) use pace::PaceCause;
-pub use pace::Quota;
 pub(crate) use pace::{ConcurrencyBounds, HeldBack};
+pub(crate) use requests::{ChangedSetting, ImageLimit, ImagePlaces, RequestArgs, by_flag};
+pub(crate) use secrets::{KeyHeader, is_secret_header, is_secret_value, looks_like_key};
+pub(crate) use wire::is_context_full;
+
+pub use endpoints::{Access, BaseUrl, Endpoint, Sending};
+pub use failures::{AskError, Reach};
+pub use models::{Model, Random, Remote, Script};
+pub use pace::Quota;
 pub use prompts::Prompts;
 pub use requests::{
     Call, Constrain, ExtraFields, ImageDetail, Message, Parameters, Query, SettingsOrigin, Temperature, Thinking,
     TokenField,
 };
-pub(crate) use requests::{ChangedSetting, ImageLimit, ImagePlaces, RequestArgs, by_flag};
 pub use secrets::Secret;
-pub(crate) use secrets::{KeyHeader, is_secret_header, is_secret_value, looks_like_key};
-pub(crate) use wire::is_context_full;
 pub use wire_kind::WireSetting;

@@ -1,14 +1,11 @@
 //! `import`: writes the frames of another data set in the common interface.
 
-mod camera_facts;
 mod conversion;
 mod frame_writer;
 mod lerobot;
 mod lerobot_frames;
 mod mcap_files;
-mod message_times;
 mod recording;
-mod topic_list;
 mod video;
 
 use std::collections::BTreeMap;
@@ -29,9 +26,8 @@ use crate::engine::images::frames::InputTally;
 use crate::engine::images::progress::Progress;
 use crate::engine::images::workers::{ThreadArgs, pool};
 use crate::error::{Error, Result};
-use crate::files::reading::open;
-use crate::pictures::ImageFile;
-use crate::pictures::png;
+use crate::files::open;
+use crate::pictures::{ImageFile, png};
 use crate::report::text::words::first_names;
 use crate::runs::Outcome;
 use crate::types::manifests::Status;

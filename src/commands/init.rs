@@ -6,13 +6,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use crate::data::{DataPlace, Dataset, SceneArgs, SelectionArgs, SetArgs};
+use crate::data::{DataPlace, SceneArgs, SelectionArgs, SetArgs, open_images};
 use crate::engine::images::progress::Progress;
-use crate::engine::images::trials::questions::open_data;
+use crate::engine::images::trials::open_data;
 use crate::error::{Error, Result};
-use crate::files::{reading, write};
-use crate::pictures::DecodeRule;
-use crate::pictures::png;
+use crate::files::{self, write};
+use crate::pictures::{DecodeRule, png};
 use crate::runs::Outcome;
 use crate::types::manifests::Status;
 use crate::types::questions::letter;
@@ -33,12 +32,16 @@ pub(crate) struct InitArgs {
 
 /// The built-in rooms whose images are written.
 const ROOMS: &str = "frames=3,seed=20,size=480x360";
+
 /// Number of questions about each image.
 const QUESTIONS_PER_IMAGE: usize = 2;
+
 /// Number of images.
 const IMAGES: usize = 3;
+
 /// File names of the images of rooms.
 const ROOM_FILES: [&str; IMAGES] = ["room1.png", "room2.png", "room3.png"];
+
 /// Number of choice columns.
 const CHOICE_COLUMNS: usize = 4;
 
@@ -149,7 +152,7 @@ fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
 /// Copies images of a folder, and returns rows with questions about their colours and shape, which can be asked about
 /// any image.
 fn image_rows(frames: &Path, folder: &Path) -> Result<Vec<Row>> {
-    let dataset = Dataset::from_images(frames, &[])?;
+    let dataset = open_images(frames, &[])?;
     let copies: Vec<(&FrameId, &Path, PathBuf)> = dataset
         .frames()
         .take(IMAGES)
@@ -170,7 +173,7 @@ fn image_rows(frames: &Path, folder: &Path) -> Result<Vec<Row>> {
         let image = copy.file_name().unwrap_or_default().to_string_lossy();
         let picture = dataset.picture(frame)?.decode()?;
         if !copy.exists() {
-            write(&copy, &reading::bytes(path)?)?;
+            write(&copy, &files::bytes(path)?)?;
         }
         let has_colours = picture
             .samples()

@@ -5,16 +5,13 @@ use std::path::PathBuf;
 use clap::Args;
 
 use crate::error::{Error, Result};
-use crate::files::folder_access::FolderAccess;
-use crate::report::joined::{choice, open};
-use crate::runs::Outcome;
-use crate::runs::ShowArgs;
-use crate::runs::StdoutFormat;
+use crate::files::FolderAccess;
+use crate::report::joined::{open, whole};
 use crate::runs::missing_thumbnails::MissingThumbnails;
-use crate::runs::record_table;
 use crate::runs::shard_records::append_records;
 use crate::runs::sharded_run::{MissingShards, ShardedRun, common_kind, run_folders_in};
 use crate::runs::stored::{ExperimentKind, StoredRun};
+use crate::runs::{Outcome, ShowArgs, StdoutFormat, record_table};
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
 use darkqa_score::answers::record::Detail;
@@ -49,7 +46,7 @@ pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     let folders = run_folders(&args.runs)?;
     match common_kind(&folders)? {
         ExperimentKind::Open => merge_all::<OpenDetail>(args, &folders, open::write),
-        ExperimentKind::Choice => merge_all::<ChoiceDetail>(args, &folders, choice::write),
+        ExperimentKind::Choice => merge_all::<ChoiceDetail>(args, &folders, whole::write),
     }
 }
 

@@ -11,7 +11,6 @@ use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::files;
-use crate::files::reading;
 use crate::report::joined;
 use crate::report::site::{DATA, PAGES, SCHEMA, products};
 use crate::runs::Outcome;
@@ -80,7 +79,7 @@ fn check_target(out: &Path) -> Result<()> {
     if is_empty {
         return Ok(());
     }
-    let is_site = reading::read(&out.join(DATA))
+    let is_site = files::read(&out.join(DATA))
         .ok()
         .and_then(|text| serde_json::from_slice::<Value>(&text).ok())
         .is_some_and(|data| data.get("schema").and_then(Value::as_str) == Some(SCHEMA));

@@ -3,6 +3,8 @@
 //!
 //! Each line is `{"id", "question", "choices", "family"}`; `family` is optional. A line has no image, because its
 //! question is asked about all images, and no answer, so replies are never scored as right or wrong.
+//!
+//! Families of questions in files: [`unnamed`], [`check_family`].
 
 use std::collections::HashMap;
 use std::convert::Infallible;
@@ -14,10 +16,9 @@ use std::str::FromStr;
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-use super::family::{check_family, unnamed};
 use super::ready_made::one_line;
 use crate::error::{Error, Result};
-use crate::files::reading::text;
+use crate::files::text;
 use crate::types::questions::{BANK_ID, CANNOT_TELL};
 use crate::types::text::excerpt;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
@@ -236,6 +237,25 @@ fn parse_line(line: &str, opt_out: OptOut, path: &Path, number: usize) -> Result
         choices: Choices::without_truth(line.choices).map_err(at)?,
         family: check_family(line.family).map_err(at)?,
     })
+}
+
+/// Family of a question that names none.
+pub(super) fn unnamed() -> Family {
+    Family::Other("other".to_owned())
+}
+
+/// Returns the family unchanged.
+///
+/// # Errors
+/// If its name is the one that tables use for the total over all families.
+pub(super) fn check_family(family: Family) -> Result<Family> {
+    if family.name().trim() == Family::TOTAL {
+        return Err(Error::data(
+            "family",
+            format_args!("the family {:?} is the name of the total over all families; rename it", Family::TOTAL),
+        ));
+    }
+    Ok(family)
 }
 
 #[cfg(test)]

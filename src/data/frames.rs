@@ -15,6 +15,8 @@
 //!
 //! Without `frames.jsonl`, every PNG, JPEG, WebP, TIFF and BMP file in the folder is a frame, named by its file name.
 //! The questions are in `questions.jsonl` in the same folder.
+//!
+//! Image files among the paths of a folder: [`ImagePaths`].
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -24,27 +26,33 @@ use std::sync::Arc;
 use serde::Deserialize;
 
 use super::dark_photos::DarkField;
-use super::frame_facts::FrameFacts;
-use super::image_paths::{ImagePaths, is_image};
-use super::image_source::FrameFile;
-use super::maps::{DepthFile, MapPaths};
-use super::{Dataset, ImageSource, Root, SetArgs, SkipBad, ready_made, stem};
+use super::dataset::{Dataset, stem};
+use super::maps::{DepthFile, FrameFacts, MapPaths};
+use super::openeqa::{FrameFile, ImageSource};
+use super::ready_made::{self, SetArgs, SkipBad};
+use super::root::Root;
 use crate::error::{Error, Result};
-use crate::files::reading::{entries, json, json_lines};
+use crate::files::{entries, json, json_lines};
 use crate::labels;
 use crate::pictures::image_file::format::SUPPORTED_FORMATS;
+use crate::types::images::is_image_ending;
 use crate::types::{DepthKind, FrameId, Intrinsics, Labels, SegmentName, Segmentation, SetLight};
 
 /// File that lists the frames.
 pub(super) const FRAMES: &str = "frames.jsonl";
+
 /// File of the questions about the frames.
 pub(super) const QUESTIONS: &str = "questions.jsonl";
+
 /// File with the class of each number in the semantic maps.
 const CLASSES: &str = "classes.json";
+
 /// File with the name of the data set, its light and the kind of its depth.
 const DATASET: &str = "dataset.json";
+
 /// Value of `schema` in `dataset.json`.
 const SCHEMA: &str = "darkqa.dataset/1";
+
 /// File with the names of the segments of a scene.
 const SEGMENTS: &str = "segments.json";
 
@@ -147,7 +155,30 @@ impl FrameLine {
     }
 }
 
-/// Opens a folder of frames with the labels of its maps, without questions.
+/// Opens an image file or a folder of frames, without questions. Paths may also lead into the folders in `further`.
+/// No image is read.
+pub(crate) fn open_images(path: &Path, further: &[PathBuf]) -> Result<Dataset> {
+    let sources = if path.is_dir() {
+        let sources = sources(path, further, MissingFiles::Refuse)?;
+        if !path.join(FRAMES).exists() {
+            warn_of_subfolders(path, further)?;
+        }
+        sources
+    } else {
+        image(path)?
+    };
+    Ok(Dataset::new(stem(path), sources, Vec::new()))
+}
+
+/// Opens a folder of frames with the labels of its maps, without questions. No image is read.
+pub fn open_frames(folder: &Path, further: &[PathBuf]) -> Result<Dataset> {
+    if !folder.is_dir() {
+        return Err(Error::usage("DATA", format_args!("{}: no such folder of frames", folder.display())));
+    }
+    frames(folder, further, MissingFiles::Refuse)
+}
+
+/// Opens a folder of frames with the labels of its maps, without questions; what is missing is refused or left out.
 pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) -> Result<Dataset> {
     let root = Root::new(folder, further)?;
     let info = data_set_info(&root)?;
@@ -155,7 +186,7 @@ pub(super) fn frames(folder: &Path, further: &[PathBuf], missing: MissingFiles) 
     let title = info.name.unwrap_or_default();
     let name = if title.is_empty() { stem(folder) } else { title.clone() };
     let dataset = Dataset::new(name, sources(folder, further, missing)?, Vec::new());
-    Ok(Dataset { title, labels, ..dataset })
+    Ok(dataset.with_title_and_labels(title, labels))
 }
 
 /// Labels of the semantic maps of a folder; `None` without a `classes.json`.
@@ -325,7 +356,7 @@ fn images(root: &Root) -> Result<BTreeMap<FrameId, ImageSource>> {
 
 /// Warns if a folder in this one has images: they are not read. Links out of the folder and hidden folders are left
 /// out.
-pub(super) fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<()> {
+fn warn_of_subfolders(folder: &Path, further: &[PathBuf]) -> Result<()> {
     let root = Root::new(folder, further)?;
     let inner: Vec<PathBuf> = root
         .entries(folder, &mut Vec::new())?
@@ -364,8 +395,65 @@ fn has_images(folder: &Path) -> bool {
     entries(folder).is_ok_and(|inner| inner.iter().any(|path| is_image(path)))
 }
 
+/// Extensions of image formats that are not supported.
+const UNSUPPORTED: [&str; 28] = [
+    "heic", "heif", "hif", "avif", "gif", "jxl", "jp2", "j2k", "jpf", "psd", "tga", "ico", "ppm", "pgm", "pnm", "pfm",
+    "hdr", "dng", "cr2", "cr3", "nef", "arw", "orf", "raf", "rw2", "pef", "srw", "svg",
+];
+
+/// Image files in supported and in unsupported formats.
+pub(crate) struct ImagePaths {
+    pub(super) images: Vec<PathBuf>,
+    unsupported: Vec<PathBuf>,
+}
+
+impl ImagePaths {
+    /// Sorts paths by their extensions. Folders and other files are left out.
+    pub(crate) fn from_paths(paths: impl IntoIterator<Item = PathBuf>) -> Self {
+        let (mut images, mut unsupported) = (Vec::new(), Vec::new());
+        for path in paths {
+            if is_image(&path) {
+                images.push(path);
+            } else if is_file_with_extension(&path, |extension| UNSUPPORTED.contains(&&*extension.to_ascii_lowercase()))
+            {
+                unsupported.push(path);
+            }
+        }
+        Self { images, unsupported }
+    }
+
+    /// Message with the number of unsupported images and the name of the first; `None` if all are supported.
+    pub(super) fn unsupported_note(&self) -> Option<String> {
+        let first = self.unsupported.first()?;
+        let count = match self.unsupported.len() {
+            1 => "1 file looks like an image and is not read".to_owned(),
+            n => format!("{n} files look like images and are not read"),
+        };
+        let name = first.file_name().unwrap_or_default().to_string_lossy();
+        Some(format!("{count}, as {name}; {SUPPORTED_FORMATS} expected, so convert them first"))
+    }
+
+    /// Warns if the folder has images in unsupported formats.
+    pub(crate) fn warn_of_unsupported(&self, folder: &Path) {
+        if let Some(note) = self.unsupported_note() {
+            tracing::warn!("{}: {note}", folder.display());
+        }
+    }
+}
+
+/// True if the path is a file with the extension of a supported image format.
+pub(crate) fn is_image(path: &Path) -> bool {
+    is_file_with_extension(path, is_image_ending)
+}
+
+fn is_file_with_extension(path: &Path, is_wanted: impl Fn(&str) -> bool) -> bool {
+    path.extension().and_then(|extension| extension.to_str()).is_some_and(is_wanted) && path.is_file()
+}
+
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use image::{GrayImage, ImageBuffer, Luma, RgbImage};
     use ndarray::array;
 
@@ -395,7 +483,7 @@ mod tests {
             let question = format!(r#"{{"id":1,"frame":"a/0","question":"?","choices":["x","y"],"answer":{answer}}}"#);
             fs::write(folder.path().join(QUESTIONS), question).unwrap();
             let dataset = open(folder.path(), None, &SetArgs::default()).unwrap();
-            let summary = dataset.summary.join("\n");
+            let summary = dataset.summary().join("\n");
             match format {
                 None => assert_eq!(summary, ""),
                 Some(format) => assert!(summary.contains(format), "{summary}"),
@@ -491,5 +579,25 @@ mod tests {
         fs::write(folder.path().join(FRAMES), "\n{\n").unwrap();
         let error = open(folder.path(), None, &SetArgs::default()).unwrap_err().to_string();
         assert!(error.ends_with("frames.jsonl, line 2: EOF while parsing an object"), "{error}");
+    }
+
+    #[test]
+    fn files_are_sorted_by_extension() {
+        let folder = tempfile::tempdir().unwrap();
+        let names = ["a.PNG", "b.webp", "c.tiff", "d.HEIC", "e.avif", "f.txt", "g"];
+        let paths = names.map(|name| folder.path().join(name));
+        for path in &paths {
+            fs::write(path, "").unwrap();
+        }
+        let inner = folder.path().join("inner.png");
+        fs::create_dir(&inner).unwrap();
+        let found = ImagePaths::from_paths(paths.into_iter().chain([inner]));
+        let images: Vec<_> = found.images.iter().map(|path| path.file_name().unwrap()).collect();
+        assert_eq!(images, ["a.PNG", "b.webp", "c.tiff"]);
+        assert_eq!(
+            found.unsupported_note().unwrap(),
+            "2 files look like images and are not read, as d.HEIC; PNG, JPEG, WebP, TIFF, BMP or OpenEXR expected, so convert them first"
+        );
+        assert_eq!(ImagePaths::from_paths([folder.path().join("f.txt")]).unsupported_note(), None);
     }
 }

@@ -3,8 +3,11 @@
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
 
-use super::{Dataset, DecodeRule, Picture};
+use super::dataset::Dataset;
+use super::frames::open_images;
+use super::maps::Picture;
 use crate::error::{Error, Result};
+use crate::pictures::DecodeRule;
 use crate::types::FrameId;
 
 /// Frames of all input files and folders.
@@ -28,10 +31,8 @@ impl Inputs {
     /// # Errors
     /// If an input is missing, two frames would have the same output name, or a name leads outside the output folder.
     pub(crate) fn open(inputs: &[PathBuf], further: &[PathBuf], rule: DecodeRule) -> Result<Self> {
-        let sets: Vec<Dataset> = inputs
-            .iter()
-            .map(|path| Ok(Dataset::from_images(path, further)?.with_rule(rule)))
-            .collect::<Result<_>>()?;
+        let sets: Vec<Dataset> =
+            inputs.iter().map(|path| Ok(open_images(path, further)?.with_rule(rule))).collect::<Result<_>>()?;
         let mut entries = Vec::new();
         let mut used_names: BTreeMap<String, String> = BTreeMap::new();
         for (set, (dataset, input)) in sets.iter().zip(inputs).enumerate() {

@@ -2,19 +2,30 @@
 //!
 //! A map has one number for each pixel of its image. A map of another size is refused instead of scaled, because ids
 //! cannot be interpolated.
+//!
+//! Metadata of a frame ([`FrameFacts`]), and its files before decoding ([`FrameFiles`]).
+//!
+//! Image of a frame before decoding: [`Picture`].
 
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use ndarray::Array2;
+use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
-use crate::files::reading;
-use crate::pictures::ImageFile;
+use crate::files;
 use crate::pictures::decode_rule::MAX_PIXELS;
 use crate::pictures::image_file::StatedOrientation;
 use crate::pictures::npy::Npy;
 use crate::pictures::raw_png::{RawPng, SampleForm};
-use crate::types::Digest;
+use crate::pictures::{DecodeRule, ImageFile};
+use crate::rooms::Room;
+use crate::types::{DepthKind, Digest, Frame, FrameId, InputNote, Intrinsics, Pixels, Rgb, SegmentName, Segmentation};
 
 /// Maximum depth of a pixel, in millimetres: a kilometre, deeper than any room (chosen). A larger value means a wrong
 /// unit, such as millimetres read as metres.
@@ -127,7 +138,7 @@ impl MapPaths {
             .into_iter()
             .flatten()
             .map(|path| {
-                let bytes = reading::bytes(path)?;
+                let bytes = files::bytes(path)?;
                 let size = if is_npy(path) {
                     Npy::parse(&bytes).map(|npy| npy.size)
                 } else {
@@ -181,7 +192,7 @@ impl MapPaths {
 }
 
 fn optional_bytes(path: Option<&Path>) -> Result<Option<Vec<u8>>> {
-    path.map(reading::bytes).transpose()
+    path.map(files::bytes).transpose()
 }
 
 /// Bytes of a frame's map files.
@@ -316,5 +327,145 @@ fn collect_grid<T>(size: Size, values: impl Iterator<Item = Result<T, String>>) 
     Array2::from_shape_vec(size, values).map_err(|e| e.to_string())
 }
 
-#[cfg(test)]
-mod tests;
+/// Metadata of a frame: scene, camera, names of segments, room.
+#[derive(Debug, Clone, Default, Serialize)]
+pub(crate) struct FrameFacts {
+    pub(crate) scene: String,
+    pub(crate) depth_kind: DepthKind,
+    pub(crate) intrinsics: Option<Intrinsics>,
+    pub(crate) segmentation: Segmentation,
+    #[serde(serialize_with = "serialize_as_pairs")]
+    pub(crate) names: Arc<BTreeMap<u32, SegmentName>>,
+    pub(crate) room: Option<String>,
+}
+
+/// Serializes a map as a list of pairs, because keys of a JSON object must be strings.
+fn serialize_as_pairs<S: Serializer>(
+    names: &BTreeMap<u32, SegmentName>,
+    serializer: S,
+) -> std::result::Result<S::Ok, S::Error> {
+    serializer.collect_seq(names)
+}
+
+/// Files of a frame, not decoded.
+#[derive(Debug)]
+pub struct FrameFiles<'a> {
+    pub(crate) id: &'a FrameId,
+    pub(crate) picture: Picture,
+    pub(crate) maps: MapFiles<'a>,
+    pub(crate) facts: &'a FrameFacts,
+}
+
+impl FrameFiles<'_> {
+    /// Digest of all files and metadata, without the name of the frame.
+    ///
+    /// # Errors
+    /// If a number of the camera intrinsics is not finite.
+    pub fn digest(&self) -> Result<Digest> {
+        let parts = [self.picture.digest(), self.maps.digest(), Digest::canonical("darkqa.view/1", self.facts)?];
+        Ok(Digest::from_parts(parts.iter().map(|part| &part.as_bytes()[..])))
+    }
+
+    /// Changes made to the samples while decoding, such as color conversion.
+    #[must_use]
+    pub fn note(&self) -> InputNote {
+        self.picture.note()
+    }
+
+    /// Decodes the image and the maps.
+    ///
+    /// # Errors
+    /// If an image or a map is broken, or a map has another size than the image; the error names the file.
+    pub fn decode(&self) -> Result<Frame> {
+        if let Picture::Drawn(room, _) = &self.picture {
+            return room.frame_with(self.picture.decode()?);
+        }
+        let rgb = self.picture.decode()?;
+        let size = (rgb.height(), rgb.width());
+        Ok(Frame {
+            id: self.id.clone(),
+            scene: self.facts.scene.clone(),
+            depth: self.maps.depth(size)?,
+            depth_kind: self.facts.depth_kind,
+            intrinsics: self.facts.intrinsics,
+            semantic: self.maps.semantic(size)?,
+            segments: self.maps.segments(size)?,
+            segmentation: self.facts.segmentation,
+            names: Arc::clone(&self.facts.names),
+            room: self.facts.room.clone(),
+            rgb,
+        })
+    }
+}
+
+/// Image that is not decoded yet: a file, or a built-in room.
+#[derive(Debug)]
+pub enum Picture {
+    /// Bytes of an image file.
+    Encoded(ImageFile),
+    /// A built-in room, drawn on demand, and the rule that scales its light.
+    Drawn(Room, DecodeRule),
+}
+
+impl Picture {
+    /// Digest of everything that decides the pixels: the file and its decoding rule, or the settings of a room.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        match self {
+            Self::Encoded(file) => file.digest(),
+            Self::Drawn(room, _) => match self.note().exposure_ev {
+                None => room.digest(),
+                Some(ev) => Digest::from_parts([
+                    &b"darkqa.reading/1"[..],
+                    room.digest().as_bytes(),
+                    format!("exposure {ev}").as_bytes(),
+                ]),
+            },
+        }
+    }
+
+    /// Changes made to the samples while decoding, such as color conversion.
+    #[must_use]
+    pub fn note(&self) -> InputNote {
+        match self {
+            Self::Encoded(file) => file.note(),
+            Self::Drawn(room, rule) => rule.input_note(room.is_light()),
+        }
+    }
+
+    /// Checks that the image can be decoded, and returns its width and height in pixels.
+    ///
+    /// # Errors
+    /// If it cannot be decoded; the error names the file.
+    pub fn check(&self) -> Result<(u32, u32)> {
+        match self {
+            Self::Encoded(file) => file.check(),
+            Self::Drawn(room, _) => Ok(room.size().map(|side| side as u32).into()),
+        }
+    }
+
+    /// Decodes the pixels at their full bit depth.
+    ///
+    /// # Errors
+    /// If the file is broken or not supported; the error names the file.
+    pub fn pixels(&self) -> Result<Pixels> {
+        match self {
+            Self::Encoded(file) => file.pixels(),
+            Self::Drawn(room, rule) => Ok(match room.pixels() {
+                Pixels::Light(light) => Pixels::Light(rule.scale_exposure(light)),
+                codes => codes,
+            }),
+        }
+    }
+
+    /// Decodes the clean image as 8-bit sRGB.
+    ///
+    /// # Errors
+    /// If the file is broken or not supported; the error names the file.
+    pub fn decode(&self) -> Result<Rgb> {
+        match self {
+            Self::Encoded(file) => file.decode(),
+            Self::Drawn(..) => Ok(Rgb::clone(&self.pixels()?.codes())),
+        }
+    }
+}

@@ -1,16 +1,22 @@
 //! Episodic-memory questions of OpenEQA and the frames of their walks: [`OpenQuestion`], [`read_questions`],
 //! [`walk_frames`] and [`sample_indices`]. Follows `facebookresearch/open-eqa` at cfa3fce.
+//!
+//! Location of an image: [`ImageSource`].
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Deserialize;
 
-use crate::error::{Error, Result};
-use crate::files::reading::bytes;
-use crate::types::QuestionId;
-
 use super::Root;
+use super::dark_photos::DarkPhoto;
+use super::maps::{FrameFacts, MapPaths};
+use super::ready_made::{Archive, EmbeddedImage};
+use crate::error::{Error, Result};
+use crate::files::bytes;
+use crate::rooms;
+use crate::types::QuestionId;
 
 /// Open question about a walk through a building.
 #[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
@@ -100,6 +106,40 @@ pub(crate) fn sample_indices(n: usize, k: usize) -> Vec<usize> {
             position.round_ties_even() as usize
         })
         .collect()
+}
+
+/// Location of one image and its maps.
+#[derive(Debug, Clone)]
+pub(crate) enum ImageSource {
+    /// An image file.
+    File(Box<FrameFile>),
+    /// An image in a ZIP file, under the name of the frame.
+    Member(Arc<Archive>),
+    /// An image inside a table.
+    Embedded(EmbeddedImage),
+    /// A frame of the built-in rooms.
+    Room(rooms::Room),
+}
+
+/// Image file of a frame, with its maps, metadata and photographs of its scene in the dark.
+#[derive(Debug, Clone)]
+pub(crate) struct FrameFile {
+    pub(crate) rgb: PathBuf,
+    pub(crate) maps: MapPaths,
+    pub(crate) facts: FrameFacts,
+    pub(crate) dark: Vec<DarkPhoto>,
+}
+
+impl ImageSource {
+    /// An image file without maps.
+    pub(super) fn image(rgb: PathBuf) -> Self {
+        Self::File(Box::new(FrameFile {
+            rgb,
+            maps: MapPaths::default(),
+            facts: FrameFacts::default(),
+            dark: Vec::new(),
+        }))
+    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,18 @@
 //! Image pairs of the same scene in normal and in low light: [`Pairs`].
+//!
+//! Pairs of photographs as frames, each with a photograph in the dark: [`open`].
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::Root;
-use super::image_paths::ImagePaths;
+use super::dark_photos::DarkPhoto;
+use super::dataset::{Dataset, stem};
+use super::frames::ImagePaths;
+use super::maps::{FrameFacts, MapPaths};
+use super::openeqa::{FrameFile, ImageSource};
+use super::root::Root;
 use crate::error::{Error, Result};
+use crate::types::{FrameId, PhotoName};
 
 /// Names of the normal-light and the low-light folder: plain words, and the names in the LOL and LISU data sets.
 const FOLDERS: [[&str; 2]; 3] = [["normal", "low"], ["high", "low"], ["val_rgb_h", "val_rgb_l"]];
@@ -59,7 +66,7 @@ impl Pairs {
         let mut sides = [BTreeMap::new(), BTreeMap::new()];
         let mut unmatched = Vec::new();
         for path in images(entries, folder) {
-            match split_side(&stem(&path)) {
+            match split_side(&path_stem(&path)) {
                 (name, Some(side)) => add_image(&mut sides[side as usize], name, &path)?,
                 (_, None) => unmatched.push(path),
             }
@@ -85,7 +92,7 @@ impl Pairs {
             let entries = root.entries(folder, &mut links_out)?;
             root.warn_of_links_out(&links_out);
             for path in images(entries, folder) {
-                let (name, _) = split_side(&stem(&path));
+                let (name, _) = split_side(&path_stem(&path));
                 add_image(side, name, &path)?;
             }
         }
@@ -182,8 +189,39 @@ fn file_name(path: &Path) -> String {
     path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-fn stem(path: &Path) -> String {
+fn path_stem(path: &Path) -> String {
     path.file_stem().unwrap_or_default().to_string_lossy().into_owned()
+}
+
+/// Makes a frame of each photograph in normal light, named by its file, with its partner in low light as dark
+/// photograph. Warns about images without a partner. The data set has no questions.
+///
+/// # Errors
+/// If two photographs in normal light have the same name.
+pub(super) fn open(folder: &Path, pairs: Pairs) -> Result<Dataset> {
+    if let Some(first) = pairs.unmatched.first() {
+        tracing::warn!(
+            "images without a partner in the other light, which are not asked: {}, first {}",
+            pairs.unmatched.len(),
+            first.display()
+        );
+    }
+    let mut sources = BTreeMap::new();
+    for pair in pairs.pairs {
+        let name = pair.normal.file_name().unwrap_or_default();
+        let id = FrameId(name.to_string_lossy().into_owned());
+        let dark = DarkPhoto { name: PhotoName::numbered(0), path: pair.low, ev: None };
+        let source = ImageSource::File(Box::new(FrameFile {
+            rgb: pair.normal.clone(),
+            maps: MapPaths::default(),
+            facts: FrameFacts::default(),
+            dark: vec![dark],
+        }));
+        if sources.insert(id, source).is_some() {
+            return Err(Error::data(pair.normal.display(), "a second file of this name"));
+        }
+    }
+    Ok(Dataset::new(stem(folder), sources, Vec::new()))
 }
 
 #[cfg(test)]

@@ -3,10 +3,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use super::frames::MissingFiles;
-use super::image_paths::{ImagePaths, is_image};
-use super::import_hint::{is_lerobot_set, with_import_hint};
-use super::{DataPlace, Dataset, Root, SetArgs, frames, stem};
+use super::dataset::{Dataset, stem};
+use super::frames::{self, ImagePaths, MissingFiles, is_image, open_images};
+use super::place::{DataPlace, is_lerobot_set, with_import_hint};
+use super::ready_made::SetArgs;
+use super::root::Root;
 use crate::error::{Error, Result};
 use crate::pictures::image_file::format::SUPPORTED_FORMATS;
 use crate::types::text::counted;
@@ -40,7 +41,7 @@ impl Photographs {
         let dataset = match place {
             DataPlace::Rooms(rooms) => Dataset::from_rooms(*rooms),
             DataPlace::Path(path) if path.is_dir() => return Self::open_folder(path, set),
-            DataPlace::Path(path) if is_image(path) => Dataset::from_images(path, &[])?,
+            DataPlace::Path(path) if is_image(path) => open_images(path, &[])?,
             DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
                 return Self::open_set(place, set);
             }
@@ -51,10 +52,10 @@ impl Photographs {
     /// The images of a ready-made set, whose rows need no questions.
     fn open_set(place: &DataPlace, set: &SetArgs) -> Result<Self> {
         let set = SetArgs { images_alone: true, ..set.clone() };
-        let dataset = Dataset::open_place(place, None, &set)?;
+        let dataset = place.open_without_hint(None, &set)?;
         let images = counted(dataset.frames().count(), "image");
         let note = format!("{place}: {images}; questions in it are ignored, and those of --ask are asked");
-        Ok(Self { dataset: Dataset { questions: Vec::new(), summary: Vec::new(), ..dataset }, notes: vec![note] })
+        Ok(Self { dataset: dataset.without_questions(), notes: vec![note] })
     }
 
     fn open_folder(folder: &Path, set: &SetArgs) -> Result<Self> {

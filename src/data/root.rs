@@ -3,15 +3,20 @@
 //! A downloaded data set must not be able to send private files of the user to an endpoint. Every path in the data is
 //! therefore resolved here, following links, and must be below the folder of the data or a folder given with
 //! `--data-root`.
+//!
+//! Files whose path is spelled in another way than in the data: [`folded`], [`SimilarPaths`].
 
+use std::collections::HashMap;
 use std::fs;
 use std::path::{self, Component, Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use clap::Args;
+use percent_encoding::percent_decode_str;
+use unicode_normalization::UnicodeNormalization as _;
 
-use super::similar_path::SimilarPaths;
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files::{self, entries};
 use crate::types::{Decides, FrameId, shell_word};
 
 /// Flag for further folders with files of the data.
@@ -167,7 +172,7 @@ impl Root {
     /// If the folder cannot be read.
     pub(crate) fn entries(&self, folder: &Path, links_out: &mut Vec<PathBuf>) -> Result<Vec<PathBuf>> {
         let mut inside = Vec::new();
-        for path in reading::entries(folder)? {
+        for path in files::entries(folder)? {
             match self.locate(&path) {
                 Location::Inside => inside.push(path),
                 Location::Outside => links_out.push(path),
@@ -311,8 +316,44 @@ fn with_slashes(path: &Path) -> String {
     path.to_string_lossy().replace(path::MAIN_SEPARATOR, "/")
 }
 
+/// A path without differences of spelling: percent-encoding, backslashes, the case of letters, and the form of Unicode.
+pub(super) fn folded(path: &str) -> String {
+    let decoded = percent_decode_str(path).decode_utf8_lossy();
+    decoded.replace('\\', "/").nfc().collect::<String>().to_lowercase()
+}
+
+/// Search for files by their [`folded`] paths. Each folder is read once.
+#[derive(Debug, Clone, Default)]
+pub(super) struct SimilarPaths {
+    /// Names in a folder, by their folded form.
+    folders: Arc<Mutex<HashMap<PathBuf, HashMap<String, String>>>>,
+}
+
+impl SimilarPaths {
+    /// Path of an existing file relative to `base` that differs from `spelled` only in its spelling.
+    pub(super) fn find(&self, base: &Path, spelled: &str) -> Option<String> {
+        let mut found: Vec<String> = Vec::new();
+        for part in folded(spelled).split('/').filter(|part| !matches!(*part, "" | ".")) {
+            let folder = base.join(found.join("/"));
+            let mut folders = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
+            let names = folders.entry(folder).or_insert_with_key(|folder| names(folder));
+            found.push(names.get(part)?.clone());
+        }
+        let found = found.join("/");
+        base.join(&found).is_file().then_some(found)
+    }
+}
+
+/// Names in a folder, by their folded form.
+fn names(folder: &Path) -> HashMap<String, String> {
+    let paths = entries(folder).unwrap_or_default();
+    paths.iter().filter_map(|path| path.file_name()?.to_str()).map(|name| (folded(name), name.to_owned())).collect()
+}
+
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     /// A folder with the data set `set`, which has an image `fr/a.png`, and `secret.png` outside it.
@@ -392,5 +433,22 @@ mod tests {
         link(set.clone(), outer.path().join("alias")).unwrap();
         let alias = outer.path().join("alias");
         assert!(Root::new(&alias, &[]).unwrap().image(&alias, "fr/a.png").is_ok());
+    }
+
+    #[test]
+    fn other_spellings_of_a_path_are_found() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("My Images")).unwrap();
+        fs::write(folder.path().join("My Images/cafe\u{301}.PNG"), "").unwrap();
+        for spelled in ["My%20Images/cafe%CC%81.PNG", "./my images/Caf\u{e9}.png", "My Images\\cafe\u{301}.PNG"] {
+            assert_eq!(
+                SimilarPaths::default().find(folder.path(), spelled).unwrap(),
+                "My Images/cafe\u{301}.PNG",
+                "{spelled}"
+            );
+        }
+        for other in ["My Images", "My Images/tea.png", "../My Images/cafe.png"] {
+            assert_eq!(SimilarPaths::default().find(folder.path(), other), None, "{other}");
+        }
     }
 }

@@ -5,15 +5,15 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::data::{DataArgs, DataPlace, Dataset, Photographs, parse_data_place};
-use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
+use crate::data::{DataArgs, DataPlace, Dataset, Photographs, open_frames, parse_data_place};
+use crate::engine::images::enhancement::enhancers;
+use crate::engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
 use crate::engine::images::frames::{Frames, Source, WalkArgs, WalkFolder, photographs};
 use crate::engine::images::image_pipeline::ImagePipeline;
-use crate::engine::images::image_steps::ImageSteps;
 use crate::engine::images::recipes::Recipe;
-use crate::engine::images::recipes::image_words::ImageFlags;
-use crate::engine::images::timings::Timings;
-use crate::engine::images::trials::questions::ASK;
+use crate::engine::images::recipes::image_recipe::ImageFlags;
+use crate::engine::images::timings::{ImageSteps, Timings};
+use crate::engine::images::trials::ASK;
 use crate::engine::images::workers::ThreadArgs;
 use crate::error::{Error, Result};
 use crate::pictures::Payload;
@@ -168,12 +168,8 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
 /// The frames of a data set. Its questions are ignored.
 fn frames(data: &DataArgs) -> Result<Dataset> {
     match &data.place() {
-        DataPlace::Path(path) if path.join("frames.jsonl").is_file() => {
-            Dataset::from_frames(path, &data.set.root.data_root)
-        }
-        place @ (DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. }) => {
-            Dataset::open(place, None, &data.set)
-        }
-        place @ DataPlace::Rooms(_) => Dataset::open_without_questions(place, &[]),
+        DataPlace::Path(path) if path.join("frames.jsonl").is_file() => open_frames(path, &data.set.root.data_root),
+        place @ (DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. }) => place.open(None, &data.set),
+        place @ DataPlace::Rooms(_) => place.open_without_questions(&[]),
     }
 }

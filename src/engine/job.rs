@@ -1,13 +1,18 @@
 //! An experiment in its run folder: [`Job`].
+//!
+//! The folder of a run: [`find`].
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
+use jiff::Timestamp;
+use serde_json::json;
+
+use super::models::{AskSettings, ModelName};
+use super::settings::{JobSettings, RESULTS, RunPlace};
 use crate::engine::batch::{self, BatchFileArgs, BatchRunArgs};
 use crate::engine::costs::{MeasuredTokens, estimate};
-use crate::engine::dark_already;
 use crate::engine::experiment::{DetailOf, Experiment};
-use crate::engine::folder;
 use crate::engine::images::enhancement::enhancers::EnhancerModels;
 use crate::engine::images::frames::{input_summary, warn_of_inputs};
 use crate::engine::images::progress::Progress;
@@ -15,15 +20,15 @@ use crate::engine::images::recipes::Maker;
 use crate::engine::images::stored::StoredFindings;
 use crate::engine::images::timings::Timings;
 use crate::engine::images::trials::Plan;
-use crate::engine::manifest;
 use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
+use crate::engine::{dark_already, manifest};
 use crate::error::{Error, Result};
-use crate::report::forecast::{json, render};
+use crate::report::forecast::{forecast_json, render};
 use crate::runs::forecast::Forecast;
 use crate::runs::outcome::Outcome;
-use crate::store::{self, Store};
+use crate::store::{self, AddressChange, Store};
 use crate::types::manifests::{RunManifest, Status};
-use crate::types::{StoredDetail as _, TrialKey};
+use crate::types::{Digest, StoredDetail as _, TrialKey};
 use darkqa_enhance::ModelFile;
 
 /// An experiment and its run folder.
@@ -39,7 +44,7 @@ pub(crate) struct Job<'a, E: Experiment> {
 impl<'a, E: Experiment> Job<'a, E> {
     /// A job in the run folder of the experiment. Nothing is written.
     pub(crate) fn new(experiment: &'a E, files: Vec<ModelFile>, progress: &'a Progress) -> Result<Self> {
-        Ok(Self { folder: folder::find(experiment)?, experiment, files, progress })
+        Ok(Self { folder: find(experiment)?, experiment, files, progress })
     }
 
     /// Asks the remaining trials, or only estimates them (`--dry-run`).
@@ -57,7 +62,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     /// If a model is built in, an image is larger than the endpoint accepts, or a file cannot be written.
     pub(crate) fn export_batch(self, files: &BatchFileArgs) -> Result<Outcome> {
         warn_of_inputs(&input_summary(self.experiment.sources()));
-        batch::export::export(self.open()?, files)
+        batch::file::export(self.open()?, files)
     }
 
     /// Submits the remaining requests in batches, and waits for their replies.
@@ -77,7 +82,7 @@ impl<'a, E: Experiment> Job<'a, E> {
     fn estimate(self) -> Result<Outcome> {
         let show = self.experiment.settings().show;
         let forecast = self.forecast()?;
-        Ok(Outcome::text(Status::Complete, if show.is_json() { json(&forecast)? } else { render(&forecast) }))
+        Ok(Outcome::text(Status::Complete, if show.is_json() { forecast_json(&forecast)? } else { render(&forecast) }))
     }
 
     /// Estimates the remaining requests and their cost. Sends nothing and writes no file.
@@ -124,7 +129,7 @@ impl<'a, E: Experiment> Job<'a, E> {
             return Ok(());
         };
         let requested = manifest::run_manifest(self.experiment, Some(stored.clone()))?;
-        let address_change = folder::address_change(&self.experiment.settings().place);
+        let address_change = address_change(&self.experiment.settings().place);
         store::check_same_run(&self.folder, &stored, &requested, address_change)
     }
 
@@ -154,11 +159,11 @@ impl<'a, E: Experiment> Job<'a, E> {
             }
         }
         let manifest = manifest::run_manifest(experiment, stored)?;
-        folder::make(&folder, settings)?;
+        make(&folder, settings)?;
         if let Some(damage) = damage {
             restore_manifest(experiment, &folder, &manifest, &damage)?;
         }
-        let mut store = Store::open(&folder, &manifest, folder::address_change(&settings.place))?;
+        let mut store = Store::open(&folder, &manifest, address_change(&settings.place))?;
         let lacks_notes = store.repair_notes();
         store.add_questions(experiment.questions(), manifest.inputs.as_ref(), || planned_keys(experiment, &folder))?;
         let present: HashSet<TrialKey> = if experiment.imported_records().is_empty() {
@@ -209,4 +214,75 @@ fn restore_manifest<E: Experiment>(experiment: &E, folder: &Path, manifest: &Run
     store::restore_manifest(folder, manifest)?;
     tracing::warn!("{damage}; made again: all {} replies of the run are of this command", own.len());
     Ok(())
+}
+
+/// The folder of a run: the one named, else the newest of the same identity and plan, else a new one.
+pub(crate) fn find<E: Experiment>(experiment: &E) -> Result<PathBuf> {
+    let settings = experiment.settings();
+    match settings.place.for_shard(settings.shard) {
+        RunPlace::Named(path) => Ok(path),
+        // The manifest is restored later, when the folder is opened.
+        RunPlace::Resume(path) if store::manifest_damage(&path)?.is_some() => Ok(path),
+        RunPlace::Resume(path) => match store::read_manifest(&path, DetailOf::<E>::SCHEMA)? {
+            Some(_) => Ok(path),
+            None => Err(Error::usage(
+                "--resume",
+                format_args!("{}: no run in this folder; --out begins a new run", path.display()),
+            )),
+        },
+        RunPlace::Automatic => automatic(experiment),
+    }
+}
+
+/// Creates the folder of a run; for a shard, also the folder of the whole run.
+///
+/// # Errors
+/// If it cannot be created.
+pub(crate) fn make(folder: &Path, settings: &JobSettings) -> Result<()> {
+    if let RunPlace::Named(outer) = &settings.place {
+        settings.access.create(outer)?;
+    }
+    settings.access.create(folder)
+}
+
+/// The newest folder under [`RESULTS`] with the identity and plan of an experiment, else the path of a new one.
+fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
+    let settings = experiment.settings();
+    let facts = json!({
+        "identity": experiment.identity(),
+        "columns": experiment.columns(),
+        "shard": settings.shard.to_string(),
+        "trials": Plan::new(experiment.plan(0, || Ok(Vec::new()))?).keys,
+        "notes": experiment.notes(),
+    });
+    let hash = &Digest::canonical("darkqa.command/2", &facts)?.to_string()[..8];
+    let base = Path::new(RESULTS);
+    Ok(store::find(base, hash).unwrap_or_else(|| {
+        let time = Timestamp::now().strftime("%Y%m%d-%H%M%S");
+        let (models, data) = (models_label(&settings.ask), experiment.data());
+        let name = format!("{time}-{models}-{data}-{hash}");
+        base.join(name.replace(|c: char| !(c.is_alphanumeric() || "-_.".contains(c)), "_"))
+    }))
+}
+
+/// The models' part of a folder name: the names of the first two models, cut at 60 characters.
+fn models_label(ask: &AskSettings) -> String {
+    let names: Vec<String> = ask
+        .models
+        .iter()
+        .take(2)
+        .map(|model| match &model.id {
+            ModelName::Remote(_) => model.name.clone(),
+            built_in => built_in.label(),
+        })
+        .collect();
+    names.join("-").chars().take(60).collect()
+}
+
+/// Allows another address of the endpoint than in the manifest only with `--resume`.
+pub(crate) fn address_change(place: &RunPlace) -> AddressChange {
+    match place {
+        RunPlace::Resume(_) => AddressChange::Allowed,
+        RunPlace::Named(_) | RunPlace::Automatic => AddressChange::Refused,
+    }
 }

@@ -1,13 +1,20 @@
 //! Queues of trials waiting to be sent, one per endpoint: [`Lanes`].
+//!
+//! Sends one trial to its model: [`send`].
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Weak};
 
-use crate::engine::images::trials::{Stimulus, Trial};
+use tokio::sync::watch;
+
+use super::costs::Permit;
+use crate::ask::{AskError, Call, Reservation};
+use crate::engine::images::trials::{Item, Stimulus, Trial};
 use crate::engine::images::workers::ThreadArgs;
 use crate::engine::models::ModelUnderTest;
 use crate::engine::open_files::RequestLimit;
 use crate::types::text::counted;
+use crate::types::{LostAttempts, Reply};
 
 /// Maximum bytes of images held so that idle endpoints can work ahead of the slowest; chosen: about fifty images of
 /// 1280×720 as PNG.
@@ -221,4 +228,47 @@ impl<'a, I> Lanes<'a, I> {
         let held_bytes: usize = self.live_images.iter().map(|(_, bytes)| bytes).sum();
         held_bytes < BYTES_AHEAD
     }
+}
+
+/// One trial, with its reply or error.
+pub(super) type Finished<I> = (PreparedTrial<I>, Result<Reply, AskError>);
+
+/// Sends one trial to its model, unless it is given up first. Returns the trial with its reply or error, including the
+/// cost of lost attempts. `has_timed_out` is true if a gateway gave up on it in an earlier call.
+pub(super) async fn send<I: Item>(
+    model: ModelUnderTest,
+    ready: PreparedTrial<I>,
+    permit: Permit,
+    has_timed_out: bool,
+    mut given_up: watch::Receiver<bool>,
+) -> Finished<I> {
+    let PreparedTrial { trial, stimulus } = &ready;
+    let call = Call {
+        query: trial.item.query(),
+        condition: stimulus.condition.as_ref(),
+        message: trial.prompt.message(&stimulus.images),
+        turn: trial.item.turn(),
+    };
+    let reservation = match &permit {
+        Permit::Reserved(reservation) => Some(&**reservation),
+        Permit::Free | Permit::Refused => None,
+    };
+    let asked = tokio::select! {
+        biased;
+        result = model.model.ask_within(call, reservation, has_timed_out) => Some(result),
+        _ = given_up.wait_for(|given_up| *given_up) => None,
+    };
+    let charged = reservation.map_or_else(LostAttempts::default, Reservation::charged);
+    let result = match asked {
+        Some(Ok(mut reply)) => {
+            reply.lost.unstated = charged.unstated;
+            Ok(reply)
+        }
+        Some(Err(mut error)) => {
+            error.lost.unstated = charged.unstated;
+            Err(error)
+        }
+        None => Err(AskError { lost: Box::new(charged), ..AskError::given_up() }),
+    };
+    (ready, result)
 }

@@ -1,21 +1,29 @@
 //! The manifest of a run that starts or continues: [`run_manifest`].
+//!
+//! The settings that define a run: those that all trials share ([`images`]), and the definitions of the values in its
+//! columns ([`columns`]).
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
+use super::models::ModelUnderTest;
+use crate::ask::{Prices, by_flag};
 use crate::engine::experiment::{DetailOf, Experiment};
-use crate::engine::identity;
 use crate::engine::images::frames::input_summary;
-use crate::engine::images::recipes::image_words::ImageWords;
+use crate::engine::images::recipes::Recipe;
+use crate::engine::images::recipes::image_recipe::ImageWords;
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::runs::changed_settings::is_kept;
-use crate::runs::divisions::tasks_setting;
-use crate::runs::renamed::{self, SettingsChange};
+use crate::pictures::Scaling;
+use crate::runs::renamed::{self, SettingsChange, is_kept};
+use crate::runs::shard::tasks_setting;
 use crate::store::now;
-use crate::types::manifests::{Counts, RunManifest, RunPart, Status};
-use crate::types::{InputSummary, ListedModel, StoredDetail as _};
+use crate::types::degradations::Kind;
+use crate::types::manifests::{Columns, Counts, RunManifest, RunPart, Status};
+use crate::types::{Degradation, Digest, InputSummary, ListedModel, PairDark, ProfileName, StoredDetail as _};
+use darkqa_enhance::{self, SizeArgs, Tiling};
+use darkqa_light::{KindSettings, Synthesis, version};
 use darkqa_score::answers::record::Detail as _;
 
 /// The manifest of a run that starts, or that continues the run of the `stored` manifest. It keeps the date, columns
@@ -25,7 +33,7 @@ use darkqa_score::answers::record::Detail as _;
 /// If a number in the settings of a model is not finite.
 pub(crate) fn run_manifest<E: Experiment>(experiment: &E, stored: Option<RunManifest>) -> Result<RunManifest> {
     let job = experiment.settings();
-    let mut settings = identity::settings(job);
+    let mut settings = settings(job);
     let notes: BTreeMap<String, Value> =
         experiment.notes().into_iter().map(|(field, value)| (field.to_owned(), value)).collect();
     settings.extend(notes.clone());
@@ -42,7 +50,7 @@ pub(crate) fn run_manifest<E: Experiment>(experiment: &E, stored: Option<RunMani
         version: env!("CARGO_PKG_VERSION").to_owned(),
         created: now(),
         updated: now(),
-        platform: identity::platform(),
+        platform: platform(),
         identity: experiment.identity(),
         columns,
         models: listed_models(job, stored.as_ref()),
@@ -113,7 +121,7 @@ pub(crate) fn mark_started<E: Experiment>(experiment: &E, manifest: &mut RunMani
     manifest.status = Status::Started;
     manifest.updated = now();
     env!("CARGO_PKG_VERSION").clone_into(&mut manifest.version);
-    let settings = identity::settings(experiment.settings());
+    let settings = settings(experiment.settings());
     manifest.settings.extend(settings);
 }
 
@@ -133,4 +141,155 @@ fn merged_flags(stored: &ImageWords, current: ImageWords) -> ImageWords {
         all.insert(flag, value);
     }
     all
+}
+
+/// The kinds of degradation in the paper. Their versions are part of the identity of every run. The versions of other
+/// kinds are in the column `variant` of runs that use them, so that they can be added to an existing run.
+const PAPER_KINDS: [Kind; 2] = [Kind::Exposure, Kind::Sensor];
+
+/// Settings of a recipe that all trials share.
+pub(crate) fn images(recipe: &Recipe) -> impl Iterator<Item = (String, Value)> {
+    let scaling = match recipe.scaling {
+        Scaling::Never => None,
+        Scaling::MaxSide(side) => Some(("--max-side", json!(side))),
+        Scaling::LongerSide(side) => Some(("--image-size", json!(side))),
+    };
+    let fields = [
+        ("--image", json!(recipe.format.to_string())),
+        ("--seed", json!(recipe.seed)),
+        ("synthesis", json!(PAPER_KINDS.map(version))),
+        ("enhancement", json!(darkqa_enhance::VERSION)),
+    ];
+    fields.into_iter().chain(scaling).map(|(field, value)| (field.to_owned(), value))
+}
+
+/// Definitions of the models, enhancers, noise profiles and other kinds of degradation of a run.
+pub(crate) fn columns<'a>(
+    models: impl IntoIterator<Item = &'a ModelUnderTest>,
+    recipe: &Recipe,
+    settings: &JobSettings,
+) -> Columns {
+    let models = models.into_iter().map(|model| (model.name.to_string(), model_definition(model)));
+    let enhancers = recipe.enhancers.iter().map(|(name, digest)| {
+        let content = enhancer_definition(digest, &settings.loading.size);
+        (name.as_str().to_owned(), content)
+    });
+    let elsewhere = recipe.enhanced_images.iter().map(|images| {
+        let content = json!({"--enhanced": images.digest()});
+        (images.name().as_str().to_owned(), content)
+    });
+    let enhancers = enhancers.chain(elsewhere);
+    let degradations = settings.light.degradations();
+    let profiles: BTreeSet<&ProfileName> = degradations
+        .iter()
+        .flatten()
+        .filter_map(Degradation::reading)
+        .chain(settings.light.matches.iter().filter_map(PairDark::reading))
+        .collect();
+    let kinds: BTreeSet<Kind> = degradations
+        .iter()
+        .flatten()
+        .map(Degradation::kind)
+        .chain(settings.light.matches.iter().filter_map(PairDark::kind))
+        .collect();
+    let variants = kinds
+        .into_iter()
+        .filter(|kind| !PAPER_KINDS.contains(kind))
+        .map(|kind| (kind.word().to_owned(), kind_definition(kind, &recipe.kinds)));
+    let noise = recipe
+        .kinds
+        .sensor
+        .readings
+        .iter()
+        .filter(|(name, _)| profiles.contains(name))
+        .map(|(name, content)| (name.to_string(), noise_definition(content)));
+    let columns: [(&str, BTreeMap<String, Value>); 4] = [
+        ("model", models.collect()),
+        ("enhancer", enhancers.collect()),
+        ("reading", noise.collect()),
+        ("variant", variants.collect()),
+    ];
+    columns
+        .into_iter()
+        .filter(|(_, values)| !values.is_empty())
+        .map(|(column, values)| (column.to_owned(), values))
+        .collect()
+}
+
+/// Settings by flag that affect the replies of a model, other than question and images, and the address of its
+/// endpoint.
+pub(crate) fn model_definition(model: &ModelUnderTest) -> Value {
+    let mut content = model.model.content();
+    if let (Some(address), Some(fields)) = (model.address(), content.as_object_mut()) {
+        *fields = by_flag(std::mem::take(fields));
+        fields.insert("--base-url".to_owned(), json!(address));
+    }
+    content
+}
+
+/// Settings by flag that affect the pixels of an enhancer. Automatic tiling is left out: it changes at most one sample
+/// in a thousand, compared with enhancement of the whole image.
+pub(crate) fn enhancer_definition(digest: &Digest, size: &SizeArgs) -> Value {
+    let tile = (size.tile != Tiling::Auto).then(|| size.tile.to_string());
+    let mut content = json!({
+        "--llie": digest,
+        "--tile": tile,
+        "--llie-max-side": size.llie_max_side,
+    });
+    // Left out if unset, so that runs of versions without the flag can be continued.
+    if size.llie_resize {
+        content["--llie-resize"] = json!(true);
+    }
+    content
+}
+
+/// Settings of a noise profile, by flag.
+fn noise_definition(synthesis: &Synthesis) -> Value {
+    json!({
+        "--amplify": synthesis.amplify,
+        "--tone": synthesis.tone,
+        "--draws": synthesis.draws,
+        "--coupling": synthesis.coupling,
+        "--camera, --gain, --ratio or --fixed": synthesis.camera,
+    })
+}
+
+/// Settings of a kind of degradation outside the paper, by flag.
+fn kind_definition(kind: Kind, kinds: &KindSettings) -> Value {
+    let mut content = json!({"synthesis": version(kind), "--motion": kinds.motion.to_string()});
+    if kind == Kind::Auto {
+        content["--auto"] = json!(kinds.auto.to_string());
+        content["--camera or --fixed"] = json!(kinds.sensor.readings.camera());
+    }
+    content
+}
+
+/// Settings that do not affect replies, but may explain the course of a run.
+pub(crate) fn settings(job: &JobSettings) -> BTreeMap<String, Value> {
+    let mut settings = vec![
+        ("--concurrency", json!(job.concurrency.to_string())),
+        ("--max-failures", json!(job.money.max_failures)),
+        ("--threads", json!(job.loading.threads.threads)),
+    ];
+    settings.extend(job.money.prices.setting().map(|own| (Prices::SETTING, own)));
+    if let Some(models) = &job.ask.file {
+        settings.push(("models", models.resolved.clone()));
+    } else if let Some(server) = job.ask.servers().first() {
+        let sending = server.sending;
+        settings.extend([
+            ("--timeout", json!(sending.timeout.as_secs_f64())),
+            ("--retries", json!(sending.retries)),
+            ("--max-wait", json!(sending.max_wait.as_secs_f64())),
+            ("--patience", json!(sending.patience.as_secs_f64())),
+            ("--rpm", json!(sending.quota.requests)),
+            ("--tpm", json!(sending.quota.tokens)),
+        ]);
+    }
+    settings.into_iter().map(|(field, value)| (field.to_owned(), value)).collect()
+}
+
+/// Operating system and processor of this machine.
+pub(crate) fn platform() -> BTreeMap<String, String> {
+    let facts = [("system", std::env::consts::OS), ("processor", std::env::consts::ARCH)];
+    facts.map(|(fact, value)| (fact.to_owned(), value.to_owned())).into()
 }

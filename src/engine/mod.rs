@@ -6,14 +6,10 @@
 
 pub(crate) mod batch;
 pub(crate) mod circuit_breaker;
-pub(crate) mod continuation;
 pub(crate) mod costs;
 pub(crate) mod dark_already;
 pub(crate) mod dispatch;
 pub(crate) mod experiment;
-pub(crate) mod first_failures;
-pub(crate) mod folder;
-pub(crate) mod identity;
 pub(crate) mod image_cache;
 pub(crate) mod image_rebuilder;
 pub(crate) mod images;
@@ -26,14 +22,9 @@ pub(crate) mod models;
 pub(crate) mod observer;
 pub(crate) mod open_files;
 pub(crate) mod open_run;
-mod refusals;
+pub(crate) mod refusals;
 pub(crate) mod reply_checks;
-pub(crate) mod room_net;
-mod sending;
-mod served_names;
 pub(crate) mod settings;
-pub(crate) mod suspects;
-mod truncation;
 
 pub(crate) use job::Job;
 pub(crate) use open_run::{image_limit, pipeline};

@@ -2,16 +2,14 @@
 //! (`ModelUnderTest`).
 //!
 //! Models that flags name and models of a models file are merged into one list of settings.
+//!
+//! Warnings about the model names in replies: [`ServedNames`].
 
-mod args;
 mod asking;
 mod check;
-mod describe;
 mod entry;
 mod file;
 mod name;
-mod run_defaults;
-mod selection;
 mod settings;
 mod trust;
 
@@ -23,16 +21,14 @@ use serde_json::{Value, json};
 use crate::ask::{Endpoint, Model, Parameters, Price, Prices, Remote, Script, Server, Unpriced};
 use crate::engine::images::trials::{Item, Stimulus, Trial};
 use crate::error::{Error, Result};
-use crate::runs::changed_settings::{self, CHANGED_FOR, REFUSED_FOR};
-use crate::runs::renamed::ADAPTED_FOR;
-use crate::types::{Condition, Record, View};
+use crate::runs::renamed::{self, ADAPTED_FOR, CHANGED_FOR, REFUSED_FOR};
+use crate::types::text::{is_other_model, is_same_name};
+use crate::types::{Condition, Record, Reply, View};
 
-pub(crate) use args::ModelArgs;
 pub(crate) use asking::AskingArgs;
-pub(crate) use check::check;
-pub(crate) use describe::describe;
-pub(crate) use name::ModelName;
-pub(crate) use run_defaults::{RunDefault, run_defaults};
+pub(crate) use check::{check, describe};
+pub(crate) use entry::{RunDefault, run_defaults};
+pub(crate) use name::{ModelArgs, ModelName};
 pub(crate) use settings::{AskSettings, KeyUse, ResolveContext, TextBaseline};
 
 /// Name in messages for the endpoint of built-in models.
@@ -235,14 +231,14 @@ pub(crate) fn note_changes(models: &[&ModelUnderTest], settings: &mut BTreeMap<S
     for model in models {
         let forced = model.model.forced();
         if !forced.is_empty() {
-            let key = changed_settings::key(REFUSED_FOR, &model.name, model.model.is_judge());
-            let earlier = changed_settings::strings(settings.get(&key));
+            let key = renamed::key(REFUSED_FOR, &model.name, model.model.is_judge());
+            let earlier = renamed::strings(settings.get(&key));
             let all: BTreeSet<&str> = earlier.iter().map(String::as_str).chain(forced).collect();
             settings.insert(key, json!(all));
         }
         let changes = model.model.changed_settings();
         if !changes.is_empty() {
-            let key = changed_settings::key(CHANGED_FOR, &model.name, model.model.is_judge());
+            let key = renamed::key(CHANGED_FOR, &model.name, model.model.is_judge());
             settings.insert(key, json!(changes));
         }
     }
@@ -262,4 +258,42 @@ pub(crate) fn adapted(models: &[ModelUnderTest]) -> impl Iterator<Item = (String
         }
     }
     by_name.into_iter().map(|(name, changes)| (name, json!(changes)))
+}
+
+/// The name in the replies of one model.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ServedNames {
+    /// Name in the first reply that has one.
+    first: Option<String>,
+    has_warned: bool,
+}
+
+impl ServedNames {
+    /// Adds a reply. Warns if the first name is evidently that of another model, and once if a later name differs from
+    /// the first.
+    pub(super) fn add(&mut self, model: &ModelUnderTest, reply: &Reply) {
+        let Some(served) = reply.served_model.as_deref().filter(|name| !name.is_empty()) else {
+            return;
+        };
+        let name = &model.name;
+        match &self.first {
+            None => {
+                if is_other_model(model.model.name(), served) {
+                    tracing::warn!(
+                        "{name}: its replies name another model, {served}: check which model the server has loaded, or serves under this \
+                         name"
+                    );
+                }
+                self.first = Some(served.to_owned());
+            }
+            Some(first) if !self.has_warned && !is_same_name(first, served) => {
+                self.has_warned = true;
+                tracing::warn!(
+                    "{name}: its replies name several models, first {first}, now {served}: replies of two models are no comparison of \
+                     light; the report counts them for each level (a --model with a date or version, or no fallback, keeps one)"
+                );
+            }
+            Some(_) => {}
+        }
+    }
 }

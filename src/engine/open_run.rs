@@ -1,4 +1,6 @@
 //! A run that is open for writing: [`OpenRun`].
+//!
+//! The source at which a process starts in its plan: [`first_source`].
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt::Write as _;
@@ -9,40 +11,34 @@ use crate::ask::{HeldBack, ImageLimit};
 use crate::engine::batch::journal::Journal;
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::costs::{Budget, InFlightCost, RunModels};
-use crate::engine::dark_already;
 use crate::engine::dispatch::{Dispatcher, TrialCounts};
 use crate::engine::experiment::{DetailOf, Experiment};
 use crate::engine::image_cache::ImageStore;
 use crate::engine::images::enhancement::enhancers::EnhancerModels;
 use crate::engine::images::frames::Source;
 use crate::engine::images::image_pipeline::ImagePipeline;
-use crate::engine::images::image_steps::ImageSteps;
 use crate::engine::images::notes::MissingNotes;
 use crate::engine::images::progress::Progress;
 use crate::engine::images::recipes::Maker;
 use crate::engine::images::stored::StoredImages;
-use crate::engine::images::timings::Timings;
+use crate::engine::images::timings::{ImageSteps, Timings};
 use crate::engine::images::trials::Plan;
 use crate::engine::images::workers::Workers;
-use crate::engine::manifest;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::reply_checks::ReplyChecks;
 use crate::engine::settings::JobSettings;
+use crate::engine::{dark_already, manifest};
 use crate::error::Result;
-use crate::runs::first_source::first_source;
 use crate::runs::missing_thumbnails::MissingThumbnails;
-use crate::runs::other_shards::OtherShards;
-use crate::runs::outcome::Outcome;
-use crate::runs::over_budget::OverBudget;
+use crate::runs::outcome::{Outcome, OverBudget};
 use crate::runs::record_table;
-use crate::runs::shard_budget::ShardBudget;
+use crate::runs::shard::{Shard, ShardBudget};
+use crate::runs::shard_records::OtherShards;
 use crate::runs::stored::StoredRun;
-use crate::store::now;
-use crate::store::{self, Store, StoredTrial};
+use crate::store::{self, Store, StoredTrial, now};
 use crate::types::manifests::{Counts, RunManifest};
-use crate::types::text::money;
-use crate::types::text::{counted, plural};
-use crate::types::{EnhancerName, TrialKey, View};
+use crate::types::text::{counted, money, plural};
+use crate::types::{Digest, EnhancerName, TrialKey, View};
 use darkqa_enhance::{Enhancer, Usage};
 use darkqa_score::answers::MIN_REPLIES;
 
@@ -527,4 +523,40 @@ pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> Ha
 /// Keys of the trials that have a reply.
 pub(crate) fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
     stored.iter().filter(|record| !record.failed()).map(|record| record.key).collect()
+}
+
+/// The index of the first source that a process works on, in a plan of `count` sources. It depends on the models and
+/// the shard, so that processes that share an image store start at different sources, and most images are made by only
+/// one of them.
+fn first_source<'n>(models: impl Iterator<Item = &'n str>, shard: Shard, count: usize) -> usize {
+    let shard = shard.to_string();
+    let mut parts: Vec<&[u8]> = models.map(str::as_bytes).collect();
+    parts.push(shard.as_bytes());
+    let number =
+        Digest::from_parts(parts).as_bytes().iter().take(8).fold(0_u64, |number, byte| number << 8 | u64::from(*byte));
+    match count {
+        0 => 0,
+        count => (number % count as u64) as usize,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn first(model: &str, shard: Shard) -> usize {
+        first_source([model].into_iter(), shard, 1000)
+    }
+
+    #[test]
+    fn first_source_depends_on_models_and_shard_only() {
+        let whole: Shard = "1/1".parse().unwrap();
+        assert_eq!(first("a", whole), first("a", whole));
+        assert_ne!(first("a", whole), first("b", whole));
+        assert_ne!(first("a", "1/2".parse().unwrap()), first("a", "2/2".parse().unwrap()));
+        assert_eq!(first_source(["a"].into_iter(), whole, 0), 0);
+        for model in ["a", "b", "c", "d"] {
+            assert!(first_source([model].into_iter(), whole, 3) < 3);
+        }
+    }
 }

@@ -1,14 +1,12 @@
 //! A user's ONNX model on ONNX Runtime's CPU provider: [`Enhancer`].
+//!
+//! Copies of an enhancer that run in parallel: [`Enhancer::twin`].
 
 mod accessors;
-pub(super) mod twin;
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
-
-use darkqa_base::error::{Error, Result};
-use darkqa_base::types::{Digest, EnhancerName, Rgb, SizeLog};
 
 use super::conventions::Description;
 use super::conventions::sidecar::{self, ADD};
@@ -17,7 +15,7 @@ use super::files::{ModelFile, RandomOperators, computed_products, traced_sizes};
 use super::graphs::{Graph, GraphSource, LoadLimits, RunResult, Stopper};
 use super::inputs::DarkImage;
 use super::libraries::Runtime;
-use super::limits::{MAX_CONSECUTIVE_OVERRUNS, MemoryCheck, MemoryLimit, TimeLimit, out_of_memory};
+use super::limits::{self, MAX_CONSECUTIVE_OVERRUNS, MemoryCheck, MemoryLimit, TimeLimit, out_of_memory};
 use super::outputs::InvalidValues;
 use super::planes::Planes;
 use super::probes::Usage;
@@ -26,6 +24,8 @@ use super::sizing::{
     AcceptedSizes, MULTIPLES, PlanError, SeamRule, SizePlan, SizeRule, SizeSearch, TileWindow, TiledImage, Tiling,
     count_image, count_planned, not_local, seams_differ, sizes_not_found,
 };
+use darkqa_base::error::{Error, Result};
+use darkqa_base::types::{Digest, EnhancerName, Rgb, SizeLog};
 
 /// Method to fit an image to a model that accepts a single size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -487,5 +487,53 @@ impl Enhancer {
     fn invalid_values_error(&self, values: InvalidValues, image: &Rgb) -> Error {
         let size = [image.height(), image.width()];
         self.error(describe_invalid_values(values, self.graph.decoding.range(), size))
+    }
+}
+
+impl Enhancer {
+    /// A copy of this enhancer with its own session and thread. It starts with the sizes, context and memory cost
+    /// measured so far, and shares the usage record, in which `number` identifies the twin.
+    ///
+    /// # Errors
+    /// If the model's file has changed, or its session cannot be opened.
+    pub fn twin(&self, number: usize, threads: NonZeroUsize) -> Result<Self> {
+        let file = ModelFile::read(&self.argument)?;
+        if file.digest() != self.digest {
+            return Err(Error::Enhancer {
+                path: self.path.clone(),
+                problem: "was changed during the run; restore it, or start a new run".to_owned(),
+            });
+        }
+        let runtime = self.graph.runtime().with_new_thread()?;
+        let limits = LoadLimits { time: self.graph.time_limit(), memory: self.graph.memory_limit() };
+        let mut twin = Self::open_within(file, &runtime, Some(threads), limits)?;
+        twin.graph = twin.graph.with_convention(self.convention().clone()).map_err(|problem| self.error(problem))?;
+        Ok(Self {
+            tiling: self.tiling,
+            fitting: self.fitting,
+            max_side: self.max_side,
+            search: self.search.clone(),
+            refused: self.refused.clone(),
+            context: self.context.clone(),
+            memory: self.memory.clone(),
+            log: SizeLog::default(),
+            usage: self.usage.clone(),
+            twin: number,
+            ..twin
+        })
+    }
+}
+
+/// Number of sets of enhancers that can run in parallel: at most `cores`, and as many as fit into the free memory. The
+/// memory of one set is estimated as the resident memory of the process, to be measured after the first image of each
+/// enhancer.
+pub fn sets_in_memory(cores: usize) -> usize {
+    match (limits::resident(), limits::available()) {
+        (Some(resident), Some(available)) => {
+            let more = available / resident.max(1);
+            cores.min(1 + usize::try_from(more).unwrap_or(cores))
+        }
+        // Without figures about memory, only one set is known to fit.
+        _ => 1,
     }
 }

@@ -40,15 +40,14 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod conventions;
-mod enhanced_folder;
-mod enhancer;
-mod expressions;
+pub(crate) mod enhancer;
+pub(crate) mod expressions;
 mod failure;
 mod files;
 mod graphs;
 mod inputs;
 mod libraries;
-mod limits;
+pub(crate) mod limits;
 mod outputs;
 mod planes;
 mod probes;
@@ -57,9 +56,7 @@ mod sizing;
 
 pub use conventions::preset::list_of_presets;
 pub use darkqa_models::ROOM_NET;
-pub use enhanced_folder::EnhancedFolder;
-pub use enhancer::twin::sets_in_memory;
-pub use enhancer::{Enhancer, Fitting};
+pub use enhancer::{Enhancer, Fitting, sets_in_memory};
 pub use files::ModelFile;
 pub use graphs::{LoadLimits, Network, Stopper};
 pub use libraries::{Install, Runtime, RuntimeSearch, disable_telemetry};
@@ -68,7 +65,7 @@ pub use probes::{
     DARK, Examination, FRAMES, Findings, ImageOutput, ImageUse, Implausible, ProposedLine, Settled, Usage, brightness,
     burnt_out, shows_nothing,
 };
-pub use settings::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
+pub use settings::{EnhancedFolder, EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use sizing::Tiling;
 
 /// Version of the input encoding and output decoding. Any change to enhanced pixels increments it, so that results

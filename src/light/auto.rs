@@ -12,12 +12,11 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-use super::camera::CameraModel;
-use super::camera::calibration::GAINS;
+use super::camera::{CameraModel, GAINS};
 use super::noise_profile::{NoiseProfile, Synthesis};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::types::Severity;
-use darkqa_base::types::flags::key_values::{number, pairs};
+use darkqa_base::types::flags::{number, pairs};
 
 /// Settings of automatic exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

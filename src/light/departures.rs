@@ -7,11 +7,11 @@ use rayon::prelude::*;
 
 use super::camera::CameraState;
 use super::camera::tests::median;
-use super::curve;
+use super::clean;
 use super::draws::{Component, NoiseKey};
 use super::noise_profile::{Amplify, Tone};
-use super::raw::noise::{self, Term};
-use super::raw::{Bayer, Developer, Plane, unprocess};
+use super::raw::noise::Term;
+use super::raw::{Bayer, Developer, Plane, noise, unprocess};
 use darkqa_base::types::images::Isa;
 use darkqa_base::types::{FrameId, Rgb, Severity};
 
@@ -55,7 +55,7 @@ fn means(values: impl Iterator<Item = f64>) -> [f64; 3] {
 /// Mean linear light of each channel before the exposure drop.
 fn light(raw: Bayer, state: &CameraState) -> [f64; 3] {
     let values = display(raw, state);
-    means(values.iter().map(|value| curve::gamma_expand(f64::from(*value))))
+    means(values.iter().map(|value| clean::gamma_expand(f64::from(*value))))
 }
 
 fn quotient(one: [f64; 3], other: [f64; 3]) -> [f64; 3] {

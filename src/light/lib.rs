@@ -40,22 +40,31 @@ mod applied;
 mod auto;
 pub mod camera;
 mod capture_state;
-mod clean;
-mod codes;
-pub mod curve;
+pub mod clean;
+#[cfg(test)]
+mod departures;
 pub mod draws;
 pub mod exposure;
-mod exposures;
-#[cfg(feature = "flags")]
-mod kind_levels;
 #[cfg(feature = "flags")]
 mod levels;
 pub mod movement;
 mod noise_profile;
-mod pair_ev;
 pub mod raw;
 #[cfg(feature = "flags")]
 mod settings;
+#[cfg(test)]
+mod signal_to_noise;
+#[cfg(test)]
+mod statistics;
+#[cfg(test)]
+mod tests;
+
+use darkqa_base::error::Result;
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{Degradation, Rgb};
+
+#[cfg(feature = "flags")]
+pub use settings::{CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings};
 
 pub use applied::AppliedDegradation;
 pub use auto::{AutoExposure, AutoSettings, AutoShot};
@@ -63,23 +72,28 @@ pub use camera::{Calibration, CameraModel, CameraState, Sampling};
 pub use capture_state::{CaptureState, NoiseTerms, SensorState};
 pub use clean::Clean;
 pub use draws::{Component, NoiseKey, Site};
-pub use exposure::{expose, expose_by};
-pub use exposures::Exposures;
-pub use exposures::version;
+pub use exposure::{Exposures, PairEv, expose, expose_by, mean_luminance};
 pub use movement::{FrameView, Motion, MotionAngle, Streak, Tap};
 pub use noise_profile::{Amplify, Coupling, Draws, NoiseProfile, NoiseProfiles, Synthesis, Tone};
-pub use pair_ev::{PairEv, mean_luminance};
 pub use raw::CleanRaw;
 pub use raw::negative::{Negative, develop_with_state};
-#[cfg(feature = "flags")]
-pub use settings::{CameraArgs, KindSettings, LightArgs, LightSettings, SensorArgs, SensorSettings};
-
-use darkqa_base::error::Result;
-use darkqa_base::types::{Degradation, Rgb};
 
 /// Version of the sensor branch, raised whenever a pixel changes, so that results of an older version are not reused.
 /// The exposure branch has its own [version](exposure::VERSION).
 pub const VERSION: u32 = 2;
+
+/// Version of a kind of degradation, raised whenever one of its pixels changes, so that results of an older version are
+/// not reused.
+#[must_use]
+pub fn version(kind: Kind) -> u32 {
+    match kind {
+        Kind::Exposure => exposure::VERSION,
+        Kind::Sensor => VERSION,
+        // Both blur and noise change the pixels.
+        Kind::Auto => 100 * VERSION + movement::blur::VERSION,
+        Kind::Motion => movement::blur::VERSION,
+    }
+}
 
 /// Applies a degradation to a frame; without one, returns the frame.
 ///
@@ -99,12 +113,3 @@ pub fn degrade(clean: &Rgb, degradation: Option<&Degradation>, key: &NoiseKey, s
     let applied = AppliedDegradation::new(how, synthesis, &auto, &motion, view, key)?;
     Ok(Exposures::default().degrade(clean.into(), &applied, key))
 }
-
-#[cfg(test)]
-mod departures;
-#[cfg(test)]
-mod signal_to_noise;
-#[cfg(test)]
-mod statistics;
-#[cfg(test)]
-mod tests;

@@ -3,29 +3,29 @@
 //! A PNG file may have several kinds of colour information. In order of priority (PNG specification, third edition,
 //! section 4.3): code points (`cICP`), an ICC profile, the chunk `sRGB`, gamma and primaries (`gAMA`, `cHRM`). Without
 //! any, codes are sRGB. Other formats have only profiles.
+//!
+//! Conversion of decoded video to sRGB: [`StatedColours`] and [`FrameConversion`].
 
-mod code_points;
-mod conversion;
-mod curve;
+pub(super) mod conversion;
 mod icc;
-mod inks;
-pub(super) mod primaries;
+pub(crate) mod inks;
 mod space;
-mod srgb;
+#[cfg(test)]
+mod tests;
 
 use std::io::Read as _;
 use std::sync::{Arc, LazyLock};
 
-pub(super) use self::code_points::CodePoints;
-use self::code_points::primaries_number;
-use self::curve::ToneCurve;
 use self::icc::Profile;
-pub(super) use self::inks::Inks;
-use self::primaries::Primaries;
-pub(super) use self::space::{CodeDepth, ColourSpace, Meaning};
 use self::space::{REMEDY, rgb_space};
+use conversion::{Primaries, ToneCurve};
 use darkqa_base::types::values::Recent;
 use darkqa_base::types::{ColourHandling, Digest};
+use space::primaries_number;
+
+pub(super) use self::inks::Inks;
+pub(super) use self::space::{CodeDepth, ColourSpace, Meaning};
+pub(super) use space::CodePoints;
 
 /// Maximum size of an ICC profile, in bytes; chosen. Matrix profiles have a few thousand bytes, printer profiles up to
 /// a few million.
@@ -211,5 +211,66 @@ fn png_number(stated: u32) -> f64 {
     f64::from(stated) / 100_000.0
 }
 
-#[cfg(test)]
-mod tests;
+/// Primaries and transfer that a video states, by the numbers of ITU-T H.273, tables 2 and 3. The same rules hold for
+/// images: the numbers in `cICP` of a PNG file have the same meaning.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct StatedColours {
+    /// Number of the primaries; 2 if they are not stated.
+    pub primaries: u8,
+    /// Number of the transfer; 2 if it is not stated.
+    pub transfer: u8,
+}
+
+/// Conversion of RGB codes of 16 bits to sRGB codes of 8 bits.
+#[derive(Debug, Clone)]
+pub struct FrameConversion {
+    space: Arc<ColourSpace>,
+    /// Light of each code, per channel.
+    tables: [Vec<f64>; 3],
+}
+
+impl StatedColours {
+    /// The conversion of RGB codes of full range; `None` if they are taken as sRGB codes.
+    ///
+    /// # Errors
+    /// If these colours are not converted. The error names the reason, without a remedy.
+    pub fn conversion(self) -> Result<Option<FrameConversion>, String> {
+        let points = CodePoints { primaries: self.primaries, transfer: self.transfer };
+        // Frames have 8 bits at the end, in which linear light has too few codes.
+        match points.meaning(CodeDepth::Eight)? {
+            Meaning::Srgb | Meaning::Linear => Ok(None),
+            Meaning::Other(space) => {
+                Ok(Some(FrameConversion { tables: space.conversion.tables(u16::MAX.into()), space }))
+            }
+        }
+    }
+}
+
+impl FrameConversion {
+    /// Name of the colours, as `HLG (HDR), BT.2020`.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        self.space.name()
+    }
+
+    /// True for HDR, where light above diffuse white becomes white.
+    #[must_use]
+    pub fn is_hdr(&self) -> bool {
+        self.space.handling == ColourHandling::Clipped
+    }
+
+    /// Converts interleaved RGB samples. Also returns the number of pixels with a channel above white.
+    #[must_use]
+    pub fn convert(&self, samples: &[u16]) -> (Vec<u8>, usize) {
+        let conversion = &self.space.conversion;
+        let mut clipped = 0;
+        let mut converted = Vec::with_capacity(samples.len());
+        for pixel in samples.as_chunks::<3>().0 {
+            let lights = [0, 1, 2].map(|i| self.tables[i][usize::from(pixel[i])]);
+            let (codes, is_clipped) = conversion.encode_8(lights);
+            clipped += usize::from(is_clipped);
+            converted.extend(codes);
+        }
+        (converted, clipped)
+    }
+}

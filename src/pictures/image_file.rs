@@ -1,15 +1,13 @@
 //! Image files of six formats, and their conversion to pixels: [`ImageFile`].
 
-mod cmyk_jpeg;
 mod cmyk_tiff;
 mod exr_layers;
 mod facts;
 pub mod format;
-mod huffman_tables;
-mod jpeg_markers;
+mod jpeg;
 mod png_chunks;
-mod tiff_tags;
-mod webp_chunks;
+#[cfg(test)]
+mod tests;
 
 use std::borrow::Cow;
 use std::io::Cursor;
@@ -22,13 +20,12 @@ use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage
 use self::exr_layers::ExrFile;
 use self::facts::{Depth, FileFacts, InkForm, fault};
 use self::format::FileFormat;
-use self::huffman_tables::with_standard_tables;
 use super::colour::{CodeDepth, ColourSpace, ColourTag, Inks, Meaning};
 use super::decode_rule::{ColourRule, DecodeRule, Transfer};
 use darkqa_base::error::{Error, Result};
-use darkqa_base::files::guarded::guarded;
-use darkqa_base::files::reading;
+use darkqa_base::files::{self, guarded};
 use darkqa_base::types::{ColourHandling, ColourNote, DepthNote, Digest, InputNote, Light, Pixels, Rgb, Rgb16Image};
+use jpeg::with_standard_tables;
 
 /// A PNG, JPEG, WebP, TIFF, BMP or OpenEXR file in memory, not decoded.
 #[derive(Debug)]
@@ -71,7 +68,7 @@ impl ImageFile {
     /// # Errors
     /// If it cannot be read.
     pub fn open(path: &Path, rule: DecodeRule) -> Result<Self> {
-        let bytes = reading::bytes(path)?;
+        let bytes = files::bytes(path)?;
         Ok(Self::new(bytes, path.display().to_string(), rule))
     }
 
@@ -306,9 +303,7 @@ impl ImageFile {
         let colours = self.ink_colours().map_err(|problem| self.error(problem))?;
         let inks = guarded(|| match form {
             InkForm::Tiff => cmyk_tiff::inks(&self.bytes, width as usize * height as usize),
-            InkForm::Plain | InkForm::Adobe => {
-                cmyk_jpeg::inks(&with_standard_tables(&self.bytes), form == InkForm::Adobe)
-            }
+            InkForm::Plain | InkForm::Adobe => jpeg::inks(&with_standard_tables(&self.bytes), form == InkForm::Adobe),
         })
         .map_err(|problem| self.error(problem))?;
         let image = RgbImage::from_raw(width, height, colours.srgb(&inks))
@@ -432,6 +427,3 @@ fn contradiction(colour: &ColourTag) -> String {
         colour.kind()
     )
 }
-
-#[cfg(test)]
-mod tests;

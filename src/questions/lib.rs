@@ -2,7 +2,7 @@
 //!
 //! Each frame is first measured ([`statistics`]), with integers only. The rules ([`rules`], `rules.toml`) use only
 //! these measurements: they classify the room ([`room`]) and then generate the questions, one file per family.
-//! [`generate()`] is the entry point. Random picks are hashes of the frame's name ([`pick`]), so the order of the
+//! [`generate()`] is the entry point. Random picks are hashes of the frame's name ([`rule_context`]), so the order of the
 //! frames does not matter.
 
 #![allow(missing_docs, reason = "fields and variants of this workspace's own use, whose names say what they are")]
@@ -19,11 +19,9 @@ pub mod colors;
 pub mod frequency;
 pub mod generate;
 pub mod observer;
-pub mod pick;
 pub mod predicted;
 mod presence;
 pub mod reason;
-mod relative;
 pub mod room;
 mod room_type;
 pub mod rule_context;
@@ -32,7 +30,6 @@ pub mod statistics;
 pub mod summary;
 #[cfg(test)]
 mod tests;
-mod views;
 mod vocabulary;
 
 pub use generate::{Generated, QuestionRequest, generate};

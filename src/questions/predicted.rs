@@ -6,16 +6,16 @@
 use std::cmp::Reverse;
 use std::sync::Arc;
 
-use darkqa_base::error::{Error, Result};
-use darkqa_base::labels;
-use darkqa_base::types::{DepthKind, Digest, Frame, FrameId, Question, Rgb, Segmentation};
 use ndarray::{Array2, ShapeError};
 
 use crate::colors::{Color, Palette};
-use crate::observer::question_topic::QuestionTopic;
+use crate::observer::answers::QuestionTopic;
 use crate::rule_context::YES_NO;
 use crate::rules::Rules;
 use crate::statistics::{FrameStatistics, Segment, measure};
+use darkqa_base::error::{Error, Result};
+use darkqa_base::labels;
+use darkqa_base::types::{DepthKind, Digest, Frame, FrameId, Question, Rgb, Segmentation};
 
 /// Label space of predicted classes.
 const SPACE: &str = "mpcat40";

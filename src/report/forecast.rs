@@ -1,4 +1,4 @@
-//! The estimate of a run as text and JSON: [`render`], [`json`].
+//! The estimate of a run as text and JSON: [`render`], [`forecast_json`].
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -15,7 +15,7 @@ use crate::types::text::{bytes, counted, hours, money};
 const TOLD_FROM: f64 = 0.05;
 
 /// Serializes the forecast as JSON.
-pub(crate) fn json(forecast: &Forecast) -> Result<String> {
+pub(crate) fn forecast_json(forecast: &Forecast) -> Result<String> {
     serde_json::to_string_pretty(forecast).map(|text| text + "\n").map_err(|e| Error::data("the estimate", e))
 }
 

@@ -10,10 +10,9 @@ use crate::report::choice_report::ChoiceReport;
 use crate::report::sentences::Sentence;
 use crate::report::tables::{BASELINE, strict_groups, summary_rows};
 use crate::report::text::alert::Alert;
-use crate::report::text::csv::fields;
-use crate::report::text::noise_profiles::NoiseProfiles;
-use crate::report::text::table::{Table, TableRow};
-use crate::runs::report_length::ReportLength;
+use crate::report::text::table::{Table, TableRow, fields};
+use crate::report::text::words::NoiseProfiles;
+use crate::runs::outcome::ReportLength;
 use crate::types::UnreadReason;
 use crate::types::manifests::RunManifest;
 

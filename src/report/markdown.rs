@@ -6,14 +6,15 @@ use std::fmt::Write;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::FindingGroups;
 use crate::report::openeqa::{OpenReport, coverage};
-use crate::report::self_agreement::{self, AgreementReport};
+use crate::report::self_agreement;
+use crate::report::self_agreement::AgreementReport;
 use crate::report::sentences::how_to_read;
 use crate::report::short::head;
 use crate::report::text::alert::Alert;
-use crate::report::text::readable::readable;
 use crate::report::text::table::{Column, ColumnKind, Table, TableFormat};
+use crate::report::text::terminal::readable;
 use crate::report::text::words::{ends, interval, words};
-use crate::runs::report_length::ReportLength;
+use crate::runs::outcome::ReportLength;
 use crate::types::text::counted;
 
 /// Name of the table of accuracies or scores by level.

@@ -2,7 +2,6 @@
 
 pub(crate) mod charts;
 pub(crate) mod choice_report;
-pub(crate) mod doctor;
 mod finding_groups;
 pub(crate) mod forecast;
 pub(crate) mod joined;
@@ -13,12 +12,11 @@ pub(crate) mod page;
 pub(crate) mod products;
 pub(crate) mod questions;
 pub(crate) mod realism;
-mod script_policy;
 pub(crate) mod self_agreement;
 pub(crate) mod sentences;
 pub(crate) mod short;
 pub(crate) mod site;
 pub(crate) mod study;
 pub(crate) mod tables;
-mod template;
+pub(crate) mod template;
 pub(crate) mod text;

@@ -1,18 +1,16 @@
 //! Files of a report: [`products`].
 
 use crate::error::Result;
-use crate::report::charts::chart;
-use crate::report::charts::chart::Figure;
+use crate::report::charts::chart::{self, Figure};
 use crate::report::charts::figures::{Names, figure_specs};
 use crate::report::charts::paper::figure;
-use crate::report::charts::samples::{self, samples};
+use crate::report::charts::samples::{self, samples_of};
 use crate::report::charts::views;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::page::{PageInputs, page};
 use crate::report::sentences::Sentence;
-use crate::report::text::csv;
 use crate::report::text::latex;
-use crate::report::text::table::Table;
+use crate::report::text::table::{self, Table};
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///
@@ -38,7 +36,7 @@ pub(super) fn files(
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let mut files = table_files(tables, sentences, "Findings and tables")?;
     files.extend(chart::svg_files(figures));
-    for samples in samples(inputs.thumbnails) {
+    for samples in samples_of(inputs.thumbnails) {
         let name = format!("figures/{}.svg", samples.name);
         files.push((name, samples::figure(&samples).into_bytes()));
     }
@@ -48,7 +46,7 @@ pub(super) fn files(
 
 /// Tables as CSV files, and as one LaTeX file that starts with the findings; `head` is the title of the LaTeX file.
 pub(super) fn table_files(tables: &[Table], sentences: &[Sentence], head: &str) -> Result<Vec<(String, Vec<u8>)>> {
-    let mut files = csv::files(tables)?;
+    let mut files = table::files(tables)?;
     let findings: Vec<String> =
         sentences.iter().map(|sentence| format!("{} ({})", sentence.text, sentence.detail)).collect();
     let tables = latex::tables(head, &findings, tables);

@@ -1,33 +1,42 @@
 //! Terminal text of a report on multiple-choice questions: [`text()`].
-
-pub(super) mod findings;
-mod foot;
-mod name_column;
-mod styled_lines;
+//!
+//! Start of a report in the terminal, with its findings: [`findings`].
+//!
+//! Lines below the short table: models without images and chance ([`baselines`]), and marks and facts of models
+//! ([`about_models`]).
+//!
+//! Column of names in the short table: [`NameColumn`].
+//!
+//! Lines of a terminal report with coloured signs: [`alert`], [`summary`], [`sentence_line`], [`heading`] and [`table`].
+//!
+//! Colours are ANSI sequences; the code that prints a text removes them if the terminal has no colours. A sign or a
+//! word always has the same meaning as the colour.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
-use self::foot::BELOW;
-use self::name_column::{LEVEL_WIDTH, NameColumn};
+use clap::builder::styling::{AnsiColor, Style};
+
+use super::finding_groups::Finding;
+use super::sentences::{Sentence, Tone};
+use super::tables::{control_text, unread_note};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::FindingGroups;
 use crate::report::sentences::how_to_read;
-use crate::report::text::frame_count::frames;
+use crate::report::text::alert::{Alert, lines};
 use crate::report::text::ladder::{Ladder, SeriesByLevel};
-use crate::report::text::noise_profiles::NoiseProfiles;
-use crate::report::text::terminal::render;
-use crate::report::text::words::{percent, widest_reach_of};
-use crate::report::text::wrapped::{WIDTH, wrapped};
-use crate::runs::report_length::ReportLength;
+use crate::report::text::terminal::{WIDTH, line, render, wrapped};
+use crate::report::text::words::{NoiseProfiles, frames, percent, shorten_middle, widest_reach_of, with_interval};
+use crate::runs::outcome::ReportLength;
 use crate::types::manifests::RunManifest;
-use crate::types::text::{counted, plural};
+use crate::types::replies::OBSERVER;
+use crate::types::text::{counted, escape_hidden, plural};
 use crate::types::{Axis, AxisLevel};
 use darkqa_score::accuracies::{AccuracyCell, Health};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::grid::Grid;
-use darkqa_score::model_in_condition::models_under_test;
+use darkqa_score::model_in_condition::{CHANCE, is_observer, models_under_test, without_run};
 
 /// Width of the interval column, in characters.
 const INTERVAL_WIDTH: usize = 15;
@@ -45,10 +54,10 @@ const MAX_LEVELS: usize = 7;
 #[must_use]
 pub(crate) fn text(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
     let groups = FindingGroups::new(&report.sentences);
-    let mut text = findings::findings(&head(report), &report.alerts, &groups, length, &how_to_read(&report.sentences));
+    let mut text = findings(&head(report), &report.alerts, &groups, length, &how_to_read(&report.sentences));
     match length {
         ReportLength::Findings => return text,
-        ReportLength::Summary => text += &styled_lines::table(&accuracy_table(report)),
+        ReportLength::Summary => text += &table(&accuracy_table(report)),
         ReportLength::Full => text += &render(&report.tables),
     }
     text += &open_question(report);
@@ -197,8 +206,8 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
     if hidden > 0 {
         let _ = writeln!(text, " {} --full", counted(hidden, "more row"));
     }
-    text += &foot::baselines(report, &ladder);
-    text + &foot::about_models(report, &ladder.models)
+    text += &baselines(report, &ladder);
+    text + &about_models(report, &ladder.models)
 }
 
 /// Rows of a block at some levels, below a heading with its title and the levels; empty if no row has a cell at these
@@ -246,4 +255,265 @@ fn accuracy_text(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> Stri
     let is_below = !report.findings.below_blind(&cell.subject, None).is_empty();
     let mark = if is_below { BELOW } else { ' ' };
     format!("{}{mark}", percent(accuracy.value))
+}
+
+/// Width of the column of group titles, in characters.
+const GROUP_WIDTH: usize = 15;
+
+/// Head, alerts and summary, then the main finding of each group, or all findings with a note on how to read them.
+pub(crate) fn findings(
+    head: &str,
+    alerts: &[Alert],
+    groups: &FindingGroups<'_>,
+    length: ReportLength,
+    how_to_read: &str,
+) -> String {
+    let mut text = match length {
+        // As wide as the tables.
+        ReportLength::Full => line("", head, " ") + &lines(alerts),
+        _ => format!("{head}\n") + &alerts.iter().map(alert).collect::<String>(),
+    };
+    if groups.count() == 0 {
+        return text + "\n";
+    }
+    let _ = write!(text, "\n{}\n", summary(&groups.summary()));
+    if length == ReportLength::Summary {
+        for (title, finding) in groups.main_findings() {
+            text += &row(title, finding);
+        }
+        let all = counted(groups.count(), "finding");
+        return text + &wrapped(" ", &format!("All {all}, and how to read them: --findings"), " ") + "\n";
+    }
+    for group in groups.all() {
+        text += &heading(group.title);
+        for sentence in group.sentences() {
+            text += &sentence_line(sentence);
+        }
+    }
+    text + &wrapped(" ", how_to_read, " ") + "\n"
+}
+
+/// Title of a group and its main finding, with the intervals below.
+fn row(title: &str, finding: &Finding<'_>) -> String {
+    let tone = finding.main_sentence().tone;
+    let first = format!(" {title:<GROUP_WIDTH$}{}  ", tone.sign());
+    let rest = " ".repeat(first.chars().count());
+    let lines = wrapped(&first, &escape_hidden(&(finding.text() + ".")), &rest);
+    let text = colour_sign(&lines, GROUP_WIDTH + 2, tone);
+    let intervals = finding.intervals_text();
+    if intervals.is_empty() {
+        return text;
+    }
+    text + &wrapped(&rest, &intervals, &rest)
+}
+
+/// Mark of an accuracy that is detected to be below the accuracy without images.
+const BELOW: char = '▼';
+
+/// Lines below the table: models without images, chance, and explanations of the last column and of the mark.
+fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {
+    let mut parts = Vec::new();
+    for (subject, cell) in &ladder.without_level {
+        let Some(share) = cell.accuracy else {
+            continue;
+        };
+        parts.push(match subject.view {
+            None => {
+                let once = report.findings.summary.chance_of_questions;
+                let once = once.map(|once| {
+                    format!(" over all orders of choices ({} with each question once)", percent(once.value))
+                });
+                format!("chance {}{}", percent(share.value), once.unwrap_or_default())
+            }
+            Some(_) if parts.is_empty() => {
+                format!("without images: {} {}", subject.model, with_interval(share))
+            }
+            Some(_) => format!("{} {}", subject.model, with_interval(share)),
+        });
+    }
+    let has_mark = report
+        .findings
+        .summary
+        .family_cells(None, ParsingMode::Strict)
+        .filter(|cell| cell.subject.level.is_some())
+        .any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty());
+    if has_mark {
+        parts.push(format!("{BELOW} less often right than without images"));
+    }
+    let mut text = String::new();
+    if !ladder.series.is_empty() {
+        let line = "95 %: how far the widest interval of the row reaches down and up";
+        text += &wrapped(" ", line, " ");
+    }
+    let lenient: usize = report.findings.health.iter().map(|health| health.lenient_only).sum();
+    if lenient > 0 {
+        let replies = if lenient == 1 { "reply is" } else { "replies are" };
+        let line = format!("{lenient} more {replies} read by the lenient parsing alone: --full");
+        text += &wrapped(" ", &line, " ");
+    }
+    if !parts.is_empty() {
+        text += &wrapped(" ", &parts.join(" · "), " ");
+    }
+    text += &observer_control(report);
+    if let Some(reasons) = unread_note(&report.findings.summary) {
+        text += &wrapped(" ", &reasons, " ");
+    }
+    text
+}
+
+/// Line that defines the observer, with the score of its standing control in each run; empty if the observer is not in
+/// the report.
+fn observer_control(report: &ChoiceReport<'_>) -> String {
+    let findings = report.findings;
+    let is_shown = findings.grid.subjects.iter().any(|subject| is_observer(&subject.model));
+    let controls = findings.observer.standing_controls();
+    let Some(first) = controls.first().filter(|_| is_shown) else {
+        return String::new();
+    };
+    let scores: Vec<String> = controls
+        .iter()
+        .map(|cell| {
+            let run = &cell.subject.model[without_run(&cell.subject.model).len()..];
+            with_interval(cell.score) + run
+        })
+        .collect();
+    let line = format!(
+        "{OBSERVER}: known-signal observer, given the untouched frame; not a model. Control: {}, scores {}; chance is {}",
+        control_text(first),
+        scores.join(" and "),
+        percent(first.chance)
+    );
+    wrapped(" ", &line, " ")
+}
+
+/// Explanations of the marks of models, training data of enhancers, and a line for each model with the facts that the
+/// user gave about it.
+fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
+    let listing = &report.findings.grid.listing;
+    let mut text = listing.footnote(models.iter().copied()).map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
+    for (enhancer, training) in listing.trainings() {
+        text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");
+    }
+    for model in models.iter().filter(|model| **model != CHANCE) {
+        let facts: Vec<String> = listing
+            .columns()
+            .iter()
+            .map(|column| {
+                let fact = Some(listing.cell(*column, model)).filter(|fact| !fact.is_empty());
+                format!("{} {}", column.head(), fact.unwrap_or("–"))
+            })
+            .collect();
+        if !facts.is_empty() {
+            text += &wrapped(" ", &format!("{model}: {}", facts.join(" · ")), "   ");
+        }
+    }
+    text
+}
+
+/// Width of the column of a level, in characters.
+const LEVEL_WIDTH: usize = 7;
+
+/// First column of the table: names, shortened to a width.
+pub(super) struct NameColumn {
+    width: usize,
+    /// Shortened names that several different names have in common.
+    ambiguous: BTreeSet<String>,
+}
+
+impl NameColumn {
+    /// Column of at most `width` characters for some names.
+    fn new<'a>(names: impl Iterator<Item = &'a str>, width: usize) -> Self {
+        let names: BTreeSet<&str> = names.collect();
+        let mut seen = BTreeSet::new();
+        let ambiguous = names
+            .into_iter()
+            .map(|name| shorten_middle(name, width))
+            .filter(|name| !seen.insert(name.clone()))
+            .collect();
+        Self { width, ambiguous }
+    }
+
+    /// Formats a row: name, values, and the reach of the widest interval. A name that is ambiguous when shortened gets
+    /// its own line above the values.
+    fn line(&self, name: &str, values: impl Iterator<Item = String>, reach: &str) -> String {
+        let width = self.width;
+        let mut text = String::new();
+        let mut short = shorten_middle(name, width);
+        if self.ambiguous.contains(&short) {
+            text = format!(" {name}\n");
+            short.clear();
+        }
+        let values: String = values.map(|value| format!("{value:>LEVEL_WIDTH$}")).collect();
+        let line = format!(" {short:<width$}{values}  {reach}");
+        text + line.trim_end() + "\n"
+    }
+}
+
+/// Wrapped text of an alert with its sign.
+fn alert(alert: &Alert) -> String {
+    style_start(&wrapped("! ", &escape_hidden(&alert.text), "  "), 1, colour(AnsiColor::Yellow))
+}
+
+/// Wrapped text of a sentence with its sign, and its detail below.
+fn sentence_line(sentence: &Sentence) -> String {
+    let first = format!(" {}  ", sentence.tone.sign());
+    let text = wrapped(&first, &escape_hidden(&sentence.text), "    ");
+    colour_sign(&text, 2, sentence.tone) + &wrapped("    ", &escape_hidden(&sentence.detail), "    ")
+}
+
+/// Applies the colour of a tone to the first `end` characters, at the end of which the sign is.
+fn colour_sign(lines: &str, end: usize, tone: Tone) -> String {
+    let style = match tone {
+        Tone::Better => colour(AnsiColor::Green),
+        Tone::Worse => colour(AnsiColor::Red),
+        Tone::NotShown | Tone::Note => Style::new().bold(),
+    };
+    style_start(lines, end, style)
+}
+
+/// Summary of a report, in bold.
+fn summary(text: &str) -> String {
+    let lines = wrapped(" ", &escape_hidden(text), " ");
+    let style = Style::new().bold();
+    format!("{style}{}{style:#}\n", lines.trim_end())
+}
+
+/// Title of a group of findings.
+fn heading(title: &str) -> String {
+    format!(" {title}\n")
+}
+
+/// Applies red to the marks of accuracies below the accuracy without images in a table.
+fn table(text: &str) -> String {
+    let style = colour(AnsiColor::Red);
+    escape_hidden(text).replace(BELOW, &format!("{style}{BELOW}{style:#}"))
+}
+
+fn colour(colour: AnsiColor) -> Style {
+    Style::new().bold().fg_color(Some(colour.into()))
+}
+
+/// Applies a style to the first `count` characters of a text.
+fn style_start(text: &str, count: usize, style: Style) -> String {
+    let end = text.char_indices().nth(count).map_or(text.len(), |(index, _)| index);
+    let (start, rest) = text.split_at(end);
+    format!("{style}{start}{style:#}{rest}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::NameColumn;
+
+    #[test]
+    fn ambiguous_names_are_not_shortened() {
+        let names = ["vision-one-instruct", "vision-two-instruct", "raw"];
+        let column = NameColumn::new(names.into_iter(), 12);
+        let [first, second, third] = names.map(|name| column.line(name, ["50.0".to_owned()].into_iter(), "−1 +2"));
+        assert_eq!(first, " vision-one-instruct\n                50.0  −1 +2\n");
+        assert_ne!(first, second);
+        assert_eq!(third, " raw            50.0  −1 +2\n");
+        let single = NameColumn::new(names[..1].iter().copied(), 12);
+        let line = single.line(names[0], std::iter::empty(), "");
+        assert_eq!(line, " visio…struct\n");
+    }
 }

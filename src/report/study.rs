@@ -2,13 +2,14 @@
 
 use serde::Serialize;
 
-use super::script_policy::allow_script;
+use super::template::allow_script;
 use crate::error::Result;
-use crate::report::text::script::to_script_json;
+use crate::report::text::terminal::to_script_json;
 use crate::types::Digest;
 
 /// Template of the page.
 const PAGE: &str = include_str!("study.html");
+
 /// Text in the template that the questions replace.
 const PLACEHOLDER: &str = "/*STUDY*/null";
 

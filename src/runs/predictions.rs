@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::sync::Arc;
 
-use crate::ask::prompts::openeqa::blind_answer;
+use crate::ask::prompts::blind_answer;
 use crate::types::{OpenDetail, QuestionId, Record, Step, Via, View};
 use darkqa_score::choice::llm_match::{Protocol, truncate_answer};
 use darkqa_score::choice::open_answer;

@@ -1,14 +1,26 @@
 //! One of several parts of a run, each for one process: [`Shard`].
+//!
+//! A shard's share of `--max-cost`: [`ShardBudget`].
+//!
+//! The divisions of a run into shards, by the shards in its folder: [`Division`].
 
-use std::fmt;
+use std::collections::BTreeMap;
 use std::num::NonZeroU32;
+use std::path::Path;
 use std::str::FromStr;
+use std::{fmt, fs};
 
+use serde_json::{Value, json};
+
+use super::batch_system::{ArrayTask, TaskRange};
 use crate::ask::Quota;
 use crate::error::{Error, Result};
+use crate::store;
+use crate::types::manifests::RunManifest;
+use crate::types::text::money;
 
 /// One of several parts of a run, with consecutive sources. Each source is in one shard, with all its conditions and
-/// questions. See [`shard_questions`](crate::runs::shard_sources::shard_questions) for the division.
+/// questions. See [`shard_questions`](crate::runs::shard_records::shard_questions) for the division.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Shard {
     /// Index of the shard, from 0.
@@ -116,6 +128,108 @@ pub(super) fn number(text: &str, whole: &str) -> Result<NonZeroU32> {
     text.trim().parse().map_err(|_| not_a_shard(whole))
 }
 
+/// Manifest setting with the share of a shard, the amount spent, and the amount left, in US dollars.
+const BUDGET_ENTRY: &str = "--max-cost of this part";
+
+/// A shard's share of the cost limit of its run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ShardBudget {
+    /// In US dollars.
+    share: f64,
+    /// Cost of the shard's replies, in US dollars.
+    spent: f64,
+}
+
+impl ShardBudget {
+    pub(crate) fn new(share: f64, spent: f64) -> Self {
+        Self { share, spent }
+    }
+
+    /// Amount left, in US dollars; at least 0.
+    fn left(self) -> f64 {
+        (self.share - self.spent).max(0.0)
+    }
+
+    /// Notes the budget in the manifest of the shard.
+    pub(crate) fn note(self, manifest: &mut RunManifest) {
+        let dollars = json!({ "share": self.share, "spent": self.spent, "left": self.left() });
+        manifest.settings.insert(BUDGET_ENTRY.to_owned(), dollars);
+    }
+
+    /// Removes the note from the manifest of a run joined from shards.
+    pub(crate) fn remove_note(manifest: &mut RunManifest) {
+        manifest.settings.remove(BUDGET_ENTRY);
+    }
+
+    /// The sentence about the amount left.
+    pub(crate) fn words(self) -> String {
+        format!(
+            "{} of its {} of --max-cost are left; other parts do not get them",
+            money(self.left()),
+            money(self.share)
+        )
+    }
+}
+
+/// Manifest setting of a shard: the Slurm array whose tasks do the shards, as `0-3`.
+const DIVISIONS_ENTRY: &str = "Slurm array of this part";
+
+/// A division of a run into shards, of which some exist.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Division {
+    /// Number of shards.
+    pub(super) count: NonZeroU32,
+    /// The Slurm array whose tasks do the shards; `None` if they were named by hand or by an earlier version.
+    tasks: Option<TaskRange>,
+}
+
+impl Division {
+    /// The shard of a task that repeats one of this division, and the array of the division; `None` if it does not
+    /// repeat one.
+    pub(super) fn shard_of(&self, task: ArrayTask) -> Option<(Shard, TaskRange)> {
+        let tasks = self.tasks.filter(|tasks| task.repeats(*tasks))?;
+        let shard = Shard::new(tasks.index(task.number)?, self.count)?;
+        Some((shard, tasks))
+    }
+}
+
+/// The divisions of the run in a folder, by their numbers of shards. Empty if the folder has no shard or cannot be
+/// read.
+pub(super) fn divisions_in(folder: &Path) -> Vec<Division> {
+    let mut shards: Vec<Shard> = fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .filter_map(|entry| Shard::of_folder(entry.ok()?.file_name().to_str()?))
+        .collect();
+    shards.sort_by_key(|shard| (shard.count(), *shard));
+    let mut divisions = BTreeMap::<NonZeroU32, Option<TaskRange>>::new();
+    for shard in shards {
+        let tasks = divisions.entry(shard.count()).or_default();
+        // One manifest of a division suffices.
+        if tasks.is_none() {
+            *tasks = tasks_of(&folder.join(shard.folder()));
+        }
+    }
+    divisions.into_iter().map(|(count, tasks)| Division { count, tasks }).collect()
+}
+
+/// The array in the manifest of a shard; `None` if there is none, or if the manifest cannot be read: opening the shard
+/// reports that error.
+fn tasks_of(shard: &Path) -> Option<TaskRange> {
+    let settings = store::read_settings(shard).ok()?;
+    settings.get(DIVISIONS_ENTRY)?.as_str()?.parse().ok()
+}
+
+/// The manifest setting that notes the array of a shard.
+pub(crate) fn tasks_setting(tasks: TaskRange) -> (String, Value) {
+    (DIVISIONS_ENTRY.to_owned(), json!(tasks.to_string()))
+}
+
+/// Removes the note from the manifest of a run joined from shards.
+pub(super) fn remove_tasks_setting(manifest: &mut RunManifest) {
+    manifest.settings.remove(DIVISIONS_ENTRY);
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -147,5 +261,17 @@ mod tests {
         for other in ["plan", "shard-0-of-2", "shard-3-of-2", "shard-1-of-x"] {
             assert_eq!(Shard::of_folder(other), None, "{other}");
         }
+    }
+
+    fn half_budget(spent: f64) -> ShardBudget {
+        ShardBudget { share: 0.5, spent }
+    }
+
+    #[test]
+    fn nothing_is_left_of_a_share_that_is_spent() {
+        assert!((half_budget(0.2).left() - 0.3).abs() < 1e-12);
+        assert_eq!(half_budget(0.6).left().to_bits(), 0.0_f64.to_bits());
+        let words = half_budget(0.25).words();
+        assert!(words.contains("0.25") && words.contains("0.50"), "{words}");
     }
 }

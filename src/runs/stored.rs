@@ -1,4 +1,6 @@
 //! Runs as read from their folders: [`StoredRun`], and [`AnyRun`] for either kind of experiment.
+//!
+//! Files of a run folder other than its records: [`RunFiles`].
 
 use std::collections::HashMap;
 use std::fs;
@@ -6,9 +8,7 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 use crate::runs::renamed;
-use crate::runs::run_files::RunFiles;
 use crate::runs::run_texts::InMemoryTexts;
-pub(crate) use crate::runs::run_texts::RunTexts;
 use crate::store;
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
@@ -16,6 +16,8 @@ use crate::types::{
     RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
 };
 use darkqa_score::answers::record::{Detail, answered};
+
+pub(crate) use crate::runs::run_texts::RunTexts;
 
 /// The models of a run that a report shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -339,4 +341,37 @@ fn no_run(folder: &Path) -> Error {
 /// A setting of a manifest, if it is a text.
 pub(crate) fn text_setting<'a>(manifest: &'a RunManifest, name: &str) -> Option<&'a str> {
     manifest.settings.get(name)?.as_str()
+}
+
+/// Contents of the files of a run folder other than its records.
+pub(crate) struct RunFiles {
+    pub(crate) questions: Vec<RunQuestion>,
+    pub(crate) thumbnails: Vec<Thumbnail>,
+    pub(crate) fidelity: Vec<ImageFidelity>,
+}
+
+impl RunFiles {
+    /// Reads the files of a run folder, without the evidence of questions.
+    ///
+    /// # Errors
+    /// If a line of a file is broken.
+    pub(crate) fn read_without_evidence(folder: &Path) -> Result<Self> {
+        let mut questions = Vec::new();
+        store::each_question(folder, |question| {
+            questions.push(question.without_evidence());
+        })?;
+        Ok(Self { questions, thumbnails: store::read_thumbnails(folder), fidelity: store::read_fidelity(folder) })
+    }
+
+    /// Reads the files of a run folder.
+    ///
+    /// # Errors
+    /// If a line of a file is broken.
+    pub(crate) fn read(folder: &Path) -> Result<Self> {
+        Ok(Self {
+            questions: store::read_questions(folder)?,
+            thumbnails: store::read_thumbnails(folder),
+            fidelity: store::read_fidelity(folder),
+        })
+    }
 }

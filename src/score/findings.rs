@@ -17,8 +17,7 @@ use super::comparisons::{
 use super::grid::Grid;
 use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use super::observed::ObserverSummary;
-use super::photographs::pair_darkness::{self, PairDarkness};
-use super::photographs::{FidelityFindings, PhotographedSet};
+use super::photographs::{self, FidelityFindings, PairDarkness, PhotographedSet};
 use super::significance::Significance;
 use darkqa_base::types::{ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant};
 
@@ -193,7 +192,7 @@ impl<'a> Findings<'a> {
             agreements: Vec::new(),
             light_agreements: Vec::new(),
             set: PhotographedSet::default(),
-            pairs: pair_darkness::from_grid(&grid),
+            pairs: photographs::from_grid(&grid),
             fidelity: FidelityFindings::new(&grid, measured),
             common: CommonItems::new(&grid),
             strict: None,

@@ -35,7 +35,6 @@ pub mod photographs;
 pub mod power;
 mod statistics;
 pub mod suggested_scenes;
-mod test_tree;
 pub mod tested_sentences;
 #[cfg(test)]
 mod tests;

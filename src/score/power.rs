@@ -5,7 +5,7 @@
 //! Smith and McHugh 1987, Stat. Med. 6:53). D is the design effect of clusters of unequal sizes m, 1 + (Σm² / Σm − 1) ρ
 //! (Eldridge, Ashby and Kerry 2006, Int. J. Epidemiol. 35:1292, with its cv of the sizes written out). The quantiles
 //! are those of Student's t, with the degrees of freedom that the test finds on average
-//! ([`degrees_of_freedom`](crate::statistics::quantiles)): half the number C of clusters, whose sums have a kurtosis of
+//! ([`degrees_of_freedom`](crate::statistics::estimate)): half the number C of clusters, whose sums have a kurtosis of
 //! about 3; C − 1 if pairs are independent.
 //!
 //! ψ and ρ are not known before a run, so both are assumed: [`CHANGED`] and [`CORRELATION`].
@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use super::comparisons::paired::POWER;
 use super::significance::least_p;
-use crate::statistics::quantiles::quantile;
+use crate::statistics::estimate::quantile;
 
 /// Share of the answers that change between two conditions without any effect, half of them in each direction; assumed.
 /// It is that of the simulated runs of `src/docs/numbers.md`.

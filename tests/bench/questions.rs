@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use darkqa_base::types::{DepthKind, Digest, Frame, FrameId, Intrinsics, Label, Labels, Rgb, Segmentation};
-use darkqa_eval::internals::dataset::Dataset;
+use darkqa_eval::internals::dataset::open_frames;
 use darkqa_questions::colors::Palette;
 use darkqa_questions::rules::Rules;
 use darkqa_questions::statistics::measure;
@@ -106,7 +106,7 @@ fn stage(c: &mut Criterion) {
     });
     let folder = tempfile::tempdir().unwrap();
     write(folder.path());
-    let dataset = Dataset::from_frames(folder.path(), &[]).unwrap();
+    let dataset = open_frames(folder.path(), &[]).unwrap();
     let name = dataset.frames().next().unwrap();
     group.bench_function("read and decode", |b| {
         b.iter(|| dataset.files(black_box(name)).unwrap().decode().unwrap());

@@ -1,4 +1,8 @@
 //! Prices of models per token: [`Prices`].
+//!
+//! Price factors of service tiers: [`TierFactors`].
+//!
+//! Upper bound on the tokens of a request: [`TokenBound`].
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,12 +10,10 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::tier_factors::TierFactors;
-use super::token_bound::TokenBound;
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
 use crate::types::text::TomlFault;
-use crate::types::{ServiceTier, Usage};
+use crate::types::{ServiceTier, Unstated, Usage};
 
 /// Price of a model, in US dollars per million tokens.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -141,7 +143,7 @@ impl Prices {
     /// # Errors
     /// If the file cannot be read or parsed, or a price or the batch share is negative or not finite.
     pub(crate) fn load(path: &Path) -> Result<Self> {
-        let text = reading::settings(path)?;
+        let text = files::settings(path)?;
         let prices: Self = toml::from_str(&text).map_err(|e| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
             invalid_table(path, &format!("line {line}: {problem}"))
@@ -309,6 +311,83 @@ fn version_of<'n>(name: &'n str, model: &str) -> Option<&'n str> {
     is_version.then_some(version)
 }
 
+/// Factor of each service tier relative to the price that it belongs to; `None` if unknown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TierFactors([Option<f64>; ServiceTier::COUNT]);
+
+impl Default for TierFactors {
+    fn default() -> Self {
+        Self::new(std::iter::empty())
+    }
+}
+
+impl TierFactors {
+    /// Factors by the names of tiers, relative to the standard tier. Tiers with other names than those of
+    /// [`ServiceTier`] are left out, because replies do not tell them apart.
+    pub(super) fn new<'a>(stated: impl Iterator<Item = (&'a str, f64)>) -> Self {
+        let mut factors = [None; ServiceTier::COUNT];
+        factors[ServiceTier::Standard as usize] = Some(1.0);
+        for (name, factor) in stated {
+            match ServiceTier::from_name(name) {
+                None | Some(ServiceTier::Other | ServiceTier::Standard) => {}
+                Some(tier) => factors[tier as usize] = Some(factor),
+            }
+        }
+        Self(factors)
+    }
+
+    /// The factors relative to the price at the tier `asked`, which has this factor.
+    pub(super) fn relative_to(self, asked: Option<ServiceTier>, factor: f64) -> Self {
+        let mut factors = self.0;
+        if let Some(asked) = asked {
+            factors[asked as usize] = Some(factor);
+        }
+        Self(factors.map(|other| other.map(|other| other / factor)))
+    }
+
+    /// The factor of a tier that a reply states; 1 for the tier that was asked for, and for one whose factor is
+    /// unknown.
+    pub(super) fn factor(&self, tier: Option<ServiceTier>) -> f64 {
+        tier.and_then(|tier| self.0[tier as usize]).filter(|factor| factor.is_finite()).unwrap_or(1.0)
+    }
+
+    /// True if a reply states a tier whose factor is unknown.
+    pub(crate) fn is_unknown(&self, tier: ServiceTier) -> bool {
+        self.0[tier as usize].is_none()
+    }
+}
+
+/// Upper bound on the tokens of one request.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct TokenBound {
+    pub(crate) prompt: u64,
+    /// Tokens of the reply, hidden reasoning included.
+    pub(crate) reply: u64,
+}
+
+impl TokenBound {
+    /// Returns the bound as the unreported tokens of one request.
+    pub(crate) fn unstated(self) -> Unstated {
+        Unstated { requests: 1, prompt_tokens: self.prompt, completion_tokens: self.reply }
+    }
+
+    /// Returns the bound on the counts that are missing from `usage`; reported counts become 0.
+    ///
+    /// Nothing is missing if the server states what it charges. Without prompt tokens (absent or 0), the server does
+    /// not count tokens: 0 reply tokens are then also missing.
+    pub(crate) fn missing_from(self, usage: Usage) -> Self {
+        if usage.cost.is_some_and(|cost| cost.dollars() > 0.0) {
+            return Self::default();
+        }
+        let prompt = usage.prompt_tokens.filter(|tokens| *tokens > 0);
+        let reply = match (prompt, usage.completion_tokens) {
+            (None, Some(0)) => None,
+            (_, reply) => reply,
+        };
+        Self { prompt: prompt.map_or(self.prompt, |_| 0), reply: reply.map_or(self.reply, |_| 0) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -443,5 +522,18 @@ mod tests {
             assert!(error.starts_with("--prices: "), "{error}");
             assert!(error.contains("gpt-4o ="), "{error}");
         }
+    }
+
+    #[test]
+    fn factors_are_relative_to_the_tier_asked_for() {
+        let factors = TierFactors::new([("priority", 1.7), ("flex", 0.5), ("turbo", 9.0)].into_iter());
+        assert!((factors.factor(Some(ServiceTier::Priority)) - 1.7).abs() < 1e-12);
+        assert!((factors.factor(None) - 1.0).abs() < 1e-12);
+        assert!(factors.is_unknown(ServiceTier::Other) && factors.is_unknown(ServiceTier::Scale));
+        let priority = factors.relative_to(Some(ServiceTier::Priority), 1.7);
+        assert!((priority.factor(Some(ServiceTier::Priority)) - 1.0).abs() < 1e-12);
+        assert!((priority.factor(Some(ServiceTier::Standard)) - 1.0 / 1.7).abs() < 1e-12);
+        let other = factors.relative_to(Some(ServiceTier::Other), 9.0);
+        assert!(!other.is_unknown(ServiceTier::Other));
     }
 }

@@ -1,24 +1,33 @@
 //! The address, key and certificates of an endpoint: [`Access`].
+//!
+//! The key of an endpoint, which a file may replace while a run asks: [`AccountKey`].
+//!
+//! TLS with the user's own certificates: [`client_config`].
 
 use std::error::Error as _;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 use reqwest::{Client, redirect};
+use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
+use rustls::client::verify_server_name;
+use rustls::crypto::CryptoProvider;
 use rustls::crypto::ring::default_provider;
-use rustls::pki_types::CertificateDer;
 use rustls::pki_types::pem::PemObject as _;
+use rustls::pki_types::{CertificateDer, ServerName, UnixTime};
+use rustls::server::ParsedCertificate;
+use rustls::{CertificateError, ClientConfig, DigitallySignedStruct, OtherError, SignatureScheme};
+use rustls_platform_verifier::Verifier;
+use tracing::warn;
 
-use super::custom_certificates::client_config;
-use super::custom_headers::CustomHeaders;
-use super::url::BaseUrl;
+use super::url::{BaseUrl, CustomHeaders};
 use crate::ask::secrets::{KeyHeader, Scrub, Secret};
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::Wire;
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
 
 /// Maximum time to open a connection; chosen.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(10);
@@ -152,7 +161,7 @@ impl Authorities {
     /// # Errors
     /// If the file cannot be read or has no valid certificate.
     pub fn load(path: &Path) -> Result<Self> {
-        let pem = reading::settings(path)?;
+        let pem = files::settings(path)?;
         let certificates: Vec<_> =
             CertificateDer::pem_slice_iter(pem.as_bytes()).collect::<Result<_, _>>().unwrap_or_default();
         if certificates.is_empty() {
@@ -182,6 +191,160 @@ pub(super) fn with_causes(error: &reqwest::Error) -> String {
         cause = error.source();
     }
     text
+}
+
+/// The key of an endpoint. If it comes from a file, the file is read again after a refusal with status 401: tokens of
+/// cloud accounts are valid for an hour, and keys are rotated.
+#[derive(Debug)]
+pub(crate) struct AccountKey {
+    access: Access,
+    state: Mutex<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    /// Key from a later reading of the file; `None` before it.
+    renewed: Option<Secret>,
+    /// Number of keys read so far, besides the first.
+    renewals: u32,
+    /// Filter that removes all keys so far.
+    scrub: Arc<Scrub>,
+}
+
+/// Headers of a request, with the key that they carry.
+#[derive(Debug)]
+pub(crate) struct KeyedHeaders {
+    pub(crate) headers: HeaderMap,
+    /// Number of the key.
+    renewals: u32,
+}
+
+impl AccountKey {
+    pub(super) fn new(access: Access, scrub: Scrub) -> Self {
+        Self { access, state: Mutex::new(State { renewed: None, renewals: 0, scrub: Arc::new(scrub) }) }
+    }
+
+    /// Filter that removes the keys and passwords of the endpoint from text of the server.
+    pub(super) fn scrub(&self) -> Arc<Scrub> {
+        Arc::clone(&self.state().scrub)
+    }
+
+    /// These headers, with the latest key.
+    pub(super) fn add_to(&self, headers: &HeaderMap) -> KeyedHeaders {
+        let state = self.state();
+        let mut headers = headers.clone();
+        if let Some(key) = &state.renewed
+            && let Ok(latest) = self.access.key_headers(Some(key), Wire::Chat)
+        {
+            headers.extend(latest);
+        }
+        KeyedHeaders { headers, renewals: state.renewals }
+    }
+
+    /// Reads the file of the key again, after the server refused the key of a request. Returns true if there is another
+    /// key since.
+    pub(super) fn renew(&self, refused: &KeyedHeaders) -> bool {
+        let Some(path) = &self.access.key_file else {
+            return false;
+        };
+        let mut state = self.state();
+        if state.renewals != refused.renewals {
+            return true;
+        }
+        let key = match Secret::read(path) {
+            Ok(key) => key,
+            Err(error) => {
+                warn!("the server refuses the key, and a new one could not be read: {error}");
+                return false;
+            }
+        };
+        if Some(&key) == state.renewed.as_ref().or(self.access.key.as_ref()) {
+            return false;
+        }
+        state.scrub = Arc::new(state.scrub.with(key.expose().to_owned()));
+        state.renewed = Some(key);
+        state.renewals += 1;
+        true
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// TLS settings of a client that trusts these certificates in addition to the system's, both as authorities and as
+/// server certificates.
+///
+/// # Errors
+/// If a certificate cannot be used.
+fn client_config(
+    trusted: &[CertificateDer<'static>],
+    provider: Arc<CryptoProvider>,
+) -> Result<ClientConfig, rustls::Error> {
+    let verifier = CustomVerifier {
+        platform: Verifier::new_with_extra_roots(trusted.iter().cloned(), Arc::clone(&provider))?,
+        trusted: trusted.to_vec(),
+    };
+    let config = ClientConfig::builder_with_provider(provider).with_safe_default_protocol_versions()?;
+    let mut config = config.dangerous().with_custom_certificate_verifier(Arc::new(verifier)).with_no_client_auth();
+    config.alpn_protocols = vec![b"h2".to_vec(), b"http/1.1".to_vec()];
+    Ok(config)
+}
+
+/// Verifier of the platform that also accepts a trusted CA certificate as the server's own certificate.
+///
+/// `openssl req -x509` creates certificates with `CA:TRUE`, which the platform verifier rejects for a server. Other
+/// clients accept such a certificate if the user trusts it.
+#[derive(Debug)]
+struct CustomVerifier {
+    platform: Verifier,
+    trusted: Vec<CertificateDer<'static>>,
+}
+
+impl ServerCertVerifier for CustomVerifier {
+    fn verify_server_cert(
+        &self,
+        end_entity: &CertificateDer<'_>,
+        intermediates: &[CertificateDer<'_>],
+        server_name: &ServerName<'_>,
+        ocsp_response: &[u8],
+        now: UnixTime,
+    ) -> Result<ServerCertVerified, rustls::Error> {
+        let verified = self.platform.verify_server_cert(end_entity, intermediates, server_name, ocsp_response, now);
+        // The platform verifier checks the dates before it reports this error.
+        match verified {
+            Err(rustls::Error::InvalidCertificate(CertificateError::Other(OtherError(error))))
+                if error.to_string().contains("CaUsedAsEndEntity")
+                    && self.trusted.iter().any(|trusted| trusted == end_entity) =>
+            {
+                verify_server_name(&ParsedCertificate::try_from(end_entity)?, server_name)?;
+                Ok(ServerCertVerified::assertion())
+            }
+            verified => verified,
+        }
+    }
+
+    fn verify_tls12_signature(
+        &self,
+        message: &[u8],
+        cert: &CertificateDer<'_>,
+        dss: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, rustls::Error> {
+        self.platform.verify_tls12_signature(message, cert, dss)
+    }
+
+    fn verify_tls13_signature(
+        &self,
+        message: &[u8],
+        cert: &CertificateDer<'_>,
+        dss: &DigitallySignedStruct,
+    ) -> Result<HandshakeSignatureValid, rustls::Error> {
+        self.platform.verify_tls13_signature(message, cert, dss)
+    }
+
+    fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
+        self.platform.supported_verify_schemes()
+    }
 }
 
 #[cfg(test)]
@@ -217,5 +380,40 @@ mod tests {
         let error = Authorities::load(file.path()).unwrap_err().to_string();
         assert!(error.contains("BEGIN CERTIFICATE"), "{error}");
         assert!(Authorities::load(Path::new("/nowhere")).is_err());
+    }
+
+    #[test]
+    fn key_is_read_again_after_a_refusal() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let write = |key: &str| std::fs::write(file.path(), key).unwrap();
+        let access = Access {
+            key: Some(Secret::new("sk-first-0123456789", "KEY").unwrap()),
+            key_file: Some(file.path().to_owned()),
+            ..Access::new("https://api.example.org/v1".parse().unwrap())
+        };
+        let base = access.headers(Wire::Chat).unwrap();
+        let scrub = access.scrub();
+        let key = AccountKey::new(access, scrub);
+        let first = key.add_to(&base);
+        write("sk-first-0123456789\n");
+        assert!(!key.renew(&first), "the same key");
+        write("");
+        assert!(!key.renew(&first), "no key");
+        write("sk-second-0123456789\n");
+        assert!(key.renew(&first));
+        assert!(key.renew(&first), "another request has read it");
+        let second = key.add_to(&base);
+        assert_eq!(second.headers["authorization"], "Bearer sk-second-0123456789");
+        assert!(second.headers["authorization"].is_sensitive());
+        assert!(!key.renew(&second), "no newer one");
+        let text = key.scrub().line("sk-first-0123456789 and sk-second-0123456789");
+        assert_eq!(text, "[secret] and [secret]");
+    }
+
+    #[test]
+    fn key_of_a_variable_is_not_read_again() {
+        let access = Access::new("https://api.example.org/v1".parse().unwrap());
+        let key = AccountKey::new(access, Scrub::default());
+        assert!(!key.renew(&key.add_to(&HeaderMap::new())));
     }
 }

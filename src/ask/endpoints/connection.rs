@@ -1,23 +1,29 @@
 //! HTTP connections to one server: [`Connection`].
+//!
+//! Causes of failed connections: [`permanent_cause`] and [`is_unknown_host`] search the error text of the HTTP client,
+//! [`lacks_open_files`] inspects the error itself.
+//!
+//! Time limit that excludes suspensions of the process: [`TimeLimit`].
+//!
+//! A suspended process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, but the clock runs on. Replies that
+//! arrive during the suspension are paid for, so they must be read before a timeout is declared.
 
-use std::io::Write as _;
+use std::error::Error;
+use std::io::{self, Write as _};
 use std::path::Path;
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use reqwest::header::{CONTENT_TYPE, HeaderMap};
 use reqwest::{Client, Method, RequestBuilder, Response, StatusCode};
-use tokio::time::Instant;
+use tokio::time::{Instant, timeout};
 
-use super::access::{Access, connect_timeout, with_causes};
-use super::account_key::{AccountKey, KeyedHeaders};
-use super::connection_fault::{UNKNOWN_HOST, is_unknown_host, lacks_open_files, permanent_cause};
-use super::proxy::proxy_variable;
-use super::time_limit::TimeLimit;
-use super::url::BaseUrl;
+use super::access::{Access, AccountKey, KeyedHeaders, connect_timeout, with_causes};
+use super::url::{BaseUrl, proxy_variable};
+use crate::ask::bounded_json::parse;
 use crate::ask::failures::{AskError, LONG_SILENCE, Reach, Retry, Unfinished};
-use crate::ask::replies::bounded_json::parse;
 use crate::ask::requests::{Parameters, RequestBody};
 use crate::ask::secrets::Scrub;
 use crate::error::Result;
@@ -400,5 +406,269 @@ impl Connection {
         };
         let message = format!("{server}: {remedy} ({text})");
         AskError { reach: Reach::Endpoint, ..AskError::new(FailureKind::Connection, message) }
+    }
+}
+
+/// Phrases in errors that a retry does not solve, with the remedy.
+const PERMANENT_CAUSES: [(&[&str], &str); 8] = [
+    (
+        &["UnknownIssuer", "self-signed", "self signed"],
+        "its certificate is signed by an authority that is not trusted; name that authority, or the certificate itself, with --ca-file",
+    ),
+    (
+        &["CaUsedAsEndEntity"],
+        "its certificate is that of an authority (CA:TRUE) and is not trusted; name it with --ca-file, or make one with \
+         basicConstraints=CA:FALSE",
+    ),
+    (
+        &["certificate expired", "certificate not valid yet", "NotValidYet", "Expired"],
+        "its certificate is not valid at the time of this machine; renew it, or set the clock",
+    ),
+    (
+        &["NotValidForName", "certificate not valid for name"],
+        "its certificate is for another host name; use the name in the certificate as --base-url",
+    ),
+    (
+        &["invalid peer certificate"],
+        "its certificate is rejected; make another one, or name the authority with --ca-file",
+    ),
+    (
+        &["proxy authorization required", "proxy authentication required"],
+        "the proxy asks for a user and password: set them in HTTPS_PROXY, or name the host in NO_PROXY",
+    ),
+    (
+        &["failed to create underlying connection: received corrupt message"],
+        "the proxy speaks plain http at this port; give it as http:// in that variable",
+    ),
+    (
+        &["InvalidContentType", "corrupt message"],
+        "the server speaks plain http at this port; use http:// in --base-url",
+    ),
+];
+
+/// Phrases in errors of plain HTTP requests to a TLS port.
+const TLS_PORT: [&str; 2] = ["invalid HTTP version parsed", "received invalid HTTP"];
+
+/// Remedy for a connection error that a retry does not solve; `None` for other errors. `is_plain` is true for http://
+/// addresses.
+fn permanent_cause(text: &str, is_plain: bool) -> Option<&'static str> {
+    if is_plain {
+        let is_tls = TLS_PORT.iter().any(|phrase| text.contains(phrase));
+        return is_tls.then_some(
+            "the server does not answer in plain http at this port; if it speaks TLS, use https:// in --base-url",
+        );
+    }
+    PERMANENT_CAUSES
+        .iter()
+        .find(|(phrases, _)| phrases.iter().any(|phrase| text.contains(phrase)))
+        .map(|(_, remedy)| *remedy)
+}
+
+/// Remedy for a host name that DNS does not know.
+const UNKNOWN_HOST: &str = "no name server knows this host; check --base-url and the proxy settings, and that the server is started and this machine is online";
+
+/// Phrases of glibc, musl, macOS and Windows for a host name that does not exist. A DNS outage has other phrases.
+const UNKNOWN_HOST_PHRASES: [&str; 5] = [
+    "Name or service not known",
+    "No address associated with hostname",
+    "Name does not resolve",
+    "nodename nor servname provided",
+    "No such host is known",
+];
+
+/// True if the error text reports that the host name does not exist.
+fn is_unknown_host(text: &str) -> bool {
+    UNKNOWN_HOST_PHRASES.iter().any(|phrase| text.contains(phrase))
+}
+
+/// Error codes for too many open files, in this process or in the system: EMFILE and ENFILE; on Windows WSAEMFILE.
+const TOO_MANY_FILES: &[i32] = if cfg!(windows) { &[10_024] } else { &[24, 23] };
+
+/// True if a request failed because the system allows no further open file or connection.
+fn lacks_open_files(error: &(dyn Error + 'static)) -> bool {
+    error
+        .downcast_ref::<io::Error>()
+        .and_then(io::Error::raw_os_error)
+        .is_some_and(|code| TOO_MANY_FILES.contains(&code))
+        || error.source().is_some_and(lacks_open_files)
+}
+
+/// Number of steps into which a limit is divided (chosen). A suspension uses up at most one step of the limit.
+const STEPS: u32 = 20;
+
+/// Shortest step (chosen).
+const MIN_STEP: Duration = Duration::from_millis(10);
+
+/// Longest step (chosen).
+const MAX_STEP: Duration = Duration::from_secs(1);
+
+/// Minimum timer delay of a suspension (chosen): a busy machine delays a timer less. The delay must also exceed one
+/// step.
+const MIN_SUSPENSION: Duration = Duration::from_millis(100);
+
+/// Limit on the running time of one future, or of several futures one after another. Suspensions of the process do not
+/// count.
+#[derive(Debug)]
+pub(super) struct TimeLimit {
+    step: Duration,
+    /// Running time left.
+    left: Duration,
+    /// Total time of the detected suspensions.
+    suspended: Duration,
+}
+
+impl TimeLimit {
+    pub(super) fn new(limit: Duration) -> Self {
+        Self { step: (limit / STEPS).clamp(MIN_STEP, MAX_STEP), left: limit, suspended: Duration::ZERO }
+    }
+
+    /// Runs a future; `None` if the limit is reached before the future is ready.
+    pub(super) async fn run<T>(&mut self, future: impl Future<Output = T>) -> Option<T> {
+        let mut future = pin!(future);
+        loop {
+            // With no time left, a step of zero still reads data that has arrived.
+            let step = self.step.min(self.left);
+            let started = Instant::now();
+            let output = timeout(step, future.as_mut()).await;
+            let elapsed = started.elapsed();
+            self.left = self.left.saturating_sub(elapsed.min(step));
+            let delay = elapsed.saturating_sub(step);
+            if delay > self.step.max(MIN_SUSPENSION) {
+                self.suspended += delay;
+                // One more step reads data that arrived during the suspension.
+                self.left = self.left.max(self.step);
+            }
+            match output {
+                Ok(output) => return Some(output),
+                Err(_) if self.left.is_zero() => return None,
+                Err(_) => {}
+            }
+        }
+    }
+
+    /// Total time of the detected suspensions of the process.
+    pub(super) fn suspended(&self) -> Duration {
+        self.suspended
+    }
+}
+
+/// Sleeps for a running time; suspensions of the process do not count.
+pub(crate) async fn sleep_running(time: Duration) {
+    let _ = TimeLimit::new(time).run(std::future::pending::<()>()).await;
+}
+
+#[cfg(test)]
+mod tests {
+    use std::future::pending;
+    use std::thread;
+
+    use tokio::time::sleep;
+
+    use super::*;
+
+    #[test]
+    fn permanent_causes_have_a_remedy() {
+        for (text, is_plain, remedy) in [
+            ("invalid peer certificate: UnknownIssuer", false, "--ca-file"),
+            ("invalid peer certificate: Other(OtherError(CaUsedAsEndEntity))", false, "CA:FALSE"),
+            ("invalid peer certificate: certificate expired: x", false, "clock"),
+            ("client error (Connect): proxy authorization required", false, "HTTPS_PROXY"),
+            ("received corrupt message of type InvalidContentType", false, "http:// in --base-url"),
+            (
+                "tunnel error: failed to create underlying connection: received corrupt message of type InvalidContentType",
+                false,
+                "the proxy speaks plain http",
+            ),
+            ("client error: invalid HTTP version parsed", true, "https://"),
+        ] {
+            let cause = permanent_cause(text, is_plain).unwrap();
+            assert!(cause.contains(remedy), "{text}: {cause}");
+        }
+        for text in ["tcp connect error: Connection refused", "connection reset by peer"] {
+            assert_eq!(permanent_cause(text, false), None);
+            assert_eq!(permanent_cause(text, true), None);
+        }
+    }
+
+    #[test]
+    fn a_dns_outage_is_not_an_unknown_host() {
+        let lookup = "dns error: failed to lookup address information: ";
+        assert!(is_unknown_host(&format!("{lookup}Name or service not known")));
+        assert!(!is_unknown_host(&format!("{lookup}Temporary failure in name resolution")));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn too_many_open_files_are_found_among_causes() {
+        #[derive(Debug, thiserror::Error)]
+        #[error("outer")]
+        struct Outer(#[source] io::Error);
+        assert!(lacks_open_files(&Outer(io::Error::from_raw_os_error(24))));
+        assert!(!lacks_open_files(&Outer(io::Error::from_raw_os_error(111))));
+        assert!(!lacks_open_files(&Outer(io::Error::other("Too many open files"))));
+    }
+
+    const LIMIT: Duration = Duration::from_millis(400);
+
+    /// Length of a simulated suspension: the only thread of the test runtime sleeps.
+    const SUSPENSION: Duration = Duration::from_millis(900);
+
+    #[tokio::test(start_paused = true)]
+    async fn limit_is_exact_without_suspension() {
+        for limit in [1, 7, 400, 120_000].map(Duration::from_millis) {
+            let started = Instant::now();
+            assert!(TimeLimit::new(limit).run(pending::<()>()).await.is_none());
+            let took = started.elapsed();
+            assert!(took >= limit && took < limit + MIN_STEP, "{took:?}");
+        }
+    }
+
+    #[tokio::test(start_paused = true)]
+    async fn futures_share_the_limit() {
+        let mut limit = TimeLimit::new(LIMIT);
+        assert!(limit.run(sleep(LIMIT * 3 / 4)).await.is_some());
+        assert!(limit.run(sleep(LIMIT / 2)).await.is_none());
+        assert_eq!(limit.suspended(), Duration::ZERO);
+    }
+
+    /// Each future represents one chunk of a streamed reply.
+    #[tokio::test(start_paused = true)]
+    async fn short_futures_do_not_outlast_the_limit() {
+        let mut limit = TimeLimit::new(LIMIT);
+        let interval = Duration::from_millis(5);
+        let mut chunks = 0;
+        while limit.run(sleep(interval)).await.is_some() {
+            chunks += 1;
+            assert!(chunks <= LIMIT.as_millis() / interval.as_millis(), "{chunks}");
+        }
+        assert!(limit.run(async {}).await.is_some(), "data that has arrived is read");
+    }
+
+    #[tokio::test]
+    async fn suspension_does_not_count() {
+        let mut limit = TimeLimit::new(LIMIT);
+        let done = limit.run(async {
+            sleep(LIMIT / 4).await;
+            thread::sleep(SUSPENSION);
+            sleep(LIMIT / 4).await;
+        });
+        assert!(done.await.is_some());
+        assert!(limit.suspended() > SUSPENSION / 2, "{:?}", limit.suspended());
+    }
+
+    #[tokio::test]
+    async fn late_output_is_read_after_suspension() {
+        // The suspension is in the last step. The future is ready some polls later, like a socket that another task
+        // reads.
+        let mut limit = TimeLimit::new(LIMIT);
+        limit.left = MIN_STEP;
+        let suspension = tokio::spawn(async { thread::sleep(SUSPENSION) });
+        let ready = async {
+            suspension.await.unwrap();
+            for _ in 0..5 {
+                tokio::task::yield_now().await;
+            }
+        };
+        assert!(limit.run(ready).await.is_some());
     }
 }

@@ -1,14 +1,26 @@
 //! The base URL of an endpoint: [`BaseUrl`].
+//!
+//! The proxy that the environment sets: [`proxy_variable`].
+//!
+//! Headers that the user adds to every request: [`CustomHeaders`].
+//!
+//! Environment variables: [`variable`].
 
-use std::fmt;
+use std::ffi::OsString;
 use std::net::IpAddr;
 use std::str::FromStr;
+use std::{env, fmt};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
+use hyper::Uri;
+use hyper::http::uri::Authority;
+use hyper_util::client::proxy::matcher::Matcher;
 use percent_encoding::percent_decode_str;
 use reqwest::Url;
+use reqwest::header::{HeaderMap, HeaderName, HeaderValue};
 
+use crate::ask::secrets::{is_secret_header, looks_like_key};
 use crate::ask::wire_kind::Wire;
 use crate::error::{Error, Result};
 
@@ -141,6 +153,210 @@ impl fmt::Debug for BaseUrl {
     }
 }
 
+/// Valid proxy address, to find out whether `NO_PROXY` exempts an address.
+const SAMPLE_PROXY: &str = "http://127.0.0.1:1";
+
+/// Variable that sets the proxy for an address; `None` if requests are sent directly. The proxy must be usable: reqwest
+/// ignores an invalid one and would connect directly.
+///
+/// Reads the same variables in the same order as reqwest: `HTTP_PROXY` or `HTTPS_PROXY` by the scheme of the address,
+/// then `ALL_PROXY`, each before its lower-case name. An empty variable counts as unset.
+///
+/// # Errors
+/// If the proxy is not usable. The error names the variable but not its value, which may contain a password.
+pub(super) fn proxy_variable(
+    base: &BaseUrl,
+    variable: impl Fn(&str) -> Option<OsString>,
+) -> Result<Option<&'static str>> {
+    // Requests to this machine use no proxy.
+    if base.is_loopback() {
+        return Ok(None);
+    }
+    let Ok(address) = base.to_string().parse::<Uri>() else {
+        return Ok(None);
+    };
+    let by_scheme = if base.is_plain() { ["HTTP_PROXY", "http_proxy"] } else { ["HTTPS_PROXY", "https_proxy"] };
+    let Some((name, value)) =
+        first_set(&variable, by_scheme).or_else(|| first_set(&variable, ["ALL_PROXY", "all_proxy"]))
+    else {
+        return Ok(None);
+    };
+    let no_proxy = first_set(&variable, ["NO_PROXY", "no_proxy"])
+        .and_then(|(_, value)| value.into_string().ok())
+        .unwrap_or_default();
+    let matcher = Matcher::builder().all(SAMPLE_PROXY).no(no_proxy).build();
+    let is_exempt = matcher.intercept(&address).is_none();
+    if is_exempt {
+        return Ok(None);
+    }
+    if value.to_str().is_some_and(is_usable) {
+        return Ok(Some(name));
+    }
+    let problem = "not a proxy that can be used, and nothing was sent without it; expected for example http://proxy.example:3128 (no \
+                   SOCKS). To connect directly, unset it or name the host in NO_PROXY";
+    Err(Error::usage(name, problem))
+}
+
+/// The first of two variables that is set, unless it is empty.
+fn first_set(
+    variable: &impl Fn(&str) -> Option<OsString>,
+    names: [&'static str; 2],
+) -> Option<(&'static str, OsString)> {
+    names.into_iter().find_map(|name| Some((name, variable(name)?))).filter(|(_, value)| !value.is_empty())
+}
+
+/// True if requests can be sent through a proxy at this address.
+fn is_usable(proxy: &str) -> bool {
+    let matcher = Matcher::builder().all(proxy.to_owned()).build();
+    matcher.intercept(&Uri::from_static("http://host.example/")).is_some_and(|proxy| {
+        let is_http = matches!(proxy.uri().scheme_str(), Some("http" | "https"));
+        is_http && proxy.uri().authority().is_some_and(is_valid_authority)
+    })
+}
+
+/// True if an authority has a host and either no port or a valid one.
+fn is_valid_authority(authority: &Authority) -> bool {
+    let port = authority.as_str().strip_prefix(authority.host()).and_then(|rest| rest.strip_prefix(':'));
+    !authority.host().is_empty() && port.is_none_or(|port| port.parse::<u16>().is_ok_and(|port| port > 0))
+}
+
+/// Headers that the user cannot set, because the program or its HTTP library sets them.
+const RESERVED: [&str; 9] = [
+    "accept-encoding",
+    "connection",
+    "content-encoding",
+    "content-length",
+    "content-type",
+    "expect",
+    "host",
+    "te",
+    "transfer-encoding",
+];
+
+/// Headers that the user adds to every request to an endpoint. Secret values come from environment variables.
+#[derive(Clone, Default)]
+pub struct CustomHeaders {
+    map: HeaderMap,
+    /// Values from environment variables, both whole and without a leading word such as `Bearer`.
+    secrets: Vec<String>,
+}
+
+impl std::fmt::Debug for CustomHeaders {
+    /// Lists the header names without their values.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_list().entries(self.map.keys()).finish()
+    }
+}
+
+impl CustomHeaders {
+    /// Parses `--header 'NAME: VALUE'` and `--header-env NAME=VARIABLE`.
+    ///
+    /// # Errors
+    /// If a header cannot be sent, is named twice, has a secret in place of a variable, or names a variable that is not
+    /// set. No error shows a value.
+    pub(super) fn read(plain: &[String], from_variables: &[String]) -> Result<Self> {
+        let mut headers = Self::default();
+        for text in plain {
+            headers.add_plain(text)?;
+        }
+        for text in from_variables {
+            headers.add_from_variable(text)?;
+        }
+        Ok(headers)
+    }
+
+    /// Adds a header given as `NAME: VALUE`.
+    fn add_plain(&mut self, text: &str) -> Result<()> {
+        let (name, value) = text
+            .split_once(':')
+            .ok_or_else(|| Error::usage("--header", "'NAME: VALUE' expected, as 'X-Team: vision'"))?;
+        let (name, value) = (name.trim(), value.trim());
+        if is_secret_header(name, value) {
+            return Err(Error::usage(
+                "--header",
+                format_args!(
+                    "the value of {name} looks like a secret, which is not shown here; put it into a variable and name that: \
+                 --header-env {name}=VARIABLE"
+                ),
+            ));
+        }
+        self.add(name, value, "--header")
+    }
+
+    /// Adds a header given as `NAME=VARIABLE`.
+    fn add_from_variable(&mut self, text: &str) -> Result<()> {
+        let (name, variable_name) = text
+            .split_once('=')
+            .ok_or_else(|| Error::usage("--header-env", "NAME=VARIABLE expected, as X-Auth=GATEWAY_TOKEN"))?;
+        let (name, variable_name) = (name.trim(), variable_name.trim());
+        if looks_like_key(variable_name) {
+            return Err(Error::usage(
+                "--header-env",
+                format_args!(
+                    "the value after {name}= looks like a secret, which is not shown here; put it into a variable and name that"
+                ),
+            ));
+        }
+        let value = variable(variable_name)
+            .ok_or_else(|| Error::usage("--header-env", format_args!("the variable {variable_name} is not set")))?;
+        let value = value.trim();
+        self.add(name, value, "--header-env")?;
+        self.secrets.push(value.to_owned());
+        // A server may repeat the secret without its leading word: only the token of "Bearer …".
+        if let Some((_, secret)) = value.split_once(' ') {
+            self.secrets.push(secret.to_owned());
+        }
+        Ok(())
+    }
+
+    /// Adds a header. Errors name `flag`, the flag that the header comes from.
+    fn add(&mut self, name: &str, value: &str, flag: &str) -> Result<()> {
+        let Ok(header_name) = HeaderName::try_from(name) else {
+            return Err(Error::usage(flag, "this is not a valid name of an HTTP header"));
+        };
+        if RESERVED.contains(&header_name.as_str()) {
+            return Err(Error::usage(flag, format_args!("{name} is set by the program itself")));
+        }
+        let Ok(mut header_value) = HeaderValue::try_from(value) else {
+            return Err(Error::usage(
+                flag,
+                format_args!("the value of {name} has characters that an HTTP header cannot carry"),
+            ));
+        };
+        header_value.set_sensitive(flag == "--header-env");
+        if self.map.insert(header_name, header_value).is_some() {
+            return Err(Error::usage(flag, format_args!("{name} is named twice")));
+        }
+        Ok(())
+    }
+
+    /// Secret values to remove from everything that is stored.
+    pub(super) fn secrets(&self) -> &[String] {
+        &self.secrets
+    }
+
+    /// Adds these headers to the headers of a request.
+    ///
+    /// # Errors
+    /// If the request already has a header of the same name, for the key or the account.
+    pub(super) fn add_to(&self, headers: &mut HeaderMap) -> Result<()> {
+        for (name, value) in &self.map {
+            if headers.insert(name, value.clone()).is_some() {
+                let problem = format_args!(
+                    "{name} is sent already, with the key or the account: leave it out of --header and --header-env, or the key with --api-key-env none"
+                );
+                return Err(Error::usage("--header", problem));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Value of an environment variable; `None` if it is unset or blank.
+pub(super) fn variable(name: &str) -> Option<String> {
+    env::var(name).ok().filter(|text| !text.trim().is_empty())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -198,5 +414,110 @@ mod tests {
         for remote in ["http://192.168.0.1/", "http://localhost.example.com/", "http://[::2]/"] {
             assert!(!url(remote).is_loopback(), "{remote}");
         }
+    }
+
+    /// Variable with an unusable proxy for this address and environment.
+    fn refused(base: &str, set: &[(&str, &str)]) -> Option<String> {
+        let error = proxy_variable(&base.parse().unwrap(), |name| {
+            set.iter().find(|(known, _)| *known == name).map(|(_, value)| value.into())
+        })
+        .err()?
+        .to_string();
+        assert!(!error.contains("pass"), "{error}");
+        Some(error.split(':').next().unwrap_or_default().to_owned())
+    }
+
+    const PLAIN: &str = "http://llm.example/v1";
+
+    const ENCRYPTED: &str = "https://llm.example/v1";
+
+    #[test]
+    fn unusable_proxies_are_refused() {
+        for proxy in [
+            "socks5://user:pass@127.0.0.1:1080",
+            "ftp://proxy",
+            "http://",
+            "http:/proxy:3128",
+            "http://:3128",
+            "http://proxy:99999",
+            "http://proxy:port",
+            "http://proxy:0",
+            "my proxy",
+            " http://proxy:3128",
+        ] {
+            for (base, name) in [(PLAIN, "HTTP_PROXY"), (ENCRYPTED, "https_proxy"), (ENCRYPTED, "ALL_PROXY")] {
+                let found = refused(base, &[(name, proxy)]);
+                assert_eq!(found.as_deref(), Some(name), "{proxy}");
+            }
+        }
+    }
+
+    #[test]
+    fn usable_proxies_are_accepted() {
+        for proxy in ["", "http://proxy:3128", "https://user:pass@proxy", "proxy:3128", "http://[::1]:3128/"] {
+            assert_eq!(refused(PLAIN, &[("HTTP_PROXY", proxy)]), None, "{proxy}");
+        }
+    }
+
+    #[test]
+    fn unused_proxies_are_not_checked() {
+        let wrong = ("ALL_PROXY", "socks5://proxy");
+        assert_eq!(refused("http://127.0.0.1:8000/v1", &[wrong]), None);
+        assert_eq!(refused(PLAIN, &[wrong, ("HTTP_PROXY", "http://proxy")]), None);
+        assert_eq!(refused(PLAIN, &[("HTTPS_PROXY", "socks5://proxy")]), None);
+        for no_proxy in ["*", "llm.example", ".example, other"] {
+            assert_eq!(refused(PLAIN, &[wrong, ("NO_PROXY", no_proxy)]), None);
+        }
+        let other = refused(PLAIN, &[wrong, ("NO_PROXY", "other")]);
+        assert_eq!(other.as_deref(), Some("ALL_PROXY"));
+    }
+
+    fn read(plain: &[&str]) -> Result<CustomHeaders> {
+        let plain: Vec<String> = plain.iter().map(|text| (*text).to_owned()).collect();
+        CustomHeaders::read(&plain, &[])
+    }
+
+    #[test]
+    fn headers_are_checked() {
+        let headers = read(&["X-Team: a: b", "x-empty:"]).unwrap();
+        assert_eq!(headers.map["x-team"], "a: b");
+        assert_eq!(headers.map["x-empty"], "");
+        for (wrong, part) in [
+            (&["X-Team"][..], "'NAME: VALUE'"),
+            (&["Content-Type: a/b"], "the program itself"),
+            (&["a b: c"], "not a valid name"),
+            (&["X-A: b", "x-a: c"], "twice"),
+            (&["X-A: b\u{7f}"], "cannot carry"),
+        ] {
+            let error = read(wrong).unwrap_err().to_string();
+            assert!(error.starts_with("--header: ") && error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn secrets_on_the_command_line_are_refused() {
+        for secret in [
+            "X-Any: sk-0123456789",
+            "Authorization: Bearer abcdefghijklmnop",
+            "X-Auth-Token: 0123456789abcdef0123",
+            "Cookie: session=0123456789abcdef",
+        ] {
+            let error = read(&[secret]).unwrap_err().to_string();
+            assert!(error.contains("--header-env"), "{error}");
+            assert!(!error.contains("0123") && !error.contains("abcd"), "{error}");
+        }
+        assert!(read(&["X-Team: 0123456789abcdef0123"]).is_ok());
+        let secret_as_variable = ["X-Auth=sk-0123456789".to_owned()];
+        let error = CustomHeaders::read(&[], &secret_as_variable).unwrap_err().to_string();
+        assert!(!error.contains("0123"), "{error}");
+    }
+
+    #[test]
+    fn a_header_is_not_sent_twice() {
+        let headers = read(&["X-Team: a"]).unwrap();
+        let mut request = HeaderMap::new();
+        headers.add_to(&mut request).unwrap();
+        assert_eq!(request["x-team"], "a");
+        assert!(headers.add_to(&mut request).is_err());
     }
 }

@@ -1,11 +1,16 @@
 //! Error of a request or a question without a reply: [`AskError`].
+//!
+//! Refusal of a batch because of the limit on enqueued tokens: [`QuotaRefusal`].
+//!
+//! Work of a server that ended without a reply, although it may be charged: [`Unfinished`].
 
 use std::time::Duration;
 
-use super::quota_refusal::QuotaRefusal;
-use super::unfinished::Unfinished;
+use super::api_error::ApiError;
+use crate::ask::bounded_json::parse;
 use crate::ask::costs::Charge;
 use crate::ask::requests::AdaptableField;
+use crate::ask::secrets::Scrub;
 use crate::types::{Failure, FailureKind, Finish, LostAttempts, Reply, Usage};
 
 /// Requests that a failure affects.
@@ -213,5 +218,152 @@ impl AskError {
     /// True if the server does not have the called API.
     pub(crate) fn is_unsupported(&self) -> bool {
         matches!(self.failure.status, Some(404 | 405 | 501))
+    }
+}
+
+/// Refusal of a batch because too many tokens are already enqueued in batches.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct QuotaRefusal {
+    /// Maximum number of enqueued tokens; `None` if the server does not report it.
+    pub limit: Option<u64>,
+    /// The server's message, without secrets.
+    pub message: String,
+}
+
+impl QuotaRefusal {
+    /// Recognizes such a refusal; `None` for other errors.
+    pub(crate) fn from_api_error(api_error: &ApiError, scrub: &Scrub) -> Option<Self> {
+        let is_quota = api_error.has_code(&["token_limit_exceeded"]) || api_error.mentions_any(&["enqueued token"]);
+        is_quota.then(|| Self { limit: stated_limit(&api_error.message), message: scrub.line(&api_error.message) })
+    }
+}
+
+/// Parses the number after "Limit:", with or without thousands separators.
+fn stated_limit(message: &str) -> Option<u64> {
+    let lower = message.to_lowercase();
+    let (_, after) = lower.split_once("limit:")?;
+    let digits: String = after
+        .trim_start()
+        .chars()
+        .take_while(|c| c.is_ascii_digit() || matches!(c, ',' | '_'))
+        .filter(char::is_ascii_digit)
+        .collect();
+    digits.parse().ok().filter(|limit| *limit > 0)
+}
+
+/// Minimum time after which a timeout stated by the server means that it worked on the request; chosen: the time limits
+/// of gateways are 10 to 100 s, and a server that is down is noticed sooner.
+const LONG_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Minimum time after which a page of a gateway, or a lost connection, means that a time limit was reached; chosen: the
+/// limits of gateways that state no timeout are 30 s and more.
+pub(crate) const LONG_SILENCE: Duration = Duration::from_secs(25);
+
+/// Phrases for a reached time limit, in lower case.
+const TIMEOUT: [&str; 6] = ["timeout", "time-out", "timed out", "timing out", "time out", "deadline exceeded"];
+
+/// Work that a server may have done, and charged, for a request without a reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Unfinished {
+    /// None that is known of.
+    #[default]
+    None,
+    /// The reply broke off after its first part.
+    BrokeOff,
+    /// A gateway answered without a wait that the server behind it is too slow: the server may also be down for a
+    /// moment.
+    QuickTimeout,
+    /// The same for the second time, while the server answered other requests: this request takes too long.
+    RepeatedTimeout,
+    /// A gateway waited, and gave up. The server behind it may go on.
+    GatewayTimeout,
+}
+
+impl Unfinished {
+    /// The work on a request that was refused with this status and body after this time.
+    pub(crate) fn of_refusal(status: u16, took: Duration, api_error: &ApiError, body: &[u8]) -> Self {
+        let is_failure = status >= 499 || status == 408;
+        let states_timeout =
+            matches!(status, 408 | 504 | 524 | 598 | 599) || (is_failure && api_error.mentions_any(&TIMEOUT));
+        let is_page = || std::str::from_utf8(body).map_or(true, |body| parse(body).is_err());
+        match status {
+            // Cloudflare sends it only after its time limit.
+            524 => Self::GatewayTimeout,
+            _ if states_timeout && took >= LONG_TIMEOUT => Self::GatewayTimeout,
+            _ if is_failure && took >= LONG_SILENCE && is_page() => Self::GatewayTimeout,
+            504 => Self::QuickTimeout,
+            _ => Self::None,
+        }
+    }
+
+    /// True if the request takes longer than a gateway waits.
+    pub(crate) fn is_timeout(self) -> bool {
+        matches!(self, Self::RepeatedTimeout | Self::GatewayTimeout)
+    }
+
+    /// True if the server has probably charged the request.
+    pub(crate) fn is_probably_charged(self) -> bool {
+        self == Self::BrokeOff || self.is_timeout()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Unfinished::{GatewayTimeout, QuickTimeout};
+    use super::*;
+
+    fn parse(code: Option<&str>, message: &str) -> Option<QuotaRefusal> {
+        let error = serde_json::json!({"code": code, "message": message});
+        QuotaRefusal::from_api_error(&ApiError::from_error(&error), &Scrub::default())
+    }
+
+    #[test]
+    fn the_limit_is_parsed_from_the_message() {
+        let message = "Enqueued token limit reached for gpt-4o in organization o. Limit: 90,000 enqueued tokens. Please try again \
+                     once some in_progress batches have been completed.";
+        assert_eq!(parse(None, message).unwrap().limit, Some(90_000));
+        let azure = parse(Some("token_limit_exceeded"), "The limit was exceeded");
+        assert_eq!(azure.unwrap().limit, None);
+        assert_eq!(parse(None, "Rate limit reached. Limit: 30000"), None);
+    }
+
+    fn refused(status: u16, seconds: u64, body: &str) -> Unfinished {
+        let took = Duration::from_secs(seconds);
+        Unfinished::of_refusal(status, took, &ApiError::from_body(body), body.as_bytes())
+    }
+
+    #[test]
+    fn gateways_that_gave_up_are_recognized() {
+        let page = "<html><title>Application error</title>";
+        for (status, seconds, body) in [
+            (524, 0, page),
+            (504, 60, page),
+            (504, 29, r#"{"message":"Endpoint request timed out"}"#),
+            (408, 30, r#"{"error":{"message":"litellm.Timeout"}}"#),
+            (502, 55, page),
+            (500, 60, ""),
+            (503, 30, page),
+            (500, 15, r#"{"error":{"message":"upstream request timeout"}}"#),
+            (599, 100, ""),
+        ] {
+            assert_eq!(refused(status, seconds, body), GatewayTimeout, "{status} {body}");
+        }
+    }
+
+    #[test]
+    fn other_failures_are_not_gateway_timeouts() {
+        let page = "<html><title>502 Bad Gateway</title>";
+        assert_eq!(refused(504, 1, page), QuickTimeout);
+        for (status, seconds, body) in [
+            (502, 1, page),
+            (500, 60, r#"{"error":{"message":"CUDA error"}}"#),
+            (503, 0, r#"{"error":{"message":"Loading model"}}"#),
+            (408, 1, ""),
+            (429, 60, page),
+            (400, 60, r#"{"error":{"message":"timeout must be a number"}}"#),
+            (522, 3, page),
+        ] {
+            assert_eq!(refused(status, seconds, body), Unfinished::None, "{status} {body}");
+        }
     }
 }

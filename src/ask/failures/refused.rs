@@ -3,6 +3,11 @@
 //!
 //! The rules go by the evidence: numbers, codes and fields in the body first, then the words of `wordings.toml` and of
 //! [`vocabulary`], the status last. If no rule finds the cause, the message has the server's words and no remedy.
+//!
+//! The HTTP status that the words of an error imply which a server sent with a success status: [`implied_status`].
+
+#[cfg(test)]
+mod tests;
 
 use std::sync::LazyLock;
 
@@ -10,9 +15,7 @@ use regex::Regex;
 
 use super::api_error::ApiError;
 use super::ask_error::{AskError, Reach, Retry};
-use super::moderation::is_moderated;
-use super::vocabulary;
-use super::wording::Wording;
+use super::vocabulary::{self, Wording, is_moderated, is_out_of_tokens};
 use crate::ask::requests::{
     AdaptableField, FieldState, RequestField, SentFields, for_judge, is_unsupported, least_temperature,
 };
@@ -321,5 +324,22 @@ impl AskError {
     }
 }
 
-#[cfg(test)]
-mod tests;
+/// The HTTP status that an error implies which came with a success status: its code, or what its words mean. Without
+/// either it is a failure of the server, which may pass.
+pub(crate) fn implied_status(api_error: &ApiError) -> u16 {
+    if let Some(status) = api_error.status() {
+        return status;
+    }
+    let is_credit = api_error.has_code_like(&vocabulary::CREDIT_CODES) || api_error.mentions_any(&vocabulary::CREDIT);
+    if is_moderated(400, api_error) || is_out_of_tokens(400, api_error) {
+        400
+    } else if is_credit {
+        402
+    } else if api_error.mentions_any(&vocabulary::RATE) {
+        429
+    } else if api_error.mentions_any(&vocabulary::WRONG_KEY) {
+        401
+    } else {
+        500
+    }
+}

@@ -4,10 +4,8 @@ use std::sync::LazyLock;
 
 use serde_json::Value;
 
-use super::local::Local;
-use super::random::Random;
+use super::local::{Local, Random, Script};
 use super::remote::Remote;
-use super::script::Script;
 use crate::ask::batch;
 use crate::ask::batch_api::BatchServer;
 use crate::ask::costs::{Reservation, image_tokens, scaling_image_tokens};

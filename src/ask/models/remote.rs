@@ -1,26 +1,29 @@
 //! Model at an endpoint: [`Remote`].
+//!
+//! Checks that the settings of a model do not contradict each other or its vendor: [`check_user_fields`],
+//! [`check_vendor`].
 
 use std::collections::BTreeSet;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use reqwest::header::HeaderMap;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use tracing::warn;
 
-use super::contradictions::{check_user_fields, check_vendor};
 use super::finish_words::FinishWords;
 use super::stream_fallback::{AskedBefore, StreamFallback};
 use crate::ask::costs::Reservation;
 use crate::ask::endpoints::{Endpoint, ModelIndex};
 use crate::ask::failures::{AskError, Reach};
-use crate::ask::requests::constraint::constrained_letter;
+use crate::ask::requests::field::constrained_letter;
 use crate::ask::requests::{
     AdaptableField, AfterTimeout, Constrain, Message, Parameters, Request, RequestFields, SentFields, Thinking,
     ThinkingBudget, TokenField,
 };
+use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::Wire;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::types::questions::letter;
 use crate::types::{FailureKind, Finish, LostAttempts, Reply};
 
@@ -495,4 +498,64 @@ fn image_hash(message: Message<'_>) -> u64 {
         first.copy_from_slice(&digest.as_bytes()[..8]);
         sum ^ u64::from_le_bytes(first)
     })
+}
+
+/// Checks that the fields of `--extra-body` do not set the same as a flag.
+fn check_user_fields(parameters: &Parameters, initial: RequestFields) -> Result<()> {
+    let extra = &parameters.extra;
+    if parameters.constrain != Constrain::None
+        && let Some(field) =
+            ["response_format", "structured_outputs", "text"].into_iter().find(|field| extra.adds(field))
+    {
+        return conflict(field, "--request constrain");
+    }
+    if let Some(field) = initial.thinking_body().into_iter().flat_map(Map::keys).find(|field| extra.adds(field)) {
+        return conflict(field, "--thinking");
+    }
+    // The field of the Responses API, which OpenRouter also accepts in chat completions.
+    if initial.effort(parameters).is_some() && extra.adds_below("reasoning", "effort") {
+        let flag = match parameters.reasoning_effort {
+            Some(_) => "--reasoning-effort",
+            None => "--thinking",
+        };
+        return conflict("reasoning.effort", flag);
+    }
+    if parameters.probabilities && extra.adds("include") {
+        return conflict("include", "--request probabilities");
+    }
+    Ok(())
+}
+
+fn conflict(field: &str, flag: &str) -> Result<()> {
+    let problem = format_args!("{field} is set by {flag}; leave one of them out");
+    Err(Error::usage("--extra-body", problem))
+}
+
+/// Checks that the vendor supports a requested constraint and requested probabilities. Warns if requests to it are not
+/// repeatable.
+fn check_vendor(vendor: &Vendor, parameters: &Parameters) -> Result<()> {
+    if vendor.ignores_constraints() && parameters.constrain != Constrain::None {
+        let problem =
+            format_args!("{} takes a constraint and ignores it, so it would be none; leave it out", vendor.name);
+        return Err(Error::usage("--request constrain", problem));
+    }
+    if parameters.probabilities
+        && let Some(reason) = vendor.without_probabilities()
+    {
+        let problem = format_args!(
+            "{} {reason}, so the confidence of {} would not be known; leave it out",
+            vendor.name, parameters.model
+        );
+        return Err(Error::usage("--request probabilities", problem));
+    }
+    if let Some(field) = &vendor.pin
+        && !parameters.extra.adds(field)
+    {
+        warn!(
+            "{}: {} may answer each request in another way unless {field} is set in the body (--extra-body): the run may not be \
+             repeatable",
+            parameters.model, vendor.name
+        );
+    }
+    Ok(())
 }

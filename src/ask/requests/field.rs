@@ -1,16 +1,23 @@
 //! Request fields that not all servers accept: [`RequestField`] describes one field for the analysis of a refusal,
 //! [`RequestFields`] has the values of the fields that the program adapts.
+//!
+//! Replies constrained to one letter: the JSON [`schema`] in the request, and the [`constrained_letter`] in the reply.
+//!
+//! The range of temperatures in a server's refusal: [`least_temperature`].
 
-use serde_json::{Map, Value};
+use std::sync::LazyLock;
 
-use super::parameters::{Constrain, Parameters, Temperature};
-use super::thinking::ThinkingSwitch;
-use super::token_field::TokenField;
+use regex::Regex;
+use serde_json::{Map, Value, json};
+
+use super::extra_fields::ThinkingSwitch;
+use super::parameters::{Constrain, Parameters, Temperature, TokenField};
 use crate::ask::endpoints::BaseUrl;
 use crate::ask::failures::ApiError;
 use crate::ask::vendors::Vendor;
 use crate::ask::wire_kind::{Wire, WireSetting};
 use crate::error::{Error, Result};
+use crate::types::questions::letter;
 
 /// Field that a server may refuse and that the program can send in another way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -384,4 +391,143 @@ pub(crate) fn is_unsupported(api_error: &ApiError) -> bool {
 /// True if a text contains a name as a whole word: `max_tokens` is not in `max_tokens_total`.
 fn mentions(text: &str, name: &str) -> bool {
     text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == name)
+}
+
+/// Name of the only field in a reply with `--request constrain=json`.
+pub(crate) const ANSWER: &str = "answer";
+
+/// JSON schema of an object whose only field is one of the letters.
+pub(crate) fn schema(letters: &[char]) -> Value {
+    json!({
+        "type": "object", "additionalProperties": false, "required": [ANSWER],
+        "properties": {ANSWER: {"type": "string", "enum": letters}},
+    })
+}
+
+/// Letter in a constrained reply; `None` without a constraint, or if the server did not follow it.
+pub(crate) fn constrained_letter(constrain: Constrain, choices: usize, reply: &str) -> Option<String> {
+    let object: Option<Value> = match constrain {
+        Constrain::None => return None,
+        Constrain::Json => serde_json::from_str(without_fence(reply)).ok(),
+        Constrain::Choice => None,
+    };
+    let text = match &object {
+        Some(object) if object.as_object()?.len() == 1 => object.get(ANSWER)?.as_str()?,
+        Some(_) => return None,
+        None => reply,
+    };
+    (0..choices).map(|index| letter(index).to_string()).find(|letter| letter == text.trim())
+}
+
+/// The content of a fenced code block that is the whole text; other texts are returned as they are.
+fn without_fence(text: &str) -> &str {
+    let fenced = || {
+        let inner = text.trim().strip_prefix("```")?.strip_suffix("```")?;
+        let (language, block) = inner.split_once('\n')?;
+        language.trim().chars().all(char::is_alphanumeric).then_some(block)
+    };
+    fenced().unwrap_or(text)
+}
+
+/// Matches a lower bound that is accepted itself: `[0.01, 2]`, `between 0.01 and 2`, `0.01 … 2`, `at least 0.01`. One
+/// group has the bound.
+static CLOSED: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(
+        r"(?i)\[\s*(\d*\.?\d+)\s*[,;]|\b(?:between|range(?: of)?|from|at least|no less than|minimum(?: is| of| value:?)?)\s+\[?(\d*\.?\d+)|(?:>=|≥|⩾|greater than or equal to|不小于|大于等于|不低于)\s*(\d*\.?\d+)|(\d*\.?\d+)\s*(?:…|\.\.+|~|–|\bto\b|至|到)\s*\d",
+    )
+});
+
+/// Matches a lower bound that is not accepted itself: `(0, 1]`, `greater than 0`, `> 0`. One group has the bound.
+static OPEN: LazyLock<Regex> = LazyLock::new(|| {
+    compiled(
+        r"(?i)\(\s*(\d*\.?\d+)\s*[,;]|\b(?:greater|higher|larger|more|bigger) than\s+(\d*\.?\d+)|\babove\s+(\d*\.?\d+)|>\s*(\d*\.?\d+)|大于\s*(\d*\.?\d+)",
+    )
+});
+
+/// Words for a bound of 0 that is not accepted itself.
+const POSITIVE: [&str; 5] = ["positive", "non-zero", "nonzero", "正数", "positiv"];
+
+/// Step above a bound that is not accepted itself, in hundredths; chosen, the least temperature of several servers.
+const STEP: u16 = 1;
+
+/// Largest bound that is not a mistake of this parser, in hundredths: servers take temperatures up to 2.
+const MAX_BOUND: u16 = 200;
+
+/// Least temperature that a server accepts by its refusal of a lower one, in hundredths. `None` if the refusal states
+/// no range.
+pub(crate) fn least_temperature(message: &str) -> Option<u16> {
+    let lower = message.to_lowercase();
+    // Only one temperature is accepted: the server's own.
+    if lower.contains("only") {
+        return None;
+    }
+    let open = first_bound(&OPEN, &lower).map(|bound| bound + STEP);
+    let closed = first_bound(&CLOSED, &lower).map(|bound| bound.max(STEP));
+    let positive = POSITIVE.iter().any(|word| lower.contains(word)).then_some(STEP);
+    closed.or(open).or(positive).filter(|bound| *bound <= MAX_BOUND)
+}
+
+/// First number in a group of the pattern, in hundredths, rounded up.
+fn first_bound(pattern: &Regex, text: &str) -> Option<u16> {
+    let captures = pattern.captures(text)?;
+    let number: f64 = captures.iter().skip(1).flatten().next()?.as_str().parse().ok()?;
+    let hundredths = (number * 100.0).ceil();
+    (0.0..=f64::from(MAX_BOUND)).contains(&hundredths).then_some(hundredths as u16)
+}
+
+fn compiled(pattern: &str) -> Regex {
+    Regex::new(pattern).unwrap_or_else(|e| unreachable!("a test compiles it: {e}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_letter_of_a_constrained_reply_is_found() {
+        use Constrain::{Choice, Json};
+        for (constrain, reply, letter) in [
+            (Json, "{\"answer\": \"B\"}", Some("B")),
+            (Json, " {\n\"answer\" : \"A\" }\n", Some("A")),
+            (Json, "```json\n{\"answer\": \"B\"}\n```\n", Some("B")),
+            (Json, "```\n{\"answer\": \"A\"}```", Some("A")),
+            (Json, "```json\n{\"answer\": \"C\"}\n```", None),
+            (Json, "{\"answer\":\"C\"}", None),
+            (Json, "{\"answer\":\"B", None),
+            (Json, "{\"answer\":\"B\",\"why\":\"x\"}", None),
+            (Json, "The answer is B", None),
+            (Choice, "B", Some("B")),
+            (Choice, " A\n", Some("A")),
+            (Choice, "a", None),
+            (Choice, "B. yes", None),
+        ] {
+            assert_eq!(constrained_letter(constrain, 2, reply).as_deref(), letter, "{reply}");
+        }
+    }
+
+    #[test]
+    fn ranges_are_found() {
+        for (message, least) in [
+            ("Input validation error: `temperature` must be strictly positive", Some(1)),
+            ("invalid params, temperature should be in (0, 1] (2013)", Some(1)),
+            ("temperature must be in (0,1]", Some(1)),
+            ("temperature should be in the range 0.01 … 2", Some(1)),
+            ("temperature: Input should be greater than 0", Some(1)),
+            ("temperature must be > 0.1", Some(11)),
+            ("temperature must be at least 0.05", Some(5)),
+            ("temperature: Input should be greater than or equal to 0.01", Some(1)),
+            ("temperature must be between 0.1 and 1.0", Some(10)),
+            ("temperature 取值范围 [0.01, 2]", Some(1)),
+            ("temperature 必须大于0", Some(1)),
+            ("temperature must be in [0, 1]", Some(1)),
+            ("invalid temperature: only 1 is allowed for this model", None),
+            ("invalid temperature: only 0.6 is allowed for this model", None),
+            ("`temperature` is deprecated for this model.", None),
+            ("`temperature` may only be set to 1 when thinking is enabled.", None),
+            ("'temperature' does not support 0.0 with this model.", None),
+            ("temperature must be at least 500", None),
+        ] {
+            assert_eq!(least_temperature(message), least, "{message}");
+        }
+    }
 }

@@ -1,4 +1,8 @@
 //! Model name and sampling settings of requests: [`Parameters`].
+//!
+//! Messages about the judge of open answers, whose settings have flags of their own: [`for_judge`].
+//!
+//! The field in which a token limit is sent: [`TokenField`].
 
 use std::fmt;
 use std::num::NonZeroU32;
@@ -9,9 +13,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::continued::{ChangedSetting, Continued};
-use super::extra_fields::ExtraFields;
-use super::thinking::Thinking;
-use super::token_field::TokenField;
+use super::extra_fields::{ExtraFields, Thinking};
 use crate::ask::wire_kind::WireSetting;
 use crate::error::{Error, Result};
 use crate::types::Decides;
@@ -313,7 +315,40 @@ pub enum Constrain {
 }
 
 written_as_text!(Temperature);
+
 flag_words!(ImageDetail, Constrain);
+
+/// Flags of models, and the judge's flags for the same settings.
+const FLAGS: [(&str, &str); 6] = [
+    ("--temperature", "--judge-temperature"),
+    ("--max-tokens", "--judge-max-tokens"),
+    ("--model", "--judge"),
+    ("--base-url", "--judge-base-url"),
+    ("--api-key-env", "--judge-api-key-env"),
+    ("--api-key-file", "--judge-api-key-file"),
+];
+
+/// Replaces the flags of models in a message by those of the judge.
+pub(crate) fn for_judge(message: &str) -> String {
+    FLAGS.iter().fold(message.to_owned(), |text, (flag, of_judge)| text.replace(flag, of_judge))
+}
+
+/// The field in which a token limit is sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+pub enum TokenField {
+    /// Known name of the endpoint, else max_tokens; the other one if the server asks for it
+    Auto,
+    /// Understood by every other server
+    MaxTokens,
+    /// Required by reasoning models of OpenAI
+    MaxCompletionTokens,
+    /// No limit is sent
+    #[value(name = "none")]
+    Omit,
+}
+
+flag_words!(TokenField);
 
 #[cfg(test)]
 mod tests {
@@ -383,5 +418,13 @@ mod tests {
         assert_eq!(own.content(), first.content());
         assert_eq!((own.changed_limit(), own.first_limit()), (Some(400), 1024));
         assert_eq!(own.temperature, Temperature::Server);
+    }
+
+    #[test]
+    fn flags_are_replaced() {
+        assert_eq!(
+            for_judge("--temperature default, or another --model with --max-tokens N"),
+            "--judge-temperature default, or another --judge with --judge-max-tokens N"
+        );
     }
 }

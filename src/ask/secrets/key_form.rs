@@ -1,7 +1,18 @@
 //! Recognition of text that looks like a secret: [`looks_like_key`], [`is_secret_value`], [`is_secret_name`],
 //! [`is_secret_header`].
+//!
+//! Recognition of private keys and service accounts, in plain text and in base64: [`is_private_key`].
+//!
+//! The header that carries a key: [`KeyHeader`].
 
-use super::private_key;
+use base64::Engine as _;
+use base64::alphabet::{STANDARD, URL_SAFE};
+use base64::engine::DecodePaddingMode;
+use base64::engine::general_purpose::{GeneralPurpose, GeneralPurposeConfig};
+use clap::ValueEnum;
+use serde_json::Value;
+
+use crate::types::flags::flag_words;
 
 /// Prefixes of the keys of common vendors.
 const KEY_PREFIXES: [&str; 6] = ["sk-", "AIza", "gsk_", "xai-", "hf_", "Bearer "];
@@ -40,7 +51,7 @@ pub(super) fn is_shell_text(key: &str) -> bool {
 /// signature.
 pub(crate) fn is_secret_value(value: &str) -> bool {
     KEY_PREFIXES.iter().any(|prefix| value.starts_with(prefix) && value.len() > prefix.len())
-        || private_key::is_private_key(value)
+        || is_private_key(value)
         || is_web_token(value)
 }
 
@@ -125,8 +136,63 @@ fn name_words(name: &str) -> Vec<String> {
     words
 }
 
+/// Texts that only files with private keys have: PEM of any kind, PGP, PuTTY, and age.
+const MARKS: [&str; 4] = ["PRIVATE KEY-----", "PRIVATE KEY BLOCK-----", "PuTTY-User-Key-File", "AGE-SECRET-KEY-"];
+
+/// Maximum length of a text that is decoded from base64, in bytes (chosen). The largest private keys in use have 13 kB.
+const MAX_ENCODED: usize = 64 << 10;
+
+/// True if a text contains a private key or a service account, or if it is one of them in base64.
+fn is_private_key(text: &str) -> bool {
+    has_mark(text) || decode(text).is_some_and(|decoded| has_mark(&decoded))
+}
+
+/// True for JSON of a private key (JWK) or of a service account. Its fields tell them: `kty` with `d` or `k`, `type`
+/// with the text `service_account`.
+pub(super) fn is_key_object(fields: &serde_json::Map<String, Value>) -> bool {
+    let has = |name: &str| fields.get(name).is_some_and(Value::is_string);
+    let is_account = fields.get("type").and_then(Value::as_str) == Some("service_account");
+    is_account || has("kty") && (has("d") || has("k"))
+}
+
+fn has_mark(text: &str) -> bool {
+    let is_object = text.trim_start().starts_with('{')
+        && serde_json::from_str::<Value>(text).is_ok_and(|value| value.as_object().is_some_and(is_key_object));
+    is_object || MARKS.iter().any(|mark| text.contains(mark))
+}
+
+/// The text that is encoded in base64; `None` if it is not.
+fn decode(text: &str) -> Option<String> {
+    if text.len() > MAX_ENCODED {
+        return None;
+    }
+    let letters: String = text.split_whitespace().collect();
+    let config = GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent);
+    [STANDARD, URL_SAFE].iter().find_map(|alphabet| {
+        let bytes = GeneralPurpose::new(alphabet, config).decode(&letters).ok()?;
+        String::from_utf8(bytes).ok()
+    })
+}
+
+/// The header that carries a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum KeyHeader {
+    /// `api-key` at Azure, `Authorization` elsewhere.
+    #[default]
+    Auto,
+    /// `Authorization: Bearer …`; at Azure for tokens of Microsoft Entra.
+    Bearer,
+    /// `api-key: …`, as Azure and gateways before it require it.
+    ApiKey,
+}
+
+flag_words!(KeyHeader);
+
 #[cfg(test)]
 mod tests {
+    use base64::engine::general_purpose::STANDARD as BASE64;
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -205,5 +271,28 @@ mod tests {
         assert!(is_secret_value(&format!("{part}.{part}.{part}")));
         assert!(!is_secret_value(&format!("{part}.{part}")));
         assert!(!is_secret_value("eyJ.a.b"));
+    }
+
+    const PEM: &str = "-----BEGIN RSA PRIVATE KEY-----\nMIIEow==\n-----END RSA PRIVATE KEY-----\n";
+
+    #[test]
+    fn private_keys_are_recognised() {
+        let account = json!({"type": "service_account", "client_email": "a@b"}).to_string();
+        let web_key = json!({"kty": "RSA", "n": "x", "d": "y"}).to_string();
+        for key in [PEM, "PuTTY-User-Key-File-3: x", &account, &web_key] {
+            assert!(is_private_key(key), "{key}");
+            assert!(is_private_key(&BASE64.encode(key)), "{key}");
+        }
+        assert!(is_private_key(&format!("key: {PEM}")));
+    }
+
+    #[test]
+    fn other_texts_are_no_private_keys() {
+        let certificate = PEM.replace("RSA PRIVATE KEY", "CERTIFICATE");
+        let public = json!({"kty": "RSA", "n": "x"}).to_string();
+        for text in [&certificate, &public, "{}", "", "the private key of a room"] {
+            assert!(!is_private_key(text), "{text}");
+            assert!(!is_private_key(&BASE64.encode(text)), "{text}");
+        }
     }
 }

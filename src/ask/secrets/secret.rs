@@ -1,12 +1,24 @@
 //! API keys that are never printed ([`Secret`]), and removal of keys from text that a server sent ([`Scrub`]).
+//!
+//! Detection of parts of keys, and of keys in base64, in text: [`SecretParts`].
+//!
+//! Removal of keys from replies, and limits on the length of their texts: [`without_secrets`].
+//!
+//! Check of `--extra-body` for secrets: [`refuse_secrets`].
 
+use std::collections::HashSet;
 use std::fmt;
+use std::ops::Range;
 use std::path::Path;
 
-use super::key_form::{is_key_in_place_of_file, is_shell_text};
-use super::secret_parts::{MASK, SecretParts};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD_NO_PAD;
+use serde_json::{Map, Value};
+
+use super::key_form::{is_key_in_place_of_file, is_key_object, is_secret_name, is_secret_value, is_shell_text};
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
+use crate::types::{Finish, OtherField, Reply, TokenChances, TokenPosition};
 
 /// Maximum size of a key file, in bytes. Chosen: twice the longest tokens.
 const MAX_FILE: u64 = 4096;
@@ -47,7 +59,7 @@ impl Secret {
     /// If the file cannot be read, or is not a single line of visible ASCII, such as a file named by mistake. The error
     /// shows neither its content nor a key in place of the path.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let bytes = reading::at_most(path, MAX_FILE).map_err(|error| {
+        let bytes = files::at_most(path, MAX_FILE).map_err(|error| {
             if path.to_str().is_some_and(is_key_in_place_of_file) {
                 Error::usage(
                     "--api-key-file",
@@ -183,8 +195,260 @@ impl fmt::Debug for Scrub {
     }
 }
 
+/// Number of consecutive letters and digits that identify a part of a key; chosen. A random text of 64 kB contains such
+/// a part with a probability of 1e-6.
+const PART: usize = 8;
+
+/// Minimum length of a part without digits; chosen. Keys of gateways contain words that also occur in replies.
+const MIN_WORD_PART: usize = 10;
+
+/// Replacement of a key.
+const MASK: &str = "[secret]";
+
+/// All sequences of [`PART`] consecutive letters and digits of keys, in plain text and in base64; in lower case.
+#[derive(Clone, Default)]
+pub(super) struct SecretParts(HashSet<[u8; PART]>);
+
+impl SecretParts {
+    /// Collects the parts of these keys.
+    pub(super) fn new<'s>(keys: impl Iterator<Item = &'s str>) -> Self {
+        let mut parts = HashSet::new();
+        for key in keys {
+            let in_base64 = (0..3).map(|offset| base64_letters(key, offset));
+            for form in in_base64.chain([key.to_owned()]) {
+                let letters: Vec<u8> = letters(&form).map(|letter| letter.value).collect();
+                let windows = letters.windows(PART);
+                parts.extend(windows.filter_map(|part| <[u8; PART]>::try_from(part).ok()));
+            }
+        }
+        Self(parts)
+    }
+
+    /// Replaces each part by `[secret]`, including any other characters between its letters.
+    pub(super) fn masked(&self, text: String) -> String {
+        let ranges = self.find(&text);
+        if ranges.is_empty() {
+            return text;
+        }
+        let mut masked = String::with_capacity(text.len());
+        let mut copied = 0;
+        for range in ranges {
+            masked += &text[copied..range.start];
+            masked += MASK;
+            copied = range.end;
+        }
+        masked + &text[copied..]
+    }
+
+    /// Byte ranges of the parts in a text.
+    fn find(&self, text: &str) -> Vec<Range<usize>> {
+        if self.0.is_empty() {
+            return Vec::new();
+        }
+        let letters: Vec<Letter> = letters(text).collect();
+        let mut runs: Vec<Range<usize>> = Vec::new();
+        for (index, window) in letters.windows(PART).enumerate() {
+            let part: [u8; PART] = std::array::from_fn(|i| window[i].value);
+            if !self.0.contains(&part) {
+                continue;
+            }
+            match runs.last_mut() {
+                Some(run) if run.end >= index => run.end = index + PART,
+                _ => runs.push(index..index + PART),
+            }
+        }
+        runs.into_iter()
+            .map(|run| &letters[run])
+            .filter(|run| {
+                let has_digit = run.iter().any(|letter| letter.value.is_ascii_digit());
+                let has_letter = run.iter().any(|letter| letter.value.is_ascii_alphabetic());
+                (has_digit && has_letter) || run.len() >= MIN_WORD_PART
+            })
+            .map(|run| run[0].start..run[run.len() - 1].end)
+            .collect()
+    }
+}
+
+/// Base64 encoding of a key after `offset` unknown bytes, without the letters that depend on other bytes.
+fn base64_letters(key: &str, offset: usize) -> String {
+    let bytes = [&[0; 2][..offset], key.as_bytes()].concat();
+    let encoded = STANDARD_NO_PAD.encode(&bytes);
+    let unknown = usize::from(!bytes.len().is_multiple_of(3));
+    let known = (offset * 8).div_ceil(6)..encoded.len() - unknown;
+    encoded[known].to_owned()
+}
+
+/// Letter or digit in a text.
+struct Letter {
+    /// ASCII code, in lower case.
+    value: u8,
+    /// Byte offset of its start.
+    start: usize,
+    /// Byte offset of its end.
+    end: usize,
+}
+
+/// ASCII letters and digits of a text, including escaped ones such as `\u0073` in JSON or `%73` in a URL. The letter of
+/// other escapes, such as `\n`, does not count.
+fn letters(text: &str) -> impl Iterator<Item = Letter> {
+    let bytes = text.as_bytes();
+    let mut start = 0;
+    std::iter::from_fn(move || {
+        while start < bytes.len() {
+            let (value, length) = letter(&bytes[start..]);
+            let end = start + length;
+            let found = value.is_ascii_alphanumeric().then(|| Letter { value: value.to_ascii_lowercase(), start, end });
+            start = end;
+            if found.is_some() {
+                return found;
+            }
+        }
+        None
+    })
+}
+
+/// First character of these bytes, unescaped, and its length in bytes.
+fn letter(bytes: &[u8]) -> (u8, usize) {
+    match bytes {
+        [b'\\', b'u', b'0', b'0', ..] => escaped(bytes, 4..6).unwrap_or((0, 1)),
+        [b'\\', other, ..] if other.is_ascii() => (0, 2),
+        [b'%', ..] => escaped(bytes, 1..3).unwrap_or((0, 1)),
+        _ => (bytes[0], 1),
+    }
+}
+
+/// The byte with this hexadecimal code, and the end of the code.
+fn escaped(bytes: &[u8], digits: Range<usize>) -> Option<(u8, usize)> {
+    let end = digits.end;
+    let digits = std::str::from_utf8(bytes.get(digits)?).ok()?;
+    let code = u8::from_str_radix(digits, 16).ok()?;
+    Some((code, end))
+}
+
+/// Maximum length of the text of a recorded reply, in bytes; chosen: four times a reply of 4,096 tokens.
+const MAX_TEXT: usize = 64 << 10;
+
+/// Maximum length of the note about omitted bytes, in bytes.
+const MAX_NOTE: usize = 64;
+
+/// Maximum length of the name of a model or provider, and of a token, in bytes; chosen.
+const MAX_NAME: usize = 200;
+
+/// Removes keys that a server or a model repeats in a reply, and limits the length of its texts.
+pub(crate) fn without_secrets(reply: Reply, scrub: &Scrub) -> Reply {
+    let name = |mut name: String| {
+        name = scrub.reply(name);
+        name.truncate(name.floor_char_boundary(MAX_NAME));
+        name
+    };
+    Reply {
+        // Shorten last: otherwise a part of a key could remain.
+        text: shortened(scrub.reply(reply.text)),
+        refusal: reply.refusal.map(|text| shortened(scrub.reply(text))),
+        served_model: reply.served_model.map(name),
+        provider: reply.provider.map(name),
+        finish: match reply.finish {
+            Finish::Other(reason) => Finish::Other(scrub.line(&reason)),
+            finish => finish,
+        }
+        .shorten(),
+        chances: reply.chances.map(|chances| map_tokens(chances, name)),
+        other_field: reply
+            .other_field
+            .map(|field| OtherField { name: name(field.name), text: shortened(scrub.reply(field.text)) }),
+        ..reply
+    }
+}
+
+/// Cuts the middle of a text longer than [`MAX_TEXT`] and replaces it by a note. The end remains, because a long answer
+/// states its choice there.
+fn shortened(text: String) -> String {
+    if text.len() <= MAX_TEXT {
+        return text;
+    }
+    let half = (MAX_TEXT - MAX_NOTE) / 2;
+    let start = text.floor_char_boundary(half);
+    let end = text.ceil_char_boundary(text.len() - half);
+    let omitted = end - start;
+    format!("{}\n[… {omitted} bytes omitted …]\n{}", &text[..start], &text[end..])
+}
+
+/// Applies a function to all tokens.
+fn map_tokens(chances: TokenChances, map: impl Fn(String) -> String) -> TokenChances {
+    TokenChances {
+        positions: chances
+            .positions
+            .into_iter()
+            .map(|position| TokenPosition {
+                likeliest: position.likeliest.into_iter().map(|(token, logprob)| (map(token), logprob)).collect(),
+                token: map(position.token),
+            })
+            .collect(),
+        ..chances
+    }
+}
+
+/// Suffixes of field names whose values are always secrets; lower-case letters and digits only.
+const SECRET_SUFFIXES: [&str; 9] = [
+    "privatekey",
+    "apikey",
+    "accesskey",
+    "secretkey",
+    "secret",
+    "password",
+    "authorization",
+    "accesstoken",
+    "authtoken",
+];
+
+/// Minimum length at which the value of a field with a secret-looking name counts as a secret; chosen.
+const MIN_LENGTH: usize = 20;
+
+/// Checks that no field, at any depth, looks like a secret: bodies are written to the manifest and to batch files.
+///
+/// # Errors
+/// [`Error::Usage`] with the name of a field that looks like a secret, without its value.
+pub(crate) fn refuse_secrets(fields: &Map<String, Value>) -> Result<()> {
+    fields.iter().try_for_each(|(name, value)| refuse_in_field(name, value))
+}
+
+fn refuse_in_field(name: &str, value: &Value) -> Result<()> {
+    if is_secret_value(name) {
+        return secret_error("the name of a field");
+    }
+    match value {
+        Value::String(text) if is_secret(name, text) => secret_error(name),
+        Value::Array(items) => items.iter().try_for_each(|item| refuse_in_field(name, item)),
+        Value::Object(fields) if is_key_object(fields) => secret_error(name),
+        Value::Object(fields) => refuse_secrets(fields),
+        _ => Ok(()),
+    }
+}
+
+fn secret_error(name: &str) -> Result<()> {
+    let problem = format_args!(
+        "{name} looks like a secret, which is not shown here and must not be in a body, because bodies are written to files: \
+             put it into a variable, and name that with --header-env or --api-key-env"
+    );
+    Err(Error::usage("--extra-body", problem))
+}
+
+/// True if the text of a field looks like a secret: it has the form of a key, a private key or a service account, or
+/// the field name always means a secret, or the field name looks secret and the text is a long mixture of letters and
+/// digits.
+fn is_secret(name: &str, text: &str) -> bool {
+    let letters: String = name.chars().filter(char::is_ascii_alphanumeric).map(|c| c.to_ascii_lowercase()).collect();
+    let has_secret_suffix = SECRET_SUFFIXES.iter().any(|suffix| letters.ends_with(suffix));
+    let is_long_key = text.len() >= MIN_LENGTH
+        && text.chars().all(|c| c.is_ascii_alphanumeric() || "-_.+/=:~".contains(c))
+        && text.contains(|c: char| c.is_ascii_digit());
+    is_secret_value(text) || (has_secret_suffix && !text.is_empty()) || (is_secret_name(name) && is_long_key)
+}
+
 #[cfg(test)]
 mod tests {
+    use serde_json::json;
+
     use super::*;
 
     #[test]
@@ -263,5 +527,113 @@ mod tests {
         assert!(!scrub.line(&long).contains("sk-"));
         assert_eq!(scrub.line(&"é".repeat(400)).chars().count(), MAX_LINE + 1);
         assert_eq!(Scrub::new(["x".to_owned()]).line("an axe\u{202e}"), "an axe");
+    }
+
+    const KEY: &str = "sk-proj-Ab12Cd34Ef56Gh78Ij90";
+
+    fn masked(text: &str) -> String {
+        SecretParts::new([KEY].into_iter()).masked(text.to_owned())
+    }
+
+    #[test]
+    fn keys_in_base64_are_masked_at_any_offset() {
+        for before in ["", "a", "ab", "Bearer ", "user:"] {
+            for after in ["", "x", "xy"] {
+                let encoded = STANDARD_NO_PAD.encode(format!("{before}{KEY}{after}"));
+                let text = masked(&format!("It is {encoded}, ok"));
+                let [head, tail] = text.split(MASK).collect::<Vec<_>>()[..] else {
+                    panic!("{text}");
+                };
+                let left = head.len() + tail.len() - "It is , ok".len();
+                // The rest encodes the surrounding text and at most two bytes of the key.
+                let around = (before.len() + after.len()) * 4 / 3;
+                assert!(left <= around + 5, "{encoded}: {text}");
+            }
+        }
+    }
+
+    #[test]
+    fn keys_in_parts_are_masked() {
+        for (text, expected) in [
+            ("sk-proj-Ab12Cd34 and Ef56Gh78Ij90", "[secret] and [secret]"),
+            ("s k - p r o j - A b 1 2 C d 3 4", "[secret]"),
+            ("sk-proj-Ab12\nCd34Ef56\nGh78Ij90.", "[secret]."),
+            ("AB12CD34EF56", "[secret]"),
+            ("é Ab12\u{200b}Cd34Ef\\u0035\\u0036Gh7%38 é", "é [secret] é"),
+        ] {
+            assert_eq!(masked(text), expected);
+        }
+    }
+
+    #[test]
+    fn other_text_is_unchanged() {
+        for text in ["sk-proj", "the project Ab12", "Zm9v12345678", "%zz \\ud83d %", "é\\"] {
+            assert_eq!(masked(text), text);
+        }
+        let words = SecretParts::new(["bathroom-gateway-key-4711"].into_iter());
+        assert_eq!(words.masked("bathroom".to_owned()), "bathroom");
+        assert_eq!(words.masked("gateway-key-4711".to_owned()), MASK);
+    }
+
+    #[test]
+    fn long_texts_lose_their_middle() {
+        let kept = "é".repeat(MAX_TEXT / 2);
+        assert_eq!(shortened(kept.clone()), kept);
+        let long = shortened(format!("start é{} the end", "é".repeat(MAX_TEXT)));
+        assert!(long.len() <= MAX_TEXT, "{}", long.len());
+        assert!(long.starts_with("start é") && long.ends_with("é the end"));
+        assert!(long.contains("bytes omitted …]"));
+        assert_eq!(shortened(long.clone()), long);
+    }
+
+    #[test]
+    fn names_are_short_and_without_keys() {
+        let key = "sk-0123456789abcdef";
+        let long = "x".repeat(MAX_NAME - 4) + key;
+        let reply = Reply {
+            served_model: Some(long.clone()),
+            provider: Some(long),
+            ..Reply::local(format!("{}{key}", "x".repeat(MAX_TEXT)))
+        };
+        let reply = without_secrets(reply, &Scrub::new([key.to_owned()]));
+        let names = [reply.served_model, reply.provider].map(Option::unwrap);
+        for text in names.iter().chain([&reply.text]) {
+            assert!(!text.contains("sk-"), "{text}");
+        }
+        assert_eq!(names[0].len(), MAX_NAME);
+    }
+
+    fn refusal(body: &Value) -> Result<(), String> {
+        refuse_secrets(body.as_object().unwrap()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn secret_fields_are_refused() {
+        for (fields, name) in [
+            (json!({"api_key": "sk-0123456789"}), "api_key"),
+            (json!({"user": "sk-0123456789"}), "user"),
+            (json!({"a": {"b": [{"X-Api-Key": "0123"}]}}), "X-Api-Key"),
+            (json!({"a": ["Bearer 0123"]}), "a"),
+            (json!({"router": {"token": "0123456789abcdef0123"}}), "token"),
+            (json!({"sk-0123456789": 1}), "the name of a field"),
+            (json!({"note": "-----BEGIN PRIVATE KEY-----\n0123\n-----END PRIVATE KEY-----"}), "note"),
+            (json!({"vertex_credentials": {"type": "service_account", "project_id": "0123"}}), "vertex_credentials"),
+            (json!({"a": "{\"type\": \"service_account\", \"b\": \"0123\"}"}), "a"),
+            (json!({"jwk": {"kty": "OKP", "d": "0123"}}), "jwk"),
+        ] {
+            let error = refusal(&fields).unwrap_err();
+            let expected = format!("--extra-body: {name} looks like a secret");
+            assert!(error.starts_with(&expected), "{error}");
+            assert!(error.contains("--header-env") && !error.contains("0123"), "{error}");
+        }
+        for fields in [
+            json!({"prompt_cache_key": "0f8fad5b-d9cb-469f-a165-70867728950e"}),
+            json!({"tokenizer": "mistralai/Mistral-7B-Instruct-v0.3"}),
+            json!({"eos_token": "<|end_of_text_number_2|>", "token_limit": 10, "api_key": null}),
+            json!({"tools": [{"type": "function"}], "certificate": "-----BEGIN CERTIFICATE-----"}),
+            json!({"keywords": ["the colour of 20 lamps in the room"]}),
+        ] {
+            assert!(refusal(&fields).is_ok(), "{fields}");
+        }
     }
 }

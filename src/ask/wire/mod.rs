@@ -3,36 +3,28 @@
 //! Retries, rate limits and the removal of keys ([`Endpoint`](super::Endpoint), [`Remote`](super::Remote)) do not
 //! depend on the API.
 
-mod charge;
-mod chat_fields;
-mod chat_reply;
-mod chat_request;
+mod chat;
 mod finish_reason;
-mod image_places;
-mod json_body;
 mod logprobs;
 mod message_fields;
-mod other_field;
-mod refusal;
-mod responses_reply;
-mod responses_request;
+mod responses;
 mod stream;
 mod usage;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, HeaderName, HeaderValue};
 
+use super::bounded_json::parse;
 use super::failures::{ApiError, ReplyError};
-use super::replies::bounded_json::parse;
 use super::requests::{Message, Parameters, RequestBody, RequestField, RequestFields, SentFields};
 use super::secrets::{KeyHeader, Secret};
 use super::wire_kind::Wire;
 use crate::error::{Error, Result};
 use crate::types::{Reply, Usage};
 
-pub(super) use charge::cost_in_headers;
+pub(super) use finish_reason::requested_wire;
+pub(super) use usage::{cost_in_headers, with_cost};
+
 pub(crate) use finish_reason::is_context_full;
-pub(super) use refusal::requested_wire;
-pub(super) use usage::with_cost;
 
 impl Wire {
     /// Headers of every request: the key in the header `form`.
@@ -54,8 +46,8 @@ impl Wire {
     ) -> Result<RequestBody, serde_json::Error> {
         let fields = RequestFields { wire: self, ..fields };
         match self {
-            Self::Chat | Self::ChatStream => chat_request::body(parameters, fields, message, choices),
-            Self::Responses => responses_request::body(parameters, fields, message, choices),
+            Self::Chat | Self::ChatStream => chat::body(parameters, fields, message, choices),
+            Self::Responses => responses::body(parameters, fields, message, choices),
         }
     }
 
@@ -63,8 +55,8 @@ impl Wire {
     pub(super) fn fields(self, sent: SentFields<'_>) -> Vec<RequestField<'_>> {
         let extra = &sent.parameters.extra;
         let mut fields: Vec<RequestField<'_>> = match self {
-            Self::Chat | Self::ChatStream => chat_fields::fields(sent),
-            Self::Responses => responses_request::fields(sent),
+            Self::Chat | Self::ChatStream => chat::fields(sent),
+            Self::Responses => responses::fields(sent),
         };
         fields.extend(sent.fields.thinking_fields());
         // An omitted field cannot be the cause of a refusal.
@@ -76,8 +68,8 @@ impl Wire {
     /// Parses the body of a response with a success status; `latency_ms` and `attempts` remain zero.
     pub(super) fn reply(self, body: &[u8], content_type: &str) -> Result<Reply, ReplyError> {
         match self {
-            Self::Chat | Self::ChatStream => chat_reply::read(body, content_type),
-            Self::Responses => responses_reply::read(body, content_type),
+            Self::Chat | Self::ChatStream => chat::read(body, content_type),
+            Self::Responses => responses::read(body, content_type),
         }
     }
 

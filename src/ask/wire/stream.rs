@@ -1,10 +1,10 @@
 //! Event streams of replies: [`events`] parses a stream, [`assemble`] joins the chunks of a chat completion.
 
-use super::message_fields::refusal_field;
 use serde_json::{Map, Value, json};
 
+use super::message_fields::refusal_field;
+use crate::ask::bounded_json::{MAX_ITEMS, parse};
 use crate::ask::failures::find_error;
-use crate::ask::replies::bounded_json::{MAX_ITEMS, parse};
 
 /// True if a body is an event stream, by its content type or its first characters.
 pub(super) fn is_stream(text: &str, content_type: &str) -> bool {

@@ -1,18 +1,35 @@
 //! Parsing of the token usage that a server reports, in all known shapes: [`read`].
+//!
+//! Charges and service tiers that servers state in their replies: [`cost_in_body`], [`cost_in_headers`], [`tier`].
+//!
+//! Only charges in US dollars count:
+//!
+//! - a field whose name says so: `cost_in_usd_ticks` of xAI (10¹⁰ to the dollar, docs.x.ai/developers/cost-tracking),
+//!   `cost_usd_total` of LLM Gateway (docs.llmgateway.io/features/cost-breakdown), `total_cost_usd`,
+//!   `cost_in_usd_nanos` and the like;
+//! - in `usage`, `cost` of OpenRouter, whose credits are US dollars (openrouter.ai/docs, "Usage Accounting"); with the
+//!   user's own key for the provider (`is_byok`), what that provider charges is added;
+//! - in `usage`, `cost.total_cost` of Perplexity (docs.perplexity.ai), and `estimated_cost` of DeepInfra
+//!   (docs.deepinfra.com);
+//! - `provider_metadata.gateway.cost` of a message from Vercel's AI Gateway (vercel.com/docs/ai-gateway);
+//! - the header `x-litellm-response-cost` of LiteLLM (docs.litellm.ai/docs/proxy/response_headers), and others whose
+//!   name says that it is the cost of the request or response in US dollars.
+//!
+//! A currency or unit that stands beside a charge must be the US dollar.
 
-use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::sync::{Mutex, PoisonError};
 
-use super::charge;
-use crate::types::{StatedCost, Usage};
+use reqwest::header::HeaderMap;
+use serde_json::{Map, Value, json};
+
+use crate::types::{ServiceTier, StatedCost, Usage};
 
 /// Parses the `usage` in a body, with the charge and the service tier that the body states. `None` if it states none of
 /// them.
 pub(super) fn in_body(body: &Value) -> Option<Usage> {
-    let usage = Usage {
-        cost: charge::cost_in_body(body),
-        service_tier: charge::tier(body),
-        ..read(body.get("usage")).unwrap_or_default()
-    };
+    let usage =
+        Usage { cost: cost_in_body(body), service_tier: tier(body), ..read(body.get("usage")).unwrap_or_default() };
     (usage != Usage::default()).then_some(usage)
 }
 
@@ -118,6 +135,179 @@ fn round_up(number: f64) -> Option<u64> {
     (0.0..=MAX_TOKENS as f64).contains(&number).then_some(number.ceil() as u64)
 }
 
+/// The charge in a body with its `usage`, in US dollars; the highest of several. `None` if the server states none.
+fn cost_in_body(body: &Value) -> Option<StatedCost> {
+    let usage = body.get("usage").and_then(Value::as_object);
+    let in_usage = usage.and_then(cost_in_usage);
+    let beside = body.as_object().and_then(named_in_dollars);
+    let gateway = body
+        .pointer("/choices/0/message/provider_metadata/gateway")
+        .and_then(Value::as_object)
+        .and_then(|gateway| plain(gateway, "cost", "cost"));
+    in_usage.max(beside).max(gateway)
+}
+
+/// Header of LiteLLM with the cost of the response.
+const LITELLM: &str = "x-litellm-response-cost";
+
+/// The charge in the headers of a response, in US dollars; the highest of several. `None` if the server states none.
+pub(crate) fn cost_in_headers(headers: &HeaderMap) -> Option<StatedCost> {
+    headers
+        .iter()
+        .filter(|(name, _)| name.as_str() == LITELLM || is_cost_of_request(name.as_str()))
+        .filter_map(|(name, value)| {
+            let text = value.to_str().ok()?;
+            // LiteLLM writes None for a model whose price it does not know.
+            let number = text.trim().parse::<f64>().ok()?;
+            in_dollars(name.as_str(), number)
+        })
+        .max()
+}
+
+/// True if a header's name says that it is the cost of one request in US dollars, and not a sum.
+fn is_cost_of_request(name: &str) -> bool {
+    let words: Vec<&str> = name.split(['-', '_']).collect();
+    let has = |word| words.contains(&word);
+    has("cost") && has("usd") && (has("request") || has("response"))
+}
+
+/// The service tier in a body or its `usage`; `None` if the server states none.
+pub(super) fn tier(body: &Value) -> Option<ServiceTier> {
+    let of = |fields: &Value| ServiceTier::from_name(fields.get("service_tier")?.as_str()?);
+    of(body).or_else(|| of(body.get("usage")?))
+}
+
+/// The charge in `usage`.
+fn cost_in_usage(usage: &Map<String, Value>) -> Option<StatedCost> {
+    let named = named_in_dollars(usage);
+    if let Some(unit) = foreign_unit(usage) {
+        warn_once(&format!("a charge in {unit}, not in US dollars"));
+        return named;
+    }
+    let cost = match usage.get("cost") {
+        Some(Value::Object(parts)) => match foreign_unit(parts) {
+            Some(unit) => {
+                warn_once(&format!("a charge in {unit}, not in US dollars"));
+                None
+            }
+            None => ["total_cost", "total"]
+                .iter()
+                .find_map(|name| plain(parts, name, "cost.total_cost"))
+                .or_else(|| named_in_dollars(parts)),
+        },
+        _ => plain(usage, "cost", "usage.cost"),
+    };
+    let cost = cost.map(|cost| match own_key_cost(usage) {
+        Some(upstream) => cost.plus(upstream),
+        None => cost,
+    });
+    let total = ["total_cost", "estimated_cost"].iter().find_map(|name| plain(usage, name, name));
+    named.max(cost).max(total)
+}
+
+/// The provider's charge for a request with the user's own key for this provider, which OpenRouter does not include in
+/// `cost`.
+fn own_key_cost(usage: &Map<String, Value>) -> Option<StatedCost> {
+    usage.get("is_byok").filter(|own| **own == true)?;
+    let details = usage.get("cost_details")?.as_object()?;
+    let name = "upstream_inference_cost";
+    plain(details, name, name)
+}
+
+/// The currency or unit that fields state, if it is not the US dollar.
+fn foreign_unit(fields: &Map<String, Value>) -> Option<String> {
+    fields
+        .iter()
+        .filter(|(name, _)| {
+            let name = name.to_lowercase();
+            name.contains("currency") || name == "unit" || name.contains("cost_unit")
+        })
+        .filter_map(|(_, value)| value.as_str())
+        .find(|unit| {
+            let unit = unit.trim().to_lowercase();
+            !["usd", "us$", "$", "dollar", "dollars", "us dollars", ""].contains(&unit.as_str())
+        })
+        .map(|unit| unit.chars().filter(|c| !c.is_control()).take(20).collect())
+}
+
+/// The charge of a field whose unit is the dollar.
+fn plain(fields: &Map<String, Value>, name: &str, shown: &str) -> Option<StatedCost> {
+    in_dollars(shown, amount(fields.get(name)?)?)
+}
+
+/// Words of the name of a field with the whole charge of a request in US dollars.
+const WORDS: [&str; 13] = [
+    "cost",
+    "total",
+    "usd",
+    "dollars",
+    "in",
+    "estimated",
+    "actual",
+    "ticks",
+    "nanos",
+    "nano",
+    "micros",
+    "micro",
+    "cents",
+];
+
+/// The highest charge among fields whose names say that they are in US dollars. Names with other words are parts of the
+/// charge, or sums.
+fn named_in_dollars(fields: &Map<String, Value>) -> Option<StatedCost> {
+    fields
+        .iter()
+        .filter_map(|(name, value)| {
+            let words: Vec<String> = name.split('_').map(str::to_lowercase).collect();
+            let has = |word: &str| words.iter().any(|other| other == word);
+            let is_cost = has("cost") && (has("usd") || has("dollars"));
+            if !is_cost || !words.iter().all(|word| WORDS.contains(&word.as_str())) {
+                return None;
+            }
+            let per_dollar = if has("ticks") {
+                1e10
+            } else if has("nanos") || has("nano") {
+                1e9
+            } else if has("micros") || has("micro") {
+                1e6
+            } else if has("cents") {
+                1e2
+            } else {
+                1.0
+            };
+            in_dollars(name, amount(value)? / per_dollar)
+        })
+        .max()
+}
+
+/// A plausible charge; warns of another one.
+fn in_dollars(name: &str, dollars: f64) -> Option<StatedCost> {
+    let cost = StatedCost::from_dollars(dollars);
+    if cost.is_none() {
+        warn_once(&format!("{name} of {dollars}, no plausible charge in US dollars"));
+    }
+    cost
+}
+
+/// Parses a number, or a number in a string.
+fn amount(value: &Value) -> Option<f64> {
+    value.as_f64().or_else(|| value.as_str()?.trim().trim_start_matches('$').parse().ok())
+}
+
+/// Maximum number of warnings about charges that do not count; chosen.
+const MAX_WARNINGS: usize = 3;
+
+/// Warns, once for each text, of a charge that does not count.
+fn warn_once(problem: &str) {
+    static WARNED: Mutex<BTreeSet<String>> = Mutex::new(BTreeSet::new());
+    // Numbers differ from reply to reply: one warning for each kind.
+    let kind: String = problem.chars().filter(|c| !c.is_ascii_digit()).collect();
+    let mut warned = WARNED.lock().unwrap_or_else(PoisonError::into_inner);
+    if warned.len() < MAX_WARNINGS && warned.insert(kind) {
+        tracing::warn!("a reply states {problem}: it is ignored, and the price table counts");
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use serde_json::json;
@@ -218,6 +408,98 @@ mod tests {
             let stated = json!({"prompt_tokens": tokens, "completion_tokens": tokens, "cache_read_input_tokens": 3});
             let usage = read(Some(&stated)).unwrap();
             assert_eq!((usage.prompt_tokens, usage.completion_tokens), (None, None));
+        }
+    }
+
+    fn dollars(body: &Value) -> Option<f64> {
+        cost_in_body(body).map(StatedCost::dollars)
+    }
+
+    #[test]
+    fn charges_of_vendors_are_read() {
+        let vercel = json!({"gateway": {"cost": "0.0045405", "generationId": "g"}});
+        for (vendor, body, expected) in [
+            (
+                "OpenRouter",
+                json!({"usage": {"cost": 0.13, "is_byok": false, "cost_details": {"upstream_inference_cost": 0.12}}}),
+                0.13,
+            ),
+            (
+                "OpenRouter with an own key",
+                json!({"usage": {"cost": 0.006, "is_byok": true, "cost_details": {"upstream_inference_cost": 0.12}}}),
+                0.126,
+            ),
+            ("xAI", json!({"usage": {"cost_in_usd_ticks": 37_756_000}}), 0.003_775_6),
+            (
+                "Perplexity",
+                json!({"usage": {"cost": {"input_tokens_cost": 0.001, "request_cost": 0.005, "total_cost": 0.006}}}),
+                0.006,
+            ),
+            ("DeepInfra", json!({"usage": {"estimated_cost": 2.6e-5}}), 2.6e-5),
+            (
+                "LLM Gateway",
+                json!({"usage": {"cost_usd_total": 0.000_125, "cost_usd_input": 0.5, "cost_usd_request": 0.25}}),
+                0.000_125,
+            ),
+            ("Vercel", json!({"choices": [{"message": {"provider_metadata": vercel}}]}), 0.004_540_5),
+            ("another one", json!({"usage": {"cost": "0.02", "currency": "USD"}}), 0.02),
+            ("nanos", json!({"usage": {"cost_in_usd_nanos": 5_000_000}}), 0.005),
+            ("beside the usage", json!({"total_cost_usd": 0.25}), 0.25),
+        ] {
+            let found = dollars(&body).unwrap_or(-1.0);
+            assert!((found - expected).abs() < 1e-9, "{vendor}: {found}");
+        }
+    }
+
+    #[test]
+    fn other_units_and_implausible_charges_are_ignored() {
+        for body in [
+            json!({"usage": {"prompt_tokens": 9}}),
+            json!({"usage": {"cost": 3, "currency": "CNY"}}),
+            json!({"usage": {"cost": 3, "cost_unit": "credits"}}),
+            json!({"usage": {"cost": {"total_cost": 3, "currency": "EUR"}}}),
+            json!({"usage": {"credits_used": 3, "points": 3, "credit_cost": 5}}),
+            json!({"usage": {"cost": -0.5}}),
+            json!({"usage": {"cost": "NaN"}}),
+            json!({"usage": {"cost": 1e9}}),
+            json!({"usage": {"cost": null}}),
+            json!({"usage": {"cost_in_usd_ticks": -4}}),
+            json!({"usage": {"cost_usd_input": 0.5}}),
+            json!({"cost": 0.5, "total_cost_of_key_usd": 3}),
+        ] {
+            assert_eq!(dollars(&body), None, "{body}");
+        }
+    }
+
+    #[test]
+    fn headers_with_the_cost_of_the_response_are_read() {
+        for (name, value, expected) in [
+            ("x-litellm-response-cost", "0.13", Some(0.13)),
+            ("x-litellm-response-cost", "2.6e-05", Some(2.6e-5)),
+            ("x-litellm-response-cost", "None", None),
+            ("x-litellm-response-cost", "-1", None),
+            ("x-litellm-key-spend", "7.5", None),
+            ("x-total-cost-usd", "7.5", None),
+            ("x-gateway-request-cost-usd", "0.25", Some(0.25)),
+        ] {
+            let mut headers = HeaderMap::new();
+            headers.insert(name, value.parse().unwrap());
+            let found = cost_in_headers(&headers).map(StatedCost::dollars);
+            assert_eq!(found, expected, "{name}: {value}");
+        }
+    }
+
+    #[test]
+    fn tiers_are_read() {
+        for (body, expected) in [
+            (json!({"service_tier": "priority"}), Some(ServiceTier::Priority)),
+            (json!({"service_tier": "default"}), Some(ServiceTier::Standard)),
+            (json!({"service_tier": null}), None),
+            (json!({"usage": {"service_tier": "standard"}}), Some(ServiceTier::Standard)),
+            (json!({"usage": {"service_tier": "batch"}}), None),
+            (json!({"service_tier": "turbo"}), Some(ServiceTier::Other)),
+        ] {
+            assert_eq!(tier(&body), expected, "{body}");
         }
     }
 }

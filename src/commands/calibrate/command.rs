@@ -1,21 +1,38 @@
 //! `calibrate`: measures a camera from frames of its sensor, and writes a file for `--noise camera`.
+//!
+//! TOML file of a measured camera, for `--noise camera`: [`camera_file`].
+//!
+//! Reports of a camera calibration: [`calibration_table`], [`calibration_json`] and `figure()`.
+//!
+//! Figure of a camera calibration, as SVG: [`calibration_figure`].
 
+#[cfg(test)]
+mod tests;
+
+use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use crate::commands::calibrate::report;
+use super::{Measured, NoiseLine, SettingFit, SlopeSource};
 use crate::commands::calibrate::{
-    CalibrateSettings, CameraFit, Cfa, Crop, ReadOptions, Recording, calibrate as measure, camera_file,
+    CalibrateSettings, CameraFit, Cfa, Crop, ReadOptions, Recording, calibrate as measure,
 };
 use crate::data::PixelLimit;
 use crate::engine::images::progress::Progress;
 use crate::engine::images::workers::{ThreadArgs, pool};
 use crate::error::{Error, Result};
 use crate::files::write;
+use crate::report::charts::chart::{LineStyle, PointPanel, PointSeries};
+use crate::report::charts::paper::point_figure;
+use crate::report::text::table::ColumnKind::Text;
+use crate::report::text::table::TableBuilder;
+use crate::report::text::terminal;
 use crate::runs::Outcome;
 use crate::types::Decides;
 use crate::types::manifests::Status;
+use crate::types::text::counted;
+use darkqa_light::Calibration;
 
 /// The flags of `calibrate`.
 #[derive(Debug, Args)]
@@ -78,7 +95,7 @@ pub(crate) fn calibrate(args: &CalibrateArgs, progress: &Progress) -> Result<Out
     let camera = workers.install(|| measure(&args.recording, &recording, &settings, || bar.inc()))?;
     drop(bar);
     write(&args.out, camera_file(&camera)?.as_bytes())?;
-    write(&figure, report::figure(&camera)?.as_bytes())?;
+    write(&figure, calibration_figure(&camera)?.as_bytes())?;
     Ok(Outcome::wrote(&args.out, Status::Complete, output(args, &camera, &figure)?))
 }
 
@@ -108,12 +125,338 @@ fn output(args: &CalibrateArgs, camera: &CameraFit, figure: &Path) -> Result<Str
         for warning in &camera.warnings {
             tracing::warn!("{warning}");
         }
-        return report::json(camera);
+        return calibration_json(camera);
     }
     Ok(format!(
         "{}{}: the camera, for --noise camera; {}: its fits\n",
-        report::table(camera),
+        calibration_table(camera),
         args.out.display(),
         figure.display()
     ))
+}
+
+/// Writes the file of a camera. Comments state the source of the numbers, their standard errors and all warnings.
+///
+/// # Errors
+/// If a number is outside the valid range of a camera file.
+pub(crate) fn camera_file(camera: &CameraFit) -> Result<String> {
+    let mut text = head(camera);
+    let gains: Vec<String> = camera.settings.iter().map(|fit| number(fit.gain.value)).collect();
+    let [low, high] = [gains.first(), gains.last()].map(|gain| gain.map_or("", String::as_str));
+    let _ = writeln!(text, "name = {}\nadu-range = {:.1}", toml::Value::from(&*camera.name), camera.adu_range());
+    let _ = writeln!(text, "# The least and the greatest K that was measured.\ngain = [{low}, {high}]");
+    text +=
+        "# Of the DarkQA paper, for every camera: a recording of a sensor says nothing of r.\nratio = [100.0, 300.0]\n";
+    let settings = camera.settings.len();
+    line(&mut text, "read-scale", &camera.read_scale, settings);
+    line(&mut text, "row-deviation", &camera.row_deviation, settings);
+    for fit in &camera.settings {
+        step(&mut text, camera, fit);
+    }
+    // Check that --noise camera accepts the file.
+    Calibration::parse(&text, "the measured camera").map_err(|e| {
+        let problem = format!("{e}; leave out the setting, or see its frames");
+        Error::data(&camera.name, problem)
+    })?;
+    Ok(text)
+}
+
+/// Writes the comments before the first key.
+fn head(camera: &CameraFit) -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    let mut text = format!("# Measured by darkqa-eval {version} calibrate");
+    let _ = match &camera.camera {
+        Some(name) => writeln!(text, ", from frames of {}.", one_line(name)),
+        None => writeln!(text, "."),
+    };
+    let [width, height] = camera.size;
+    let _ = writeln!(
+        text,
+        "# {} frames of {width} × {height} sites, filters {}, black {}, white {}; BLAKE3 of the list of frames:\n# {}",
+        camera.frames, camera.cfa, camera.black, camera.white, camera.frames_digest
+    );
+    if let Some([first, last]) = &camera.dates {
+        let _ = writeln!(text, "# Taken from {} to {}.", one_line(first), one_line(last));
+    }
+    text += "# ± is a standard error by bootstrap over frame pairs.\n";
+    for warning in &camera.warnings {
+        let _ = writeln!(text, "# Warning: {}", one_line(warning));
+    }
+    text
+}
+
+/// Writes the table of a line, with its source and uncertainty as comments. `total` is the number of settings of the
+/// camera.
+fn line(text: &mut String, key: &str, line: &NoiseLine, total: usize) {
+    let through = match line.settings {
+        1 => "1 setting".to_owned(),
+        n => format!("the mean of {n} settings"),
+    };
+    let source = match line.slope_from {
+        SlopeSource::Settings => format!("# Fitted to {} settings.\n", line.settings),
+        SlopeSource::Preset => format!(
+            "# The slope is that of the preset sony-a7s2, because a slope needs 3 settings; the line passes through {through}.\n"
+        ),
+        SlopeSource::NoNoise => "# No setting has noise of this kind.\n".to_owned(),
+    };
+    let left_out = match total - line.settings {
+        0 => "",
+        _ if line.settings == 0 => "",
+        1 => "# 1 setting without visible noise is left out; the line holds for it, too.\n",
+        n => &format!("# {n} settings without visible noise are left out; the line holds for them, too.\n"),
+    };
+    let error = match (line.deviation_error(), line.slope_from) {
+        (Some(error), _) => format!("# The deviation is known to ± {:.0} % of itself.\n", 100.0 * error),
+        (None, SlopeSource::Preset) => "# A single setting has no deviation.\n".to_owned(),
+        (None, SlopeSource::Settings | SlopeSource::NoNoise) => String::new(),
+    };
+    let _ = writeln!(
+        text,
+        "\n[{key}]\n{source}{left_out}slope = {}\nintercept = {}\n{error}deviation = {}",
+        number(line.slope),
+        number(line.intercept),
+        number(line.deviation)
+    );
+}
+
+/// Writes the table of a setting.
+fn step(text: &mut String, camera: &CameraFit, fit: &SettingFit) {
+    let _ = writeln!(
+        text,
+        "\n[[step]]\n# {}: {} bias frames, {} pairs of flats at {} exposures; K {}, σ_TL {} ADU, λ {} ({:.4} by the probability plot), σ_r {} ADU",
+        one_line(&fit.name),
+        fit.frames.bias,
+        fit.frames.flat_pairs,
+        fit.frames.exposures,
+        with_error(fit.gain),
+        with_error(fit.read_scale),
+        with_error(fit.read_shape),
+        fit.plot.shape,
+        with_error(fit.row_deviation)
+    );
+    let bias = camera.bias(fit);
+    // The order of planes is R, G1, G2, B; the order in a camera file is R, G1, B, G2.
+    let [r, g1, b, g2] = [0, 1, 3, 2].map(|plane| {
+        let bias = bias.get(plane).or(bias.first());
+        number(bias.map_or(0.0, |bias| bias.value))
+    });
+    let _ = writeln!(
+        text,
+        "gain = {}\nshape = [{}]\nbias = [[{r}, {g1}, {b}, {g2}]]",
+        number(fit.gain.value),
+        number(fit.read_shape.value)
+    );
+}
+
+/// Formats a number with its standard error.
+fn with_error(number: Measured) -> String {
+    match number.error {
+        Some(error) => format!("{:.4} ± {error:.4}", number.value),
+        None => format!("{:.4}", number.value),
+    }
+}
+
+/// Formats a number with six significant digits as a TOML float.
+fn number(value: f64) -> String {
+    if value == 0.0 {
+        return "0.0".to_owned();
+    }
+    let magnitude = libm::log10(value.abs()).floor() as i32;
+    let decimals = (5 - magnitude).clamp(1, 12) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// Replaces line breaks and other control characters by spaces, for a comment.
+fn one_line(text: &str) -> String {
+    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+}
+
+/// The calibration of a camera as JSON, with the ADU range and the bias of each setting.
+///
+/// # Errors
+/// If the calibration cannot be serialized.
+fn calibration_json(camera: &CameraFit) -> Result<String> {
+    let mut value = serde_json::to_value(camera).map_err(|e| Error::data("summary", e))?;
+    value["adu_range"] = camera.adu_range().into();
+    for (index, fit) in camera.settings.iter().enumerate() {
+        let bias = serde_json::to_value(camera.bias(fit));
+        value["settings"][index]["bias"] = bias.map_err(|e| Error::data("summary", e))?;
+    }
+    Ok(format!("{value:#}\n"))
+}
+
+/// The calibration of a camera as text: a table with one row per setting, the two fitted noise lines, and the warnings.
+#[must_use]
+fn calibration_table(camera: &CameraFit) -> String {
+    let title = format!(
+        "{}: {} of {} × {} sites, black {}, white {}; ± standard error by bootstrap over frame pairs",
+        camera.name,
+        counted(camera.frames, "frame"),
+        camera.size[0],
+        camera.size[1],
+        camera.black,
+        camera.white
+    );
+    let bias_head = format!("terminal bias {} ADU", camera.cfa.plane_names().join(" / "));
+    let settings = TableBuilder::new("calibration", &camera.settings)
+        .column(Text, "terminal", |fit| fit.name.clone())
+        .column(Text, "terminal K ADU/e", |fit| text_with_error(fit.gain, 4))
+        .column(Text, "terminal σ_TL ADU", |fit| text_with_error(fit.read_scale, 4))
+        .column(Text, "terminal λ", |fit| text_with_error(fit.read_shape, 4))
+        .column(Text, "terminal λ by PPCC", |fit| decimal(fit.plot.shape, 4))
+        .column(Text, "terminal σ_row ADU", |fit| text_with_error(fit.row_deviation, 4))
+        .column(Text, &*bias_head, |fit| bias_cell(camera, fit))
+        .build();
+    let table = terminal::table(&[settings]);
+    let noise_lines = [noise_line("σ_TL", &camera.read_scale), noise_line("σ_row", &camera.row_deviation)];
+    let checks = if camera.warnings.is_empty() {
+        "checks: nothing to report\n".to_owned()
+    } else {
+        let warnings: String = camera.warnings.iter().map(|warning| format!("  {warning}\n")).collect();
+        format!("checks:\n{warnings}")
+    };
+    let lacks_error = camera.settings.iter().any(|fit| fit.gain.error.is_none() || fit.read_scale.error.is_none());
+    let error_note = if lacks_error {
+        "no ±: a standard error needs 2 pairs of frames or more (10 bias frames are recommended)\n"
+    } else {
+        ""
+    };
+    format!("{title}\n{table}{}{error_note}{checks}", noise_lines.concat())
+}
+
+/// Bias of each colour plane, with the largest standard error of the planes.
+fn bias_cell(camera: &CameraFit, fit: &SettingFit) -> String {
+    let planes = camera.bias(fit);
+    let values = planes.iter().map(|bias| decimal(bias.value, 3)).collect::<Vec<_>>().join(" / ");
+    let largest_error = planes.iter().filter_map(|bias| bias.error).reduce(f64::max);
+    match largest_error {
+        Some(error) => format!("{values} ± {error:.3}"),
+        None => values,
+    }
+}
+
+/// Number with `digits` decimals and the minus sign U+2212.
+fn decimal(value: f64, digits: usize) -> String {
+    format!("{value:.digits$}").replace('-', "−")
+}
+
+/// A measured value ± its standard error, if known.
+fn text_with_error(measured: Measured, digits: usize) -> String {
+    let value = decimal(measured.value, digits);
+    match measured.error {
+        Some(error) => format!("{value} ± {error:.digits$}"),
+        None => value,
+    }
+}
+
+/// Equation of a fitted noise line, ln σ over ln K, with the deviation about it and the source of its slope.
+fn noise_line(name: &str, line: &NoiseLine) -> String {
+    let formula = format!(
+        "ln {name} = {} ln K {} {:.4}",
+        decimal(line.slope, 4),
+        if line.intercept < 0.0 { '−' } else { '+' },
+        line.intercept.abs()
+    );
+    let source = match line.slope_from {
+        SlopeSource::Settings => String::new(),
+        SlopeSource::Preset => "; fewer than 3 settings count: the slope is that of sony-a7s2".to_owned(),
+        SlopeSource::NoNoise => return format!("{name}: no setting has any\n"),
+    };
+    let deviation = match line.deviation_error() {
+        Some(error) => format!(
+            ", deviation {:.4} (known to ± {:.0} % of itself: {})",
+            line.deviation,
+            100.0 * error,
+            counted(line.settings, "setting")
+        ),
+        None => ", no deviation from 1 setting".to_owned(),
+    };
+    format!("{formula}{deviation}{source}\n")
+}
+
+/// Draws three panels: photon transfer, probability plots of the read noise, and the deviations of read and row noise
+/// over the gain K.
+///
+/// # Errors
+/// If the figure cannot be drawn.
+fn calibration_figure(camera: &CameraFit) -> Result<String> {
+    point_figure(&[transfer(camera), probability(camera), deviations(camera)])
+}
+
+/// One series for each camera setting.
+fn setting_series(camera: &CameraFit, series: impl Fn(&SettingFit, LineStyle) -> PointSeries) -> Vec<PointSeries> {
+    camera.settings.iter().enumerate().map(|(style, fit)| series(fit, LineStyle(style))).collect()
+}
+
+/// Panel of variance over signal for each exposure and colour plane on logarithmic axes, with the fitted line of K.
+fn transfer(camera: &CameraFit) -> PointPanel {
+    let series = setting_series(camera, |fit, style| {
+        let points: Vec<[f64; 2]> = fit
+            .figure
+            .transfer
+            .iter()
+            .filter(|[signal, variance]| *signal > 0.0 && *variance > 0.0)
+            .map(|point| point.map(libm::log10))
+            .collect();
+        let signals = points.iter().map(|[signal, _]| *signal);
+        let ends = [signals.clone().reduce(f64::min), signals.reduce(f64::max)];
+        let line = ends.into_iter().flatten().map(|signal| [signal, signal + libm::log10(fit.gain.value)]).collect();
+        PointSeries { name: format!("{}: K {:.4}", fit.name, fit.gain.value), style, lines: vec![line], points }
+    });
+    PointPanel {
+        title: "photon transfer".to_owned(),
+        axes: ["log10 of light in ADU", "log10 of variance in ADU²"],
+        series,
+    }
+}
+
+/// Panel of scaled residuals over the quantiles of the fitted distribution; the points are on a straight line if the
+/// fit is good.
+fn probability(camera: &CameraFit) -> PointPanel {
+    let series = setting_series(camera, |fit, style| {
+        let points = &fit.figure.plot;
+        let ends = [points.first(), points.last()].into_iter().flatten();
+        PointSeries {
+            name: format!("{}: λ {:.4}", fit.name, fit.read_shape.value),
+            style,
+            lines: vec![ends.map(|end| [end[0]; 2]).collect()],
+            points: points.clone(),
+        }
+    });
+    PointPanel {
+        title: "read noise".to_owned(),
+        axes: ["quantile of the Tukey-λ distribution", "residual / σ_TL"],
+        series,
+    }
+}
+
+/// Panel of ln σ over ln K for read and row noise, with their fitted lines.
+fn deviations(camera: &CameraFit) -> PointPanel {
+    let read = deviation_series(camera, |fit| fit.read_scale.value, &camera.read_scale);
+    let row = deviation_series(camera, |fit| fit.row_deviation.value, &camera.row_deviation);
+    PointPanel {
+        title: "noise over gain".to_owned(),
+        axes: ["ln K", "ln σ"],
+        series: vec![
+            PointSeries { name: "σ_TL".to_owned(), style: LineStyle(0), ..read },
+            PointSeries { name: "σ_row".to_owned(), style: LineStyle(1), ..row },
+        ],
+    }
+}
+
+/// Unnamed series of ln σ over ln K with its fitted line. Settings without noise are left out.
+fn deviation_series(camera: &CameraFit, sigma: fn(&SettingFit) -> f64, line: &NoiseLine) -> PointSeries {
+    let points: Vec<[f64; 2]> = camera
+        .settings
+        .iter()
+        .map(|fit| [fit.gain.value, sigma(fit)])
+        .filter(|[_, sigma]| *sigma > 0.0)
+        .map(|point| point.map(libm::log))
+        .collect();
+    PointSeries {
+        name: String::new(),
+        style: LineStyle(0),
+        lines: vec![points.iter().map(|[x, _]| [*x, libm::log(line.at(libm::exp(*x)))]).collect()],
+        points,
+    }
 }

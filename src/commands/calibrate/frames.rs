@@ -1,11 +1,29 @@
 //! Reader for the frames of a recording, which must have the same size, form and camera: [`FrameReader`].
+//!
+//! Parallel processing of many frames with bounded memory: [`in_batches`].
+//!
+//! Hot pixels, which are left out of all sums: [`HotPixels`].
+//!
+//! Colour filters of a sensor ([`Cfa`]), and the planes, rows and tiles of its frames ([`Layout`]).
+//!
+//! Input files of a calibration: [`Inputs`].
 
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 use std::str::FromStr;
 
-use super::layout::{Cfa, Layout};
+use clap::ValueEnum;
+use rayon::prelude::*;
+use serde::Serialize;
+
 use super::mosaic::{FrameFacts, Mosaic};
 use crate::error::{Error, Result};
+use crate::types::Digest;
+use crate::types::flags::flag_words;
 
 /// Minimum number of rows and of columns of a frame (chosen for row means and the correlation of neighbours).
 const MIN_SIDE: usize = 256;
@@ -179,5 +197,235 @@ fn layout(options: ReadOptions, [width, height]: [usize; 2]) -> Result<Layout, S
     Ok(Layout { cfa, width: width - width % step, height: height - height % step })
 }
 
-#[cfg(test)]
-mod tests;
+/// Memory limit for the frames in memory, in bytes (chosen). Reading a frame of 24 megapixels takes 0.14 GB.
+const MEMORY: usize = 1 << 30;
+
+/// Calls `work` for the items on all threads, and `take` with the results in the order of the items. `bytes` is the
+/// memory for one item; at least one item is processed at a time.
+///
+/// # Errors
+/// The error of the first item that fails, in the order of the items.
+pub(super) fn in_batches<T: Sync, R: Send>(
+    items: &[T],
+    bytes: usize,
+    work: impl Fn(&T) -> Result<R> + Sync,
+    mut take: impl FnMut(&T, R) -> Result<()>,
+) -> Result<()> {
+    let batch_size = (MEMORY / bytes.max(1)).clamp(1, 2 * rayon::current_num_threads());
+    for batch in items.chunks(batch_size) {
+        let results: Vec<Result<R>> = batch.par_iter().map(&work).collect();
+        for (item, result) in batch.iter().zip(results) {
+            take(item, result?)?;
+        }
+    }
+    Ok(())
+}
+
+/// Hot pixels by part of a row, see [`Layout::place`](Layout::place).
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct HotPixels {
+    /// Columns within the plane for each part of a row, in ascending order.
+    columns: Vec<Vec<u32>>,
+    count: usize,
+}
+
+impl HotPixels {
+    /// Hot pixels by part of a row; each list of columns must be in ascending order.
+    pub(super) fn new(columns: Vec<Vec<u32>>) -> Self {
+        let count = columns.iter().map(Vec::len).sum();
+        Self { columns, count }
+    }
+
+    /// No hot pixels, in a layout with this number of parts of rows.
+    pub(super) fn none(plane_rows: usize) -> Self {
+        Self::new(vec![Vec::new(); plane_rows])
+    }
+
+    /// Hot columns in a part of a row.
+    pub(super) fn columns(&self, plane_row: usize) -> impl Iterator<Item = usize> + '_ {
+        self.columns[plane_row].iter().map(|column| *column as usize)
+    }
+
+    /// Number of hot pixels.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+}
+
+/// Number of tiles of a plane along each side (chosen). Photon transfer is fitted to tiles, so that the fall-off of
+/// light towards the corners adds points and not variance.
+pub(super) const TILES: usize = 8;
+
+/// The colours of the four sites at the upper left corner of a frame, row by row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum, Serialize)]
+#[serde(rename_all = "UPPERCASE")]
+#[value(rename_all = "UPPER")]
+pub(crate) enum Cfa {
+    /// Red and green above green and blue
+    #[default]
+    Rggb,
+    /// Blue and green above green and red
+    Bggr,
+    /// Green and red above blue and green
+    Grbg,
+    /// Green and blue above red and green
+    Gbrg,
+    /// No colour filters
+    #[value(name = "mono")]
+    #[serde(rename = "mono")]
+    Mono,
+}
+
+flag_words!(Cfa);
+
+impl Cfa {
+    /// Period of the pattern in rows and columns: the number of planes in a row.
+    pub(super) fn step(self) -> usize {
+        if self == Self::Mono { 1 } else { 2 }
+    }
+
+    /// Number of planes.
+    pub(super) fn planes(self) -> usize {
+        self.step() * self.step()
+    }
+
+    /// Plane of the sites in a row whose column modulo the period is `parity`. Planes 0 to 3 are red, green in red
+    /// rows, green in blue rows, and blue; the only plane of a sensor without filters is 0.
+    pub(super) fn plane(self, row: usize, parity: usize) -> usize {
+        let [first_row, first_column] = match self {
+            Self::Mono => return 0,
+            Self::Rggb => [0, 0],
+            Self::Grbg => [0, 1],
+            Self::Gbrg => [1, 0],
+            Self::Bggr => [1, 1],
+        };
+        2 * ((row + first_row) % 2) + (parity + first_column) % 2
+    }
+
+    /// Names of the planes, in order.
+    pub(crate) fn plane_names(self) -> &'static [&'static str] {
+        match self {
+            Self::Mono => &["all"],
+            _ => &["R", "G1", "G2", "B"],
+        }
+    }
+}
+
+/// Colour filters and size of all frames of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Layout {
+    pub(super) cfa: Cfa,
+    pub(super) height: usize,
+    pub(super) width: usize,
+}
+
+impl Layout {
+    /// Rows and columns of each plane.
+    pub(super) fn plane_size(self) -> [usize; 2] {
+        [self.height, self.width].map(|side| side / self.cfa.step())
+    }
+
+    /// Number of parts of rows, each with the sites of one plane in one row. They are numbered row by row, and by
+    /// parity within a row.
+    pub(super) fn plane_rows(self) -> usize {
+        self.height * self.cfa.step()
+    }
+
+    /// Row and column parity of a part of a row.
+    pub(super) fn place(self, plane_row: usize) -> [usize; 2] {
+        let step = self.cfa.step();
+        [plane_row / step, plane_row % step]
+    }
+
+    /// Rows or columns of a tile, for a plane with `side` rows or columns.
+    pub(super) fn tile(side: usize, tile: usize) -> Range<usize> {
+        tile * side / TILES..(tile + 1) * side / TILES
+    }
+
+    /// Tile row of a sensor row.
+    pub(super) fn tile_row(self, row: usize) -> usize {
+        let [rows, _] = self.plane_size();
+        let row = row / self.cfa.step();
+        (0..TILES).find(|tile| Self::tile(rows, *tile).contains(&row)).unwrap_or(TILES - 1)
+    }
+}
+
+/// All frames read so far, in the order of the recording.
+#[derive(Debug, Default)]
+pub(super) struct Inputs {
+    /// Path and digest of each frame.
+    list: Vec<(String, Digest)>,
+    /// Path of the bias, flat or dark frame with each digest.
+    places: BTreeMap<Digest, String>,
+    /// First and last date in the files.
+    dates: Option<[String; 2]>,
+}
+
+impl Inputs {
+    /// Adds a frame.
+    pub(super) fn add(&mut self, path: &Path, facts: &FrameFacts) {
+        self.list.push((path.display().to_string(), facts.digest));
+        if let Some(taken) = &facts.taken {
+            let [first, last] = self.dates.get_or_insert_with(|| [taken.clone(), taken.clone()]);
+            if taken < first {
+                first.clone_from(taken);
+            }
+            if taken > last {
+                last.clone_from(taken);
+            }
+        }
+    }
+
+    /// Adds a frame that may be used only once.
+    ///
+    /// # Errors
+    /// See [`check_unique`](Self::check_unique).
+    pub(super) fn add_unique(&mut self, path: &Path, facts: &FrameFacts) -> Result<()> {
+        self.check_unique(&path.display().to_string(), facts.digest)?;
+        self.add(path, facts);
+        Ok(())
+    }
+
+    /// Checks that a frame is not a copy of an earlier one. Overexposed frames need no check, because they may be
+    /// identical.
+    ///
+    /// # Errors
+    /// If the same frame was used before: copies have no independent noise.
+    pub(super) fn check_unique(&mut self, place: &str, digest: Digest) -> Result<()> {
+        match self.places.insert(digest, place.to_owned()) {
+            Some(first) => Err(Error::data(
+                place,
+                format_args!("the same frame as {first}; copies have no noise between them, use each frame once"),
+            )),
+            None => Ok(()),
+        }
+    }
+
+    /// Number of frames.
+    pub(super) fn count(&self) -> usize {
+        self.list.len()
+    }
+
+    /// Digest of the paths of all frames, relative to `folder`, and of their contents.
+    ///
+    /// # Errors
+    /// Never for strings; only numbers that are not finite have no canonical form.
+    pub(super) fn digest(&self, folder: &Path) -> Result<Digest> {
+        let prefix = folder.display().to_string();
+        let list: Vec<(String, String)> = self
+            .list
+            .iter()
+            .map(|(place, digest)| {
+                let inner = place.strip_prefix(&prefix).unwrap_or(place);
+                let inner = inner.trim_start_matches(['/', '\\']).replace('\\', "/");
+                (inner, digest.to_string())
+            })
+            .collect();
+        Digest::canonical("darkqa.calibration-frames/1", &list)
+    }
+
+    /// First and last date in the files.
+    pub(super) fn dates(&self) -> Option<&[String; 2]> {
+        self.dates.as_ref()
+    }
+}

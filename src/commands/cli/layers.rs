@@ -3,14 +3,17 @@
 //! Values from the environment and files are turned into words, for flags that were not typed. They are appended to the
 //! typed words, and all words are parsed together, once. Thus a value is read in the same way wherever it comes from.
 //! ripgrep reads its configuration file like this (`crates/core/flags/parse.rs`).
+//!
+//! The error about a file of flags that is not TOML: [`invalid_toml`].
+//!
+//! The flags of the run that the `[defaults]` of a file of models set: [`values`].
+//!
+//! Flags that once turned a command into another one: [`in_current_form`].
 
-mod earlier_form;
 mod expansion;
-mod invalid_toml;
-mod layered_value;
-mod models_file;
 mod sent_secrets;
-mod value_text;
+#[cfg(test)]
+mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ffi::{OsStr, OsString};
@@ -21,17 +24,15 @@ use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command};
 use toml::{Table, Value};
 
-use self::earlier_form::in_current_form;
 use self::expansion::Expansion;
-use self::invalid_toml::invalid_toml;
-use self::layered_value::LayeredValue;
-use self::value_text::text_of;
 use super::command::SHORT_HELP;
 use super::keyed::{name_of, spell_as_keys};
 use crate::ask::OPENAI_KEY;
+use crate::engine::models::{RunDefault, run_defaults};
 use crate::error::{Error, Result};
-use crate::files::reading;
-use crate::types::text::near_name::{did_you_mean, nearest, suggestion};
+use crate::files;
+use crate::types::text::{TomlFault, did_you_mean, nearest, suggestion};
+use expansion::{LayeredValue, text_of};
 
 /// Prefix of this program's environment variables.
 const PREFIX: &str = "DARKQA_";
@@ -268,7 +269,7 @@ fn file_values(
     command: &Command,
     called: &[String],
 ) -> Result<BTreeMap<String, LayeredValue>> {
-    let text = reading::settings(path)?;
+    let text = files::settings(path)?;
     let table: Table = text.parse().map_err(|e| invalid_toml(path, &text, &e))?;
     let mut values = BTreeMap::new();
     let flags: Vec<String> = settable_flags(command).map(name_of).collect();
@@ -355,7 +356,7 @@ fn models_values(
     let Some(path) = typed.or_else(|| layered.map(PathBuf::from)) else {
         return Ok(BTreeMap::new());
     };
-    let values = models_file::values(&path, &flags)?.into_iter().map(|(flag, origin, value)| {
+    let values = values(&path, &flags)?.into_iter().map(|(flag, origin, value)| {
         let values = vec![value];
         (flag, LayeredValue { origin, values })
     });
@@ -467,5 +468,89 @@ pub(super) fn one_line(error: &clap::Error) -> String {
     }
 }
 
-#[cfg(test)]
-mod tests;
+/// The error about invalid TOML, on one line and with its line number.
+fn invalid_toml(path: &Path, text: &str, error: &toml::de::Error) -> Error {
+    let TomlFault { line, problem } = TomlFault::new(text, error);
+    Error::line(path, line, format_args!("not valid TOML: {problem}"))
+}
+
+/// The flags of the run that a file of models sets, each with its place in the file and its text. `flags` are those of
+/// the command.
+///
+/// # Errors
+/// If the command has no such flag, or the value has a form that no flag has.
+fn values(path: &Path, flags: &[String]) -> Result<Vec<(String, String, OsString)>> {
+    // An unusable file is reported later, where its models are read.
+    let defaults = run_defaults(path).unwrap_or_default();
+    defaults
+        .into_iter()
+        .map(|default| {
+            let RunDefault { flag, value, place } = default;
+            if !flags.contains(&flag) {
+                let problem = format_args!("{flag}: this command has no --{flag}");
+                return Err(Error::usage(place, problem));
+            }
+            let Some(text) = text_of(&value) else {
+                let problem = format_args!("{flag}: a text, a number or a switch expected");
+                return Err(Error::usage(place, problem));
+            };
+            Ok((flag, place, text))
+        })
+        .collect()
+}
+
+/// A flag whose command is now a subcommand.
+struct Mode {
+    command: &'static str,
+    /// The flag. It is also the name of the subcommand.
+    flag: &'static str,
+    /// True if the flag had a value. This value is now the first word after the subcommand.
+    has_value: bool,
+}
+
+const MODES: [Mode; 5] = [
+    Mode::new("synthesize", "check", true),
+    Mode::new("synthesize", "from", true),
+    Mode::new("enhance", "describe", false),
+    Mode::new("enhance", "doctor", false),
+    Mode::new("import", "script", false),
+];
+
+impl Mode {
+    const fn new(command: &'static str, flag: &'static str, has_value: bool) -> Self {
+        Self { command, flag, has_value }
+    }
+
+    /// The place of the flag in the words, and its value if it is joined to the flag.
+    fn find(&self, words: &[OsString]) -> Option<(usize, Option<OsString>)> {
+        words.iter().take_while(|word| *word != "--").enumerate().find_map(|(place, word)| {
+            let rest = word.to_str()?.strip_prefix("--")?.strip_prefix(self.flag)?;
+            match rest.strip_prefix('=') {
+                Some(value) if self.has_value => Some((place, Some(value.into()))),
+                None if rest.is_empty() => Some((place, None)),
+                _ => None,
+            }
+        })
+    }
+}
+
+/// The words of a call, with the flag of a mode replaced by its subcommand: `enhance m --describe` becomes `enhance
+/// describe m`. `at` is the place of the command's name.
+fn in_current_form(mut words: Vec<OsString>, at: usize) -> Vec<OsString> {
+    let found = MODES
+        .iter()
+        .filter(|mode| words.get(at).is_some_and(|word| word == mode.command))
+        .filter_map(|mode| Some((mode, mode.find(&words)?)));
+    let Some((mode, (place, value))) = found.min_by_key(|(_, (place, _))| *place) else {
+        return words;
+    };
+    words.remove(place);
+    let value = match value {
+        None if mode.has_value && place < words.len() => Some(words.remove(place)),
+        value => value,
+    };
+    let subcommand = std::iter::once(OsString::from(mode.flag));
+    let rest = words.split_off(at + 1);
+    words.extend(subcommand.chain(value).chain(rest));
+    words
+}

@@ -3,11 +3,14 @@
 //! The flags of a command are a struct in the module of the command. Flags that several commands share are groups in
 //! the modules that use them. The environment and a `--config` file are turned into words before parsing (see
 //! `cli/layers.rs`), so one parser reads all values.
+//!
+//! Warnings about flags that have no effect in a call: [`without_effect`].
 
 mod command;
 mod keyed;
-mod layers;
-mod no_effect;
+pub(crate) mod layers;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -17,33 +20,48 @@ use std::process::ExitCode;
 
 use anstream::{AutoStream, ColorChoice};
 use clap::parser::ValueSource;
-use clap::{ArgMatches, FromArgMatches as _};
+use clap::{ArgMatches, Args, Command as Clap, FromArgMatches as _};
 use clap_complete::Shell;
 use tracing_subscriber::EnvFilter;
 
+use super::evaluate::{EvaluateArgs, ShrinkArgs};
+use super::openeqa::{JudgeArgs, OpenEqaArgs};
+use super::synthesize::Sheet;
+use crate::ask::{AccessArgs, Parameters, RequestArgs, Sending};
 use crate::commands::evaluate::{check, evaluate, export_batch, plan, run_batch};
 use crate::commands::merge::merge;
 use crate::commands::openeqa::openeqa;
 use crate::commands::{self, study};
+use crate::data::{DecodeArgs, SetArgs};
+use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
+use crate::engine::image_cache::StoreArgs;
 use crate::engine::images::progress::{Progress, Verbosity};
-use crate::engine::images::recipes::image_words;
+use crate::engine::images::recipes::image_recipe;
 use crate::engine::interrupt::{INTERRUPTED, end_at_interrupts};
+use crate::engine::models::ModelName;
 use crate::engine::open_files::raise_limit;
+use crate::engine::settings::JobArgs;
 use crate::error::{Error, Result};
+use crate::pictures::ImageArgs;
 use crate::report::joined::report;
 use crate::runs::Outcome;
+use crate::types::degradations::Kind;
+use crate::types::flags::flag_spelling;
 use crate::types::manifests::Status;
 use crate::types::text::{escape_hidden, escape_hidden_except_styles};
-
-use command::{BatchCommand, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
+use crate::types::{AxisLevel, SetLight};
+use command::{BatchCommand, CheckCommand, Cli, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
+use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
+use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
+use darkqa_score::photographs::realism::residual::Bins;
 use layers::one_line;
-
-use command::Cli;
 
 /// Exit code: finished, but some trials failed.
 const WITH_FAILURES: u8 = 1;
+
 /// Exit code: wrong usage or configuration, or an error that stops everything.
 const FATAL: u8 = 2;
+
 /// Exit code: stopped by `--max-cost`. The same command would stop again, so a scheduler must not start it again by
 /// itself.
 const OVER_BUDGET: u8 = 3;
@@ -91,7 +109,7 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         .without_time()
         .with_writer(progress.clone())
         .init();
-    for line in no_effect::without_effect(&cli, &parsed.matches) {
+    for line in without_effect(&cli, &parsed.matches) {
         tracing::warn!("{line}");
     }
     let colours = match cli.common.color {
@@ -126,7 +144,7 @@ fn to_cli(parsed: &layers::Parsed, words: &[String]) -> Result<Cli> {
         _ => None,
     };
     if let Some(job) = job {
-        job.image_flags = image_words::typed_flags(own)?;
+        job.image_flags = image_recipe::typed_flags(own)?;
         job.typed.clone_from(&parsed.typed);
         job.unset = unset_flags(own);
         job.words = words.to_vec();
@@ -252,5 +270,254 @@ fn fail(problem: &str) -> ExitCode {
     ExitCode::from(FATAL)
 }
 
-#[cfg(test)]
-mod tests;
+/// One line for each reason why flags of the call have no effect.
+fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
+    let mut idle = NoEffect::new(layers::command_matches(matches));
+    match &cli.command {
+        None => idle.evaluation(&cli.evaluate),
+        Some(Command::Batch(BatchCommand::Export(args))) => idle.batch_evaluation(&args.evaluate),
+        Some(Command::Batch(BatchCommand::Run(args))) => idle.batch_evaluation(&args.evaluate),
+        Some(Command::Plan(args)) => {
+            let others = ["timings", "max_failures", "fail_fast", "max_cost", "dry_run", "resume"];
+            idle.because("plan asks nothing", &others.map(str::to_owned));
+            let why = "a plan is of the whole run, and the same for all its parts";
+            idle.because(why, &["shard".to_owned(), "workers".to_owned()]);
+            idle.evaluation(args);
+        }
+        Some(Command::Check(args)) => idle.check(args),
+        Some(Command::OpenEqa(args)) => idle.open_questions(args),
+        Some(Command::Synthesize(command)) => {
+            if let Some(args) = &command.images {
+                if args.sheet == Some(Sheet::Noise) {
+                    let why = "this sheet shows the noise variant";
+                    idle.because(why, &[vec!["variant".into()], camera()].concat());
+                }
+                idle.light(&args.light);
+            }
+        }
+        Some(Command::Report(command)) if command.report.as_ref().is_some_and(|args| !args.writes_into_run()) => {
+            let why = "the report is not written into the folder of a run";
+            idle.because(why, &["no_parquet".into()]);
+        }
+        Some(Command::Export(args)) => {
+            idle.light(&args.light);
+            idle.enhancement(&args.enhancers, false);
+        }
+        Some(Command::Questions(args)) if args.shard.as_deref().is_some_and(|shard| shard != "none") => {
+            let of_all =
+                ["families", "balance", "room", "candidates", "stats", "against", "review", "verdicts", "json"];
+            let why = "a part measures its frames, and the same command without --shard makes the questions";
+            idle.because(why, &of_all.map(str::to_owned));
+        }
+        Some(Command::Realism(args)) if args.kl_bins == Bins::Kousha => {
+            let why = "the bins of kousha have one count added to each";
+            idle.because(why, &["kl_empty".into()]);
+        }
+        _ => {}
+    }
+    idle.lines
+}
+
+/// The ids of the flags in a group.
+fn ids<A: Args>() -> Vec<String> {
+    let command = A::augment_args(Clap::new(""));
+    command.get_arguments().map(|arg| arg.get_id().to_string()).collect()
+}
+
+/// The flags that affect only degraded images. The seed is not one of them: it affects guesses and orders too.
+fn light() -> Vec<String> {
+    without("seed", ids::<LightArgs>())
+}
+
+/// The flags that affect only noise.
+fn sensor() -> Vec<String> {
+    without("seed", ids::<SensorArgs>())
+}
+
+/// The flags that affect only automatic exposure and motion blur.
+fn camera() -> Vec<String> {
+    ids::<CameraArgs>()
+}
+
+/// The flags of the sensor that automatic exposure uses. The other ones affect only the noise variant.
+const SENSOR_FLAGS_OF_AUTO: [&str; 2] = ["camera", "fixed"];
+
+fn without(name: &str, mut ids: Vec<String>) -> Vec<String> {
+    ids.retain(|id| id != name);
+    ids
+}
+
+/// The flags that affect only enhanced images, without those for ONNX Runtime.
+fn enhancement() -> Vec<String> {
+    [ids::<EnhancerArgs>(), ids::<SizeArgs>(), ids::<ProbeArgs>()].concat()
+}
+
+/// The flags that were typed, and the warnings about those without effect.
+struct NoEffect {
+    typed: BTreeSet<String>,
+    lines: Vec<String>,
+}
+
+impl NoEffect {
+    fn new(matches: &ArgMatches) -> Self {
+        let typed = matches.ids().map(ToString::to_string).filter(|id| {
+            let is_flag = matches.try_contains_id(id).unwrap_or(false);
+            is_flag && matches.value_source(id) == Some(ValueSource::CommandLine)
+        });
+        Self { typed: typed.collect(), lines: Vec::new() }
+    }
+
+    /// Adds a warning that names those of the given flags that were typed. Each flag is named once, with the first
+    /// reason.
+    fn because(&mut self, why: &str, flags: &[String]) {
+        let idle: Vec<String> =
+            flags.iter().filter(|id| self.typed.remove(*id)).map(|id| flag_spelling(&id.replace('_', "-"))).collect();
+        if !idle.is_empty() {
+            self.lines.push(format!("{}: no effect: {why}", idle.join(", ")));
+        }
+    }
+
+    fn evaluation(&mut self, args: &EvaluateArgs) {
+        let replies = ["constrain".to_owned(), "probabilities".to_owned()];
+        let models = &args.job.models;
+        if models.blind || !models.model.contains(&ModelName::Observer(None)) {
+            let why = "the observer is not asked about images";
+            self.because(why, &["observer_controls".to_owned()]);
+        }
+        if args.bank.ask.is_none() {
+            self.because("no --ask is named", &["ask_per_image".to_owned()]);
+        }
+        let images = [ids::<ShrinkArgs>(), vec!["image_first".into()]].concat();
+        if !models.model.iter().any(|name| matches!(name, ModelName::Remote(_))) {
+            let why = "no model at an endpoint is shown an image";
+            self.because(why, &["image_first".to_owned()]);
+        }
+        if args.scene.pairs.is_some() {
+            self.because("--pairs names the data", &["data".to_owned()]);
+        }
+        if args.scene.pairs.is_none() && args.data.place().path().is_none() {
+            self.because("the built-in rooms are not files", &ids::<SetArgs>());
+        }
+        self.job(&args.job, &images, &replies, None);
+    }
+
+    fn batch_evaluation(&mut self, args: &EvaluateArgs) {
+        self.because("a batch has no request in flight", &["grace".to_owned()]);
+        self.evaluation(args);
+    }
+
+    fn check(&mut self, args: &CheckCommand) {
+        if let Some(place) = &args.check.place {
+            let why = "the data are named without it";
+            self.because(why, &["data".to_owned()]);
+            if place.path().is_none() {
+                self.because("the built-in rooms are not files", &ids::<SetArgs>());
+            }
+        }
+    }
+
+    fn open_questions(&mut self, args: &OpenEqaArgs) {
+        if args.study.is_some() {
+            let asking =
+                [ids::<AccessArgs>(), ids::<Parameters>(), ids::<RequestArgs>(), ids::<Sending>(), ids::<JudgeArgs>()];
+            self.because("--study asks no model", &asking.concat());
+        }
+        let long = ["full".into(), "findings".into()];
+        self.because("open questions have one table", &long);
+        if args.judge.judge.is_none() {
+            self.because("no judge is named", &ids::<JudgeArgs>());
+        }
+        if !args.batch && !args.batch_run {
+            let why = "only --batch and --batch-run write such files";
+            self.because(why, &ids::<BatchFileArgs>());
+        }
+        if !args.batch_run {
+            let why = "only --batch-run submits batches";
+            self.because(why, &ids::<BatchRunArgs>());
+        }
+        if args.study.is_none() {
+            self.job(&args.job, &[], &[], args.judge.judge.as_ref());
+        }
+    }
+
+    /// Checks the flags that both experiments have. `images` adds flags for images, `replies` adds flags for requests
+    /// to servers.
+    fn job(&mut self, args: &JobArgs, images: &[String], replies: &[String], judge: Option<&ModelName>) {
+        let models = &args.models;
+        if models.models.is_none() && (models.blind || models.model.is_empty()) {
+            let shown = [
+                light(),
+                enhancement(),
+                ids::<ImageArgs>(),
+                without("max_pixels", ids::<DecodeArgs>()),
+                images.to_vec(),
+            ];
+            let shown = [shown.concat(), vec!["detail".into(), "max_image".into()]].concat();
+            self.because("no model is shown an image", &shown);
+        }
+        if models.models.is_none() {
+            self.because("no file of models is named", &["trust_models".into()]);
+        }
+        self.light(&args.light);
+        let may_run = models.models.is_some() || models.model.contains(&ModelName::RoomNet);
+        self.enhancement(&args.enhancers, may_run);
+        let mut names = models.model.iter().chain(&models.blind_model).chain(judge);
+        if models.models.is_none() && !names.any(|name| matches!(name, ModelName::Remote(_))) {
+            let sent =
+                [ids::<AccessArgs>(), ids::<Parameters>(), ids::<RequestArgs>(), ids::<Sending>(), replies.to_vec()];
+            let others = ["max_cost".into(), "prices".into(), "grace".into()];
+            self.because("all models are built in", &[sent.concat(), others.to_vec()].concat());
+        }
+        if args.money.dry_run {
+            self.because(
+                "--dry-run sends nothing",
+                &["grace", "timings", "max_failures", "fail_fast", "no_parquet"].map(String::from),
+            );
+        }
+        if args.stored.images_cache.is_none() {
+            self.because("no --images-cache is named", &ids::<StoreArgs>());
+        }
+    }
+
+    /// Checks the flags for degradation against the levels and variants.
+    fn light(&mut self, args: &LightArgs) {
+        let kinds: Vec<Kind> = args.variant.kinds().collect();
+        let levels = args.levels(SetLight::Lit).0;
+        if levels.iter().all(|level| *level == AxisLevel::L0) {
+            let idle = [sensor(), camera(), vec!["variant".into()]].concat();
+            self.because("the only level is L0, which is not degraded", &idle);
+            return;
+        }
+        if !kinds.iter().any(|kind| kind.has_noise()) {
+            self.because("no variant has noise", &sensor());
+        } else if !kinds.iter().any(|kind| kind.has_profiles()) {
+            let mut idle = sensor();
+            idle.retain(|id| !SENSOR_FLAGS_OF_AUTO.contains(&&**id));
+            let why = "automatic exposure has the reading physical, and a gain of its own (--auto)";
+            self.because(why, &idle);
+        }
+        if !kinds.contains(&Kind::Auto) {
+            self.because("no variant has automatic exposure", &["auto".into()]);
+        }
+        if !kinds.iter().any(|kind| kind.has_motion()) {
+            self.because("no variant has motion blur", &["motion".into()]);
+        }
+    }
+
+    /// Checks the flags for enhancement. Enhancers that no condition uses are an error elsewhere. The model `room-net`
+    /// needs ONNX Runtime too.
+    fn enhancement(&mut self, args: &EnhancerArgs, may_run_room_net: bool) {
+        let mut runtime = ids::<RuntimeArgs>();
+        runtime.retain(|id| !(may_run_room_net && ["ort_lib", "offline"].contains(&&**id)));
+        if args.is_empty() {
+            let mut idle = enhancement();
+            idle.extend(runtime);
+            self.because("no --llie is named", &idle);
+        } else if args.llie.is_empty() {
+            let mut idle = ids::<SizeArgs>();
+            idle.extend(runtime);
+            idle.retain(|id| id != "enhanced");
+            self.because("no --llie is named, and --enhanced runs no model", &idle);
+        }
+    }
+}

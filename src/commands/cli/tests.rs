@@ -5,10 +5,13 @@ use std::path::Path;
 
 use clap::{Arg, Command as Clap, CommandFactory as _};
 
+use super::command;
 use super::*;
 use crate::commands::cli::keyed::{name_of, with_keyed_flags, with_value};
 use crate::types::Decides;
 use crate::types::flags::{KEYED_FLAGS, keyed_form};
+use clap::FromArgMatches as _;
+use std::ffi::OsString;
 
 #[test]
 fn the_command_line_is_valid() {
@@ -436,4 +439,112 @@ fn warnings_of_every_crate_are_shown() {
     let shown = fs::read_to_string(log.path()).unwrap();
     assert!(shown.contains("of the program") && shown.contains("of a library"));
     assert!(!shown.contains("a detail") && !shown.contains("of a dependency"));
+}
+
+fn lines(words: &str) -> Vec<String> {
+    let words: Vec<OsString> = std::iter::once("darkqa-eval").chain(words.split(' ')).map(OsString::from).collect();
+    let parsed = layers::parse(command::command(), words, |_| None);
+    let matches = parsed.map_err(|_| "not parsed").unwrap().matches;
+    without_effect(&Cli::from_arg_matches(&matches).unwrap(), &matches)
+}
+
+/// Command lines, each with the beginning of the one warning about it.
+const WITH_WARNING: &[(&str, &str)] = &[
+    ("--model m --blind --llie f.onnx --levels L3", "--levels, --llie: no effect: no model is shown an image"),
+    (
+        "--blind-model m --max-side 9 --image jpeg:9 --detail low",
+        "--image, --image max-side, --image detail: no effect: no model is shown",
+    ),
+    (
+        "--blind-model m --colour ignore --transfer linear --exposure 1",
+        "--decode colour, --decode transfer, --decode exposure: no effect: no model is shown",
+    ),
+    (
+        "--model m --levels L0 --variant ev --ratio 9 --fixed",
+        "--noise ratio, --noise fixed, --variant: no effect: the only level is L0",
+    ),
+    ("--model m --variant ev --profile eld", "--profile: no effect: no variant has noise"),
+    ("--model m --tile whole --offline", "--llie-options tile, --llie-options offline: no effect: no --llie is named"),
+    (
+        "--model m --levels L0 --llie-on l0 --ort-lib x --llie-max-side 9",
+        "--llie-on, --llie-options max-side, --llie-options ort-lib: no effect: no --llie is named",
+    ),
+    (
+        "--model random --temperature 0 --rpm 9 --max-cost 1 --grace 9",
+        "--temperature, --rpm, --max-cost, --stop grace: no effect: all models are built in",
+    ),
+    ("--model random --constrain json", "--request constrain: no effect: all models are built in"),
+    ("--model random --observer-controls", "--observer-controls: no effect: the observer is not asked"),
+    ("--model m --ask-per-image 3", "--ask per-image: no effect: no --ask is named"),
+    ("--model m --trust-models", "--allow models-file: no effect: no file of models is named"),
+    ("--model m --dry-run --timings --grace 9", "--stop grace, --timings: no effect: --dry-run sends nothing"),
+    ("batch run --model m --grace 9", "--stop grace: no effect: a batch has no request in flight"),
+    ("--model m --dry-run --no-parquet", "--no-parquet: no effect: --dry-run sends nothing"),
+    (
+        "questions data --out q.jsonl --shard 1/2 --balance none --json",
+        "--balance, --json: no effect: a part measures its frames, and the same command without --shard makes the questions",
+    ),
+    ("report a b --no-parquet", "--no-parquet: no effect: the report is not written"),
+    ("report a --out b --no-parquet", "--no-parquet: no effect: the report is not written"),
+    ("--model m --images-cache-size 9", "--images-cache size: no effect: no --images-cache is named"),
+    (
+        "openeqa --questions q --frames f --model m --judge-temperature 1",
+        "--judge-temperature: no effect: no judge is named",
+    ),
+    ("openeqa --questions q --frames f --model m --url /v1", "--url: no effect: only --batch"),
+    ("openeqa --questions q --frames f --study s --rpm 9", "--rpm: no effect: --study asks no model"),
+    (
+        "openeqa --questions q --frames f --model m --levels L0 --gain 1",
+        "--noise gain: no effect: the only level is L0",
+    ),
+    ("synthesize a --out b --sheet noise --variant ev", "--variant: no effect: this sheet"),
+    ("--model m --motion speed=3", "--motion: no effect: no variant has motion blur"),
+    ("--model m --auto gain=3", "--auto: no effect: no variant has automatic exposure"),
+    ("--model m --variant motion --profile eld --gain 1", "--profile, --noise gain: no effect: no variant has noise"),
+    (
+        "--model m --variant auto --profile eld --gain 1 --camera nikon-d850",
+        "--profile, --noise gain: no effect: automatic exposure has",
+    ),
+    ("export llava a --out b --levels L0 --auto gain=3", "--auto: no effect: the only level is L0"),
+    ("synthesize a --out b --levels L0 --tone none", "--noise tone: no effect: the only level is L0"),
+    ("export llava a --out b --llie-on ev", "--llie-on: no effect: no --llie"),
+    ("realism a --kl-bins kousha --kl-empty drop", "--kl-empty: no effect: the bins of kousha"),
+    (
+        "plan --model m --out r --shard 1/2 --workers 2",
+        "--shard, --shard workers: no effect: a plan is of the whole run",
+    ),
+    ("plan --model m --out r --dry-run", "--dry-run: no effect: plan asks nothing"),
+];
+
+#[test]
+fn flags_without_effect_are_named() {
+    for (words, idle) in WITH_WARNING {
+        let lines = lines(words);
+        assert_eq!(lines.len(), 1, "{words}: {lines:?}");
+        assert!(lines[0].starts_with(idle), "{words}: {lines:?}");
+    }
+    for words in [
+        "--model m",
+        "--model m --dry-run --images-cache d",
+        "openeqa --questions q --frames f --study s --images-cache d",
+        "--model m --llie f.onnx --tile whole --profile eld --image jpeg:90 --rpm 9",
+        "--model m --ask home --ask-per-image 3",
+        "report a --no-parquet",
+        "merge a --out b --no-parquet",
+        "--model m --blind --seed 3 --temperature 1",
+        "--model random --seed 3 --shuffle-options",
+        "--model observer --observer-controls",
+        "--model room-net --offline",
+        "openeqa --questions q --frames f --model script:a --judge j --judge-temperature 1 --rpm 9",
+        "synthesize a --out b --sheet levels --profile eld",
+        "synthesize a --out b --sheet levels --variant ev",
+        "--model m --variant ev,motion --motion speed=3",
+        "--model m --variant auto --auto gain=3 --motion speed=3 --camera nikon-d850 --fixed",
+        "export llava a --out b --llie f.onnx --llie-on both",
+        "--model m --levels L0 --llie f.onnx --llie-on l0 --tile whole",
+        "realism a --kl-empty drop",
+        "enhance m a --out b --tile whole",
+    ] {
+        assert_eq!(lines(words), [""; 0], "{words}");
+    }
 }

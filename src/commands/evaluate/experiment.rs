@@ -1,30 +1,34 @@
 //! The [`Experiment`] of questions with choices.
+//!
+//! The trials of an evaluation: [`plan_trials`].
 
 use std::collections::HashSet;
+use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::plan::{ChoiceItem, plan_trials};
-use super::power::{power_forecast, run_contents};
-use super::settings::ImagePlace;
-use super::setup::ChoiceSetup;
+use super::settings::{ImagePlace, shown_questions};
+use super::setup::{ChoiceSetup, is_other_room};
+use super::write_plan::{power_forecast, run_contents};
+use crate::ask::{ImagePlaces, Query};
 use crate::engine::experiment::Experiment;
-use crate::engine::identity;
 use crate::engine::images::frames::{Frames, Source};
 use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::SourcePlan;
-use crate::engine::images::trials::questions::ASK;
-use crate::engine::models::ModelUnderTest;
+use crate::engine::images::trials::{ASK, Item, Prompt, SourcePlan, Stimulus, Trial, TrialGroup};
+use crate::engine::key_facts::KeyFacts;
+use crate::engine::manifest;
+use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::report::joined;
-use crate::runs::Outcome;
-use crate::runs::StdoutFormat;
-use crate::runs::power_forecast::PowerForecast;
+use crate::runs::forecast::PowerForecast;
 use crate::runs::stored::StoredRun;
+use crate::runs::{Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};
-use crate::types::{ChoiceDetail, QuestionId, Record, RunQuestion, SetLight, View};
+use crate::types::{
+    ChoiceDetail, Condition, Digest, FrameId, Question, QuestionId, Record, RunQuestion, SetLight, TrialOutcome, View,
+};
 use darkqa_questions::rules::Rules;
 use darkqa_score::model_in_condition::is_reference;
 
@@ -106,7 +110,7 @@ impl Experiment for ChoiceSetup<'_> {
             .into_iter()
             .flatten()
             .map(|(field, value)| (field.to_owned(), value))
-            .chain(identity::images(&self.recipe))
+            .chain(manifest::images(&self.recipe))
             .collect()
     }
 
@@ -126,7 +130,7 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn columns(&self) -> Columns {
-        identity::columns(&self.models, &self.recipe, &self.config.job)
+        manifest::columns(&self.models, &self.recipe, &self.config.job)
     }
 
     fn plan(&self, _: usize, _: impl FnOnce() -> Result<Vec<Record>>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
@@ -134,6 +138,195 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn report(&self, store: &Store<ChoiceDetail>, run: StoredRun<ChoiceDetail>, show: StdoutFormat) -> Result<Outcome> {
-        joined::choice::write(store, run, show)
+        joined::whole::write(store, run, show)
     }
+}
+
+/// A question with its choices in one order.
+#[derive(Debug, Clone)]
+pub(crate) struct ChoiceItem {
+    pub(super) question: Arc<Question>,
+    /// Number of times that this order was asked before.
+    pub(super) repeat: u32,
+    /// Number of times that the question was asked before, in any order of its choices.
+    pub(super) turn: u32,
+    /// The frame whose image is shown, if it is not the frame of the question.
+    pub(super) shown_frame: Option<FrameId>,
+}
+
+impl Item for ChoiceItem {
+    type Detail = ChoiceDetail;
+
+    fn reply_tokens(&self) -> f64 {
+        // The reply is one letter.
+        4.0
+    }
+
+    fn query(&self) -> Query<'_> {
+        Query::Choice(&self.question)
+    }
+
+    fn source(&self) -> &str {
+        let shown = self.shown_frame.as_ref();
+        &shown.unwrap_or(&self.question.frame).0
+    }
+
+    fn turn(&self) -> u32 {
+        self.turn
+    }
+
+    fn blank(trial: &Trial<Self>, stimulus: &Stimulus, model: &str) -> Record {
+        let question = &*trial.item.question;
+        let mut images = stimulus.images.iter().map(|image| image.facts().clone());
+        let detail = ChoiceDetail {
+            frame: question.frame.clone(),
+            family: question.family.clone(),
+            choices: question.choices.texts().to_vec(),
+            truth: question.choices.truth(),
+            repeat: trial.item.repeat,
+            strict: None,
+            lenient: None,
+            outcome: TrialOutcome::Failed,
+            image: images.next(),
+            more_images: images.collect(),
+            shown_frame: trial.item.shown_frame.clone(),
+            observed: None,
+            options: None,
+        };
+        let condition = stimulus.condition.clone();
+        Record::blank(trial.key, question.id.clone(), model, condition, detail)
+    }
+}
+
+/// One order of a question, with the prompts for models that see the image and for blind models.
+struct QuestionPrompts {
+    item: ChoiceItem,
+    image: Prompt,
+    blind: Prompt,
+}
+
+/// The questions asked with the images of one frame.
+#[derive(Default)]
+struct FrameQuestions {
+    /// Questions about the frame.
+    own: Vec<QuestionPrompts>,
+    /// Questions about other frames, for the control `observer:other-room`.
+    others: Vec<QuestionPrompts>,
+}
+
+/// All trials, grouped by frame: first the trials without an image, then those of each condition.
+fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+    let mut by_source = Vec::new();
+    by_source.resize_with(setup.sources.len(), FrameQuestions::default);
+    for question in &setup.questions {
+        let own = &mut by_source[setup.places[&question.frame]].own;
+        own.extend(prompts(setup, question, None)?);
+    }
+    for question in &setup.with_other_rooms {
+        if let Some(shown) = setup.other_rooms.shown_for(&question.frame) {
+            let others = &mut by_source[setup.places[shown]].others;
+            others.extend(prompts(setup, question, Some(shown))?);
+        }
+    }
+    by_source
+        .into_iter()
+        .enumerate()
+        .map(|(source, questions)| {
+            let shown = setup.conditions.iter().filter(|condition| setup.sources[source].can_show(condition));
+            let groups = std::iter::once(None)
+                .chain(shown.map(Some))
+                .filter_map(|condition| group(setup, source, condition, &questions).transpose())
+                .collect::<Result<_>>()?;
+            Ok(SourcePlan { source, groups })
+        })
+        .collect()
+}
+
+/// A question in each order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of
+/// the question.
+fn prompts(
+    setup: &ChoiceSetup<'_>,
+    question: &Question,
+    shown_frame: Option<&FrameId>,
+) -> Result<Vec<QuestionPrompts>> {
+    let (order, repeats) = (setup.config.order, setup.config.repeats);
+    shown_questions(question, order, repeats, setup.recipe.seed)?
+        .into_iter()
+        .map(|shown| {
+            let prompt = |view| {
+                let words = setup.config.prompts.render(view, &shown.question)?;
+                let prompt = match (view, setup.config.image_place) {
+                    (View::Image, ImagePlace::BeforeWords) => Prompt::after_images(words.into()),
+                    _ => Prompt::from_text(words.into()),
+                };
+                let several = setup.dataset.image_series(&question.frame);
+                Ok(match view {
+                    View::Image if !several.is_empty() => prompt.with_places(ImagePlaces::Marked),
+                    View::Image | View::Blind => prompt,
+                })
+            };
+            Ok(QuestionPrompts {
+                image: prompt(View::Image)?,
+                blind: prompt(View::Blind)?,
+                item: ChoiceItem {
+                    question: Arc::new(shown.question),
+                    repeat: shown.repeat,
+                    turn: shown.turn,
+                    shown_frame: shown_frame.cloned(),
+                },
+            })
+        })
+        .collect()
+}
+
+/// The trials in a condition; `None` if no model is asked in it.
+fn group(
+    setup: &ChoiceSetup<'_>,
+    source: usize,
+    condition: Option<&Condition>,
+    questions: &FrameQuestions,
+) -> Result<Option<TrialGroup<ChoiceItem>>> {
+    let view = condition.map_or(View::Blind, |_| View::Image);
+    let models = asked_in(&setup.models, condition);
+    if models.is_empty() {
+        return Ok(None);
+    }
+    let image =
+        condition.map(|condition| setup.recipe.stimulus_digest(&setup.sources[source], condition)).transpose()?;
+    let own = questions.own.iter().map(|shown| (shown, false));
+    let others = questions.others.iter().map(|shown| (shown, true));
+    let count = questions.own.len() + questions.others.len();
+    let mut trials = Vec::with_capacity(count * models.len());
+    let times = setup.config.repeats.times(condition);
+    for (shown, is_of_other) in own.chain(others).filter(|(shown, _)| shown.item.repeat < times) {
+        let prompt = match view {
+            View::Image => &shown.image,
+            View::Blind => &shown.blind,
+        };
+        let place = setup.question_places[&shown.item.question.id];
+        for &(index, model) in models
+            .iter()
+            .filter(|(_, model)| model.is_asked(place) && (view == View::Image && is_other_room(model)) == is_of_other)
+        {
+            trials.push(Trial {
+                key: key_facts(shown, prompt, model, condition, image).key()?,
+                model: index,
+                prompt: prompt.clone(),
+                item: shown.item.clone(),
+            });
+        }
+    }
+    Ok(Some(TrialGroup { condition: condition.cloned(), trials }))
+}
+
+fn key_facts<'a>(
+    shown: &'a QuestionPrompts,
+    prompt: &'a Prompt,
+    model: &'a ModelUnderTest,
+    condition: Option<&'a Condition>,
+    image: Option<Digest>,
+) -> KeyFacts<'a> {
+    let question = &*shown.item.question;
+    KeyFacts::new(model, &question.id, prompt, condition, image)
+        .with_choices(question.choices.texts(), shown.item.repeat)
 }

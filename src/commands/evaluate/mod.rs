@@ -1,16 +1,9 @@
 //! The evaluation: questions with choices about each frame ([`evaluate`]).
 
-mod check;
-mod choice_order;
-mod controls;
+pub(crate) mod check;
 mod experiment;
-mod other_room;
-mod plan;
-mod plan_identity;
-mod power;
 mod settings;
 mod setup;
-mod unnamed_scenes;
 mod write_plan;
 
 use crate::engine::Job;
@@ -18,10 +11,10 @@ use crate::engine::batch::{BatchFileArgs, BatchRunArgs};
 use crate::engine::images::progress::Progress;
 use crate::error::Result;
 use crate::runs::Outcome;
+use setup::ChoiceSetup;
 
 pub(crate) use check::{CheckArgs, check};
 pub(crate) use settings::{EvaluateArgs, ShrinkArgs};
-use setup::ChoiceSetup;
 pub(crate) use write_plan::plan;
 
 /// Runs an evaluation or continues it; a dry run prints the estimate of its cost.

@@ -1,14 +1,16 @@
 //! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
+//!
+//! Choice of the frame shown to the control `observer:other-room`: [`OtherRooms`].
+//!
+//! Controls of the observer that are added to a run without a flag: [`AddedControls`].
+//!
+//! The warning about frames without the scenes that their names suggest: [`unnamed_scenes`].
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::Path;
 use std::sync::Arc;
 
-use super::controls::{AddedControls, is_other_room};
-use super::other_room::OtherRooms;
-use super::plan_identity::plan_identity;
-use super::settings::Evaluation;
-use super::unnamed_scenes::unnamed_scenes;
+use super::settings::{Evaluation, plan_identity};
 use crate::ask::{Model, Random};
 use crate::data::Dataset;
 use crate::engine::dark_already;
@@ -16,19 +18,20 @@ use crate::engine::images::enhancement::evenly_spaced_indices;
 use crate::engine::images::frames::{Source, first_question_per_frame, inspect_all, photographs};
 use crate::engine::images::progress::Progress;
 use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::questions::{QuestionBank, open_data, open_without_generating, select};
-use crate::engine::images::trials::{check_enhanced, conditions};
+use crate::engine::images::trials::{
+    QuestionBank, check_enhanced, conditions, open_data, open_without_generating, select,
+};
 use crate::engine::models::{self, ModelName, ModelUnderTest};
-use crate::engine::observer::Observer;
-use crate::engine::room_net::RoomNet;
+use crate::engine::observer::{Observer, RoomNet};
 use crate::engine::settings::JobSettings;
-use crate::error::Result;
-use crate::runs::shard_sources::shard_questions;
+use crate::error::{Error, Result};
+use crate::runs::shard_records::shard_questions;
 use crate::types::manifests::PartPlace;
-use crate::types::{Condition, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
+use crate::types::{Condition, Control, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
 use darkqa_enhance::{FRAMES, ModelFile};
 use darkqa_questions::observer::is_in_rulebook;
 use darkqa_questions::rules::Rules;
+use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// Data and models of an evaluation, opened and checked. Nothing has been asked or written yet.
 pub(super) struct ChoiceSetup<'a> {
@@ -283,4 +286,161 @@ fn open_models(
             _ => Model::Random(guesser),
         })
     })
+}
+
+/// For each frame, the frame whose image is shown instead.
+///
+/// It is the next frame of another scene in the order of the run; after the last frame, the order starts again at the
+/// first. All frames of the run are considered, so that shards and resumed runs choose the same.
+#[derive(Debug, Default)]
+pub(super) struct OtherRooms(BTreeMap<FrameId, FrameId>);
+
+impl OtherRooms {
+    /// Chooses the other frames; `None` if all frames are of one scene. A frame without a scene (empty) counts as a
+    /// scene of its own.
+    pub(super) fn new(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
+        let frames: Vec<&FrameId> =
+            first_question_per_frame(questions).into_iter().map(|question| &question.frame).collect();
+        let scenes: Vec<String> = frames
+            .iter()
+            .map(|frame| match scene(frame) {
+                scene if scene.is_empty() => format!("frame {frame}"),
+                scene => scene,
+            })
+            .collect();
+        if scenes.iter().collect::<HashSet<_>>().len() < 2 {
+            return None;
+        }
+        let count = frames.len();
+        let mut others = BTreeMap::new();
+        let mut next = 0;
+        // Going backwards, `next` is the nearest later frame of another scene. For the last scene this is one of the
+        // first frames, which is known only after one pass over all frames, so the loop makes two.
+        for place in (0..2 * count).rev().map(|place| place % count) {
+            let after = (place + 1) % count;
+            if scenes[after] != scenes[place] {
+                next = after;
+            }
+            others.insert(frames[place].clone(), frames[next].clone());
+        }
+        Some(Self(others))
+    }
+
+    /// The frame that is shown in place of a frame.
+    pub(super) fn shown_for(&self, frame: &FrameId) -> Option<&FrameId> {
+        self.0.get(frame)
+    }
+}
+
+/// True if a model is the control `observer:other-room`, which gets the image of another scene.
+pub(super) fn is_other_room(model: &ModelUnderTest) -> bool {
+    Control::from_model_name(model.model.name()) == Some(Control::OtherRoom)
+}
+
+/// Controls that are added to a run with the observer.
+#[derive(Debug, Default)]
+pub(super) struct AddedControls {
+    pub(super) names: Vec<ModelName>,
+    /// Line for the user about other-room; `None` if it is not possible.
+    line: Option<&'static str>,
+}
+
+impl AddedControls {
+    /// The controls to add: none without the observer, else at least the default control. This is other-room or, if all
+    /// frames are of one scene, the image with its tiles in another order.
+    ///
+    /// # Errors
+    /// If a flag names other-room, and all frames are of one scene.
+    pub(super) fn new(config: &Evaluation, has_other_scene: bool) -> Result<Self> {
+        let ask = &config.job.ask;
+        let other_room = ModelName::Observer(Some(Control::OtherRoom));
+        if !has_other_scene && ask.shows_images_to(&other_room) {
+            let problem = "observer:other-room needs frames of at least two scenes";
+            return Err(Error::usage("--model", problem));
+        }
+        if !ask.shows_images_to(&ModelName::Observer(None)) {
+            return Ok(Self::default());
+        }
+        let default = if has_other_scene { Control::OtherRoom } else { Control::Tiles };
+        let names: Vec<ModelName> = Control::ALL
+            .into_iter()
+            .filter(|control| {
+                let is_wanted = config.observer_controls || *control == default;
+                is_wanted && (has_other_scene || *control != Control::OtherRoom)
+            })
+            .map(|control| ModelName::Observer(Some(control)))
+            .filter(|name| !ask.shows_images_to(name))
+            .collect();
+        if !has_other_scene {
+            tracing::warn!(
+                "all frames are of one scene, so observer:other-room is not possible; observer:tiles is asked instead: the observer \
+                 with the tiles of the right image in another order; its score must be that of chance"
+            );
+        }
+        let line = has_other_scene.then_some(
+            "observer:other-room is asked too: the observer with the image of another scene; its score must be that of chance",
+        );
+        Ok(Self { names, line })
+    }
+
+    /// Prints the line about other-room.
+    pub(super) fn print(&self, progress: &Progress) {
+        if let Some(line) = self.line {
+            progress.print_on_terminal(line);
+        }
+    }
+}
+
+/// The warning; `None` if the data set has scenes, or the names of the frames suggest none.
+pub(super) fn unnamed_scenes(dataset: &Dataset, questions: &[Question]) -> Option<String> {
+    let frames = questions.iter().map(|question| &question.frame);
+    if frames.clone().any(|frame| !dataset.scene(frame).is_empty()) {
+        return None;
+    }
+    let suggested = SuggestedScenes::new(frames)?;
+    Some(format!("{}; a \"scene\" in each question (or --map scene=COLUMN) names them", suggested.sentence()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::{Choices, Family, QuestionId};
+
+    fn others(frames: &str) -> Option<String> {
+        let questions: Vec<Question> = frames
+            .chars()
+            .enumerate()
+            .map(|(id, frame)| Question {
+                id: QuestionId(id.to_string()),
+                frame: FrameId(frame.to_string()),
+                family: Family::Closest,
+                text: "?".into(),
+                choices: Choices::new(vec!["a".into(), "b".into()], 0).unwrap(),
+                group: None,
+                evidence: serde_json::Value::Null,
+            })
+            .collect();
+        // Lower and upper case are frames of one scene; digits have none.
+        let others = OtherRooms::new(&questions, |frame| frame.0.to_lowercase().replace(char::is_numeric, ""))?;
+        frames.chars().map(|frame| Some(others.shown_for(&FrameId(frame.to_string())).unwrap().0.clone())).collect()
+    }
+
+    #[test]
+    fn the_next_frame_of_another_scene_is_shown() {
+        for (frames, shown) in [
+            ("12", Some("21")),
+            ("aAbB", Some("bbaa")),
+            ("aAbBc", Some("bbcca")),
+            ("adDA", Some("dAAd")),
+            ("aabb", Some("bbaa")),
+            ("123", Some("231")),
+            ("aA", None),
+            ("a", None),
+            ("", None),
+        ] {
+            let found = others(frames);
+            let expected = shown.map(str::to_owned);
+            assert_eq!(found, expected, "{frames}");
+        }
+    }
 }

@@ -1,19 +1,28 @@
 //! `plan`: writes the questions and frames of a run once, so that no shard makes them again ([`plan`]).
+//!
+//! The effect that a planned evaluation can detect: [`power_forecast`].
 
-use super::plan_identity::plan_identity;
-use super::settings::EvaluateArgs;
+use std::collections::{BTreeSet, HashMap};
+
+use super::settings::{EvaluateArgs, plan_identity};
 use super::setup::ChoiceSetup;
+use crate::data::Dataset;
 use crate::engine::Job;
-use crate::engine::costs::plan_costs::costs;
+use crate::engine::costs::estimate::costs;
 use crate::engine::experiment::Experiment as _;
 use crate::engine::images::progress::Progress;
 use crate::engine::images::trials::Plan;
 use crate::error::{Error, Result};
-use crate::files::folder_access::FolderAccess;
+use crate::files::FolderAccess;
 use crate::runs::Outcome;
+use crate::runs::forecast::PowerForecast;
 use crate::runs::run_plan::{NewPlan, PlannedFrame, recorded_command};
+use crate::types::degradations::Kind;
 use crate::types::manifests::Status;
 use crate::types::text::counted;
+use crate::types::{Condition, Digest, FrameId, Question, Variant};
+use darkqa_score::cluster::{Clusters, FrameTies};
+use darkqa_score::tested_sentences::RunContents;
 
 /// Writes the plan of a run into its folder. Nothing is asked.
 ///
@@ -63,4 +72,48 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
         counted(forecast.trials, "trial")
     );
     Ok(Outcome::wrote(folder, Status::Complete, output))
+}
+
+/// The effect that these questions can detect; `None` without questions, or if a true answer is unknown. `digests` are
+/// those of the frames, as far as they are known.
+pub(super) fn power_forecast(
+    dataset: &Dataset,
+    questions: &[Question],
+    digests: &HashMap<FrameId, Digest>,
+    contents: RunContents,
+) -> Option<PowerForecast> {
+    if questions.iter().any(|question| question.choices.truth().is_none()) {
+        return None;
+    }
+    let mut ties = FrameTies { digests: digests.clone(), ..FrameTies::default() };
+    for question in questions {
+        let frame = &question.frame;
+        let (scene, several) = (dataset.scene(frame), dataset.image_series(frame));
+        if !scene.is_empty() {
+            ties.scenes.insert(frame.clone(), scene);
+        }
+        if !several.is_empty() {
+            ties.images.insert(frame.clone(), several.to_vec());
+        }
+    }
+    let pairs = questions.iter().map(|question| (&question.id, &question.frame));
+    let clusters = Clusters::new(pairs, &ties);
+    let question_clusters: Vec<u32> =
+        questions.iter().filter_map(|question| clusters.get(&question.frame, &question.id)).collect();
+    PowerForecast::new(&clusters, &question_clusters, contents)
+}
+
+/// The numbers of models, enhancers and lights of a run with these conditions.
+pub(super) fn run_contents(conditions: &[Condition], models: usize) -> RunContents {
+    let variants: BTreeSet<Variant> = conditions.iter().map(Condition::variant).collect();
+    let last = variants.iter().filter_map(|variant| variant.kind).max();
+    let lights = variants.iter().filter(|variant| variant.kind == last);
+    let base = last.and_then(Kind::base);
+    let enhancers: BTreeSet<_> = conditions.iter().filter_map(|condition| condition.enhancer.as_ref()).collect();
+    RunContents {
+        models: models.max(1),
+        enhancers: enhancers.len(),
+        lights: lights.count(),
+        has_noise: base.is_some() && variants.iter().any(|variant| variant.kind == base),
+    }
 }

@@ -5,7 +5,7 @@ use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use crate::data::import::recording::Encoding;
-use crate::files::reading::{entries, open};
+use crate::files::{entries, open};
 use crate::types::shell_word;
 
 /// Kind of a file or folder, by its first bytes or the files in it.

@@ -10,11 +10,11 @@ use std::sync::Arc;
 use clap::Args;
 use serde_json::{Map, Value, json};
 
-use super::camera_facts::{Cameras, Exposures};
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, VIDEO_REMEDY, summary, thumbnail};
-use super::mcap_files::{drive_name, files, open_reader, overview, slug, total_bytes};
-use super::message_times::MessageTimes;
-use super::topic_list::{MAX_NAMED, listing, no_images, warn_of_unread};
+use super::mcap_files::{
+    Cameras, Exposures, MAX_NAMED, MessageTimes, drive_name, files, listing, no_images, open_reader, overview, slug,
+    total_bytes, warn_of_unread,
+};
 use crate::data::import::recording::{
     CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader, Message, Nanoseconds,
     Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_name, camera_of_info,

@@ -1,31 +1,37 @@
 //! The [`Experiment`] of open questions and of marks for the answers.
+//!
+//! The trials of the models: [`plan_answers`].
+//!
+//! The trials of the judge: [`plan_marks`].
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::marks::{mark_prompt, plan_marks};
-use super::plan::plan_answers;
 use super::record::OpenItem;
 use super::setup::OpenSetup;
+use crate::ask::ImagePlaces;
+use crate::ask::prompts::{blind, judge_prompt, vision};
+use crate::data::openeqa::OpenQuestion;
 use crate::engine::costs::text_tokens;
 use crate::engine::experiment::{ExpectedRequest, Experiment};
-use crate::engine::identity;
 use crate::engine::images::frames::{Frames, Source};
 use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{Item as _, SourcePlan};
-use crate::engine::models::ModelUnderTest;
+use crate::engine::images::trials::{Item as _, Prompt, SourcePlan, Trial, TrialGroup};
+use crate::engine::key_facts::KeyFacts;
+use crate::engine::manifest;
+use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
 use crate::report::joined::open;
-use crate::runs::Outcome;
-use crate::runs::StdoutFormat;
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
+use crate::runs::predictions::{AnswerState, predictions};
 use crate::runs::stored::StoredRun;
+use crate::runs::{Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, JUDGES, PartPlace};
-use crate::types::{Family, FrameId, OpenDetail, Record, RunQuestion};
+use crate::types::{Condition, Digest, Family, FrameId, OpenDetail, QuestionId, Record, RunQuestion, TrialKey, View};
 use darkqa_score::choice::llm_match::Protocol;
 
 /// A typical answer, for estimating the length of a judge's prompt.
@@ -110,15 +116,15 @@ impl Experiment for OpenSetup<'_> {
         [("--num-frames", json!(walk.frames)), ("--degrade", json!(walk.degraded_at)), ("--sensor", json!(walk.camera))]
             .into_iter()
             .map(|(field, value)| (field.to_owned(), value))
-            .chain(identity::images(&self.recipe))
+            .chain(manifest::images(&self.recipe))
             .collect()
     }
 
     fn columns(&self) -> Columns {
-        let mut columns = identity::columns(&self.models, &self.recipe, &self.config.job);
+        let mut columns = manifest::columns(&self.models, &self.recipe, &self.config.job);
         if let Some(judge) = &self.judge {
             // A model that is its own judge may have other settings as a judge.
-            let content = || BTreeMap::from([(judge.name.to_string(), identity::model_definition(judge))]);
+            let content = || BTreeMap::from([(judge.name.to_string(), manifest::model_definition(judge))]);
             columns.insert(JUDGES.to_owned(), content());
             let models = columns.entry("model".to_owned()).or_default();
             for (name, content) in content() {
@@ -180,4 +186,110 @@ impl Experiment for OpenSetup<'_> {
     fn report(&self, store: &Store<OpenDetail>, run: StoredRun<OpenDetail>, show: StdoutFormat) -> Result<Outcome> {
         open::write(store, run, show)
     }
+}
+
+/// The trials of all answers, grouped by walk: first those without images, then those of each condition.
+fn plan_answers(setup: &OpenSetup<'_>) -> Result<Vec<SourcePlan<OpenItem>>> {
+    let mut by_walk = BTreeMap::<&str, Vec<&Arc<OpenQuestion>>>::new();
+    for question in &setup.questions {
+        by_walk.entry(&question.episode).or_default().push(question);
+    }
+    setup
+        .sources
+        .iter()
+        .enumerate()
+        .map(|(source, walk)| {
+            let questions = by_walk.remove(&*walk.name.0).unwrap_or_default();
+            let groups = std::iter::once(None)
+                .chain(setup.conditions.iter().map(Some))
+                .filter_map(|condition| group(setup, source, condition, &questions).transpose());
+            Ok(SourcePlan { source, groups: groups.collect::<Result<_>>()? })
+        })
+        .collect()
+}
+
+/// The trials in a condition; `None` if no model is asked in it.
+fn group(
+    setup: &OpenSetup<'_>,
+    source: usize,
+    condition: Option<&Condition>,
+    questions: &[&Arc<OpenQuestion>],
+) -> Result<Option<TrialGroup<OpenItem>>> {
+    let view = condition.map_or(View::Blind, |_| View::Image);
+    let models = asked_in(&setup.models, condition);
+    if models.is_empty() {
+        return Ok(None);
+    }
+    let walk = &setup.sources[source];
+    let images = condition.map(|condition| setup.recipe.stimulus_digest(walk, condition));
+    let images: Option<Digest> = images.transpose()?;
+    let mut trials = Vec::new();
+    for question in questions {
+        let prompt = prompt(question, view);
+        let place = setup.question_places[&question.id];
+        for &(index, model) in models.iter().filter(|(_, model)| model.is_asked(place)) {
+            trials.push(Trial {
+                key: KeyFacts::new(model, &question.id, &prompt, condition, images).key()?,
+                model: index,
+                prompt: prompt.clone(),
+                item: OpenItem::Answer(Arc::clone(question)),
+            });
+        }
+    }
+    Ok(Some(TrialGroup { condition: condition.cloned(), trials }))
+}
+
+/// The prompt of a question, for a model with images or a blind one.
+fn prompt(question: &OpenQuestion, view: View) -> Prompt {
+    match view {
+        View::Blind => Prompt::from_text(blind(&question.text).into()),
+        View::Image => {
+            let (before, behind) = vision(&question.text);
+            Prompt { before: before.into(), after: Some(behind.into()), places: ImagePlaces::Together }
+        }
+    }
+}
+
+/// The prompt that asks the judge to mark an answer.
+fn mark_prompt(question: &OpenQuestion, answer: &str) -> Prompt {
+    let extra = question.extra.as_deref();
+    Prompt::from_text(judge_prompt(&question.text, &question.answer, extra, answer).into())
+}
+
+/// The key of a mark. It does not depend on model and condition, so that the same answer to a question is judged once.
+fn mark_key(judge: &ModelUnderTest, prompt: &Prompt) -> Result<TrialKey> {
+    let facts = (judge.model.name(), &*judge.digest, &*prompt.before);
+    Digest::canonical("darkqa.mark/2", &facts).map(Into::into)
+}
+
+/// The trials for all marks of a run, grouped by walk. Each distinct answer to a question is marked once.
+fn plan_marks(setup: &OpenSetup<'_>, records: &[Record<OpenDetail>]) -> Result<Vec<SourcePlan<OpenItem>>> {
+    let Some(judge) = &setup.judge else {
+        return Ok(Vec::new());
+    };
+    let ids: Vec<&QuestionId> = setup.questions.iter().map(|question| &question.id).collect();
+    let mut by_walk: Vec<Vec<Trial<OpenItem>>> = Vec::new();
+    by_walk.resize_with(setup.sources.len(), Vec::new);
+    let mut planned = HashSet::new();
+    for prediction in predictions(records, &ids, setup.config.protocol) {
+        let AnswerState::Text { answer, .. } = prediction.state else {
+            continue;
+        };
+        let question = &setup.questions[prediction.question];
+        let prompt = mark_prompt(question, &answer);
+        let key = mark_key(judge, &prompt)?;
+        if planned.insert(key) {
+            by_walk[setup.walk_of(question)].push(Trial {
+                key,
+                model: 0,
+                prompt,
+                item: OpenItem::Mark { question: Arc::clone(question), answer },
+            });
+        }
+    }
+    Ok(by_walk
+        .into_iter()
+        .enumerate()
+        .map(|(source, trials)| SourcePlan { source, groups: vec![TrialGroup { condition: None, trials }] })
+        .collect())
 }

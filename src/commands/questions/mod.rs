@@ -1,11 +1,13 @@
 //! `questions`: makes multiple-choice questions about frames by rule.
+//!
+//! `questions --against`: compares the look of the frames with that of another set.
+//!
+//! Paths of the files with frame statistics, next to the questions: [`statistics_path`], [`shard_files`].
 
-mod against;
 mod checked;
-mod statistics_cache;
-mod statistics_file;
 
 use std::collections::BTreeSet;
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -13,21 +15,22 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::data::{Dataset, FolderArgs};
+use crate::data::{Dataset, FolderArgs, open_frames, open_images};
 use crate::engine::images::frames::InputTally;
 use crate::engine::images::progress::Progress;
-use crate::engine::images::trials::questions::rules;
+use crate::engine::images::trials::rules;
 use crate::engine::images::workers::{ThreadArgs, pool};
 use crate::error::{Error, Result};
-use crate::files::{reading, write};
+use crate::files::{self, write};
 use crate::report;
-use crate::report::questions::against::AppearanceComparison;
+use crate::report::questions::AppearanceComparison;
 use crate::runs::Outcome;
+use crate::runs::resolved_shard::{keep_shard, shard_from_flag};
 use crate::runs::shard::Shard;
-use crate::runs::shard_args::{keep_shard, shard_from_flag};
-use crate::types::shell_word;
 use crate::types::text::{counted, plural};
-use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId};
+use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId, shell_word};
+use checked::StatisticsCache;
+use darkqa_questions::appearance::FrameAppearance;
 use darkqa_questions::balance::BalanceMode;
 use darkqa_questions::colors::Palette;
 use darkqa_questions::reason::Reason;
@@ -37,9 +40,6 @@ use darkqa_questions::rules::Rules;
 use darkqa_questions::statistics::{self, FrameStatistics, measure, unknown_labels};
 use darkqa_questions::summary::QuestionSummary;
 use darkqa_questions::{Generated, GeneratedQuestion, QuestionRequest, generate};
-
-use statistics_cache::StatisticsCache;
-use statistics_file::{shard_files, statistics_path};
 
 /// The flags of `questions`.
 #[derive(Debug, Args)]
@@ -164,9 +164,9 @@ impl<'a> QuestionSettings<'a> {
         let Some(folder) = &args.against else {
             return Ok(None);
         };
-        let other = Dataset::from_images(folder, &args.folders.root.data_root)?;
+        let other = open_images(folder, &args.folders.root.data_root)?;
         let other = other.with_rule(args.folders.decode.rule());
-        against::compare([dataset, &other], &self.palette, args.threads, progress).map(Some)
+        compare([dataset, &other], &self.palette, args.threads, progress).map(Some)
     }
 }
 
@@ -175,7 +175,7 @@ fn read_table<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Op
     let Some(path) = path else {
         return Ok(None);
     };
-    let text = reading::settings(path)?;
+    let text = files::settings(path)?;
     parse(&text).map(Some).map_err(|e| e.at(path.display().to_string()))
 }
 
@@ -186,7 +186,7 @@ fn read_table<T>(path: Option<&Path>, parse: fn(&str) -> Result<T>) -> Result<Op
 pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Outcome> {
     let settings = &QuestionSettings::read(args)?;
     let folder = folder(args)?;
-    let dataset = Dataset::from_frames(folder, &args.folders.root.data_root)?;
+    let dataset = open_frames(folder, &args.folders.root.data_root)?;
     let dataset = dataset.with_rule(args.folders.decode.rule());
     let labels = dataset.labels().ok_or_else(|| {
         let problem = "no classes.json in this folder, which gives the class of each number in its maps; `darkqa-eval import` writes one";
@@ -234,7 +234,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
     }
     let looks = comparison.as_ref().map_or_else(String::new, AppearanceComparison::table);
     let table = report::questions::table(&summary);
-    let checks = report::questions::checks::text(&verdicts.checks);
+    let checks = report::questions::text(&verdicts.checks);
     let output = format!("{table}{looks}{checks}{}\n", args.out.display());
     Ok(Outcome::wrote(&args.out, status, output))
 }
@@ -242,7 +242,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
 /// Writes the statistics into a folder as JSON, CSV and SVG.
 fn write_statistics(folder: &Path, summary: &QuestionSummary, json: &str) -> Result<()> {
     let csv = report::questions::csv(summary)?;
-    let figure = report::questions::figure::figure(summary)?;
+    let figure = report::questions::figure(summary)?;
     write(&folder.join("statistics.json"), json.as_bytes())?;
     write(&folder.join("statistics.csv"), &csv)?;
     write(&folder.join("statistics.svg"), figure.as_bytes())
@@ -422,4 +422,95 @@ fn lines<T: Serialize>(values: impl IntoIterator<Item = T>) -> Result<Vec<u8>> {
         lines.push(b'\n');
     }
     Ok(lines)
+}
+
+/// Compares the frames of two sets.
+///
+/// # Errors
+/// If a set has no images, or an image cannot be read: leaving it out would bias the comparison.
+fn compare(
+    sets: [&Dataset; 2],
+    palette: &Palette,
+    threads: ThreadArgs,
+    progress: &Progress,
+) -> Result<AppearanceComparison> {
+    let looks = |set: &Dataset| {
+        let found = looks(set, palette, threads, progress)?;
+        if found.is_empty() {
+            return Err(Error::data(set.name(), "no images to compare"));
+        }
+        Ok(found)
+    };
+    let [own, others] = [looks(sets[0])?, looks(sets[1])?];
+    Ok(AppearanceComparison::new([(sets[0].name(), &own), (sets[1].name(), &others)]))
+}
+
+/// The look of each frame.
+fn looks(
+    dataset: &Dataset,
+    palette: &Palette,
+    threads: ThreadArgs,
+    progress: &Progress,
+) -> Result<Vec<FrameAppearance>> {
+    let names: Vec<&FrameId> = dataset.frames().collect();
+    let tally = InputTally::default();
+    let bar = progress.bar("looks", names.len());
+    let looks = pool(threads.threads)?.install(|| {
+        names
+            .par_iter()
+            .map(|name| {
+                let files = dataset.files(name)?;
+                tally.add(name, &files.note());
+                let look = FrameAppearance::new(&files.decode()?, palette);
+                bar.inc();
+                Ok(look)
+            })
+            .collect::<Result<Vec<FrameAppearance>>>()
+    });
+    drop(bar);
+    tally.warn();
+    looks
+}
+
+/// Suffix of the file names.
+const SUFFIX: &str = ".statistics.jsonl";
+
+/// The file of a shard, or of all frames.
+fn statistics_path(out: &Path, shard: Shard) -> PathBuf {
+    let stem = stem(out);
+    out.with_file_name(if shard.is_part() {
+        format!("{stem}.{}{SUFFIX}", shard.folder())
+    } else {
+        format!("{stem}{SUFFIX}")
+    })
+}
+
+/// The existing files of shards, of any number of shards, sorted.
+///
+/// # Errors
+/// If the folder cannot be read.
+fn shard_files(out: &Path) -> Result<Vec<PathBuf>> {
+    let folder = match out.parent() {
+        Some(folder) if folder != Path::new("") => folder,
+        _ => Path::new("."),
+    };
+    if !folder.exists() {
+        return Ok(Vec::new());
+    }
+    let prefix = format!("{}.shard-", stem(out));
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))? {
+        let path = entry.map_err(|e| Error::file(folder, "read", e))?.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.starts_with(&prefix) && name.ends_with(SUFFIX) {
+            files.push(path);
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn stem(out: &Path) -> String {
+    let stem = out.file_stem().unwrap_or_default();
+    stem.to_string_lossy().into_owned()
 }

@@ -1,18 +1,33 @@
 //! Checks which pairs can be compared, before any is compared: [`check`].
+//!
+//! Fits the gain of the sensor to pairs ([`fit`]), and makes the camera with fitted gains ([`fitted_camera`]).
+//!
+//! The flags of `realism`: [`RealismArgs`].
+//!
+//! Threads that process the pairs: [`PairWorkers`].
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use super::settings::RealismArgs;
-use super::workers::PairWorkers;
+use clap::Args;
+use rayon::ThreadPool;
+use rayon::prelude::*;
+
 use crate::data::pairs::Pair;
+use crate::data::{DecodeArgs, RootArgs};
 use crate::engine::images::frames::InputTally;
+use crate::engine::images::progress::Progress;
+use crate::engine::images::workers::ThreadArgs;
 use crate::error::{Error, Result};
 use crate::pictures::ImageFile;
 use crate::report::realism::LeftOut;
-use crate::types::Rgb;
-use crate::types::{FrameId, Pixels};
-use darkqa_score::photographs::realism::scene::{MIN_CORRELATION, SceneMatch};
-use darkqa_score::photographs::realism::{exposure_drop, same_size};
+use crate::types::{Decides, FrameId, Pixels, ProfileName, Rgb};
+use darkqa_light::{
+    CameraModel, CameraState, CleanRaw, Coupling, NoiseKey, Sampling, SensorArgs, SensorSettings, Synthesis,
+};
+use darkqa_score::photographs::realism::gain::{GAINS, GainFit, LADDER_STEPS, PairFit, ProfileFit, ladder};
+use darkqa_score::photographs::realism::residual::{Bins, EmptyBins};
+use darkqa_score::photographs::realism::smooth::SmoothBlocks;
+use darkqa_score::photographs::realism::{MIN_CORRELATION, SceneMatch, exposure_drop, same_size};
 
 /// Absolute exposure drop in EV below which the images of a pair have nearly the same light (chosen).
 const SMALL_DROP: f32 = 0.5;
@@ -152,4 +167,208 @@ fn refuse_swapped_folders(args: &RealismArgs, place: &Path, lights: &[Result<Pai
         known.len()
     );
     Err(Error::data(place.display(), problem))
+}
+
+/// The fits to all pairs, one for each noise profile. Pairs that cannot be read are left out.
+///
+/// # Errors
+/// If the camera does not accept the gains of the fit.
+pub(super) fn fit(
+    args: &RealismArgs,
+    sensor: &SensorSettings,
+    pairs: &[CheckedPair<'_>],
+    workers: &PairWorkers<'_>,
+) -> Result<Vec<ProfileFit>> {
+    let profiles: Vec<ProfileLadder> =
+        sensor.readings.iter().map(|(name, synthesis)| ProfileLadder::new(name, synthesis)).collect::<Result<_>>()?;
+    let fits = workers.map("pairs fitted", pairs, |_, checked| {
+        // A file that can no longer be read fails in the comparison, where it is logged and counted.
+        let (normal, low) = load(args, checked.pair, None).ok()?;
+        Some(fit_pair(sensor.seed, &profiles, checked, &normal, &low))
+    });
+    Ok(profiles
+        .iter()
+        .enumerate()
+        .map(|(index, profile)| {
+            let pair_fits = pairs
+                .iter()
+                .zip(&fits)
+                .filter_map(|(checked, fits)| {
+                    Some(PairFit { pair: checked.pair.name.clone(), fit: *fits.as_ref()?.get(index)? })
+                })
+                .collect();
+            ProfileFit::new(profile.name.clone(), profile.ratio(), pair_fits)
+        })
+        .collect())
+}
+
+/// A noise profile with a camera at the middle of its ranges, for each gain of the ladder.
+struct ProfileLadder {
+    name: ProfileName,
+    ladder: [Synthesis; LADDER_STEPS],
+}
+
+impl ProfileLadder {
+    fn new(name: &ProfileName, synthesis: &Synthesis) -> Result<Self> {
+        let mut camera = synthesis.camera.clone();
+        camera.set_sampling(Sampling::Fixed);
+        camera.set_gain_range(GAINS)?;
+        let given = Synthesis { camera, ..synthesis.clone() };
+        let mut at_gains = ladder().map(|_| given.clone());
+        for (synthesis, gain) in at_gains.iter_mut().zip(ladder()) {
+            synthesis.camera.pin_gain(gain)?;
+        }
+        Ok(Self { name: name.clone(), ladder: at_gains })
+    }
+
+    /// The light ratio r; `None` if it depends on the exposure drop.
+    fn ratio(&self) -> Option<f64> {
+        let [synthesis, ..] = &self.ladder;
+        let is_free = synthesis.coupling == Coupling::Independent;
+        is_free.then(|| fixed_state(synthesis, 0.0).ratio)
+    }
+}
+
+/// The state of a camera at the middle of its ranges, which is the same for all frames.
+fn fixed_state(synthesis: &Synthesis, drop_ev: f64) -> CameraState {
+    synthesis.state_after_drop(&NoiseKey::new(0, &FrameId(String::new())), drop_ev)
+}
+
+/// The fits to one pair, one for each noise profile.
+fn fit_pair(
+    seed: u64,
+    profiles: &[ProfileLadder],
+    checked: &CheckedPair<'_>,
+    normal: &Pixels,
+    low: &Rgb,
+) -> Vec<GainFit> {
+    // The key differs from that of the comparison, so that fit and comparison do not share noise.
+    let key = NoiseKey::new(seed, &FrameId(format!("fit of {}", checked.pair.name)));
+    let drop = f64::from(checked.drop);
+    let smooth = SmoothBlocks::new(&normal.codes(), drop);
+    let real = smooth.spread(low);
+    profiles
+        .iter()
+        .map(|profile| {
+            let mut raw = None;
+            let curves = profile.ladder.each_ref().map(|synthesis| {
+                let state = fixed_state(synthesis, drop);
+                // The clean RAW image is the same at all gains, because the colours of the camera are.
+                let headroom = synthesis.headroom_ev(drop);
+                let raw = raw.get_or_insert_with(|| CleanRaw::new(normal, state.clone(), headroom));
+                let negative = raw.negative(&key, &state, synthesis.amplify, synthesis.tone);
+                smooth.spread(&negative.develop_by(drop))
+            });
+            GainFit::fit(&real, &curves)
+        })
+        .collect()
+}
+
+/// The camera of a noise profile with its gain drawn from a fitted range, and with the ratio of the fit.
+///
+/// # Errors
+/// If the camera does not take the range or the ratio.
+pub(super) fn fitted_camera(camera: &CameraModel, fit: &ProfileFit, range: [f64; 2]) -> Result<CameraModel> {
+    let mut fitted = camera.clone();
+    fitted.set_gain_range(range)?;
+    if let Some(ratio) = fit.ratio {
+        fitted.pin_ratio(ratio)?;
+    }
+    Ok(fitted)
+}
+
+/// Minimum and maximum of `--ev`, in EV.
+const DROP_RANGE: [f32; 2] = [-20.0, 20.0];
+
+/// The flags of `realism`.
+#[derive(Debug, Args)]
+pub(crate) struct RealismArgs {
+    /// A folder of pairs: normal/ and low/, high/ and low/, val_rgb_h/ and val_rgb_l/, or files like normal1.png and
+    /// low1.png
+    #[arg(
+        value_name = "PAIRS",
+        required_unless_present = "normal",
+        conflicts_with = "normal", add = Decides::Pixels)]
+    pub pairs: Option<PathBuf>,
+    /// The images in normal light, if they lie elsewhere; default: in PAIRS
+    #[arg(long, value_name = "DIR", requires = "low", add = Decides::Pixels)]
+    pub normal: Option<PathBuf>,
+    /// The images in low light, of the same names; default: in PAIRS
+    #[arg(long, value_name = "DIR", requires = "normal", add = Decides::Pixels)]
+    pub low: Option<PathBuf>,
+    /// Further folders that images may lie in.
+    #[command(flatten)]
+    pub root: RootArgs,
+    /// The exposure drop of every pair in EV, -20 to 20; default: estimated for each from its mean light
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = drop_ev, add = Decides::Pixels)]
+    pub ev: Option<f32>,
+    /// Fit the sensor's gain K to the noise of each pair, in each noise profile, and compare the fitted camera too
+    ///
+    /// The gain is the one whose noise has the spread of the low-light image in blocks that are smooth in normal light,
+    /// as saved: a smaller K than the sensor's means that noise was averaged away. paper and eld take the middle of the
+    /// camera's r, or --noise ratio, because images show the product rK alone. With 3 fitted pairs or more, each pair
+    /// is judged by the gains of the others. --out also gets a camera file for --noise camera: fitted.toml, or
+    /// fitted-READING.toml for each of several readings.
+    #[arg(long, conflicts_with = "gain", add = Decides::Pixels)]
+    pub fit: bool,
+    /// The bins of the residuals' divergence
+    #[arg(long, value_enum, default_value_t, add = Decides::Nothing)]
+    pub kl_bins: Bins,
+    /// Treatment of empty bins of fu; both are shown
+    #[arg(long, value_enum, default_value_t, add = Decides::Nothing)]
+    pub kl_empty: EmptyBins,
+    /// The sensor and its noise.
+    #[command(flatten)]
+    pub sensor: SensorArgs,
+    /// Where the numbers by pair, the summary and the figures go; default: nowhere
+    #[arg(long, value_name = "DIR", help_heading = "Output", add = Decides::Nothing)]
+    pub out: Option<PathBuf>,
+    /// Print the summary as JSON instead of a table
+    #[arg(long, help_heading = "Output", add = Decides::Nothing)]
+    pub json: bool,
+    /// The reading of images.
+    #[command(flatten)]
+    pub decode: DecodeArgs,
+    /// The number of threads.
+    #[command(flatten)]
+    pub threads: ThreadArgs,
+}
+
+/// Parses an exposure drop in EV.
+fn drop_ev(text: &str) -> Result<f32, String> {
+    let [min, max] = DROP_RANGE;
+    text.parse()
+        .ok()
+        .filter(|ev| (min..=max).contains(ev))
+        .ok_or_else(|| format!("a number from {min} to {max} expected"))
+}
+
+/// Threads that process the pairs, with a progress bar.
+pub(super) struct PairWorkers<'a> {
+    pub pool: ThreadPool,
+    pub progress: &'a Progress,
+}
+
+impl PairWorkers<'_> {
+    /// Applies `work` to each item and its index, and returns the results in order. `what` is the name of the items in
+    /// the progress bar.
+    pub(super) fn map<I: Sync, T: Send>(
+        &self,
+        what: &'static str,
+        items: &[I],
+        work: impl Fn(usize, &I) -> T + Sync,
+    ) -> Vec<T> {
+        let bar = self.progress.bar(what, items.len());
+        self.pool.install(|| {
+            items
+                .par_iter()
+                .enumerate()
+                .map(|(index, item)| {
+                    let result = work(index, item);
+                    bar.inc();
+                    result
+                })
+                .collect()
+        })
+    }
 }

@@ -3,33 +3,38 @@
 //!
 //! `POST /v1/chat/completions` takes a multiple-choice question with or without an image and answers with a letter;
 //! `GET /v1/models` lists the models. The observer must know which frame an image shows, and finds it by the image
-//! alone ([`frame_matcher`]). Only programs on this machine are answered, not web pages of other sites ([`admission`]).
+//! alone ([`request`]). Only programs on this machine are answered, not web pages of other sites (`admission`).
 //! Any key is accepted, and nothing is charged or stored.
+//!
+//! Admission of requests from programs on this machine, but not from web pages of other sites: [`admit`].
+//!
+//! Connections of the server, with limits for their number and for the time of clients: [`answer_until`].
 
-mod admission;
 mod completion;
-mod connections;
-mod frame_matcher;
-mod memory;
-mod parsed_question;
 mod request;
 
 use std::convert::Infallible;
+use std::future::{Future, poll_fn};
 use std::io::Write as _;
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::pin::Pin;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
 
 use clap::Args;
-use hyper::body::Incoming;
-use hyper::service::service_fn;
-use hyper::{Method, Request, Response, StatusCode};
+use hyper::body::{Body as _, Incoming};
+use hyper::server::conn::http1;
+use hyper::service::{HttpService, service_fn};
+use hyper::{HeaderMap, Method, Request, Response, StatusCode, Uri, header};
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::server::graceful::GracefulShutdown;
 use tokio::runtime;
-use tokio::sync::Semaphore;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::ask::{Call, Message, Model, Query, Random};
-use crate::data::{self, DataPlace, Dataset, RootArgs};
+use crate::data::{self, DataPlace, RootArgs};
 use crate::engine::images::progress::Progress;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::observer::Observer;
@@ -37,18 +42,14 @@ use crate::error::{Error, Result};
 use crate::runs::Outcome;
 use crate::types::manifests::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
+use completion::{Completion, MemoryBound, RequestFault};
 use darkqa_questions::rules::Rules;
-
-use admission::{MAX_BODY, admit, body};
-use completion::{Completion, RequestFault};
-use frame_matcher::FrameMatcher;
-use memory::MemoryBound;
-use parsed_question::ParsedQuestion;
-use request::{MAX_PIXELS, ServedQuestion};
+use request::{FrameMatcher, MAX_PIXELS, ParsedQuestion, ServedQuestion};
 
 /// Maximum number of bytes of all bodies in flight (chosen). A body takes up to three times its size until it is
 /// decoded.
 const MAX_BODIES: usize = 2 * MAX_BODY;
+
 /// Maximum number of requests answered in parallel; further ones wait (chosen).
 const MAX_PARALLEL: usize = 16;
 
@@ -96,7 +97,7 @@ struct ServerState {
 pub(crate) fn serve(args: &ServeArgs, progress: &Progress) -> Result<Outcome> {
     // Bind first, so that a used port is reported before any frame is drawn.
     let listener = bind(args.port)?;
-    let dataset = Arc::new(Dataset::open_without_questions(&args.data, &args.root.data_root)?);
+    let dataset = Arc::new(args.data.open_without_questions(&args.root.data_root)?);
     let prior = Random { seed: args.seed };
     let observer = Observer::open(&dataset, &args.data, &args.root.data_root, &[], Rules::built_in()?)
         .map_err(|e| e.usage_at("--data"))?;
@@ -148,7 +149,7 @@ async fn listen(listener: TcpListener, state: Arc<ServerState>, progress: &Progr
     let mut interrupt = Interrupt::listen()?;
     // Dropped after the first interrupt, so that a second one ends the process at once.
     let interrupted = async move { interrupt.next().await };
-    connections::answer_until(listener, service, interrupted).await;
+    answer_until(listener, service, interrupted).await;
     Ok(())
 }
 
@@ -224,5 +225,180 @@ impl ServerState {
             .await
             .map_err(|e| RequestFault::new(StatusCode::INTERNAL_SERVER_ERROR, e.failure.message))?;
         Ok(Completion { model: request.model, text: reply.text, form: request.form })
+    }
+}
+
+/// Maximum size of a request body, in bytes (chosen).
+const MAX_BODY: usize = 64 << 20;
+
+/// Maximum time for receiving the body of a request (chosen).
+const BODY_TIMEOUT: Duration = Duration::from_mins(1);
+
+/// Host names of the loopback interface.
+const LOOPBACK: [&str; 3] = ["127.0.0.1", "localhost", "[::1]"];
+
+/// Checks the headers of a request to this port.
+///
+/// A web page in a browser may send requests to loopback. If its domain resolves to this machine (DNS rebinding),
+/// `Host` has that domain; otherwise `Origin` has the site of the page. Without a CORS preflight, a page cannot send
+/// JSON.
+///
+/// # Errors
+/// 421 for another host, 403 for a page of another site, 415 for a body that is not JSON.
+fn admit(request: &Request<Incoming>, port: u16) -> Result<(), RequestFault> {
+    let headers = request.headers();
+    let host = request
+        .uri()
+        .authority()
+        .map(|authority| authority.as_str().to_owned())
+        .or_else(|| header_text(headers, header::HOST));
+    let is_here = host.as_deref().is_some_and(|host| is_here(host, port));
+    if !is_here {
+        let message = format!("the host is neither 127.0.0.1:{port} nor localhost:{port}");
+        return Err(RequestFault::new(StatusCode::MISDIRECTED_REQUEST, message));
+    }
+    let origin = headers.get(header::ORIGIN);
+    if origin.is_some_and(|origin| !origin.to_str().is_ok_and(is_local_page)) {
+        let message = "requests from pages of other sites are not answered";
+        return Err(RequestFault::new(StatusCode::FORBIDDEN, message));
+    }
+    let kind = header_text(headers, header::CONTENT_TYPE).unwrap_or_default();
+    let kind = kind.split(';').next().unwrap_or_default().trim();
+    if request.method() == Method::POST && !kind.eq_ignore_ascii_case("application/json") {
+        let message = "the header Content-Type: application/json is missing";
+        return Err(RequestFault::new(StatusCode::UNSUPPORTED_MEDIA_TYPE, message));
+    }
+    Ok(())
+}
+
+/// The body of a request, with its share of the bytes that all bodies may have together.
+///
+/// # Errors
+/// If it is too large, does not arrive in time, or breaks off; 503 if other bodies have all bytes.
+async fn body(body: Incoming, bodies: &MemoryBound) -> Result<(Vec<u8>, OwnedSemaphorePermit), RequestFault> {
+    // Check the announced length first. A body without one may be as long as allowed.
+    if body.size_hint().lower() > MAX_BODY as u64 {
+        return Err(too_large());
+    }
+    let length = body.size_hint().exact().map_or(MAX_BODY, |n| n as usize);
+    let share = bodies.take(length).await?;
+    tokio::time::timeout(BODY_TIMEOUT, read_all(body))
+        .await
+        .map_err(|_| {
+            let message = format!("the body did not arrive within {} s", BODY_TIMEOUT.as_secs());
+            RequestFault::new(StatusCode::REQUEST_TIMEOUT, message)
+        })?
+        .ok_or_else(too_large)
+        .map(|bytes| (bytes, share))
+}
+
+fn too_large() -> RequestFault {
+    let message = format!("the body is incomplete, or has more than {} MiB", MAX_BODY >> 20);
+    RequestFault::new(StatusCode::PAYLOAD_TOO_LARGE, message)
+}
+
+/// All bytes of a body; `None` if it is too large or breaks off.
+async fn read_all(mut body: Incoming) -> Option<Vec<u8>> {
+    let announced = body.size_hint().exact().unwrap_or_default() as usize;
+    let mut bytes = Vec::with_capacity(announced.min(MAX_BODY));
+    while let Some(frame) = poll_fn(|context| Pin::new(&mut body).poll_frame(context)).await {
+        // A frame without data contains trailers, which are ignored.
+        let data = frame.ok()?.into_data().unwrap_or_default();
+        if bytes.len() + data.len() > MAX_BODY {
+            return None;
+        }
+        bytes.extend_from_slice(&data);
+    }
+    Some(bytes)
+}
+
+/// The value of a header; `None` if it is missing, repeated or not text.
+fn header_text(headers: &HeaderMap, name: header::HeaderName) -> Option<String> {
+    let mut values = headers.get_all(name).into_iter();
+    let first = values.next()?.to_str().ok()?.to_owned();
+    values.next().is_none().then_some(first)
+}
+
+/// True if a host with a port is this server.
+fn is_here(host: &str, port: u16) -> bool {
+    LOOPBACK.iter().any(|name| host.eq_ignore_ascii_case(&format!("{name}:{port}")))
+}
+
+/// True if an origin is a page from this machine, on any port.
+fn is_local_page(origin: &str) -> bool {
+    let Ok(origin) = origin.parse::<Uri>() else {
+        return false;
+    };
+    let is_http = matches!(origin.scheme_str(), Some("http" | "https"));
+    is_http && origin.host().is_some_and(|host| LOOPBACK.contains(&host))
+}
+
+/// Maximum number of open connections; further ones wait (chosen).
+const MAX_CONNECTIONS: usize = 64;
+
+/// Maximum time for receiving the headers of a request, which also limits idle connections (chosen).
+const HEADER_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Time for finishing open requests after `end` (chosen).
+const SHUTDOWN_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// Pause after a connection could not be accepted, for example because no file descriptor is free (chosen).
+const ACCEPT_PAUSE: Duration = Duration::from_millis(100);
+
+/// Answers requests until `end`, then finishes the open ones.
+async fn answer_until<S>(listener: tokio::net::TcpListener, service: S, end: impl Future<Output = ()>)
+where
+    S: HttpService<Incoming, ResBody = String, Error = Infallible, Future: Send> + Clone + Send + 'static,
+{
+    let free = Arc::new(Semaphore::new(MAX_CONNECTIONS));
+    let open = GracefulShutdown::new();
+    let mut end = std::pin::pin!(end);
+    loop {
+        let next = async {
+            let permit = Arc::clone(&free).acquire_owned().await;
+            (permit, listener.accept().await)
+        };
+        let (permit, accepted) = tokio::select! {
+            () = &mut end => break,
+            next = next => next,
+        };
+        let Ok((stream, _)) = accepted else {
+            tokio::time::sleep(ACCEPT_PAUSE).await;
+            continue;
+        };
+        let connection = http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(HEADER_TIMEOUT)
+            .serve_connection(TokioIo::new(stream), service.clone());
+        let connection = open.watch(connection);
+        tokio::spawn(async move {
+            // Errors such as a broken connection or invalid HTTP concern only the client.
+            let _ = connection.await;
+            drop(permit);
+        });
+    }
+    let _ = tokio::time::timeout(SHUTDOWN_TIMEOUT, open.shutdown()).await;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_pages_of_this_machine_are_local() {
+        for origin in ["http://localhost:3000", "http://127.0.0.1", "http://[::1]:8"] {
+            assert!(is_local_page(origin), "{origin}");
+        }
+        for origin in [
+            "null",
+            "http://evil.example",
+            "http://localhost.evil.example",
+            "http://127.0.0.1.evil.example:8089",
+            "file://localhost",
+        ] {
+            assert!(!is_local_page(origin), "{origin}");
+        }
+        assert!(is_here("localhost:80", 80) && is_here("LOCALHOST:80", 80));
+        assert!(!is_here("localhost", 80) && !is_here("localhost:81", 80));
     }
 }

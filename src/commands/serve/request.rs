@@ -1,18 +1,30 @@
 //! Parses a request: [`ServedQuestion`].
+//!
+//! Parses a multiple-choice question in free text: [`ParsedQuestion`].
+//!
+//! Matching of an image to the frame of a data set that it shows: [`FrameMatcher`].
+//!
+//! The linear light of the image is averaged over a coarse grid, which removes most of the sensor noise. The cell
+//! values are then correlated with those of every frame. The correlation does not depend on the brightness of the
+//! image, so a frame is recognised at every level at which some of it is visible.
 
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use hyper::StatusCode;
+use rayon::prelude::*;
+use regex::Regex;
 use serde::Deserialize;
 use tokio::sync::OwnedSemaphorePermit;
 
-use super::completion::{ReplyForm, RequestFault};
-use super::memory::MemoryBound;
-use crate::pictures::{DecodeRule, ImageFile};
-use crate::pictures::{Payload, PayloadFormat};
-use crate::types::Rgb;
+use super::completion::{MemoryBound, ReplyForm, RequestFault};
+use crate::data::Dataset;
+use crate::engine::images::progress::Progress;
+use crate::error::Result;
+use crate::pictures::{DecodeRule, ImageFile, Payload, PayloadFormat};
+use crate::types::questions::letter;
+use crate::types::{FrameId, Rgb};
 
 /// Maximum number of pixels of an image, and of all images in flight (chosen). Decoded and encoded again, a pixel takes
 /// 10 to 20 bytes.
@@ -177,6 +189,129 @@ fn invalid_image(message: String) -> RequestFault {
     RequestFault::new(StatusCode::BAD_REQUEST, message).at("image_url", "invalid_image_url")
 }
 
+/// A question with its choices, without their letters.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) struct ParsedQuestion {
+    pub(super) question: String,
+    pub(super) choices: Vec<String>,
+}
+
+/// A line with a choice: `A. yes`, `(B) no`, `C: perhaps`.
+static CHOICE: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(r"^\s*[(\[]?([A-Z])[)\].:]+\s*(\S.*?)\s*$").ok());
+
+impl ParsedQuestion {
+    /// Parses the last question of a text. The choices are lines with consecutive letters. The question is the last
+    /// line before them that ends with a question mark, or else the line directly before them.
+    ///
+    /// # Errors
+    /// 400 if the text has fewer than two choices.
+    pub(super) fn parse(text: &str) -> Result<Self, RequestFault> {
+        let lines: Vec<&str> = text.lines().collect();
+        let parsed: Vec<Option<(char, &str)>> = lines.iter().map(|line| parse_choice(line)).collect();
+        let first = parsed.iter().rposition(|line| matches!(line, Some(('A', _)))).ok_or_else(no_choices)?;
+        let mut choices = Vec::new();
+        for (own_letter, text) in parsed[first..].iter().flatten() {
+            if *own_letter == letter(choices.len()) {
+                choices.push((*text).to_owned());
+            }
+        }
+        if choices.len() < 2 {
+            return Err(no_choices());
+        }
+        let mut before = lines[..first].iter().rev().map(|line| line.trim()).filter(|line| !line.is_empty());
+        let question = before.clone().find(|line| line.ends_with('?')).or_else(|| before.next()).unwrap_or_default();
+        let question = question.strip_prefix("Question:").unwrap_or(question);
+        Ok(Self { question: question.trim().to_owned(), choices })
+    }
+}
+
+fn no_choices() -> RequestFault {
+    let message = "no choices in the text; lines like \"A. yes\" and \"B. no\" are expected";
+    RequestFault::new(StatusCode::BAD_REQUEST, message)
+}
+
+/// The letter and the text of a choice; `None` if the line is not a choice.
+fn parse_choice(line: &str) -> Option<(char, &str)> {
+    let found = CHOICE.as_ref()?.captures(line)?;
+    let letter = found.get(1)?.as_str().chars().next()?;
+    Some((letter, found.get(2)?.as_str()))
+}
+
+/// Number of grid cells, horizontally and vertically (chosen).
+const GRID: [usize; 2] = [32, 24];
+
+/// Minimum correlation at which an image is matched to a frame (chosen).
+const MIN_CORRELATION: f64 = 0.5;
+
+/// Linear light of each sRGB code, from 0 to 65,535 (IEC 61966-2-1).
+static LINEAR: LazyLock<[u64; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|code| {
+        let value = code as f64 / 255.0;
+        let linear = if value <= 0.04045 { value / 12.92 } else { libm::pow((value + 0.055) / 1.055, 2.4) };
+        (linear * 65_535.0 + 0.5) as u64
+    })
+});
+
+/// Frames of a data set, each with its normalised cell values.
+pub(super) struct FrameMatcher(Vec<(FrameId, Vec<f64>)>);
+
+impl FrameMatcher {
+    /// Computes the cell values of every frame of a data set.
+    ///
+    /// # Errors
+    /// If an image cannot be read or decoded.
+    pub(super) fn new(dataset: &Dataset, progress: &Progress) -> Result<Self> {
+        let ids: Vec<&FrameId> = dataset.frames().collect();
+        let bar = progress.bar("looking at frames", ids.len());
+        ids.into_par_iter()
+            .map(|id| {
+                let image = dataset.picture(id)?.decode()?;
+                bar.inc();
+                Ok((id.clone(), cell_values(&image)))
+            })
+            .collect::<Result<_>>()
+            .map(Self)
+    }
+
+    /// Number of frames.
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Frame with the highest correlation to an image; `None` if the highest correlation is below the minimum.
+    pub(super) fn best_match(&self, image: &Rgb) -> Option<&FrameId> {
+        let own = cell_values(image);
+        let (highest, id) = self
+            .0
+            .iter()
+            .map(|(id, other)| {
+                let correlation: f64 = own.iter().zip(other).map(|(a, b)| a * b).sum();
+                (correlation, id)
+            })
+            .max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (highest >= MIN_CORRELATION).then_some(id)
+    }
+}
+
+/// Square root of the mean linear light of each cell, normalised to mean 0 and Euclidean norm 1.
+fn cell_values(image: &Rgb) -> Vec<f64> {
+    let (width, height) = (image.width(), image.height());
+    let mut cells = vec![(0_u64, 0_u64); GRID[0] * GRID[1]];
+    let (pixels, _) = image.samples().as_chunks::<3>();
+    for (i, pixel) in pixels.iter().enumerate() {
+        let (x, y) = (i % width * GRID[0] / width, i / width * GRID[1] / height);
+        let (light, count) = &mut cells[y * GRID[0] + x];
+        *light += pixel.iter().map(|code| LINEAR[usize::from(*code)]).sum::<u64>();
+        *count += 1;
+    }
+    // The square root keeps a bright window from dominating the rest.
+    let lights: Vec<f64> = cells.iter().map(|(light, count)| (*light as f64 / (*count).max(1) as f64).sqrt()).collect();
+    let mean = lights.iter().sum::<f64>() / lights.len() as f64;
+    let norm = lights.iter().map(|light| (light - mean) * (light - mean)).sum::<f64>().sqrt();
+    let norm = if norm > 0.0 { norm } else { 1.0 };
+    lights.into_iter().map(|light| (light - mean) / norm).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -185,6 +320,27 @@ mod tests {
     fn values_are_counted_outside_of_strings() {
         for (json, count) in [(r#"{"a": [1, 2], "b": {}}"#, 5), (r#"{"a": "[,\",{"}"#, 1), (r#""a""#, 0)] {
             assert_eq!(value_count(json.as_bytes()), count, "{json}");
+        }
+    }
+
+    #[test]
+    fn choices_are_read_however_they_are_lettered() {
+        for text in [
+            "Is it dark?\nA. yes\nB. no\nAnswer with the letter.",
+            "You are a helpful assistant.\nQuestion: Is it dark?\n\nOptions:\n(A) yes\n(B) no\n",
+            "Is it dark?\n A: yes \n B: no\nThe best answer is:",
+            "Was it?\nA. no\nB. yes\nIs it dark?\nA) yes\nB) no",
+        ] {
+            let parsed = ParsedQuestion::parse(text).ok().unwrap();
+            assert_eq!(parsed.question, "Is it dark?", "{text}");
+            assert_eq!(parsed.choices, ["yes", "no"], "{text}");
+        }
+    }
+
+    #[test]
+    fn a_text_without_choices_is_refused() {
+        for text in ["", "Hello", "Is it?\nA. yes", "Is it?\nB. no"] {
+            assert!(ParsedQuestion::parse(text).is_err(), "{text}");
         }
     }
 }

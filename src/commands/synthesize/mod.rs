@@ -1,7 +1,8 @@
 //! `synthesize`: writes low-light versions of images, identical to those that an evaluation of the same folder would
 //! send.
+//!
+//! `synthesize check`: compares images with the digests in their JSON files.
 
-mod check;
 mod sheet;
 
 use std::collections::BTreeSet;
@@ -10,26 +11,29 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use rayon::prelude::*;
+use serde::Deserialize;
 
+use crate::data::frames::is_image;
 use crate::data::inputs::{InputFrame, Inputs, stem};
 use crate::data::{FolderArgs, Picture};
 use crate::engine::images::frame_work::FrameWork;
 use crate::engine::images::frames::{Frames, InputTally};
-use crate::engine::images::image_steps::ImageSteps;
 use crate::engine::images::progress::{Progress, StepBar};
 use crate::engine::images::recipes::{ImageRecipe, Recipe};
-use crate::engine::images::stored::{ImageCounts, ImageOutcome, OutputImage, Refusals, Sidecar};
-use crate::engine::images::timings::Timings;
+use crate::engine::images::stored::{ImageCounts, ImageOutcome, OutputFile, OutputImage, Refusals, Sidecar};
+use crate::engine::images::timings::{ImageSteps, Timings};
 use crate::engine::images::workers::{ThreadArgs, pool};
 use crate::error::{Error, Result};
+use crate::files;
+use crate::report::text::words::first_names;
 use crate::runs::Outcome;
-use crate::runs::shard_args::{ShardArgs, keep_shard};
+use crate::runs::resolved_shard::{ShardArgs, keep_shard};
 use crate::types::text::counted;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 use darkqa_light::{LightArgs, LightSettings, NoiseKey};
+use sheet::SheetRecipe;
 
 pub(crate) use sheet::Sheet;
-use sheet::SheetRecipe;
 
 /// `synthesize`, or another form of it.
 #[derive(Debug, Args)]
@@ -120,7 +124,7 @@ struct ImageMaking<'a> {
 /// If images cannot be made, or none to check is found.
 pub(crate) fn synthesize(command: &SynthesizeCommand, progress: &Progress) -> Result<Outcome> {
     match (&command.form, &command.images) {
-        (Some(SynthesizeForm::Check { folder }), _) => check::check(folder),
+        (Some(SynthesizeForm::Check { folder }), _) => check(folder),
         (Some(SynthesizeForm::From(args)), _) => replay(args),
         (None, Some(args)) => make_images(args, progress),
         (None, None) => Err(Error::usage("INPUT", "an image or a folder is missing")),
@@ -308,4 +312,112 @@ fn replay(args: &ReplayArgs) -> Result<Outcome> {
         return Err(refusal.into_error());
     }
     Ok(outcome(counts, &args.out, 1))
+}
+
+/// Schemas of JSON files with the digest of an image. Other JSON files are ignored.
+const SCHEMAS: [&str; 3] = ["darkqa.image/1", "darkqa.image/2", "darkqa.sheet/1"];
+
+/// Maximum number of images without a JSON file that are named; chosen.
+const MAX_NAMED: usize = 3;
+
+/// Checks that each image in a folder has a JSON file and the digest in it. Nothing is changed.
+///
+/// # Errors
+/// If the folder cannot be read, or has no JSON file of an image.
+fn check(folder: &Path) -> Result<Outcome> {
+    let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
+    let files: std::io::Result<Vec<PathBuf>> = entries.map(|entry| Ok(entry?.path())).collect();
+    let mut files = files.map_err(|e| Error::file(folder, "read", e))?;
+    files.sort();
+    let (mut intact, mut wrong) = (0, 0);
+    let mut unknown: BTreeSet<String> = files
+        .iter()
+        .filter(|file| is_image(file))
+        .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
+        .collect();
+    for file in files.iter().filter(|file| file.extension().is_some_and(|end| end == "json")) {
+        match read_output(file) {
+            Ok(Some(output)) => {
+                unknown.remove(&output.file);
+                match check_image(file, &output) {
+                    Ok(()) => intact += 1,
+                    Err(e) => {
+                        tracing::error!("{e}");
+                        wrong += 1;
+                    }
+                }
+            }
+            Ok(None) => {}
+            Err(e) => {
+                // The image has a JSON file, although an unusable one.
+                unknown.retain(|image| Path::new(image).file_stem() != file.file_stem());
+                tracing::error!("{e}");
+                wrong += 1;
+            }
+        }
+    }
+    if intact + wrong == 0 {
+        let problem = "no JSON file of an image of `synthesize` is in it";
+        return Err(Error::data(folder.display(), problem));
+    }
+    if !unknown.is_empty() {
+        let unknown: Vec<String> = unknown.iter().cloned().collect();
+        tracing::error!(
+            "{}: no JSON file says how they were made: {}",
+            folder.display(),
+            first_names(&unknown, MAX_NAMED)
+        );
+    }
+    Ok(Outcome::text(
+        Outcome::complete_if(wrong == 0 && unknown.is_empty()),
+        format!(
+            "{}: images as they were written: {intact}; not as they were written: {wrong}; without a JSON file: {}\n",
+            folder.display(),
+            unknown.len()
+        ),
+    ))
+}
+
+/// The fields of a JSON file that are checked, in all schemas.
+#[derive(Deserialize)]
+struct SidecarOutput {
+    schema: String,
+    output: Option<OutputFile>,
+}
+
+/// Reads the file name and digest of the image of a JSON file; `None` for a JSON file with another schema.
+///
+/// # Errors
+/// If the JSON file has no digest of its image, or names an image outside of its folder.
+fn read_output(file: &Path) -> Result<Option<OutputFile>> {
+    let text = files::text(file)?;
+    let Ok(sidecar) = serde_json::from_str::<SidecarOutput>(&text) else {
+        return Ok(None);
+    };
+    if !SCHEMAS.contains(&&*sidecar.schema) {
+        return Ok(None);
+    }
+    let Some(output) = sidecar.output else {
+        return Err(Error::data(
+            file.display(),
+            "has no digest of its image: an older version wrote it; run `synthesize` again to add it",
+        ));
+    };
+    if Path::new(&output.file).components().count() != 1 {
+        return Err(Error::data(file.display(), "names an image outside of its folder"));
+    }
+    Ok(Some(output))
+}
+
+/// Compares an image with the digest in its JSON file.
+///
+/// # Errors
+/// If the image is missing or has other bytes.
+fn check_image(file: &Path, output: &OutputFile) -> Result<()> {
+    let image = file.with_file_name(&output.file);
+    let bytes = files::bytes(&image)?;
+    match output.fault(&bytes) {
+        None => Ok(()),
+        Some(fault) => Err(Error::data(image.display(), fault)),
+    }
 }

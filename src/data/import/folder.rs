@@ -2,17 +2,24 @@
 //!
 //! The folders are `rgb`, `depth`, `sem` and `over` (or the names of other tools), in the folder itself or in one
 //! folder per scene.
+//!
+//! A folder of frames in the format of this program, imported to choose key frames: [`FrameFolder`].
+//!
+//! Files of a folder that an import does not read: [`UnreadFiles`].
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, labels};
-use super::files::{IMAGES, MAPS, files, first_folder, folders};
-use super::map_files::MapFiles;
-use crate::data::image_paths::ImagePaths;
+use serde::Deserialize;
+
+use super::files::{
+    Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MAPS, MapArgs, MapFiles, files, first_folder, folders, labels,
+};
+use crate::data::frames::ImagePaths;
+use crate::data::{Dataset, ImageSource, open_frames};
 use crate::error::{Error, Result};
-use crate::files::reading::entries;
-use crate::types::{Labels, Rgb};
+use crate::files::{entries, json_lines};
+use crate::types::{DepthKind, Frame, FrameId, Labels, Rgb, Segmentation};
 
 /// Names of the folders of images, depth, classes and segments.
 const RGB: [&str; 6] = ["rgb", "image", "images", "color", "img", "RGB"];
@@ -143,5 +150,202 @@ impl Adapter for Folder {
             classes.mapv_inplace(|id| if id == 255 { 0 } else { id + 1 });
         }
         Ok(maps)
+    }
+}
+
+/// Folder of frames in the format of this program.
+#[derive(Debug)]
+pub(super) struct FrameFolder {
+    folder: PathBuf,
+    dataset: Dataset,
+    listing: Listing,
+}
+
+/// Fields of a line of `frames.jsonl` that [`Dataset`] does not read.
+#[derive(Deserialize)]
+struct FrameLine {
+    scene: String,
+    frame: String,
+    t: Option<f64>,
+    pose: Option<Vec<f64>>,
+    depth_kind: Option<DepthKind>,
+}
+
+impl FrameFolder {
+    pub(super) fn open(folder: &Path, further: &[PathBuf]) -> Result<Self> {
+        let dataset = open_frames(folder, further)?;
+        let Some(labels) = dataset.labels().cloned() else {
+            return Err(Error::data(folder.display(), "no classes.json in this folder"));
+        };
+        let lines = json_lines::<FrameLine>(&folder.join("frames.jsonl"))?;
+        let depth_kind = lines.iter().find_map(|(_, line)| line.depth_kind);
+        let mut listing = Listing { labels, depth_kind: depth_kind.unwrap_or_default(), ..Listing::default() };
+        for (index, (_, line)) in lines.into_iter().enumerate() {
+            let id = FrameId(format!("{}/{}", line.scene, line.frame));
+            let Some(ImageSource::File(file)) = dataset.sources.get(&id) else {
+                continue;
+            };
+            let facts = &file.facts;
+            if facts.segmentation == Segmentation::Parts {
+                listing.segmentation = Segmentation::Parts;
+            }
+            listing.names.entry(line.scene.clone()).or_insert_with(|| facts.names.as_ref().clone());
+            listing.frames.push(ListedFrame {
+                rgb: file.rgb.clone(),
+                scene: line.scene,
+                frame: line.frame,
+                time: line.t,
+                pose: line.pose,
+                intrinsics: facts.intrinsics,
+                room: facts.room.clone(),
+                index,
+            });
+        }
+        listing.frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
+        Ok(Self { folder: folder.to_owned(), dataset, listing })
+    }
+}
+
+impl Adapter for FrameFolder {
+    fn listing(&self) -> &Listing {
+        &self.listing
+    }
+
+    fn other_files(&self) -> Vec<PathBuf> {
+        let folder_files = ["frames.jsonl", "classes.json", "dataset.json"].map(|name| self.folder.join(name));
+        let segment_names =
+            self.listing.names.keys().map(|scene| self.folder.join("scenes").join(scene).join("segments.json"));
+        let maps = self
+            .dataset
+            .sources
+            .values()
+            .filter_map(|source| match source {
+                ImageSource::File(file) => Some(file.maps.paths()),
+                _ => None,
+            })
+            .flatten();
+        folder_files.into_iter().chain(segment_names).chain(maps).collect()
+    }
+
+    fn read_maps(&self, frame: &ListedFrame, _rgb: &Rgb) -> Result<FrameMaps> {
+        let Frame { depth, semantic, segments, .. } =
+            self.dataset.frame(&FrameId(format!("{}/{}", frame.scene, frame.frame)))?;
+        Ok(FrameMaps { depth, semantic, segments, room: None })
+    }
+}
+
+/// Maximum number of kinds of files in the message.
+const MAX_NAMED_KINDS: usize = 8;
+
+/// Unread files by kind: the name of their folder and their extension.
+#[derive(Debug, Default, PartialEq, Eq)]
+pub(crate) struct UnreadFiles(BTreeMap<String, FilesOfKind>);
+
+#[derive(Debug, PartialEq, Eq)]
+struct FilesOfKind {
+    count: usize,
+    /// Relative path of the first file.
+    first: String,
+}
+
+impl UnreadFiles {
+    /// Finds the files in a folder and its subfolders that are not in `read`. Links to folders are not followed.
+    ///
+    /// # Errors
+    /// If a folder cannot be read.
+    pub(super) fn in_folder(folder: &Path, read: &BTreeSet<PathBuf>) -> Result<Self> {
+        let mut unread = Self::default();
+        unread.add_folder(folder, folder, read)?;
+        Ok(unread)
+    }
+
+    fn add_folder(&mut self, root: &Path, folder: &Path, read: &BTreeSet<PathBuf>) -> Result<()> {
+        for path in entries(folder)? {
+            if path.is_symlink() && path.is_dir() {
+                continue;
+            }
+            if path.is_dir() {
+                self.add_folder(root, &path, read)?;
+            } else if !read.contains(&path) {
+                self.count(path.strip_prefix(root).unwrap_or(&path));
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts a file, given by its relative path.
+    fn count(&mut self, path: &Path) {
+        let folder = text(path.parent().and_then(Path::file_name));
+        let name = match path.extension() {
+            Some(ending) => format!("*.{}", ending.to_string_lossy()),
+            None => text(path.file_name()),
+        };
+        let kind = if folder.is_empty() { name } else { format!("{folder}/{name}") };
+        let files = self.0.entry(kind).or_insert_with(|| FilesOfKind { count: 0, first: path.display().to_string() });
+        files.count += 1;
+    }
+
+    /// Adds the files of another folder.
+    pub(super) fn merge(&mut self, other: Self) {
+        for (kind, files) in other.0 {
+            self.0.entry(kind).and_modify(|known| known.count += files.count).or_insert(files);
+        }
+    }
+
+    /// Line with the unread files, the most frequent kinds first; empty if there are none.
+    pub(crate) fn line(&self) -> String {
+        if self.0.is_empty() {
+            return String::new();
+        }
+        let mut kinds: Vec<(&String, &FilesOfKind)> = self.0.iter().collect();
+        kinds.sort_by_key(|(kind, files)| (std::cmp::Reverse(files.count), *kind));
+        let mut named: Vec<String> = kinds
+            .iter()
+            .take(MAX_NAMED_KINDS)
+            .map(|(kind, files)| match files.count {
+                1 => files.first.clone(),
+                count => format!("{count} {kind}"),
+            })
+            .collect();
+        let more: usize = kinds.iter().skip(MAX_NAMED_KINDS).map(|(_, files)| files.count).sum();
+        if more > 0 {
+            named.push(format!("{more} more"));
+        }
+        format!("not read: {}\n", named.join(", "))
+    }
+}
+
+fn text(part: Option<&std::ffi::OsStr>) -> String {
+    part.unwrap_or_default().to_string_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+
+    use super::*;
+
+    fn write(folder: &Path, name: &str) -> PathBuf {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "").unwrap();
+        path
+    }
+
+    #[test]
+    fn unread_files_are_counted_by_kind() {
+        let folder = tempfile::tempdir().unwrap();
+        let read: BTreeSet<PathBuf> = ["s0/rgb/0.png", "s0/rgb/1.png"].map(|name| write(folder.path(), name)).into();
+        assert_eq!(UnreadFiles::in_folder(folder.path(), &read).unwrap().line(), "");
+        for name in ["s0/sem/0.tif", "s1/sem/1.tif", "s0/note", "README.md"] {
+            write(folder.path(), name);
+        }
+        let unread = UnreadFiles::in_folder(folder.path(), &read).unwrap();
+        assert_eq!(unread.line(), "not read: 2 sem/*.tif, README.md, s0/note\n");
+        for number in 0..9 {
+            write(folder.path(), &format!("more/{number}.e{number}"));
+        }
+        let line = UnreadFiles::in_folder(folder.path(), &read).unwrap().line();
+        assert!(line.ends_with(", 4 more\n"), "{line}");
     }
 }

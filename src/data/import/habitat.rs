@@ -7,18 +7,37 @@
 //! - one annotation file: `*.semantic.txt` (HM3D-Sem), `*.house` (Matterport3D) or `info_semantic.json` (Replica);
 //! - `trajectory.jsonl`, optional, with one line per frame: `{"frame", "t", "pose", "intrinsics"}`.
 //!
-//! The optional `scenes.json`, next to the scene folders, records how the scenes were rendered (see [`renders`]).
+//! The optional `scenes.json`, next to the scene folders, records how the scenes were rendered (see `renders`).
+//!
+//! Segment names of an HM3D-Sem scene, from `<scene>.semantic.txt`.
+//!
+//! The format follows habitat-sim (`src/esp/scene/HM3DSemanticScene.cpp`): the first line is `HM3D Semantic
+//! Annotations`, then one line per segment, `id,colour,"name",region`. A name is all text between the quotes and may
+//! contain commas.
+//!
+//! Segment names and room types of a Matterport3D scene, from `<scene>.house`.
+//!
+//! The first word of a line is its type (Matterport `data_organization.md`): `C` is a category with its class in
+//! mpcat40, `O` an object with its region and category, `R` a region with the letter of its room type. In names, `#`
+//! represents a space.
+//!
+//! Record of how scenes were rendered: `scenes.json`, written by the script `hm3d_frames.py`.
+//!
+//! Segment names of a Replica scene, from `info_semantic.json`.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
+use serde_json::Value;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, class_numbers};
-use super::files::{IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_segments};
-use super::{hm3d, mp3d, renders, replica};
+use super::files::{
+    Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MapArgs, check_same_size, class_numbers, file_name, files,
+    folders, map_paths, read_frame_depth, read_segments,
+};
 use crate::error::{Error, Result};
-use crate::files::reading::{json_lines, text};
+use crate::files::{json_lines, text};
+use crate::labels::{UNKNOWN, class_of, class_override};
 use crate::types::{Intrinsics, Rgb, SegmentName};
 
 /// Minimum share of a frame's named pixels, in percent, in the region that gives the frame its room type (chosen).
@@ -76,7 +95,7 @@ impl Habitat {
                 set.add_scene(&scene)?;
             }
         }
-        set.listing.renders = renders::read(folder, &set.scenes.keys().collect())?;
+        set.listing.renders = read(folder, &set.scenes.keys().collect())?;
         Ok(set)
     }
 
@@ -130,15 +149,15 @@ impl Habitat {
         self.scene_files.push(path.clone());
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         let (names, rooms) = if extension == "house" {
-            let house = mp3d::parse(&content, &self.listing.labels.expressible)
+            let house = parse_mp3d(&content, &self.listing.labels.expressible)
                 .map_err(|(line, problem)| Error::line(&path, line, problem))?;
             (house.names, house.rooms)
         } else if extension == "json" {
-            let names = replica::parse(&content, &mut self.listing.unlisted)
+            let names = parse_replica(&content, &mut self.listing.unlisted)
                 .map_err(|problem| Error::data(path.display(), problem))?;
             (names, BTreeMap::new())
         } else {
-            let names = hm3d::parse(&content, &mut self.listing.unlisted)
+            let names = parse_hm3d(&content, &mut self.listing.unlisted)
                 .map_err(|(line, problem)| Error::line(&path, line, problem))?;
             (names, BTreeMap::new())
         };
@@ -223,5 +242,286 @@ impl Adapter for Habitat {
             segments: Some(segments),
             room: room.map(|room| (*room).to_owned()),
         })
+    }
+}
+
+const HEAD: &str = "HM3D Semantic Annotations";
+
+/// Parses the names of segments, by number. Segments with an empty or unknown name are left out. Names without a known
+/// class are counted in `unlisted`.
+///
+/// # Errors
+/// If a line is invalid: its number, and the problem.
+fn parse_hm3d(
+    text: &str,
+    unlisted: &mut BTreeMap<String, usize>,
+) -> Result<BTreeMap<u32, SegmentName>, (usize, String)> {
+    let mut lines = (1..).zip(text.trim_start_matches('\u{feff}').lines());
+    match lines.next() {
+        Some((_, head)) if head.trim() == HEAD => {}
+        _ => return Err((1, format!("{HEAD:?} expected"))),
+    }
+    let mut names = BTreeMap::new();
+    for (number, line) in lines {
+        if line.trim().is_empty() {
+            continue;
+        }
+        let wrong = |problem: &str| (number, format!("{problem} in id,colour,\"name\",region"));
+        let mut parts = line.splitn(2, '"');
+        let head = parts.next().unwrap_or_default();
+        let (name, region) = parts
+            .next()
+            .and_then(|rest| rest.rsplit_once('"'))
+            .ok_or_else(|| wrong("a name between quotes expected"))?;
+        let id: u32 = head
+            .split(',')
+            .next()
+            .unwrap_or_default()
+            .trim()
+            .parse()
+            .map_err(|_| wrong("a whole number expected as id"))?;
+        let region: i64 =
+            region.trim_start_matches(',').trim().parse().map_err(|_| wrong("a whole number expected as region"))?;
+        let Some(canonical) = class_of(name, name, 1, unlisted) else {
+            continue;
+        };
+        let segment = SegmentName { name: name.to_owned(), canonical: canonical.to_owned(), region: Some(region) };
+        if names.insert(id, segment).is_some() {
+            return Err((number, format!("the segment {id} is defined twice")));
+        }
+    }
+    Ok(names)
+}
+
+/// Used content of a `.house` file.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct House {
+    /// Names of segments, by number.
+    pub(super) names: BTreeMap<u32, SegmentName>,
+    /// Room type of each region, by its number.
+    pub(super) rooms: BTreeMap<i64, &'static str>,
+}
+
+/// Room type for the letter of a region; `None` for room types that no question asks about.
+fn room_type(letter: &str) -> Option<&'static str> {
+    Some(match letter {
+        "a" | "t" => "bathroom",
+        "b" => "bedroom",
+        "d" => "dining room",
+        "f" | "l" => "living room",
+        "j" => "laundry room",
+        "k" => "kitchen",
+        "o" => "office",
+        _ => return None,
+    })
+}
+
+/// Parses a `.house` file. Categories with a class that is not in `classes` get the class for unknown objects.
+///
+/// # Errors
+/// If a line is invalid: its number, and the problem.
+fn parse_mp3d(text: &str, classes: &BTreeSet<String>) -> Result<House, (usize, String)> {
+    let mut categories: BTreeMap<&str, (String, String)> = BTreeMap::new();
+    let mut objects = Vec::new();
+    let mut house = House::default();
+    for (number, line) in (1..).zip(text.lines()) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let short = || (number, format!("a line of {} words is too short", words.len()));
+        match words.first() {
+            Some(&"C") => {
+                let [_, index, _, name, _, class, ..] = words[..] else {
+                    return Err(short());
+                };
+                let name = name.replace('#', " ");
+                let class = class_override(&name).unwrap_or(class);
+                let class = if classes.contains(class) { class } else { UNKNOWN };
+                categories.insert(index, (name, class.to_owned()));
+            }
+            Some(&"O") => {
+                let [_, index, region, category, ..] = words[..] else {
+                    return Err(short());
+                };
+                let index: u32 =
+                    index.parse().map_err(|_| (number, format!("{index:?} is not the number of an object")))?;
+                let region: i64 =
+                    region.parse().map_err(|_| (number, format!("{region:?} is not the number of a region")))?;
+                objects.push((index, region, category));
+            }
+            Some(&"R") => {
+                let [_, index, _, _, _, letter, ..] = words[..] else {
+                    return Err(short());
+                };
+                let index: i64 =
+                    index.parse().map_err(|_| (number, format!("{index:?} is not the number of a region")))?;
+                house.rooms.extend(room_type(letter).map(|room| (index, room)));
+            }
+            _ => {}
+        }
+    }
+    for (index, region, category) in objects {
+        if let Some((name, canonical)) = categories.get(category) {
+            let name = SegmentName { name: name.clone(), canonical: canonical.clone(), region: Some(region) };
+            house.names.insert(index, name);
+        }
+    }
+    Ok(house)
+}
+
+/// Value of `schema` in `scenes.json`.
+const SCHEMA: &str = "darkqa.renders/1";
+
+/// Reads `scenes.json`, without scenes that are not in `present`, the scenes of the folder. `None` if the file does not
+/// exist, or, with a warning, if it is from another tool.
+///
+/// # Errors
+/// If the file is not JSON, or is from an unknown version of the script.
+pub(super) fn read(folder: &Path, present: &BTreeSet<&String>) -> Result<Option<Value>> {
+    let path = folder.join("scenes.json");
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let mut record: Value = serde_json::from_str(&text(&path)?).map_err(|e| Error::data(path.display(), e))?;
+    match record["schema"].as_str() {
+        Some(SCHEMA) => {}
+        Some(other) if other.starts_with("darkqa.renders/") => {
+            let problem = format_args!("{SCHEMA:?} expected, not {other:?}");
+            return Err(Error::data(path.display(), problem));
+        }
+        _ => {
+            tracing::warn!("{}: not the record of hm3d_frames.py, so it is ignored", path.display());
+            return Ok(None);
+        }
+    }
+    let Some(scenes) = record["scenes"].as_array_mut() else {
+        let problem = "a list of scenes expected at the key scenes";
+        return Err(Error::data(path.display(), problem));
+    };
+    let recorded: BTreeSet<String> = scenes.iter().map(scene_name).collect();
+    for scene in present.iter().filter(|scene| !recorded.contains(**scene)) {
+        tracing::warn!("{}: nothing about the scene {scene}", path.display());
+    }
+    scenes.retain(|scene| present.contains(&scene_name(scene)));
+    for scene in recorded.iter().filter(|scene| !present.contains(scene)) {
+        tracing::warn!("{}: the scene {scene} is not in the folder", path.display());
+    }
+    Ok(Some(record))
+}
+
+fn scene_name(scene: &Value) -> String {
+    scene["scene"].as_str().unwrap_or_default().to_owned()
+}
+
+/// Used fields of the file.
+#[derive(Deserialize)]
+struct SemanticInfo {
+    objects: Vec<ReplicaObject>,
+}
+
+#[derive(Deserialize)]
+struct ReplicaObject {
+    id: i64,
+    class_name: String,
+}
+
+/// Parses the names of segments, by number. Segments without a name are left out. Names without a known class are
+/// counted in `unlisted`.
+fn parse_replica(text: &str, unlisted: &mut BTreeMap<String, usize>) -> Result<BTreeMap<u32, SegmentName>, String> {
+    let info: SemanticInfo = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    let mut names = BTreeMap::new();
+    for ReplicaObject { id, class_name } in info.objects {
+        let Ok(id) = u32::try_from(id) else {
+            continue;
+        };
+        let words = class_name.replace('-', " ");
+        let Some(canonical) = class_of(&words, &class_name, 1, unlisted) else {
+            continue;
+        };
+        let name = SegmentName { name: words, canonical: canonical.to_owned(), region: None };
+        names.insert(id, name);
+    }
+    Ok(names)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::labels::canonical;
+
+    #[test]
+    fn names_may_have_commas_and_be_empty() {
+        let text = "HM3D Semantic Annotations\n1,00FF7F,\"Night stand\",0\n\n2,AA0000,\"books, magazines\",-1\n3,BB,\"\",4\n4,CC,\"unknown\",4\n5,DD,\"flux capacitor\",2\n";
+        let mut unlisted = BTreeMap::new();
+        let names = parse_hm3d(text, &mut unlisted).unwrap();
+        assert_eq!(names.keys().copied().collect::<Vec<_>>(), [1, 2, 5]);
+        assert_eq!((names[&1].canonical.as_str(), names[&1].region), ("chest_of_drawers", Some(0)));
+        assert_eq!(names[&2].name, "books, magazines");
+        assert_eq!(names[&5].canonical, "misc");
+        assert_eq!(unlisted.into_keys().collect::<Vec<_>>(), ["books, magazines", "flux capacitor"]);
+    }
+
+    #[test]
+    fn errors_name_the_invalid_line() {
+        for (text, line, message) in [
+            ("", 1, "HM3D Semantic"),
+            ("id,colour\n", 1, "HM3D Semantic"),
+            ("HM3D Semantic Annotations\n1,FF,name,0\n", 2, "between quotes"),
+            ("HM3D Semantic Annotations\nx,FF,\"bed\",0\n", 2, "as id"),
+            ("HM3D Semantic Annotations\n1,FF,\"bed\"\n", 2, "as region"),
+            ("HM3D Semantic Annotations\n1,FF,\"bed\",0\n1,FE,\"bed\",0\n", 3, "segment 1 is defined twice"),
+        ] {
+            let (found, problem) = parse_hm3d(text, &mut BTreeMap::new()).unwrap_err();
+            assert!(found == line && problem.contains(message), "{found}: {problem}");
+        }
+    }
+
+    #[test]
+    fn objects_have_categories_and_regions() {
+        let text = "ASCII 1.1\nH x y 0 0\nR 0 0 0 0 b 1 2 3\nR 1 0 0 0 h 1 2 3\nC 4 12 coffee#table 5 table 0 0 0 0 0\nC 7 9 painting 39 objects 0 0 0 0 0\nC 8 9 thing 41 unlabeled 0\nO 0 0 4 1.0 2.0 3.0\nO 1 1 7 1 2 3\nO 2 1 -1 1 2 3\nO 3 1 8 0 0 0\n";
+        let house = parse_mp3d(text, &canonical()).unwrap();
+        assert_eq!(house.rooms, [(0, "bedroom")].into());
+        let names: Vec<(u32, &str, &str)> =
+            house.names.iter().map(|(id, name)| (*id, name.name.as_str(), name.canonical.as_str())).collect();
+        assert_eq!(names, [(0, "coffee table", "table"), (1, "painting", "picture"), (3, "thing", "misc")]);
+        assert_eq!(parse_mp3d("O 1", &canonical()).unwrap_err().0, 1);
+        assert!(parse_mp3d("\nO x 1 2", &canonical()).unwrap_err().1.contains("not the number of an object"));
+    }
+
+    fn read_text(content: &str) -> Result<Option<Value>> {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("scenes.json"), content).unwrap();
+        read(folder.path(), &BTreeSet::from([&"a".to_owned()]))
+    }
+
+    #[test]
+    fn record_is_limited_to_present_scenes() {
+        assert!(matches!(read(Path::new("/nowhere"), &BTreeSet::new()), Ok(None)));
+        let record = r#"{"schema": "darkqa.renders/1", "mode": "cover", "scenes": [{"scene": "a"}, {"scene": "b"}]}"#;
+        let found = read_text(record).unwrap().unwrap();
+        assert_eq!(found["mode"], "cover");
+        assert_eq!(found["scenes"], serde_json::json!([{"scene": "a"}]));
+        assert!(matches!(read_text(r#"{"scenes": ["kitchen"]}"#), Ok(None)));
+    }
+
+    #[test]
+    fn invalid_records_are_refused() {
+        for (content, message) in [
+            ("{", "scenes.json"),
+            (r#"{"schema": "darkqa.renders/2"}"#, "darkqa.renders/1"),
+            (r#"{"schema": "darkqa.renders/1"}"#, "a list of scenes"),
+        ] {
+            let problem = read_text(content).unwrap_err().to_string();
+            assert!(problem.contains(message), "{problem}");
+        }
+    }
+
+    #[test]
+    fn objects_have_classes() {
+        let text = r#"{"classes":[{"id":1,"name":"bed"}],"objects":[{"id":0,"class_id":1,"class_name":"bed"},{"id":2,"class_name":"coffee-table"},{"id":-1,"class_name":"bed"},{"id":3,"class_name":"gizmo"},{"id":4,"class_name":""}]}"#;
+        let mut unlisted = BTreeMap::new();
+        let names = parse_replica(text, &mut unlisted).unwrap();
+        let classes: Vec<(u32, &str)> = names.iter().map(|(id, name)| (*id, name.canonical.as_str())).collect();
+        assert_eq!(classes, [(0, "bed"), (2, "table"), (3, "misc")]);
+        assert_eq!(unlisted, [("gizmo".to_owned(), 1)].into());
+        assert!(parse_replica("{}", &mut unlisted).unwrap_err().contains("missing field `objects`"));
     }
 }

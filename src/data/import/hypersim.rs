@@ -6,9 +6,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, labels};
-use super::files::{file_name, files, folders};
-use super::map_files::MapFiles;
+use super::files::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, MapFiles, file_name, files, folders, labels};
 use crate::error::Result;
 use crate::types::{DepthKind, Rgb};
 

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 
 use clap::Args;
 
-use super::adapter::ListedFrame;
+use super::files::ListedFrame;
 use crate::error::{Error, Result};
 use crate::types::Decides;
 use crate::types::flags::positive;

@@ -4,38 +4,38 @@
 //! the same units: depth in millimetres, class numbers of a label space, segment numbers from 1.
 //! `src/docs/importing.md` shows the layouts. Recordings of robots have no maps and no adapter: [`recording`] and
 //! [`lerobot`] read them.
+//!
+//! NYU Depth v2 as PNG files: folders of images, depth and labels with the same file names, read by [`folder`].
+//!
+//! The labels have 40 classes (`--labels nyu40`, the default; 0 is void), 13 (`nyu13`), or 40 counted from 0 with 255
+//! for void, as several tools write them (`nyu40-1`). Depth files exist in millimetres, in 1/5000 m and scaled to the
+//! range of 16 bits, so `--depth-scale` is required.
+//!
+//! Several data sets of one kind as one: [`Combined`].
 
-mod adapter;
-mod combined;
 mod files;
 mod folder;
-mod frame_folder;
 mod habitat;
-mod hm3d;
 mod hypersim;
 pub(crate) mod keyframes;
 pub(crate) mod lerobot;
-mod map_files;
-mod mp3d;
-mod nyu;
-mod polygons;
 pub(crate) mod recording;
-mod renders;
-mod replica;
 mod scannet;
 mod sunrgbd;
 mod thor;
-mod unread_files;
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use crate::data::Root;
 use crate::error::{Error, Result};
 use crate::types::flags::flag_words;
+use crate::types::{Intrinsics, Rgb};
+use files::{Listing, SizedCamera, labels};
+use folder::{Folder, NumberOffset};
 
-pub(crate) use adapter::{Adapter, FrameMaps, ListedFrame, MapArgs};
-pub(crate) use unread_files::UnreadFiles;
+pub(crate) use files::{Adapter, FrameMaps, ListedFrame, MapArgs};
+pub(crate) use folder::UnreadFiles;
 
 /// Kind of data set in a folder.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -74,7 +74,7 @@ pub(crate) fn open_all(
         parts.push(open(kind, folder, args, further)?);
     }
     if parts.len() > 1 {
-        return Ok(Box::new(combined::Combined::new(folders, parts)?));
+        return Ok(Box::new(Combined::new(folders, parts)?));
     }
     parts.pop().ok_or_else(|| Error::usage("--src", "a folder of a data set expected"))
 }
@@ -106,12 +106,12 @@ fn open(kind: DataSetKind, folder: &Path, args: &MapArgs, further: &[PathBuf]) -
     let adapter: Box<dyn Adapter> = match kind {
         DataSetKind::Habitat => Box::new(habitat::Habitat::open(folder, args)?),
         DataSetKind::Scannet => Box::new(scannet::Scannet::open(folder, args)?),
-        DataSetKind::Nyu => Box::new(nyu::open(folder, args)?),
+        DataSetKind::Nyu => Box::new(open_nyu(folder, args)?),
         DataSetKind::Sunrgbd => Box::new(sunrgbd::SunRgbd::open(folder)?),
         DataSetKind::Thor => Box::new(thor::Thor::open(folder, args)?),
         DataSetKind::Hypersim => Box::new(hypersim::Hypersim::open(folder, args)?),
         DataSetKind::Folder if folder.join("frames.jsonl").exists() => {
-            Box::new(frame_folder::FrameFolder::open(folder, further)?)
+            Box::new(folder::FrameFolder::open(folder, further)?)
         }
         DataSetKind::Folder => Box::new(folder::Folder::open(folder, args)?),
     };
@@ -122,6 +122,139 @@ fn open(kind: DataSetKind, folder: &Path, args: &MapArgs, further: &[PathBuf]) -
         return Err(Error::data(folder.display(), problem));
     }
     Ok(adapter)
+}
+
+/// Colour camera of the Kinect (NYU Depth v2 toolbox, `camera_params.m`).
+const KINECT: SizedCamera = SizedCamera {
+    size: (640, 480),
+    camera: Intrinsics { fx: 518.857_901, fy: 519.469_612, cx: 325.582_449, cy: 253.736_166 },
+};
+
+/// Opens a folder of PNG files.
+fn open_nyu(folder: &Path, args: &MapArgs) -> Result<Folder> {
+    let (name, offset) = match args.labels.as_deref() {
+        None => ("nyu40", NumberOffset::None),
+        Some("nyu40-1") => ("nyu40", NumberOffset::One),
+        Some(name) => (name, NumberOffset::None),
+    };
+    let args = &MapArgs { labels: Some(name.to_owned()), ..args.clone() };
+    let labels = labels(args)?.unwrap_or_default();
+    let mut set = Folder::with_labels(folder, args, labels, offset)?;
+    set.listing.sensor = Some(KINECT);
+    Ok(set)
+}
+
+/// Data sets of several folders. If two of them have a scene of the same name, the number of the folder, from 1, is put
+/// before it: `2-kitchen`.
+#[derive(Debug)]
+pub(super) struct Combined {
+    parts: Vec<Box<dyn Adapter>>,
+    listing: Listing,
+    /// Part of each frame, and its index among the frames of the part.
+    part_frames: Vec<(usize, usize)>,
+}
+
+impl Combined {
+    /// Combines the data sets in these folders.
+    ///
+    /// # Errors
+    /// If their labels, kinds of depth or kinds of segments differ. The error names the two folders.
+    fn new(folders: &[PathBuf], parts: Vec<Box<dyn Adapter>>) -> Result<Self> {
+        let mut scene_counts: BTreeMap<&String, usize> = BTreeMap::new();
+        for part in &parts {
+            let scenes: BTreeSet<&String> = part.listing().frames.iter().map(|frame| &frame.scene).collect();
+            for scene in scenes {
+                *scene_counts.entry(scene).or_default() += 1;
+            }
+        }
+        let unique_name = |number: usize, scene: &String| {
+            if scene_counts.get(scene).is_some_and(|count| *count > 1) {
+                format!("{}-{scene}", number + 1)
+            } else {
+                scene.clone()
+            }
+        };
+        let mut combined = Listing::default();
+        let mut part_frames = Vec::new();
+        for (number, part) in parts.iter().enumerate() {
+            let own = part.listing();
+            if number == 0 {
+                combined.labels = own.labels.clone();
+                combined.depth_kind = own.depth_kind;
+                combined.segmentation = own.segmentation;
+                combined.renders.clone_from(&own.renders);
+            }
+            let differing = [
+                ("class numbers (classes.json, --labels)", combined.labels == own.labels),
+                ("kinds of depth", combined.depth_kind == own.depth_kind),
+                ("kinds of segments", combined.segmentation == own.segmentation),
+            ];
+            if let Some((what, _)) = differing.into_iter().find(|(_, is_same)| !is_same) {
+                let problem = format_args!(
+                    "{} and {} have different {what}; import each with its own --out",
+                    folders[0].display(),
+                    folders[number].display()
+                );
+                return Err(Error::usage("--src", problem));
+            }
+            if number > 0 && (combined.renders.is_some() || own.renders.is_some()) {
+                combined.renders = None;
+                tracing::warn!("scenes.json is not carried over from several folders");
+            }
+            for (index, frame) in own.frames.iter().enumerate() {
+                combined.frames.push(ListedFrame {
+                    scene: unique_name(number, &frame.scene),
+                    index: part_frames.len(),
+                    ..frame.clone()
+                });
+                part_frames.push((number, index));
+            }
+            for (scene, names) in &own.names {
+                combined.names.insert(unique_name(number, scene), names.clone());
+            }
+            for (word, count) in &own.unlisted {
+                *combined.unlisted.entry(word.clone()).or_default() += count;
+            }
+        }
+        combined.frames.sort_by(|a, b| (&a.scene, &a.frame).cmp(&(&b.scene, &b.frame)));
+        Ok(Self { parts, listing: combined, part_frames })
+    }
+
+    /// Data set of a frame, and the frame in its listing.
+    fn part(&self, frame: &ListedFrame) -> (&dyn Adapter, &ListedFrame) {
+        let (part, index) = self.part_frames[frame.index];
+        let part = &*self.parts[part];
+        (part, &part.listing().frames[index])
+    }
+}
+
+impl Adapter for Combined {
+    fn listing(&self) -> &Listing {
+        &self.listing
+    }
+
+    fn camera(&self, frame: &ListedFrame, rgb: &Rgb) -> Option<Intrinsics> {
+        let (part, frame) = self.part(frame);
+        part.camera(frame, rgb)
+    }
+
+    fn depth_folder(&self, frame: &ListedFrame) -> Option<&'static str> {
+        let (part, frame) = self.part(frame);
+        part.depth_folder(frame)
+    }
+
+    fn assumes_metres(&self) -> bool {
+        self.parts.iter().any(|part| part.assumes_metres())
+    }
+
+    fn other_files(&self) -> Vec<PathBuf> {
+        self.parts.iter().flat_map(|part| part.other_files()).collect()
+    }
+
+    fn read_maps(&self, frame: &ListedFrame, rgb: &Rgb) -> Result<FrameMaps> {
+        let (part, frame) = self.part(frame);
+        part.read_maps(frame, rgb)
+    }
 }
 
 #[cfg(test)]

@@ -12,19 +12,22 @@ use std::path::{Path, PathBuf};
 use ndarray::{Array2, ShapeError};
 use serde::Deserialize;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs};
-use super::files::{IMAGES, check_same_size, file_name, files, folders, read_depth, read_numbers, read_png};
+use super::files::{
+    Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MapArgs, check_same_size, file_name, files, folders, read_depth,
+    read_numbers, read_png,
+};
 use crate::error::{Error, Result};
-use crate::files::reading::{bytes, json, text};
-use crate::labels::names::{UNKNOWN, class_override};
-use crate::labels::{canonical, space};
+use crate::files::{bytes, json, text};
+use crate::labels::{UNKNOWN, canonical, class_override, space};
 use crate::pictures::raw_png::SampleForm;
 use crate::types::{Intrinsics, Label, Labels, Rgb};
 
 /// File name of the table of ScanNet's label numbers.
 const LABEL_TABLE: &str = "scannetv2-labels.combined.tsv";
+
 /// Frames per second of the sensor. The name of a frame is its number.
 const FRAME_RATE: f64 = 30.0;
+
 /// Metres per unit of depth.
 const DEPTH_SCALE: f64 = 0.001;
 

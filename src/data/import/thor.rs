@@ -8,11 +8,13 @@ use std::path::{Path, PathBuf};
 
 use ndarray::Array2;
 
-use super::adapter::{Adapter, FrameMaps, ListedFrame, Listing, MapArgs, class_numbers};
-use super::files::{IMAGES, check_same_size, file_name, files, folders, map_paths, read_frame_depth, read_id_image};
+use super::files::{
+    Adapter, FrameMaps, IMAGES, ListedFrame, Listing, MapArgs, check_same_size, class_numbers, file_name, files,
+    folders, map_paths, read_frame_depth, read_id_image,
+};
 use crate::error::{Error, Result};
-use crate::files::reading::json;
-use crate::labels::names;
+use crate::files::json;
+use crate::labels;
 use crate::types::{Rgb, SegmentName};
 
 /// Folder of AI2-THOR scenes.
@@ -97,7 +99,7 @@ impl SceneColors {
         let (mut colors, mut names) = (BTreeMap::new(), BTreeMap::new());
         for (id, (object, object_colors)) in (1..).zip(objects) {
             let kind = object.split('|').next().unwrap_or_default();
-            let (name, class) = names::thor(kind);
+            let (name, class) = labels::thor(kind);
             let name = SegmentName { name, canonical: class.to_owned(), region: None };
             names.insert(id, name);
             colors.extend(object_colors.into_iter().map(|color| (color, id)));

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::cells::{Cell, Row, Table};
 use super::choices::is_native_format;
 use super::columns::map::ColumnMap;
-use super::columns::names::Role;
 use super::columns::{Column, find_column};
 use super::summary::count;
+use crate::data::ready_made::columns::map::Role;
 use crate::types::{Question, StrictGroup};
 
 /// Rule that makes the name of a row's group from its cells.

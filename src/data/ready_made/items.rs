@@ -1,16 +1,17 @@
 //! Conversion of a data set's rows to questions, without their correct answers: [`items`].
 
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
 use super::cells::{Cell, ConversationPaths, Row, Table, parse_list};
 use super::choices::{LetteredOptions, OptionInterner, OptionList, Options, find_in_question};
 use super::columns::map::map_flag;
-use super::columns::names::{Role, split_instructions};
 use super::columns::{Column, OptionsInQuestion, QuestionSource, Roles};
 use super::omissions::{OmissionReason, Omissions};
 use super::pictures::{ImageForm, ImageMarks};
 use super::settings::{SetArgs, SeveralImages};
+use crate::data::ready_made::columns::map::{Role, split_instructions};
 use crate::types::text::excerpt;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 
 /// Maximum length of a question or an option, in bytes.
 const MAX_TEXT_BYTES: usize = 16 << 10;

@@ -10,52 +10,54 @@
 //! 6. Assign ids and frames to the questions (`pictures/`), and print the inferred mapping (`summary.rs`).
 //!
 //! The code is not specific to any set; further rules for well-known sets are presets in `sets.toml`.
+//!
+//! The optional `dataset.json` of a ready-made data set: [`FolderInfo`].
 
 mod cells;
 mod choices;
 mod columns;
-mod container;
-mod folder_info;
+pub(crate) mod container;
 mod groups;
 mod items;
-mod omissions;
+pub(crate) mod omissions;
 mod pictures;
 mod preset;
 mod settings;
 mod summary;
+#[cfg(test)]
+mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::family::{check_family, unnamed};
-use super::image_source::ImageSource;
+use super::bank::{check_family, unnamed};
+use super::openeqa::ImageSource;
 use super::root::Root;
 use crate::error::{Error, Result};
-use crate::types::{Choices, Family, FrameId, Question};
-
-pub(super) use choices::one_line;
-pub(super) use container::{Archive, is_set_folder, is_zip_file};
-pub(crate) use container::{ParquetColumns, cached_snapshot, refuse_lfs_pointer};
-pub(super) use folder_info::light_of_archive;
-pub(crate) use omissions::SkipBad;
-pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
-pub(super) use preset::{is_known as is_known_set, names as known_sets};
-pub use settings::SetArgs;
-pub(super) use summary::LEFT_OUT;
-
+use crate::files;
+use crate::types::{Choices, Family, FrameId, Question, SetLight};
 use cells::{Cell, Table};
 use choices::{ParsedQuestion, find_truths, is_native_format};
-use columns::map::{CellFormat, ColumnMap};
-use columns::names::Role;
+use columns::map::{CellFormat, ColumnMap, Role};
 use columns::{FamilySource, ImageColumns, QuestionSource, Roles};
 use container::{FoundFiles, Joined, SetFile};
-use folder_info::FolderInfo;
 use groups::{GroupRule, Groups};
 use items::{InstructionCounts, items, rows_with_images};
 use omissions::{OmissionReason, Omissions, omit_contradictions};
 use pictures::{Frames, Ids, ImageForm, Scenes};
 use summary::Summary;
+
+pub(super) use choices::one_line;
+pub(super) use container::{Archive, is_set_folder, is_zip_file};
+pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
+pub(super) use preset::{is_known as is_known_set, names as known_sets};
+pub(super) use summary::LEFT_OUT;
+
+pub(crate) use container::{ParquetColumns, cached_snapshot, refuse_lfs_pointer};
+pub(crate) use omissions::SkipBad;
+
+pub use settings::SetArgs;
 
 /// Opens a set: a file, a pattern of files, a folder, or several files. `stem` is its name unless `dataset.json` has
 /// one.
@@ -470,5 +472,64 @@ fn build_questions(
     Ok(questions)
 }
 
-#[cfg(test)]
-mod tests;
+/// The fields that are read from `dataset.json`.
+#[derive(Debug, Default)]
+pub(super) struct FolderInfo {
+    /// Name of the data set; empty if none is given.
+    name: String,
+    /// Column mapping; `None` if none is given.
+    map: Option<ColumnMap>,
+}
+
+impl FolderInfo {
+    const FILE: &str = "dataset.json";
+
+    /// Reads `dataset.json` in a folder; the default if it does not exist.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or is a link out of the folders of `root`.
+    fn in_folder(root: &Root) -> Result<Self> {
+        let Some(path) = root.own_file(Self::FILE)? else {
+            return Ok(Self::default());
+        };
+        Self::read(&path, &files::json(&path)?)
+    }
+
+    /// Reads `dataset.json` at the top level of a ZIP file; the default if it does not exist.
+    fn in_archive(archive: &Archive) -> Result<Self> {
+        if !archive.has(Self::FILE) {
+            return Ok(Self::default());
+        }
+        let path = archive.path().join(Self::FILE);
+        let text = archive.read_text(Self::FILE)?;
+        let info: serde_json::Value = serde_json::from_str(&text).map_err(|e| Error::data(path.display(), e))?;
+        Self::read(&path, &info)
+    }
+
+    fn read(path: &Path, info: &serde_json::Value) -> Result<Self> {
+        let map = text_field(info, "map")
+            .map(str::parse::<ColumnMap>)
+            .transpose()
+            .map_err(|problem| Error::data(path.display(), format_args!("map: {problem}")))?;
+        Ok(Self { name: text_field(info, "name").unwrap_or_default().to_owned(), map })
+    }
+}
+
+/// Light in which the photographs of a ZIP file were taken, from its `dataset.json`; lit by default.
+pub(super) fn light_of_archive(path: &Path) -> Result<SetLight> {
+    let archive = Archive::open(path)?;
+    if !archive.has(FolderInfo::FILE) {
+        return Ok(SetLight::Lit);
+    }
+    let wrong = |e| Error::data(path.join(FolderInfo::FILE).display(), e);
+    let text = archive.read_text(FolderInfo::FILE)?;
+    let mut info: serde_json::Value = serde_json::from_str(&text).map_err(wrong)?;
+    match info.get_mut("light") {
+        Some(light) => serde_json::from_value(light.take()).map_err(wrong),
+        None => Ok(SetLight::Lit),
+    }
+}
+
+fn text_field<'a>(info: &'a serde_json::Value, key: &str) -> Option<&'a str> {
+    info.get(key).and_then(serde_json::Value::as_str)
+}

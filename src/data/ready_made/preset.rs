@@ -7,9 +7,9 @@ use serde::Deserialize;
 
 use super::cells::Table;
 use super::columns::map::ColumnMap;
-use super::columns::names::normalize;
 use super::groups::template_columns;
 use super::settings::{LeaveOut, SetArgs, SeveralImages};
+use crate::data::ready_made::columns::map::normalize;
 
 /// Presets in TOML.
 const SETS: &str = include_str!("sets.toml");

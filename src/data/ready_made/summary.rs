@@ -7,7 +7,7 @@ use super::columns::{FamilySource, ImageColumns, QuestionSource, Roles};
 use super::items::InstructionCounts;
 use super::omissions::{OmissionReason, Omissions};
 use super::pictures::Series;
-use crate::data::image_source::ImageSource;
+use crate::data::openeqa::ImageSource;
 use crate::types::{FrameId, Question};
 
 /// Facts about a set, for messages and the manifest.

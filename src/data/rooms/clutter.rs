@@ -3,10 +3,8 @@
 use glam::{Vec3, vec2, vec3};
 
 use super::furniture::parts;
-use super::mesh::{Face, bounds};
-use super::plan::{FloorArea, FloorPlan};
-use super::scene::{Piece, Pose};
-use super::shell::WALLS;
+use super::mesh::{Face, Piece, Pose, bounds};
+use super::plan::{FloorArea, FloorPlan, WALLS};
 
 /// Furniture that carries clutter: its word, the place name of its clutter in the parts table, the height of the
 /// surface in metres (0 for the top of the furniture), and the share of the depth, from the back, that remains empty.
@@ -31,6 +29,7 @@ const SURFACES: [(&str, &str, f32, f32); 15] = [
 /// Number of things per square metre of a surface (chosen), before scaling by the mess of the room. Three placements
 /// are tried for each.
 const DENSITY: f32 = 9.0;
+
 /// Minimum gap between adjacent things, in metres.
 const GAP: f32 = 0.006;
 

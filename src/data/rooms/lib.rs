@@ -14,22 +14,13 @@ mod clutter;
 mod furniture;
 mod kinds;
 mod light;
-mod light_grid;
 mod mesh;
-mod noise;
 mod openings;
-mod paint;
 mod pattern;
 mod plan;
 mod render;
-mod rendered_frame;
-mod room_light;
-mod scene;
 mod seeded_rng;
 mod settings;
-mod shell;
-mod surface;
-mod surface_point;
 mod viewpoint;
 
 use std::collections::BTreeMap;
@@ -40,16 +31,17 @@ use self::bvh::Bvh;
 use self::camera::Camera;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
-use self::rendered_frame::RenderedFrame;
-pub use self::room_light::RoomLight;
-use self::scene::ThingKind;
 use self::seeded_rng::SeededRng;
-pub use self::settings::Rooms;
 use self::viewpoint::CameraHeight;
+use camera::RenderedFrame;
 use darkqa_base::error::Result;
 use darkqa_base::labels;
 use darkqa_base::types::values::Recent;
 use darkqa_base::types::{Digest, Frame, FrameId, Labels, Light, Pixels, Rgb};
+use mesh::ThingKind;
+
+pub use self::settings::Rooms;
+pub use light::RoomLight;
 
 /// Version of the generator. Any change of a pixel or a name needs a new version.
 pub const VERSION: u32 = 2;
@@ -307,7 +299,7 @@ fn class_number(class: &str) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darkqa_base::labels::names::{Meaning, meaning};
+    use darkqa_base::labels::{Meaning, meaning};
 
     #[test]
     fn words_have_the_classes_of_other_data_sets() {

@@ -2,14 +2,11 @@
 
 use glam::vec3;
 
-use super::furniture::{parts, plants, seats, storage, textiles, walls};
-use super::mesh::{Mesh, bounds};
-use super::paint::{ALL_COLORS, Paint};
-use super::pattern::Pattern;
-use super::plan::{FloorPlan, WallPatch};
-use super::scene::{LightSource, Piece, Pose, kind};
-use super::shell::{Doorway, Flooring, WALL_THICKNESS, Wall, floor_surface};
-use super::surface::Surface;
+use super::furniture::{parts, plants, seats, storage, walls};
+use super::mesh::{LightSource, Mesh, Piece, Pose, bounds, kind};
+use super::pattern::{ALL_COLORS, Paint, Pattern, Surface};
+use super::plan::{Doorway, FloorPlan, Flooring, WALL_THICKNESS, Wall, WallPatch, floor_surface};
+use crate::furniture::beds;
 
 /// Curtains or blinds of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +18,7 @@ pub(super) enum WindowDressing {
 
 /// Number of random positions tried for an opening before it is left out (chosen).
 const TRIES: usize = 60;
+
 /// Width and height of a doorway in metres.
 const DOORWAY: [f32; 2] = [0.88, 2.04];
 
@@ -162,7 +160,7 @@ impl FloorPlan {
                 let is_long = self.rng.chance(0.7);
                 let drop = if is_long { 2.26 } else { 2.45 - sill };
                 let rail = Pose::new(vec3(pose.position.x, 2.3, pose.position.z), pose.angle);
-                for piece in textiles::curtains(width, drop, &mut self.rng) {
+                for piece in beds::curtains(width, drop, &mut self.rng) {
                     self.add(piece, rail);
                 }
                 if is_long {

@@ -2,10 +2,16 @@
 //!
 //! Details smaller than a pixel fade out, as in a camera. A pattern therefore needs the width of a pixel on the
 //! surface.
+//!
+//! Pseudo-random functions of a position: [`hash`] and [`value_noise`].
+//!
+//! Paints in colours whose names people agree on: [`Paint`].
+//!
+//! Surfaces of things: [`Surface`].
 
 use glam::{Vec2, Vec3, vec2, vec3};
 
-use super::noise::{hash, value_noise};
+use super::seeded_rng::SeededRng;
 
 /// How the colour varies over a surface. Lengths are metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -313,4 +319,189 @@ fn ripple(value: f32) -> f32 {
     let share = value * 0.5 - (value * 0.5).floor();
     let tent = 1.0 - 4.0 * (share - 0.5).abs();
     tent * (1.5 - 0.5 * tent * tent)
+}
+
+/// Maps three integers to a pseudo-random number from 0 to 1.
+pub(super) fn hash(x: i32, y: i32, z: i32) -> f32 {
+    let mut bits = (x as u32).wrapping_mul(0x8da6_b343)
+        ^ (y as u32).wrapping_mul(0xd816_3841)
+        ^ (z as u32).wrapping_mul(0xcb1a_b31f);
+    bits = (bits ^ (bits >> 15)).wrapping_mul(0x2c1b_3c6d);
+    bits = (bits ^ (bits >> 12)).wrapping_mul(0x297a_2d39);
+    bits ^= bits >> 15;
+    (bits >> 8) as f32 / (1_u32 << 24) as f32
+}
+
+/// Value noise from 0 to 1: random values at integer lattice points, interpolated smoothly.
+fn value_noise(position: Vec3) -> f32 {
+    let cell = position.floor();
+    let share = position - cell;
+    let share = share * share * (Vec3::splat(3.0) - 2.0 * share);
+    let [x, y, z] = [cell.x as i32, cell.y as i32, cell.z as i32];
+    let sheets = [0, 1].map(|k| {
+        let rows = [0, 1].map(|j| {
+            let corners = [0, 1].map(|i| hash(x.wrapping_add(i), y.wrapping_add(j), z.wrapping_add(k)));
+            mix(corners, share.x)
+        });
+        mix(rows, share.y)
+    });
+    mix(sheets, share.z)
+}
+
+/// Interpolates linearly between two values.
+fn mix([a, b]: [f32; 2], share: f32) -> f32 {
+    a + (b - a) * share
+}
+
+/// Colour and its name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Paint {
+    /// One of the eleven basic colour terms; empty if people would disagree.
+    pub(super) name: &'static str,
+    /// Linear light of red, green and blue.
+    pub(super) color: Vec3,
+}
+
+/// sRGB codes of the paints of each name. The colours are strong, so that shade does not change their name.
+const PAINTS: [(&str, &[[u8; 3]]); 11] = [
+    ("black", &[[24, 24, 26], [30, 28, 28]]),
+    ("grey", &[[108, 108, 112], [116, 118, 118], [122, 120, 116]]),
+    ("white", &[[250, 250, 248], [248, 249, 250]]),
+    ("red", &[[176, 32, 36], [150, 26, 36], [166, 42, 40]]),
+    ("orange", &[[255, 156, 60], [255, 152, 54]]),
+    ("yellow", &[[250, 218, 84], [248, 214, 92]]),
+    ("green", &[[84, 126, 78], [120, 140, 92], [58, 100, 72]]),
+    ("blue", &[[60, 92, 150], [92, 122, 168], [52, 72, 122]]),
+    ("purple", &[[116, 74, 142], [104, 66, 128], [128, 92, 150]]),
+    ("pink", &[[255, 182, 206], [252, 176, 198]]),
+    ("brown", &[[120, 80, 52], [110, 72, 46], [128, 88, 58]]),
+];
+
+/// Linear light of one sRGB code (IEC 61966-2-1).
+fn linear(code: u8) -> f32 {
+    let value = f32::from(code) / 255.0;
+    if value <= 0.04045 { value / 12.92 } else { libm::powf((value + 0.055) / 1.055, 2.4) }
+}
+
+/// sRGB codes of a number in the form `0xrrggbb`.
+pub(super) fn codes_from_hex(number: u32) -> [u8; 3] {
+    [16, 8, 0].map(|shift| (number >> shift) as u8)
+}
+
+/// Linear light of three sRGB codes.
+pub(super) fn linear_rgb([red, green, blue]: [u8; 3]) -> Vec3 {
+    vec3(linear(red), linear(green), linear(blue))
+}
+
+impl Paint {
+    /// Returns a random paint with one of these names.
+    pub(super) fn random(names: &[&str], rng: &mut SeededRng) -> Self {
+        let name = rng.pick(names);
+        let (name, codes) = PAINTS.iter().find(|(known, _)| *known == name).map_or(PAINTS[0], |found| *found);
+        Self { name, color: linear_rgb(rng.pick(codes)) }
+    }
+
+    /// Creates a paint whose colour has no name that people agree on.
+    pub(super) fn nameless(codes: [u8; 3]) -> Self {
+        Self { name: "", color: linear_rgb(codes) }
+    }
+}
+
+/// Colour names for furniture and textiles. A name that is listed twice is twice as likely.
+pub(super) const COMMON_COLORS: [&str; 16] = [
+    "black", "grey", "grey", "white", "white", "red", "red", "orange", "yellow", "green", "green", "blue", "blue",
+    "purple", "pink", "brown",
+];
+
+/// The eleven basic colour terms.
+pub(super) const ALL_COLORS: [&str; 11] =
+    ["black", "grey", "white", "red", "orange", "yellow", "green", "blue", "purple", "pink", "brown"];
+
+/// The material of a face.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Surface {
+    /// Share of linear light that the surface reflects, by channel, before the pattern is applied.
+    pub(super) color: Vec3,
+    pub(super) pattern: Pattern,
+    pub(super) finish: SurfaceFinish,
+}
+
+/// How a surface reflects light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum SurfaceFinish {
+    /// Reflects the same light in all directions.
+    Matte,
+    /// Matte with a highlight.
+    Glossy,
+    /// Mirrors the room.
+    Mirror,
+    /// Emits light, this many times as bright as its colour. Casts no shadow.
+    Glow(f32),
+}
+
+impl Surface {
+    fn new(color: Vec3, pattern: Pattern, finish: SurfaceFinish) -> Self {
+        Self { color, pattern, finish }
+    }
+
+    /// Matte paint of one colour.
+    pub(super) fn paint(paint: Paint) -> Self {
+        Self::new(paint.color, Pattern::Brushed, SurfaceFinish::Matte)
+    }
+
+    /// Lacquer, ceramic or plastic.
+    pub(super) fn gloss(paint: Paint) -> Self {
+        Self::new(paint.color, Pattern::Plain, SurfaceFinish::Glossy)
+    }
+
+    /// Matte cloth of one colour.
+    pub(super) fn cloth(paint: Paint) -> Self {
+        Self::new(paint.color, Pattern::Cloth, SurfaceFinish::Matte)
+    }
+
+    /// Cloth of one colour, often woven or printed in two tones.
+    pub(super) fn fabric(paint: Paint, rng: &mut SeededRng) -> Self {
+        let cloth = Self::cloth(paint);
+        // Two tones of a light colour may have two names.
+        if ["white", "yellow", "orange", "pink"].contains(&paint.name) {
+            return cloth;
+        }
+        let darker = paint.color * 0.66;
+        match rng.below(6) {
+            0 => cloth.with_pattern(Pattern::Checks(rng.between(0.05, 0.16))),
+            1 | 2 => cloth.with_pattern(Pattern::Flowers(rng.between(0.08, 0.26), darker)),
+            3 => cloth.with_pattern(Pattern::Stripes(rng.between(0.02, 0.08), darker)),
+            _ => cloth,
+        }
+    }
+
+    /// Matte colour, given by its sRGB codes.
+    pub(super) fn plain(codes: [u8; 3]) -> Self {
+        Self::new(linear_rgb(codes), Pattern::Plain, SurfaceFinish::Matte)
+    }
+
+    /// Glossy grey metal.
+    pub(super) fn steel() -> Self {
+        let steel = linear_rgb([164, 166, 170]);
+        Self::new(steel, Pattern::Plain, SurfaceFinish::Glossy)
+    }
+
+    /// Wood in the colour of a paint, with its grain along an axis (0 x, 1 y, 2 z).
+    pub(super) fn wood(paint: Paint, axis: usize) -> Self {
+        Self::new(paint.color, Pattern::Grain(axis), SurfaceFinish::Matte)
+    }
+
+    /// Colour at a point with a surface normal, both in the coordinates of the thing. `pixel_width` is the width of a
+    /// pixel there, in metres.
+    pub(super) fn color_at(&self, point: Vec3, normal: Vec3, pixel_width: f32) -> Vec3 {
+        self.pattern.color(self.color, point, normal, pixel_width)
+    }
+
+    pub(super) fn with_pattern(&self, pattern: Pattern) -> Self {
+        Self { pattern, ..self.clone() }
+    }
+
+    pub(super) fn with_finish(&self, finish: SurfaceFinish) -> Self {
+        Self { finish, ..self.clone() }
+    }
 }

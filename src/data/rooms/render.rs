@@ -11,11 +11,8 @@ use rayon::prelude::*;
 
 use super::bvh::Bvh;
 use super::camera::Camera;
-use super::light::{LightSample, Lighting, STRATA, luminance};
-use super::light_grid::LightGrid;
-use super::room_light::RoomLight;
-use super::scene::Scene;
-use super::surface_point::SurfacePoint;
+use super::light::{LightGrid, LightSample, Lighting, RoomLight, STRATA, SurfacePoint, luminance};
+use super::mesh::Scene;
 use darkqa_base::types::{Light, Pixels, Rgb};
 
 /// Image and maps of a view.
@@ -130,7 +127,7 @@ pub(super) fn preview(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<u32> {
     (0..width * height)
         .map(|i| {
             let ray = camera.ray((i % width) as f32, (i / width) as f32);
-            let hit = tree.closest_hit(&ray, super::surface_point::FAR);
+            let hit = tree.closest_hit(&ray, super::light::FAR);
             hit.map_or(0, |hit| scene.face_owners[hit.face] as u32 + 1)
         })
         .collect()

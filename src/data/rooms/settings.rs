@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 
-use super::room_light::RoomLight;
+use super::light::RoomLight;
 use darkqa_base::error::Result;
 use darkqa_base::types::Decides;
 
@@ -34,6 +34,7 @@ impl Default for Rooms {
 
 /// Maximum width and height of a frame, in pixels (chosen).
 const MAX_SIDE: usize = 8192;
+
 /// Maximum number of frames (chosen).
 const MAX_FRAMES: usize = 1_000_000;
 

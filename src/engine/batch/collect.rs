@@ -8,9 +8,8 @@ use jiff::Timestamp;
 use tokio::time::sleep;
 
 use super::driver::{Driver, Goal, Step};
-use super::event::Event;
-use super::import::for_each_line;
-use super::part::Part;
+use super::journal::{Event, Part};
+use super::replies::for_each_line;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
 use crate::error::{Error, Result};
 use darkqa_score::answers::record::Detail;

@@ -1,18 +1,39 @@
 //! Input files for one model: [`ModelInputFiles`].
+//!
+//! Writes the remaining requests as lines of input files: [`Requests`].
+//!
+//! Exports the remaining requests as input files of a Batch API: [`export`].
+//!
+//! Models whose batches are not continued by this command: [`StoppedModels`].
 
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest as _, Sha256};
 
-use super::event::PartFacts;
-use super::journal::Journal;
-use crate::ask::TokenBound;
+use super::BatchFileArgs;
+use super::journal::{Journal, PartFacts, file_name};
+use super::servers::account;
+use crate::ask::{BatchInterface, TokenBound};
+use crate::engine::dark_already;
+use crate::engine::experiment::Experiment;
+use crate::engine::images::recipes::Maker;
+use crate::engine::images::stored::StoredImages;
+use crate::engine::images::timings::Timings;
+use crate::engine::images::trials::{Item, Plan, PreparedGroup, Stimulus, Trial};
+use crate::engine::images::workers::pool;
+use crate::engine::models::ModelUnderTest;
+use crate::engine::open_run::{OpenRun, Remaining, every_model, image_limit, missing_notes, pipeline};
 use crate::error::{Error, Result};
 use crate::files::create_new;
-use crate::store::Store;
+use crate::runs::outcome::Outcome;
+use crate::store::{BATCH, Store};
 use crate::types::Record;
+use crate::types::manifests::Status;
+use crate::types::text::counted;
 use darkqa_score::answers::record::Detail;
 
 /// Extension of a file until it is complete.
@@ -218,4 +239,320 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
         .flat_map(|byte| [byte >> 4, byte & 15])
         .map(|half| char::from_digit(half.into(), 16).unwrap_or('0'))
         .collect()
+}
+
+/// Maximum tokens of a part, as a share of the tokens that may wait for batches; chosen below a half, so that one part
+/// can wait while another one is processed.
+pub(super) const SHARE_OF_QUOTA: f64 = 0.45;
+
+/// Maximum tokens of a part if the limit is unknown; chosen.
+const MAX_PART_TOKENS: f64 = 2e6;
+
+/// Function that returns the expected cost of a trial's request with a stimulus.
+pub(super) type CostOf<'a, I> = &'a (dyn Fn(&Trial<I>, &Stimulus) -> RequestCost + Sync);
+
+/// The input files of all models, while they are written.
+pub(crate) struct Requests<'a, I: Item> {
+    models: &'a [ModelUnderTest],
+    /// URL path of the requests, by model.
+    urls: Vec<String>,
+    /// Files by model.
+    files: Vec<ModelInputFiles<I::Detail>>,
+    register: Register<'a, I::Detail>,
+    cost: CostOf<'a, I>,
+}
+
+impl<'a, I: Item> Requests<'a, I> {
+    /// Input files in the batch folder of a run, which is created if needed. `all` are the models of all phases.
+    ///
+    /// # Errors
+    /// If the folder cannot be created.
+    pub(crate) fn new(
+        models: &'a [ModelUnderTest],
+        all: &[&ModelUnderTest],
+        args: &'a BatchFileArgs,
+        quota: Option<u64>,
+        register: Register<'a, I::Detail>,
+        cost: CostOf<'a, I>,
+    ) -> Result<Self> {
+        let folder = register.store.folder().join(BATCH);
+        fs::create_dir_all(&folder).map_err(|e| Error::file(&folder, "create", e))?;
+        let journal = register.journal.as_deref();
+        let (mut files, mut urls) = (Vec::new(), Vec::new());
+        for (i, model) in models.iter().enumerate() {
+            // The number makes the name unique: two models may have the same file name, or one may be asked with and
+            // without images.
+            let stem = file_name(&format!("{}-{}", i + 1, model.name));
+            let destination = destination(model, all, args)?;
+            urls.push(destination.url.clone());
+            let known = BatchInterface::at(&destination.base);
+            let (stem, first, tokens) = match journal {
+                None => (stem, 1, f64::INFINITY),
+                Some(journal) => {
+                    let stem = format!("part-{stem}");
+                    let scope = (destination.base.clone(), destination.model.clone());
+                    let limit = journal.limits.get(&scope).copied().or(quota);
+                    let tokens = limit.map_or(MAX_PART_TOKENS, |limit| SHARE_OF_QUOTA * limit as f64);
+                    (stem.clone(), journal.free_number(&stem), tokens)
+                }
+            };
+            let limits = FileLimits {
+                bytes: args.file_size.unwrap_or(known.file_size()).get().saturating_mul(1_000_000),
+                requests: args.file_requests.unwrap_or(known.requests()).get(),
+                tokens,
+            };
+            files.push(ModelInputFiles::new(&folder, &stem, first, limits, destination));
+        }
+        Ok(Self { models, urls, files, register, cost })
+    }
+
+    /// Adds all requests of a group.
+    pub(crate) fn add(&mut self, group: &PreparedGroup<I>) -> Result<()> {
+        let stimulus = &group.stimulus;
+        group.notes.store(self.register.store)?;
+        for trial in &group.trials {
+            let under_test = &self.models[trial.model];
+            let model = &under_test.model;
+            let (id, query) = (trial.key.to_string(), trial.item.query());
+            let message = trial.prompt.message(&stimulus.images);
+            let line = model.batch_line(&id, &self.urls[trial.model], message, query.choice_count());
+            let Some(line) = line.map_err(|e| Error::data(query.id(), e))? else {
+                continue;
+            };
+            let mut blank = under_test.blank(trial, stimulus);
+            let cost = (self.cost)(trial, stimulus);
+            // The maximum, in case the reply states no tokens.
+            if let Some(bound) = cost.bound {
+                blank.lost.unstated = bound.unstated();
+            }
+            self.files[trial.model].add(&line, blank, cost, &mut self.register)?;
+        }
+        Ok(())
+    }
+
+    /// Closes all files; returns each with its number of requests.
+    pub(crate) fn finish(mut self) -> Result<Vec<(PathBuf, usize)>> {
+        let mut written = Vec::new();
+        for files in self.files {
+            written.extend(files.finish(&mut self.register)?);
+        }
+        Ok(written)
+    }
+}
+
+/// Model and endpoint of the requests to a model.
+fn destination(model: &ModelUnderTest, all: &[&ModelUnderTest], args: &BatchFileArgs) -> Result<Destination> {
+    let base = model.model.batch_base().unwrap_or_default();
+    let known = BatchInterface::at(&base);
+    let usual = model.model.batch_url().unwrap_or_default();
+    let url = args.url.as_deref().unwrap_or_else(|| known.url(usual));
+    Ok(Destination {
+        model: model.model.name().to_owned(),
+        name: model.name.to_string(),
+        account: account(model, all)?,
+        url: url.to_owned(),
+        base,
+    })
+}
+
+/// Checks that all models can be asked in a batch.
+///
+/// # Errors
+/// If a model is built in.
+pub(crate) fn require_remote(models: &[ModelUnderTest]) -> Result<()> {
+    match models.iter().find(|model| !model.model.is_remote()) {
+        None => Ok(()),
+        Some(local) => {
+            let problem = format_args!("{} is built in; a batch can only ask models of an endpoint", local.name);
+            Err(Error::usage("--model", problem))
+        }
+    }
+}
+
+/// Checks that the endpoints of all models support the file and batch API that the program uses.
+///
+/// # Errors
+/// If the vendor of an endpoint does not support it.
+pub(super) fn require_files(models: &[ModelUnderTest]) -> Result<()> {
+    models
+        .iter()
+        .filter_map(|model| model.model.batch_base())
+        .try_for_each(|base| BatchInterface::at(&base).require_files())
+}
+
+/// The text about the written files and the next step for the user.
+pub(crate) fn summary(written: &[(PathBuf, usize)], answered: usize, in_batch: usize, run: &Path) -> String {
+    let requests: usize = written.iter().map(|(_, requests)| requests).sum();
+    let mut text = format!(
+        "{} in {}; {answered} already answered, {in_batch} waiting for an earlier batch\n",
+        counted(requests, "request"),
+        counted(written.len(), "file")
+    );
+    for (path, requests) in written {
+        let requests = counted(*requests, "request");
+        let _ = writeln!(text, "{} ({requests})", path.display());
+    }
+    let _ = writeln!(
+        text,
+        "upload each file to the Batch API, then run: darkqa-eval batch import {} OUTPUT.jsonl ERRORS.jsonl …",
+        run.display()
+    );
+    text
+}
+
+/// Settings for writing input files.
+pub(super) struct Target<'a, I: Item> {
+    pub(super) files: &'a BatchFileArgs,
+    /// Maximum number of tokens waiting for batches of a model; `None` if unknown.
+    pub(super) quota: Option<u64>,
+    /// Journal for files submitted by the program; `None` for files submitted by the user.
+    pub(super) journal: Option<&'a mut Journal>,
+    pub(super) cost: CostOf<'a, I>,
+}
+
+/// Writes the input files of the first phase with remaining trials, and records in the run that these trials are in a
+/// batch.
+pub(crate) fn export<E: Experiment>(mut run: OpenRun<'_, E>, files: &BatchFileArgs) -> Result<Outcome> {
+    for phase in 0..E::PHASES.len() {
+        let models = run.experiment.models(phase);
+        let remaining = run.remaining(phase)?;
+        let last = phase + 1 == E::PHASES.len();
+        if remaining.plan.remaining() == 0 && !last {
+            continue;
+        }
+        require_remote(models)?;
+        run.write_counts(&remaining.stored)?;
+        let Remaining { plan, in_batch, .. } = remaining;
+        let trials = plan.keys.len();
+        let answered = trials - plan.remaining() - in_batch;
+        let target = Target { files, quota: None, journal: None, cost: &|_, _| RequestCost::default() };
+        let written = write(&mut run, phase, plan, target)?;
+        let mut output = summary(&written, answered, in_batch, run.store.folder());
+        if !last {
+            output += "then run the same command again, for the remaining requests and the ";
+            output += &(E::PHASES[phase + 1..].join(", ") + "\n");
+        }
+        return Ok(Outcome::text(Status::Complete, output));
+    }
+    Ok(Outcome::text(Status::Complete, String::new()))
+}
+
+/// Writes the trials of a plan into input files; returns each file with its number of requests.
+pub(super) fn write<E: Experiment>(
+    run: &mut OpenRun<'_, E>,
+    phase: usize,
+    plan: Plan<E::Item>,
+    target: Target<'_, E::Item>,
+) -> Result<Vec<(PathBuf, usize)>> {
+    let (experiment, settings) = (run.experiment, run.experiment.settings());
+    let workers = pool(settings.loading.threads.threads)?;
+    let timings = Timings::default();
+    let shows_images = !plan.conditions().is_empty();
+    let enhancers = if shows_images { run.enhancers.take_models()? } else { Vec::new() };
+    let limit = image_limit(settings);
+    let maker = Maker::new(run.enhancers.version(), &settings.loading.size);
+    let images = run.images.as_ref();
+    let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
+    pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
+    let missing = missing_notes(experiment, run.store.folder());
+    let sources = experiment.sources();
+    workers.install(|| {
+        pipeline.open_enhancers(enhancers, &settings.loading, sources, &plan.sources)?;
+        if shows_images {
+            dark_already::warn(experiment);
+        }
+        pipeline.check_largest_image(sources, &plan.sources)
+    })?;
+    let usages = pipeline.usages();
+    let bar = run.progress.bar("writing requests", plan.remaining());
+    let register = Register { store: &mut run.store, journal: target.journal };
+    let (models, files) = (experiment.models(phase), target.files);
+    let all = every_model(experiment);
+    let mut requests = Requests::new(models, &all, files, target.quota, register, target.cost)?;
+    let mut problems = Vec::new();
+    let plan = plan.sources.into_iter();
+    workers.install(|| {
+        pipeline.for_each_group(sources, plan, &missing, |group| {
+            bar.advance(group.trials.len());
+            match group.problem {
+                Some(ended @ Error::EnhancerEnded { .. }) => Err(ended),
+                Some(problem) => {
+                    tracing::debug!("{problem}");
+                    problems.push(problem.to_string());
+                    Ok(())
+                }
+                None => requests.add(&group),
+            }
+        })
+    })?;
+    drop(bar);
+    if let Some(first) = problems.first() {
+        tracing::warn!(
+            "groups of requests that are not in the files, because their images cannot be made: {}; the first: {first}",
+            problems.len()
+        );
+    }
+    let written = requests.finish()?;
+    run.note_enhancers(usages);
+    run.store.write_manifest(&run.manifest)?;
+    Ok(written)
+}
+
+/// Models whose batches are not continued by this command, because their server refuses all further calls.
+#[derive(Debug, Default)]
+pub(super) struct StoppedModels {
+    /// Base URLs and names of models whose parts stay as they are.
+    models: BTreeSet<(String, String)>,
+    /// Phases and indices of models that are not asked any more in a phase. In another phase or without images, the
+    /// same model may still be asked.
+    in_phase: BTreeSet<(usize, usize)>,
+    errors: Vec<Error>,
+}
+
+impl StoppedModels {
+    /// Stops the model of a part.
+    pub(super) fn add_part(&mut self, facts: &PartFacts, error: Error) {
+        self.models.insert(base_and_name(facts));
+        self.errors.push(error);
+    }
+
+    /// Stops the model with this index in a phase. Its error must be added by [`add_errors`](Self::add_errors).
+    pub(super) fn add_model(&mut self, phase: usize, index: usize) {
+        self.in_phase.insert((phase, index));
+    }
+
+    /// Adds the errors that stopped models.
+    pub(super) fn add_errors(&mut self, errors: Vec<Error>) {
+        self.errors.extend(errors);
+    }
+
+    /// True if the model of a part is stopped.
+    pub(super) fn has_part(&self, facts: &PartFacts) -> bool {
+        self.models.contains(&base_and_name(facts))
+    }
+
+    /// True if the model with this index in a phase is stopped.
+    pub(super) fn has_model(&self, phase: usize, index: usize, model: &ModelUnderTest) -> bool {
+        let base = model.model.batch_base().unwrap_or_default();
+        self.in_phase.contains(&(phase, index)) || self.models.contains(&(base, model.name.to_string()))
+    }
+
+    /// The errors that stopped models; empty if no model is stopped.
+    pub(super) fn errors(&self) -> &[Error] {
+        &self.errors
+    }
+
+    /// Takes the errors out.
+    pub(super) fn take_errors(&mut self) -> Vec<Error> {
+        std::mem::take(&mut self.errors)
+    }
+}
+
+/// Base URL and name of the model of a part.
+fn base_and_name(facts: &PartFacts) -> (String, String) {
+    let name = match &*facts.name {
+        "" => &facts.model,
+        name => name,
+    };
+    (facts.base.clone(), name.to_owned())
 }

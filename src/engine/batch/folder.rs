@@ -1,4 +1,6 @@
 //! The batches of a run folder, without the settings of the run: [`FolderBatches`].
+//!
+//! The state of a run's parts as text: [`lines`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
@@ -7,19 +9,17 @@ use std::path::Path;
 use tokio::runtime;
 
 use super::driver::{Driver, Goal, Notes};
-use super::journal::Journal;
-use super::part::Stage;
+use super::file::StoppedModels;
+use super::journal::{Journal, Part, Stage};
 use super::recover::recover;
-use super::servers::Servers;
-use super::settings::{BatchRunArgs, CollectArgs};
-use super::stopped_models::StoppedModels;
-use super::summary;
+use super::servers::{BatchRunArgs, CollectArgs, Servers};
 use crate::ask::{AccessArgs, BaseUrl, Endpoint, Sending};
 use crate::engine::images::progress::Progress;
 use crate::engine::images::workers::thread_start_error;
 use crate::error::{Error, Result};
 use crate::store::Store;
 use crate::types::manifests::RunManifest;
+use crate::types::text::counted;
 use darkqa_score::answers::record::Detail;
 
 /// The task for the batches of a folder.
@@ -85,7 +85,7 @@ impl<'a> FolderBatches<'a> {
                 }
             }
         }
-        Ok(summary::lines(&self.journal, &counts) + &problems)
+        Ok(lines(&self.journal, &counts) + &problems)
     }
 
     /// Refuses batches of several accounts at the same base URL, because the flags have only one key.
@@ -148,7 +148,7 @@ impl<'a> FolderBatches<'a> {
         if let Some(first) = stopped.take_errors().into_iter().next() {
             return Err(first);
         }
-        Ok(summary::lines(&self.journal, &BTreeMap::new()))
+        Ok(lines(&self.journal, &BTreeMap::new()))
     }
 }
 
@@ -189,4 +189,36 @@ fn base_url(journal: &Journal, access: &AccessArgs) -> Result<Option<String>> {
     }
     access.check_run_address(&base.parse()?)?;
     Ok(Some(base.to_owned()))
+}
+
+/// One line per part, with its file, requests, batch and state. `states` are current states from the server, by name of
+/// the part.
+pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> String {
+    let mut text = String::new();
+    for part in &journal.parts {
+        let batch = part.batch.as_deref().unwrap_or("no batch");
+        let _ = writeln!(
+            text,
+            "{}: {} to {}, {batch}, {}",
+            part.name,
+            counted(part.facts.requests, "request"),
+            part.facts.model,
+            states.get(&part.name).cloned().unwrap_or_else(|| state_words(part))
+        );
+    }
+    text
+}
+
+/// The state of a part, in words.
+fn state_words(part: &Part) -> String {
+    match (&part.stage, part.outcome) {
+        (Stage::Written | Stage::Uploading | Stage::Uploaded, _) => "not submitted yet".to_owned(),
+        (Stage::Creating, _) => "being submitted".to_owned(),
+        (Stage::Created, _) if part.state.is_empty() => "submitted".to_owned(),
+        (Stage::Fetched { state }, _) => format!("{state}, fetched"),
+        (Stage::Imported | Stage::Ended, Some((answered, failed))) => {
+            format!("{}: {answered} answered, {failed} not", part.state)
+        }
+        (Stage::Created | Stage::Imported | Stage::Ended, _) => part.state.clone(),
+    }
 }

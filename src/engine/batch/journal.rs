@@ -3,6 +3,12 @@
 //! It has one line per event, synced to disk before and after each call that changes something at the server. So
 //! everything that a killed process did is known, except for the effect of its last call, which is looked up at the
 //! server.
+//!
+//! Events of a part in the journal: [`Event`].
+//!
+//! An input file and its batch: [`Part`].
+//!
+//! Names of input files: [`file_name`].
 
 use std::collections::BTreeMap;
 use std::fs::{self, File, OpenOptions};
@@ -11,11 +17,8 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::event::{Event, PartFacts};
-use super::part::{Part, Stage};
-use super::part_name::file_name;
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
 use crate::store::{BATCH, BATCH_STATE, now};
 use crate::types::Digest;
 use crate::types::manifests::RunManifest;
@@ -82,7 +85,7 @@ impl Journal {
             limits: BTreeMap::new(),
         };
         let path = journal.path();
-        let text = match reading::read(&path) {
+        let text = match files::read(&path) {
             Ok(text) => text,
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(journal),
             Err(e) => return Err(Error::file(path, "read", e)),
@@ -207,7 +210,7 @@ fn append(path: &Path, text: &[u8]) -> std::io::Result<()> {
 
 /// Removes an incomplete last line.
 fn cut_incomplete_line(path: &Path) -> std::io::Result<()> {
-    let text = match reading::read(path) {
+    let text = match files::read(path) {
         Ok(text) => text,
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
         Err(e) => return Err(e),
@@ -217,4 +220,300 @@ fn cut_incomplete_line(path: &Path) -> std::io::Result<()> {
         return Ok(());
     }
     File::options().write(true).open(path)?.set_len(complete as u64)
+}
+
+/// Facts about a part and its file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PartFacts {
+    /// SHA-256 of the file, as 64 hexadecimal digits.
+    pub sha256: String,
+    /// Size of the file in bytes.
+    pub bytes: u64,
+    /// Number of requests.
+    pub requests: usize,
+    /// The model's id at the endpoint.
+    pub model: String,
+    /// The model's name in tables; empty in journals of earlier versions.
+    #[serde(default)]
+    pub name: String,
+    /// The charged account: the name of the first model with the same base URL, key and headers; empty in journals of
+    /// earlier versions.
+    #[serde(default)]
+    pub account: String,
+    /// Base URL of the model's endpoint, without secrets.
+    pub base: String,
+    /// Path of each request, for example `/v1/chat/completions`.
+    pub url: String,
+    /// Expected tokens of all prompts.
+    pub tokens: f64,
+    /// Expected cost in US dollars, at the price of batches; `None` if the model has no known price.
+    pub dollars: Option<f64>,
+    /// Maximum cost of all requests in US dollars, at the price of batches; `None` if the model has no known price, and
+    /// in journals of earlier versions.
+    #[serde(default)]
+    pub most_dollars: Option<f64>,
+    /// Maximum cost of a single request, in US dollars.
+    #[serde(default)]
+    pub most_dollars_each: Option<f64>,
+}
+
+impl PartFacts {
+    /// The scope of a limit of waiting tokens: base URL and model id.
+    pub(super) fn quota_scope(&self) -> (String, String) {
+        (self.base.clone(), self.model.clone())
+    }
+
+    /// Maximum cost of the requests, in US dollars; 0 if the model has no known price.
+    pub(super) fn max_cost(&self) -> f64 {
+        self.most_dollars.or(self.dollars).unwrap_or(0.0)
+    }
+
+    /// The number of requests whose maximum cost is within `dollars`; all if the model has no known price.
+    pub(super) fn requests_within(&self, dollars: f64) -> usize {
+        let each = self.most_dollars_each.unwrap_or(self.max_cost() / self.requests.max(1) as f64);
+        let within = if each > 0.0 { dollars / each } else { f64::INFINITY };
+        (within.max(0.0) as usize).min(self.requests)
+    }
+
+    /// True if the part asks the model with this name and id.
+    pub(super) fn asks(&self, name: &str, id: &str) -> bool {
+        self.model == id && (self.name.is_empty() || self.name == name)
+    }
+}
+
+/// An event that has happened to a part, or that is about to happen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub(crate) enum Event {
+    /// The file of the part is written.
+    Written(PartFacts),
+    /// The upload begins.
+    Uploading,
+    /// The file is at the server.
+    Uploaded {
+        /// The server's id of the file.
+        id: String,
+    },
+    /// The batch is about to be created.
+    Creating {
+        /// Number of attempts to create a batch of this part, including this one.
+        attempt: u32,
+    },
+    /// The batch is created.
+    Created {
+        /// The server's id of the batch.
+        id: String,
+    },
+    /// The last call had no effect.
+    Refused {
+        /// The server's message.
+        why: String,
+    },
+    /// The batch was refused, because too many tokens are waiting for batches.
+    QuotaReached {
+        /// Maximum number of waiting tokens; `None` if the server does not state it.
+        limit: Option<u64>,
+    },
+    /// The server reports a new state of the batch.
+    Seen {
+        /// The state.
+        state: String,
+    },
+    /// The user or `--give-up` asked the server to cancel the batch.
+    Cancelled,
+    /// The output is downloaded into the batch folder.
+    Fetched {
+        /// Final state of the batch.
+        state: String,
+        /// The server's ids of the output file and the error file.
+        files: Vec<String>,
+    },
+    /// The replies are in the records of the run.
+    TakenOver {
+        /// Number of replies.
+        answered: usize,
+        /// Number of requests without a reply.
+        failed: usize,
+    },
+    /// The files at the server are deleted.
+    Deleted,
+    /// The files at the server are kept, or could not be deleted.
+    Kept,
+    /// The part is split, because it exceeds a limit.
+    Split {
+        /// The new parts.
+        into: Vec<Piece>,
+    },
+    /// The part ended without a batch; its requests may be asked again.
+    GaveUp {
+        /// The reason.
+        why: String,
+    },
+}
+
+/// A new part that was split off a larger one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Piece {
+    /// File name.
+    pub(super) file: String,
+    pub(super) facts: PartFacts,
+}
+
+/// Progress of a part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// The file is written.
+    Written,
+    /// The file may be at the server.
+    Uploading,
+    /// The file is at the server.
+    Uploaded,
+    /// The batch may exist at the server.
+    Creating,
+    /// The batch exists, and is not known to have ended.
+    Created,
+    /// The output is in the batch folder.
+    Fetched {
+        /// Final state of the batch.
+        state: String,
+    },
+    /// The replies are in the records.
+    Imported,
+    /// Nothing is left to do.
+    Ended,
+}
+
+/// An input file and its batch.
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    /// Name of the file in the batch folder.
+    pub(super) name: String,
+    pub(super) facts: PartFacts,
+    pub(super) stage: Stage,
+    /// Number of attempts to create a batch.
+    pub(super) attempt: u32,
+    /// True if a creation was refused or its batch was not found, so that a batch may exist all the same.
+    pub(super) in_doubt: bool,
+    /// Number of attempts to upload the file.
+    pub(super) uploads: u32,
+    /// Ids of the files at the server, the input file first.
+    pub(super) files: Vec<String>,
+    /// Id of the batch at the server; `None` before it is created.
+    pub(super) batch: Option<String>,
+    /// Time at which the batch was created, in UTC; empty before.
+    pub(super) created: String,
+    /// Last state reported by the server, or the reason why the part ended without a batch; empty before.
+    pub(super) state: String,
+    /// True if the server was asked to cancel the batch.
+    pub(super) cancelled: bool,
+    /// Numbers of requests with and without a reply; `None` before the replies are imported.
+    pub(super) outcome: Option<(usize, usize)>,
+}
+
+impl Part {
+    pub(super) fn new(name: &str, facts: PartFacts) -> Self {
+        Self {
+            name: name.to_owned(),
+            facts,
+            stage: Stage::Written,
+            attempt: 0,
+            in_doubt: false,
+            uploads: 0,
+            files: Vec::new(),
+            batch: None,
+            created: String::new(),
+            state: String::new(),
+            cancelled: false,
+            outcome: None,
+        }
+    }
+
+    /// The name without the extension.
+    pub(super) fn stem(&self) -> &str {
+        self.name.strip_suffix(".jsonl").unwrap_or(&self.name)
+    }
+
+    /// True if the batch exists or may exist at the server.
+    pub(super) fn is_out(&self) -> bool {
+        matches!(self.stage, Stage::Creating | Stage::Created)
+    }
+
+    /// True if the batch may have costs that are not in the records yet.
+    pub(super) fn may_cost(&self) -> bool {
+        self.is_out() || matches!(self.stage, Stage::Fetched { .. })
+    }
+
+    /// True if the batch is still to be created.
+    pub(super) fn is_unsubmitted(&self) -> bool {
+        matches!(self.stage, Stage::Written | Stage::Uploading | Stage::Uploaded)
+    }
+
+    /// Updates the part by an event at a time in UTC.
+    pub(super) fn apply(&mut self, event: &Event, at: &str) {
+        self.stage = match event {
+            Event::Written(facts) => {
+                self.facts = facts.clone();
+                Stage::Written
+            }
+            Event::Uploading => {
+                self.uploads += 1;
+                Stage::Uploading
+            }
+            Event::Uploaded { id } => {
+                self.files = vec![id.clone()];
+                Stage::Uploaded
+            }
+            Event::Creating { attempt } => {
+                self.attempt = *attempt;
+                Stage::Creating
+            }
+            Event::Created { id } => {
+                self.batch = Some(id.clone());
+                self.state.clear();
+                at.clone_into(&mut self.created);
+                Stage::Created
+            }
+            Event::Refused { .. } if self.stage == Stage::Creating => {
+                self.in_doubt = true;
+                Stage::Uploaded
+            }
+            Event::Refused { .. } => Stage::Written,
+            Event::QuotaReached { .. } => {
+                self.batch = None;
+                Stage::Uploaded
+            }
+            Event::Seen { state } => {
+                self.state.clone_from(state);
+                return;
+            }
+            Event::Cancelled => {
+                self.cancelled = true;
+                return;
+            }
+            Event::Fetched { state, files } => {
+                self.state.clone_from(state);
+                self.files.extend(files.iter().cloned());
+                Stage::Fetched { state: state.clone() }
+            }
+            Event::TakenOver { answered, failed } => {
+                self.outcome = Some((*answered, *failed));
+                Stage::Imported
+            }
+            Event::Split { .. } => {
+                "divided into smaller parts".clone_into(&mut self.state);
+                Stage::Ended
+            }
+            Event::GaveUp { why } => {
+                self.state.clone_from(why);
+                Stage::Ended
+            }
+            Event::Deleted | Event::Kept => Stage::Ended,
+        };
+    }
+}
+
+/// Converts a text to a part of a file name: characters other than ASCII letters, digits, `-`, `_` and `.` are
+/// replaced.
+pub(super) fn file_name(text: &str) -> String {
+    text.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_")
 }

@@ -2,38 +2,28 @@
 //!
 //! The remaining requests are written as input files into `RUN/batch/`, together with records of their trials without
 //! outcomes. Until the replies are imported, the run does not ask those trials. Either the user uploads the files to
-//! the API and imports its output, or the program does both ([`run`]): each file is then a [`part`], a [`driver`]
+//! the API and imports its output, or the program does both ([`run`]): each file is then a [`journal`], a [`driver`]
 //! advances the parts, and a [`journal`] records their progress.
 
 mod collect;
 mod driver;
-mod event;
-pub(crate) mod export;
-mod file;
+pub(crate) mod file;
 mod folder;
-mod import;
 pub(crate) mod journal;
-mod part;
-mod part_name;
-mod quota;
 mod recover;
 pub(crate) mod replies;
-mod requests;
 pub(crate) mod run;
 mod servers;
-mod settings;
-mod split;
-mod stopped_models;
 mod submit;
-mod summary;
 
-pub(crate) use folder::{FolderBatches, FolderTask};
-pub(crate) use settings::{BatchRunArgs, CollectArgs};
-
-use crate::types::Decides;
 use std::num::{NonZeroU64, NonZeroUsize};
 
 use clap::Args;
+
+use crate::types::Decides;
+
+pub(crate) use folder::{FolderBatches, FolderTask};
+pub(crate) use servers::{BatchRunArgs, CollectArgs};
 
 /// Flags of the input files of a Batch API. The default limits are those of the vendor, else those of OpenAI and Azure.
 #[derive(Debug, Clone, Args)]

@@ -4,16 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::BatchFileArgs;
 use super::driver::{Driven, Driver, Goal, Notes};
-use super::export;
-use super::file::RequestCost;
-use super::folder::start_runtime;
+use super::file::{self, RequestCost, StoppedModels, require_files, require_remote};
+use super::folder::{self, start_runtime};
 use super::journal::Journal;
 use super::recover::recover;
-use super::requests::{require_files, require_remote};
-use super::servers::Servers;
-use super::settings::BatchRunArgs;
-use super::stopped_models::StoppedModels;
-use super::summary;
+use super::servers::{BatchRunArgs, Servers};
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::costs::{Budget, BudgetNotes, RunModels};
 use crate::engine::experiment::Experiment;
@@ -27,8 +22,7 @@ use crate::runs::outcome::Outcome;
 use crate::store::StoredTrial;
 use crate::types::TrialKey;
 use crate::types::manifests::Status;
-use crate::types::text::money;
-use crate::types::text::plural;
+use crate::types::text::{money, plural};
 
 /// Maximum number of further batches for requests without a reply; chosen.
 const MAX_REPEATS: usize = 3;
@@ -262,8 +256,8 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             }
         };
         let quota = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
-        let target = export::Target { files: self.files, quota, journal: Some(&mut self.journal), cost: &cost };
-        export::write(&mut self.run, phase, remaining.plan, target)?;
+        let target = file::Target { files: self.files, quota, journal: Some(&mut self.journal), cost: &cost };
+        file::write(&mut self.run, phase, remaining.plan, target)?;
         Ok(())
     }
 
@@ -320,7 +314,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     /// The outcome of a command that does not wait for its batches.
     fn detached(self) -> Outcome {
         let folder = self.run.store.folder().display().to_string();
-        let parts = summary::lines(&self.journal, &BTreeMap::new());
+        let parts = folder::lines(&self.journal, &BTreeMap::new());
         let output = format!(
             "{parts}the same command, or batch fetch {folder}, imports the replies; the same command also submits what waits\n"
         );

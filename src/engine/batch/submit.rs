@@ -2,12 +2,11 @@
 //! process.
 
 use super::driver::{Driver, Goal, Step};
-use super::event::Event;
+use super::journal::Event;
 use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
 use crate::ask::{AskError, BatchInterface};
 use crate::error::{Error, Result};
-use crate::types::text::counted;
-use crate::types::text::money;
+use crate::types::text::{counted, money};
 use darkqa_score::answers::record::Detail;
 
 /// Number of consecutive failed uploads or creations after which a model is stopped; chosen: 15 minutes by

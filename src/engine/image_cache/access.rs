@@ -1,27 +1,36 @@
 //! Reads and writes of an image store: [`ImageStore`].
+//!
+//! Counts of the reads and writes of this process: [`StoreCounts`].
+//!
+//! Flags of the image store: [`StoreArgs`].
 
-use std::fs;
+#[cfg(test)]
+mod tests;
+
 use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
+use std::{fmt, fs};
 
-use super::counts::StoreCounts;
-use super::entry::{Content, Damaged, Entry, FOOTER, is_footer_valid};
-use super::folder::{StoreFolder, if_exists};
-use super::key::Key;
-use super::kinds::StoredKinds;
-use super::sweep::sweep;
+use clap::Args;
+
+use super::entry::{Content, Damaged, Entry, FOOTER, ImageSet, Key, StoredKinds, is_footer_valid};
+use super::folder::{StoreFolder, if_exists, sweep};
 use crate::error::{Error, Result};
-use crate::files::folder_access::FolderAccess;
-use crate::files::reading;
+use crate::files::{self, FolderAccess};
+use crate::types::Decides;
+use crate::types::flags::positive;
 
 /// Maximum number of written bytes between two sweeps; chosen.
 const SWEEP_AFTER: u64 = 1_000_000_000;
+
 /// Divisor of the store's capacity that gives the bytes between two sweeps of a small store; chosen.
 const SWEEP_SHARE: u64 = 8;
+
 /// Maximum size, in bytes, of a file that is read; chosen (an image of 100 megapixels has a third).
 const MAX_BYTES: u64 = 1 << 30;
+
 /// Age of a file's time from which on a read updates it: a day, so that reads cause few writes.
 const TOUCH_AFTER: Duration = Duration::from_hours(24);
 
@@ -244,7 +253,7 @@ impl ImageStore {
 /// Reads a file, and updates its time as a sign of use. A file that is too large, or has no valid footer, counts as
 /// damaged.
 fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
-    let mut file = reading::open(path)?;
+    let mut file = files::open(path)?;
     let data = file.metadata()?;
     let mut footer = Vec::new();
     let before = data.len().saturating_sub(FOOTER as u64);
@@ -265,5 +274,91 @@ fn read(path: &Path) -> io::Result<Result<Vec<u8>, Damaged>> {
     Ok(Ok(content))
 }
 
-#[cfg(test)]
-mod tests;
+/// Numbers of images read, written and left out, with their bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct StoreCounts {
+    /// Images that were read from the store.
+    pub(crate) hits: usize,
+    /// Bytes of these images.
+    pub(crate) hit_bytes: u64,
+    /// Measures, thumbnails and probe results that were read.
+    pub(crate) facts: usize,
+    /// Time saved by reading: the time that the entries took to compute, in milliseconds.
+    pub(crate) saved_ms: u64,
+    /// Images that the store did not have.
+    pub(crate) misses: usize,
+    /// Images that were written to the store.
+    pub(crate) written: usize,
+    /// Bytes of their files.
+    pub(crate) written_bytes: u64,
+    /// Images that the store had no room for.
+    pub(crate) left_out: usize,
+    /// Images whose files were damaged or exchanged, and therefore removed.
+    pub(crate) damaged: usize,
+    /// Images that were removed because they had been unused for long.
+    pub(crate) evicted: usize,
+}
+
+impl fmt::Display for StoreCounts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "{} of {} images read ({:.1} MB), {} measures and small copies; these took {:.1} s to make; {} written ({:.1} MB)",
+            self.hits,
+            self.hits + self.misses,
+            self.hit_bytes as f64 / 1e6,
+            self.facts,
+            self.saved_ms as f64 / 1e3,
+            self.written,
+            self.written_bytes as f64 / 1e6,
+        )?;
+        for (count, what) in [
+            (self.left_out, "not stored because the store is full (--images-cache size)"),
+            (self.damaged, "damaged and made again"),
+            (self.evicted, "removed that nobody had used for 14 days"),
+        ] {
+            if count > 0 {
+                write!(f, ", {count} {what}")?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Flags of the folder in which images are kept for other runs.
+#[derive(Debug, Clone, Args)]
+#[command(next_help_heading = "Scale")]
+#[expect(clippy::struct_field_names, reason = "the names of the flags")]
+pub(crate) struct StoreArgs {
+    /// Folder of stored images, shared by runs, models, shards and processes; it may be deleted at any time;
+    /// `darkqa-eval cache DIR` lists it; default: no image is stored
+    #[arg(long, value_name = "DIR", add = Decides::Nothing)]
+    pub images_cache: Option<PathBuf>,
+    /// Images to store
+    #[arg(long, value_name = "WHAT", value_enum, default_value_t = StoredKinds::Enhanced, add = Decides::Nothing)]
+    pub images_cache_what: StoredKinds,
+    /// Maximum size in GB (10⁹ bytes); when it is reached, images unused for 14 days are removed; if there are none, no
+    /// image is added
+    #[arg(long, value_name = "GB", value_parser = positive, default_value = "20", add = Decides::Nothing)]
+    pub images_cache_size: f64,
+}
+
+impl StoreArgs {
+    /// An empty estimate of the images that the store would keep; `None` without a store.
+    pub(crate) fn image_set(&self) -> Option<ImageSet> {
+        let set = ImageSet::new(self.images_cache_what, self.images_cache_size * 1e9);
+        self.images_cache.is_some().then_some(set)
+    }
+
+    /// Opens the store; `None` if the flags name no folder.
+    ///
+    /// # Errors
+    /// If the folder cannot be created or read.
+    pub(crate) fn open(&self, access: FolderAccess) -> Result<Option<ImageStore>> {
+        let bytes = (self.images_cache_size * 1e9) as u64;
+        self.images_cache
+            .as_deref()
+            .map(|folder| ImageStore::open(folder, access, self.images_cache_what, bytes))
+            .transpose()
+    }
+}

@@ -11,16 +11,26 @@
 //! | 8 | `DQIMAGE1` |
 //!
 //! Numbers are little-endian. The digest covers the key, so that exchanged files are detected.
+//!
+//! Key of an entry in the store: [`Key`].
+//!
+//! Kinds of images that a store keeps: [`StoredKinds`].
+//!
+//! Estimate of the bytes that a run would store: [`ImageSet`].
 
 use std::fmt;
 
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::key::Key;
+use crate::error::Result;
+use crate::types::Digest;
+use crate::types::flags::flag_words;
 
 /// Last bytes of each file: type and version of the format.
 const MAGIC: &[u8; 8] = b"DQIMAGE1";
+
 /// Length of the footer in bytes.
 pub(super) const FOOTER: usize = 32 + 8 + 3 * 4 + 8;
 
@@ -215,6 +225,86 @@ fn digest(key: &Key, numbers: &[u8; 20], image: &[u8], facts: &[u8]) -> blake3::
     hasher.update(MAGIC).update(key.digest().as_bytes());
     hasher.update(numbers).update(image).update(facts);
     hasher.finalize()
+}
+
+/// Domain and version of the digests. The version is raised when the same recipe gives another image, or when entries
+/// get other facts. Entries of other versions are not found any more, and are evicted when they are old.
+const DOMAIN: &str = "darkqa.image-store/1";
+
+/// Digest of a recipe (everything that determines the file of an image), with the recipe as canonical JSON.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Key {
+    digest: Digest,
+    recipe: Value,
+}
+
+impl Key {
+    /// The key of a recipe, which must contain everything that determines the bytes of an image, and nothing else.
+    ///
+    /// # Errors
+    /// If a number of the recipe is infinite or NaN.
+    pub(crate) fn from_recipe(recipe: &impl Serialize) -> Result<Self> {
+        let (digest, recipe) = Digest::canonical_value(DOMAIN, recipe)?;
+        Ok(Self { digest, recipe })
+    }
+
+    pub(crate) fn digest(&self) -> &Digest {
+        &self.digest
+    }
+
+    /// The recipe as canonical JSON.
+    pub(super) fn recipe(&self) -> &Value {
+        &self.recipe
+    }
+}
+
+/// Which images are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum StoredKinds {
+    /// Enhanced images; of the others PSNR and SSIM alone
+    Enhanced,
+    /// Degraded ones too, which are made faster than a network share is read: for slow processors and fast disks
+    All,
+}
+
+flag_words!(StoredKinds);
+
+/// Estimated size of a run's images that a store would keep, and the store's capacity, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct ImageSet {
+    kinds: StoredKinds,
+    bytes: f64,
+    room: f64,
+}
+
+impl ImageSet {
+    /// An empty set, for a store with this capacity in bytes.
+    pub(super) fn new(kinds: StoredKinds, room: f64) -> Self {
+        Self { kinds, bytes: 0.0, room }
+    }
+
+    /// Adds images of this total size in bytes, if the store keeps images of this kind.
+    pub(crate) fn add(&mut self, is_enhanced: bool, bytes: f64) {
+        if is_enhanced || self.kinds == StoredKinds::All {
+            self.bytes += bytes;
+        }
+    }
+
+    /// Description of the images that the store keeps.
+    pub(crate) fn description(&self) -> &'static str {
+        match self.kinds {
+            StoredKinds::Enhanced => "enhanced images",
+            StoredKinds::All => "images",
+        }
+    }
+
+    pub(crate) fn bytes(&self) -> f64 {
+        self.bytes
+    }
+
+    pub(crate) fn room(&self) -> f64 {
+        self.room
+    }
 }
 
 #[cfg(test)]

@@ -10,20 +10,9 @@
 //! ```
 
 mod access;
-mod counts;
 mod entry;
 mod folder;
-mod image_set;
-mod key;
-mod kinds;
-mod listing;
-mod settings;
-mod sweep;
 
-pub(crate) use access::ImageStore;
-pub(crate) use entry::{Content, Entry, EntryFacts, Shown};
-pub(crate) use image_set::ImageSet;
-pub(crate) use key::Key;
-pub(crate) use kinds::StoredKinds;
-pub(crate) use listing::{clear, listing};
-pub(crate) use settings::StoreArgs;
+pub(crate) use access::{ImageStore, StoreArgs};
+pub(crate) use entry::{Content, Entry, EntryFacts, ImageSet, Key, Shown, StoredKinds};
+pub(crate) use folder::{clear, listing};

@@ -1,22 +1,30 @@
 //! Cached steps from one frame to its images: [`FrameWork`].
-
-pub(crate) mod pairs;
-pub(crate) mod staged;
+//!
+//! Conditions of pairs of a frame and its photograph in the dark: the photograph itself, or a degradation that is as
+//! dark ([`Resolved`]).
+//!
+//! One image of a frame before its enhancer ([`StagedImage`]) and as it is sent ([`PreparedImage`]).
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
+use super::frames::matching_degradation;
+use super::notes::similarity;
+use super::stored::{Needed, Similarity, StoredNotes};
+use super::timings::ImageSteps;
 use crate::data::Picture;
 use crate::engine::images::frames::{DegradeStage, Source, SourceFrame, SourcePhotograph};
-use crate::engine::images::image_steps::ImageSteps;
 use crate::engine::images::recipes::Recipe;
 use crate::engine::images::stored::StoredPlace;
 use crate::engine::images::timings::TimedStep;
 use crate::error::{Error, Result};
-use crate::pictures::Scaling;
-use crate::pictures::bilinear;
-use crate::pictures::{Payload, PayloadFormat};
-use crate::types::{Condition, Degradation, Digest, ExposureFacts, FrameId, InputNote, PhotoName, Pixels, Rgb};
+use crate::pictures::{Payload, PayloadFormat, Scaling, bilinear};
+use crate::types::{
+    Condition, Degradation, Digest, EnhancerName, ExposureFacts, FrameId, InputNote, PairDark, PairFacts, PhotoName,
+    Pixels, Rgb, Treatment,
+};
+use darkqa_enhance::ImageUse;
 use darkqa_light::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 
 /// Cached steps of one frame (file, clean pixels, degraded image). Each is computed on first use.
@@ -262,4 +270,232 @@ fn get_or_try_insert<T>(slot: &mut Option<T>, compute: impl FnOnce() -> Result<T
         None => compute()?,
     };
     Ok(slot.insert(value))
+}
+
+/// A condition of one frame after pairs are replaced: a photograph becomes an untouched frame, and a synthetic image as
+/// dark as the photograph becomes a degradation with the exposure drop of that photograph. So all rules for untouched
+/// and degraded frames apply.
+pub(crate) struct Resolved<'w, 'a> {
+    /// The steps of the frame, or of its photograph.
+    pub(crate) work: &'w mut FrameWork<'a>,
+    /// The condition of `work`: untouched or degraded.
+    pub(crate) condition: Condition,
+    /// How dark the photograph is; `None` if the condition has no pair.
+    pub(crate) pair: Option<PairFacts>,
+}
+
+impl<'a> FrameWork<'a> {
+    /// Replaces the pair in a condition of this frame.
+    ///
+    /// # Errors
+    /// If the frame has no such photograph, or its exposure drop is unknown or cannot be synthesised.
+    pub(crate) fn resolve(&mut self, condition: &Condition) -> Result<Resolved<'_, 'a>> {
+        match &condition.treatment {
+            Treatment::Untouched | Treatment::Degraded(_) => {
+                Ok(Resolved { work: self, condition: condition.clone(), pair: None })
+            }
+            Treatment::Paired(PairDark::Match(kind, reading)) => {
+                let (how, facts) =
+                    matching_degradation(&self.photographs, *kind, reading.as_ref()).ok_or_else(|| {
+                        let problem = "no photograph in the dark with a known exposure drop";
+                        Error::data(&self.frame, problem)
+                    })?;
+                Ok(Resolved {
+                    work: self,
+                    condition: with_treatment(condition, Treatment::Degraded(how)),
+                    pair: Some(facts),
+                })
+            }
+            Treatment::Paired(PairDark::Photograph(name)) => {
+                let pair = Some(self.pair_facts(name)?);
+                Ok(Resolved {
+                    work: self.photograph_work(name)?,
+                    condition: with_treatment(condition, Treatment::Untouched),
+                    pair,
+                })
+            }
+        }
+    }
+
+    /// How dark a photograph is; measured on first use.
+    fn pair_facts(&mut self, name: &PhotoName) -> Result<PairFacts> {
+        let index = self.photograph_index(name)?;
+        if let Some(facts) = self.photographs[index].facts {
+            return Ok(facts);
+        }
+        let normal = Arc::clone(self.clean()?);
+        let low = Arc::clone(self.photograph_work(name)?.clean()?);
+        let photo = &mut self.photographs[index];
+        let facts = self.steps.timings.time(TimedStep::Measure, || photo.measure(&normal, &low));
+        photo.facts = Some(facts);
+        Ok(facts)
+    }
+
+    /// The steps of a photograph of the frame. Their noise key is never used, because a photograph is not degraded.
+    fn photograph_work(&mut self, name: &PhotoName) -> Result<&mut Self> {
+        let planned = self.photographs[self.photograph_index(name)?].digest;
+        let (steps, of, key) = (self.steps, &self.frame, self.key);
+        Ok(self.photograph_works.entry(name.clone()).or_insert_with(|| {
+            let label = FrameId(format!("{of} ({name})"));
+            Box::new(Self {
+                photograph: Some((of.clone(), name.clone())),
+                ..Self::new(steps, label, key, Some(planned))
+            })
+        }))
+    }
+
+    fn photograph_index(&self, name: &PhotoName) -> Result<usize> {
+        self.photographs
+            .iter()
+            .position(|photo| photo.name == *name)
+            .ok_or_else(|| Error::data(&self.frame, format_args!("no photograph {name} of this frame")))
+    }
+}
+
+/// The same condition with another treatment.
+fn with_treatment(condition: &Condition, treatment: Treatment) -> Condition {
+    Condition { treatment, ..condition.clone() }
+}
+
+/// Adds the facts about a pair to an image of it.
+fn with_pair_facts(payload: Arc<Payload>, pair: Option<PairFacts>) -> Arc<Payload> {
+    match pair {
+        None => payload,
+        pair => Arc::new(Arc::unwrap_or_clone(payload).with_pair(pair)),
+    }
+}
+
+/// An image as it is sent, with facts about it.
+pub(crate) struct PreparedImage<'a> {
+    pub(crate) payload: Arc<Payload>,
+    pub(crate) pixels: PixelsSent,
+    /// Similarity to the clean frame; `None` if it was not wanted.
+    pub(crate) similarity: Option<Similarity>,
+    /// Place in the store; `None` if the image is not stored.
+    pub(crate) place: Option<StoredPlace<'a>>,
+}
+
+/// Where the pixels of a sent image are.
+pub(crate) enum PixelsSent {
+    /// In memory, because they were just encoded.
+    Encoded(Arc<Rgb>),
+    /// In the file of the frame, which is sent unchanged.
+    InFrameFile,
+    /// In the image store, not decoded.
+    Stored,
+}
+
+/// An image that is ready, or that its enhancer must still process.
+pub(crate) enum StagedImage<'a> {
+    Ready(PreparedImage<'a>),
+    /// An enhanced image from the store. Its notes must still be added to the usage of its enhancer.
+    Stored {
+        image: PreparedImage<'a>,
+        enhancer: EnhancerName,
+        notes: StoredNotes,
+    },
+    ToEnhance {
+        degraded: Arc<Rgb>,
+        enhancer: EnhancerName,
+        finish: ImageFinisher<'a>,
+    },
+}
+
+/// The steps that turn the pixels of an image into a [`PreparedImage`]: encode, compare with the clean frame, store.
+pub(crate) struct ImageFinisher<'a> {
+    steps: ImageSteps<'a>,
+    /// Changes that reading the frame made besides decoding it.
+    note: InputNote,
+    /// The camera's exposure; `None` for a kind that leaves it open.
+    exposure: Option<ExposureFacts>,
+    /// How dark the photograph of the frame is; `None` if the condition has no pair.
+    pair: Option<PairFacts>,
+    place: Option<StoredPlace<'a>>,
+    /// The clean frame in the size sent; `None` if the image is not compared with it.
+    clean: Option<Arc<Rgb>>,
+    /// Similarity from the store.
+    known: Option<Similarity>,
+    /// Time spent on the pixels so far.
+    pub(crate) took: Duration,
+}
+
+impl<'a> FrameWork<'a> {
+    /// Prepares the frame in a condition: as it is sent, or as input of its enhancer. Uses the store if it has
+    /// everything needed.
+    ///
+    /// # Errors
+    /// If the frame cannot be read, or cannot be shown in the condition.
+    pub(crate) fn stage(&mut self, condition: &Condition, needed: Needed) -> Result<StagedImage<'a>> {
+        let Resolved { work, condition, pair } = self.resolve(condition)?;
+        let steps = work.steps;
+        let place = work.stored_place(&condition)?;
+        if let Some(payload) = work.unchanged_file(&condition)? {
+            return Ok(StagedImage::Ready(PreparedImage {
+                payload: with_pair_facts(payload, pair),
+                pixels: PixelsSent::InFrameFile,
+                similarity: None,
+                place,
+            }));
+        }
+        let (note, exposure) = (work.note()?, work.exposure(&condition)?);
+        if let Some(stored) = place.as_ref().and_then(|place| steps.stored_image(place, needed)) {
+            let payload = steps.stored_payload(stored.payload, &note, exposure)?;
+            let image = PreparedImage {
+                payload: with_pair_facts(payload, pair),
+                pixels: PixelsSent::Stored,
+                similarity: stored.notes.similarity,
+                place,
+            };
+            return Ok(match condition.enhancer {
+                None => StagedImage::Ready(image),
+                Some(enhancer) => StagedImage::Stored { image, enhancer, notes: stored.notes },
+            });
+        }
+        let started = Instant::now();
+        let is_compared = needed == Needed::Similarity;
+        let known = place.as_ref().filter(|_| is_compared).and_then(|place| steps.stored_similarity(place));
+        let clean = (is_compared && known.is_none()).then(|| work.clean_as_sent());
+        let finish = ImageFinisher {
+            steps,
+            note,
+            exposure,
+            pair,
+            place,
+            clean: clean.transpose()?,
+            known,
+            took: Duration::ZERO,
+        };
+        let degraded = Arc::clone(work.degraded(condition.degradation())?);
+        let finish = ImageFinisher { took: started.elapsed(), ..finish };
+        match condition.enhancer {
+            None => finish.image(&degraded, None).map(StagedImage::Ready),
+            Some(enhancer) => Ok(StagedImage::ToEnhance { degraded, enhancer, finish }),
+        }
+    }
+}
+
+impl<'a> ImageFinisher<'a> {
+    /// Encodes pixels and stores the image. `enhanced` is what the image adds to the usage of its enhancer.
+    ///
+    /// # Errors
+    /// If it cannot be encoded, or is larger than the endpoint accepts.
+    pub(crate) fn image(self, pixels: &Arc<Rgb>, enhanced: Option<ImageUse>) -> Result<PreparedImage<'a>> {
+        let started = Instant::now();
+        let (payload, encoded) = self.steps.payload(pixels, &self.note, self.exposure)?;
+        let measuring = Instant::now();
+        let measured =
+            self.clean.map(|clean| self.steps.timings.time(TimedStep::Measure, || similarity(&encoded, &clean)));
+        let similarity = self.known.or(measured.transpose()?);
+        if let Some(place) = self.place.as_ref().filter(|_| self.known.is_none()) {
+            let notes = StoredNotes { enhanced, similarity };
+            let took = if place.keeps_image() { self.took + started.elapsed() } else { measuring.elapsed() };
+            self.steps.store(place, &payload, &notes, took);
+        }
+        Ok(PreparedImage {
+            payload: with_pair_facts(payload, self.pair),
+            pixels: PixelsSent::Encoded(encoded),
+            similarity,
+            place: self.place,
+        })
+    }
 }

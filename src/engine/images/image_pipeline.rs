@@ -2,12 +2,12 @@
 //!
 //! The images of a frame are made condition by condition, those of a walk all at once. The channel to the requests is
 //! bounded, so that memory contains only the images in flight, one or two more groups, and the frame of each worker.
+//!
+//! The notes about an image for the report, made with the image: [`ImagePipeline::image_and_notes`].
 
-mod image_and_notes;
-mod opening;
 mod preparation;
-
-pub(crate) use opening::EnhancerStopper;
+#[cfg(test)]
+mod tests;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -16,13 +16,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 use tokio::sync::mpsc::Sender;
 
+use super::frame_work::{PixelsSent, PreparedImage, Resolved, StagedImage};
+use super::notes::{ShownObjects, WantedNotes, fidelity, thumbnail, thumbnail_of_all};
+use super::timings::ImageSteps;
 use crate::engine::images::enhancement::LazyEnhancer;
 use crate::engine::images::frame_work::FrameWork;
-use crate::engine::images::frame_work::pairs::Resolved;
-use crate::engine::images::frame_work::staged::{PreparedImage, StagedImage};
 use crate::engine::images::frames::Source;
-use crate::engine::images::image_steps::ImageSteps;
-use crate::engine::images::notes::thumbnail::{ShownObjects, thumbnail_of_all};
 use crate::engine::images::notes::{ImageNotes, MissingNotes};
 use crate::engine::images::stored::{Needed, StoredNotes};
 use crate::engine::images::timings::TimedStep;
@@ -30,8 +29,10 @@ use crate::engine::images::trials::{Item, PreparedGroup, SourcePlan, Stimulus, T
 use crate::engine::images::workers::Workers;
 use crate::error::{Error, Result};
 use crate::pictures::Payload;
-use crate::types::{Condition, EnhancerName, FrameId, Rgb};
+use crate::types::{Condition, EnhancerName, FrameId, Rgb, Thumbnail};
 use darkqa_enhance::{Enhancer, ImageUse, Implausible};
+
+pub(crate) use preparation::EnhancerStopper;
 
 /// The steps from a frame to an image, with the enhancement models that they need.
 pub(crate) struct ImagePipeline<'a> {
@@ -351,5 +352,64 @@ fn ok_or_warn<T>(name: &FrameId, condition: &Condition, made: Result<T>) -> Opti
     .ok()
 }
 
-#[cfg(test)]
-mod tests;
+impl ImagePipeline<'_> {
+    /// Makes the image of a frame in a condition as it is sent, with the wanted notes. `objects` are cropped for the
+    /// thumbnail.
+    fn image_and_notes(
+        &mut self,
+        work: &mut FrameWork<'_>,
+        condition: &Condition,
+        name: &FrameId,
+        objects: Option<ShownObjects<'_>>,
+        wanted: WantedNotes,
+    ) -> Result<(Arc<Payload>, ImageNotes)> {
+        let needed = if wanted.fidelity { Needed::Similarity } else { Needed::Image };
+        let image = self.image(work, condition, needed)?;
+        let similarity = image.similarity.filter(|_| wanted.fidelity);
+        let thumbnail =
+            if wanted.thumbnail { stored_or_new_thumbnail(work, condition, name, objects, &image)? } else { None };
+        let notes = ImageNotes {
+            thumbnail,
+            fidelity: similarity.map(|found| fidelity(name, condition, &image.payload, found)),
+        };
+        Ok((image.payload, notes))
+    }
+}
+
+/// The thumbnail of an image, from the store if possible; `None` with a warning if it cannot be made.
+///
+/// # Errors
+/// If the frame cannot be decoded.
+fn stored_or_new_thumbnail(
+    work: &mut FrameWork<'_>,
+    condition: &Condition,
+    name: &FrameId,
+    objects: Option<ShownObjects<'_>>,
+    image: &PreparedImage<'_>,
+) -> Result<Option<Thumbnail>> {
+    let timings = work.steps.timings;
+    let payload = &image.payload;
+    // A store key does not contain how dark a photograph is, and the gain of the crops depends on that.
+    let place = image
+        .place
+        .as_ref()
+        .filter(|_| payload.facts().pair.is_none())
+        .and_then(|place| place.thumbnail(name, condition, objects));
+    let stored =
+        place.as_ref().and_then(|place| timings.time(TimedStep::Decode, || place.read(payload.facts().digest)));
+    if stored.is_some() {
+        return Ok(stored);
+    }
+    let started = Instant::now();
+    let encoded: Option<Arc<Rgb>> = match &image.pixels {
+        PixelsSent::Encoded(pixels) => Some(Arc::clone(pixels)),
+        PixelsSent::InFrameFile => Some(Arc::clone(work.resolve(condition)?.work.clean()?)),
+        PixelsSent::Stored => None,
+    };
+    let made = timings.time(TimedStep::Encode, || thumbnail(name, condition, payload, encoded.as_deref(), objects));
+    let made = ok_or_warn(name, condition, made);
+    if let (Some(place), Some(made)) = (place, &made) {
+        place.write(made, started.elapsed().as_millis() as u64);
+    }
+    Ok(made)
+}

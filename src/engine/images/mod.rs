@@ -9,7 +9,6 @@ pub(crate) mod enhancement;
 pub(crate) mod frame_work;
 pub(crate) mod frames;
 pub(crate) mod image_pipeline;
-pub(crate) mod image_steps;
 pub(crate) mod notes;
 pub(crate) mod progress;
 pub(crate) mod recipes;

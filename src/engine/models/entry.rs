@@ -1,18 +1,21 @@
 //! One model of a run before it is opened, merged from the flags and the tables of a models file: [`Entry`].
+//!
+//! Keys in the `[defaults]` of a models file that are settings of the whole run: [`run_defaults`].
 
 use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
+use std::path::Path;
 
 use serde_json::json;
 use toml::Value;
 
 use super::asking::AskingArgs;
-use super::file::{Keys, Located};
+use super::file::{Keys, Located, ModelsFile};
 use super::name::ModelName;
 use crate::ask::Price;
 use crate::error::{Error, Result};
 use crate::types::View;
-use crate::types::text::near_name::{did_you_mean, nearest};
+use crate::types::text::{did_you_mean, nearest};
 
 /// Keys of a model that do not correspond to a flag, or have another form than the flag.
 const MODEL_KEYS: [&str; 10] =
@@ -172,12 +175,12 @@ pub(super) fn check_keys(keys: &Keys, is_defaults: bool) -> Result<()> {
 }
 
 /// True if a key is a setting of the run, and not of a model.
-pub(super) fn is_run_key(key: &str) -> bool {
+fn is_run_key(key: &str) -> bool {
     RUN_KEYS.contains(&key)
 }
 
 /// All keys of a model.
-pub(super) fn known_keys() -> BTreeSet<String> {
+fn known_keys() -> BTreeSet<String> {
     AskingArgs::flags()
         .into_iter()
         .filter(|flag| !matches!(&**flag, "header" | "header-env"))
@@ -280,4 +283,28 @@ fn limit(located: &Located) -> Result<NonZeroUsize> {
     let number = located.value.as_integer().and_then(|number| usize::try_from(number).ok());
     let number = number.and_then(NonZeroUsize::new);
     number.ok_or_else(|| located.error("limit: a whole number from 1 on expected"))
+}
+
+/// A flag of the run that a models file sets.
+#[derive(Debug)]
+pub(crate) struct RunDefault {
+    /// Long name of the flag.
+    pub(crate) flag: String,
+    pub(crate) value: Value,
+    /// File and line.
+    pub(crate) place: String,
+}
+
+/// Reads the flags of the run that the `[defaults]` of a models file set.
+///
+/// # Errors
+/// See [`ModelsFile::read`].
+pub(crate) fn run_defaults(path: &Path) -> Result<Vec<RunDefault>> {
+    let file = ModelsFile::read(path)?;
+    Ok(file
+        .defaults
+        .into_iter()
+        .filter(|(key, _)| is_run_key(key))
+        .map(|(flag, located)| RunDefault { flag, value: located.value, place: located.place })
+        .collect())
 }

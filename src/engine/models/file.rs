@@ -8,7 +8,7 @@ use toml::{Spanned, Table, Value};
 
 use crate::ask::{is_secret_header, is_secret_value, looks_like_key};
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
 use crate::types::text::{TomlFault, line_at};
 
 /// The tables of a models file. Keys and values are not validated yet.
@@ -45,7 +45,7 @@ impl ModelsFile {
     /// If it cannot be read, is not TOML, has other tables than `[defaults]` and `[[model]]`, or contains a secret. The
     /// error names the line, and does not show the secret.
     pub(super) fn read(path: &Path) -> Result<Self> {
-        let text = reading::settings(path)?;
+        let text = files::settings(path)?;
         let at = |start: usize| in_line(path, line_at(&text, start));
         let values: Table = toml::from_str(&text).map_err(|e| invalid_toml(path, &text, &e))?;
         let spans = DeTable::parse(&text).map_err(|e| invalid_toml(path, &text, &e))?;

@@ -1,13 +1,17 @@
 //! Names of models in flags and in models files: [`ModelName`].
+//!
+//! Flags that name the models to ask: [`ModelArgs`].
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::Args;
+
 use crate::ask::Prices;
-use crate::engine::{observer, room_net};
+use crate::engine::observer;
 use crate::error::{Error, Result};
-use crate::types::Control;
-use crate::types::text::near_name::is_nearly;
+use crate::types::text::is_nearly;
+use crate::types::{Control, Decides};
 
 /// A model that a flag or a models file names.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -26,7 +30,7 @@ pub(crate) enum ModelName {
 }
 
 /// First words of the names of built-in models.
-const BUILT_IN: [&str; 4] = ["random", "observer", room_net::NAME, "script"];
+const BUILT_IN: [&str; 4] = ["random", "observer", observer::NAME, "script"];
 
 impl ModelName {
     /// True for the built-in models that answer multiple-choice questions only.
@@ -42,7 +46,7 @@ impl ModelName {
         let name = match self {
             Self::Random => "random",
             Self::Observer(_) => "observer",
-            Self::RoomNet => room_net::NAME,
+            Self::RoomNet => observer::NAME,
             Self::Script(_) | Self::Remote(_) => return Ok(()),
         };
         let problem = format_args!("{name} can only choose, and these questions are open");
@@ -86,7 +90,7 @@ impl ModelName {
         match self {
             Self::Random => "random".to_owned(),
             Self::Observer(control) => observer::name(*control),
-            Self::RoomNet => room_net::NAME.to_owned(),
+            Self::RoomNet => observer::NAME.to_owned(),
             Self::Script(path) => {
                 path.file_stem().map_or_else(|| "script".to_owned(), |stem| stem.to_string_lossy().into_owned())
             }
@@ -110,7 +114,7 @@ impl FromStr for ModelName {
             "" => Err("the name of a model is empty".to_owned()),
             "random" => Ok(Self::Random),
             "observer" => Ok(Self::Observer(None)),
-            room_net::NAME => Ok(Self::RoomNet),
+            observer::NAME => Ok(Self::RoomNet),
             "script" => Err("script:FILE expected, a file of replies".to_owned()),
             name => match name.strip_prefix("script:") {
                 Some(path) => Ok(Self::Script(path.into())),
@@ -120,6 +124,47 @@ impl FromStr for ModelName {
                 None => Ok(Self::Remote(name.to_owned())),
             },
         }
+    }
+}
+
+/// Flags that name the models to ask.
+#[derive(Debug, Clone, Default, Args)]
+#[command(next_help_heading = "Model")]
+pub(crate) struct ModelArgs {
+    /// Model to ask, by its name at the endpoint (required, or --models); repeatable; built in: room-net (a small
+    /// network that sees drawn rooms), observer (frames with maps), its controls (observer:CONTROL), random,
+    /// script:FILE
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
+    pub model: Vec<ModelName>,
+    /// Send the models text only, no image
+    #[arg(long, add = Decides::Trials)]
+    pub blind: bool,
+    /// Add a text-only baseline by this model; repeatable; default: none
+    #[arg(long, value_name = "NAME", add = Decides::Trials)]
+    pub blind_model: Vec<ModelName>,
+    /// TOML file with one table per model: endpoint, key and settings; default: none
+    #[arg(long, value_name = "FILE", add = Decides::Trials)]
+    pub models: Option<PathBuf>,
+    /// Ask only these models, separated by commas; default: all
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', add = Decides::Trials)]
+    pub only: Vec<String>,
+    /// Trust a models file in the data folder: it may then name any variable and file
+    #[arg(long, add = Decides::Nothing)]
+    pub trust_models: bool,
+    /// Override one key of one model in the models file; repeatable; default: none
+    #[arg(long, value_name = "NAME.KEY=VALUE", add = Decides::Reply)]
+    pub set: Vec<String>,
+}
+
+impl ModelArgs {
+    /// True if no flag names a model or a models file.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.model.is_empty() && self.blind_model.is_empty() && self.models.is_none()
+    }
+
+    /// The models that flags name.
+    pub(crate) fn named(&self) -> impl Iterator<Item = &ModelName> {
+        self.model.iter().chain(&self.blind_model)
     }
 }
 

@@ -1,5 +1,8 @@
 //! Conventions of published models, taken from their authors' code: [`Preset`].
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -11,7 +14,7 @@ use super::sidecar::{ADD, ModelSidecar, OutputChoice};
 use crate::expressions::Expression;
 use crate::graphs::{Port, format_ports};
 use darkqa_base::error::{Error, Result};
-use darkqa_base::types::text::near_name::suggestion;
+use darkqa_base::types::text::suggestion;
 
 /// TOML file of all presets.
 const PRESETS: &str = include_str!("../presets.toml");
@@ -405,6 +408,3 @@ fn name_occurs(name: &str, stem: &str) -> bool {
 fn letters_of(text: &str) -> String {
     text.to_lowercase().replace(|c: char| !c.is_alphanumeric(), "")
 }
-
-#[cfg(test)]
-mod tests;

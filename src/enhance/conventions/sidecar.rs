@@ -1,11 +1,10 @@
 //! Input and output convention stated in the user's `MODEL.onnx.toml` or in a preset: [`ModelSidecar`].
 
 use std::collections::BTreeMap;
-use std::fmt;
-use std::fs;
 use std::io::ErrorKind;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
+use std::{fmt, fs};
 
 use serde::{Deserialize, Serialize};
 
@@ -13,7 +12,7 @@ use super::convention::{ChannelOrder, Channels, Locality, Padding, Rounding, Ten
 use super::extra::ExtraValue;
 use crate::expressions::Expression;
 use darkqa_base::error::{Error, Result};
-use darkqa_base::files::reading;
+use darkqa_base::files;
 use darkqa_base::types::text::TomlFault;
 
 /// Content of a sidecar. Every key is optional; an unknown key is an error.
@@ -123,7 +122,7 @@ pub(crate) fn text_for(model: &Path) -> Result<String> {
             }
             Ok(String::new())
         }
-        _ => reading::settings(&path),
+        _ => files::settings(&path),
     }
 }
 

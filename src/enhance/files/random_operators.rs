@@ -5,8 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use super::onnx_message::OnnxMessage;
-use super::protobuf::{FieldValue, Malformed, fields, push_bytes};
+use super::protobuf::{FieldValue, Malformed, OnnxMessage, fields, push_bytes};
 
 /// Random operators, whose attribute `seed` is a float.
 const SEEDED_BY_FLOAT: [&str; 6] =

@@ -6,8 +6,7 @@
 
 use half::f16;
 
-use super::fed_image::FedImage;
-use super::tensor::{Tensor, TensorData};
+use super::tensor::{FedImage, Tensor, TensorData};
 use crate::conventions::sidecar::ModelSidecar;
 use crate::conventions::{ChannelOrder, Channels, ElementType, Padding, Signature, TensorLayout, ValueRange};
 use crate::expressions::Expression;

@@ -6,7 +6,7 @@ use std::env::{self, consts};
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-use super::library::{PINNED, is_library_name};
+use super::library_file::{PINNED, is_library_name};
 
 /// Folders of this process that are searched for a library, directly or in their subfolders.
 #[derive(Debug, Clone, Default)]

@@ -3,7 +3,7 @@
 //! The estimate is based on the size of the input tensor, because a wrong multiple or fixed size in a sidecar can make
 //! it much larger than the image. The check precedes the allocation.
 
-use super::memory::{self, MemoryCost, PROBE_SIDES};
+use super::{MemoryCost, PROBE_SIDES};
 use crate::conventions::Locality;
 use crate::failure::{RunFailure, format_size};
 use crate::graphs::{Arena, Graph, RunResult};
@@ -46,7 +46,7 @@ impl MemoryCheck {
         image_size: [usize; 2],
     ) -> Result<std::result::Result<(), String>> {
         let pixels = input_size[0].saturating_mul(input_size[1]);
-        let Some(available) = memory::available().filter(|_| pixels > MAX_WHOLE) else {
+        let Some(available) = super::available().filter(|_| pixels > MAX_WHOLE) else {
             return Ok(Ok(()));
         };
         let batch_pixels = graph.batch().saturating_mul(pixels);
@@ -76,7 +76,7 @@ pub(crate) fn out_of_memory(failure: &RunFailure, rule: SizeRule, image_size: [u
     };
     let requested =
         requested.map_or(String::new(), |bytes| format!("{} were needed at once, ", format_gigabytes(bytes)));
-    let free = memory::available().map_or("too few GB".to_owned(), format_gigabytes);
+    let free = super::available().map_or("too few GB".to_owned(), format_gigabytes);
     let (message, remedy) = (failure.message(), remedy(rule, *fed, image_size));
     format!("{message}: {requested}{free} are free; {remedy}")
 }
@@ -132,7 +132,7 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
         if !probe(graph, side, Arena::Kept)? {
             return Ok(Estimate::Tensors);
         }
-        let Some(resident) = memory::resident() else {
+        let Some(resident) = super::resident() else {
             return Ok(Estimate::Tensors);
         };
         measured.push((side * side, resident));

@@ -2,27 +2,25 @@
 //!
 //! The model runs on a few dark frames with each possible convention. If exactly one convention gives plausible images,
 //! it is proposed.
-
-mod proposal;
+//!
+//! Conclusion of an examination: proposed lines of a sidecar ([`Proposal`]).
+//!
+//! Trials of expressions for outputs that are not the image itself: residuals, gains and light maps.
 
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::expressions::{ExpressionTrial, OutputKind};
 use super::plausible::{Facts, UnclampedImage};
-use super::probe::{PairTrial, Probe};
-use super::probe_run::Trials;
-use super::range_pair::RangePair;
-use super::trial_images::run_frames;
+use super::probe::{Conclusion, Endpoints, PairTrial, Probe, RangePair};
+use super::probe_run::{Trials, run_frames};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar, OutputChoice};
-use crate::conventions::{ChannelOrder, ValueScale};
+use crate::conventions::{ChannelOrder, Channels, ValueRange, ValueScale};
 use crate::enhancer::Enhancer;
 use crate::graphs::Port;
+use crate::outputs::{expression_name, light_map_line};
 use crate::sizing::AcceptedSizes;
 use darkqa_base::error::Result;
-use darkqa_base::types::Rgb;
-use proposal::{Proposal, propose};
-pub use proposal::{ProposedLine, Settled};
+use darkqa_base::types::{Flaw, Rgb};
 
 /// Results of a model on dark frames, by convention.
 #[derive(Debug)]
@@ -304,5 +302,299 @@ fn column(pair: &PairTrial, title: String) -> ExaminedConvention {
             })
             .collect(),
         problem: pair.verdict().map(|verdict| verdict.to_string()),
+    }
+}
+
+/// Whether an examination found one convention.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Settled {
+    /// Exactly one convention is plausible.
+    Yes,
+    /// No or several conventions are plausible.
+    No,
+}
+
+/// A proposed line of a sidecar.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ProposedLine {
+    /// The line, such as `range_in = "0..1"`.
+    pub line: String,
+    /// Reason for the proposal.
+    pub reason: String,
+}
+
+/// Conclusion of an examination, with proposed lines.
+pub(super) struct Proposal {
+    lines: Vec<ProposedLine>,
+    conclusion: String,
+    settled: Settled,
+}
+
+impl Proposal {
+    fn without_lines(conclusion: String) -> Self {
+        Self { lines: Vec::new(), conclusion, settled: Settled::No }
+    }
+
+    /// No lines, because the stated ranges are plausible.
+    fn for_stated(pair: RangePair) -> Self {
+        let conclusion = format!(
+            "With {pair}, as set by MODEL.onnx.toml, the preset or the element types, its images are plausible."
+        );
+        Self { settled: Settled::Yes, ..Self::without_lines(conclusion) }
+    }
+
+    /// No lines, because several outputs could be the image: `first`, which is read, and `others`, which are plausible.
+    fn for_unknown_output(first: &str, probe: &Probe, others: &[String]) -> Self {
+        let mut plausible: Vec<&str> = Vec::new();
+        if !probe.plausible().is_empty() {
+            plausible.push(first);
+        }
+        plausible.extend(others.iter().map(String::as_str));
+        Self::without_lines(format!(
+            "It is unknown which output is the image; plausible: {}. Choose one in MODEL.onnx.toml next to it, `output = \"NAME\"`, or name its preset (PRESET:FILE).",
+            if plausible.is_empty() { "none".to_owned() } else { plausible.join("; ") }
+        ))
+    }
+
+    /// Adds to the conclusion that other outputs give plausible images, too.
+    fn mention_outputs(&mut self, others: &[String]) {
+        for output in others {
+            let found = " gives plausible images, too; check which one the model's code uses.";
+            self.conclusion += &[" The ", output, found].concat();
+        }
+    }
+
+    /// Lines that state a pair of ranges.
+    fn for_ranges(pair: RangePair, conclusion: String) -> Self {
+        let reason = "with these value ranges its images are plausible";
+        let lines = pair.lines().into_iter().map(|line| ProposedLine { line, reason: reason.to_owned() });
+        Self { lines: lines.collect(), conclusion, settled: Settled::Yes }
+    }
+}
+
+/// Proposes the only plausible pair of ranges. `swapped` is the probe with the output in the other channel order,
+/// `order`. It is used if no pair is plausible in the present order and swapped colours are the flaw; if several of its
+/// pairs are plausible, the `stated` one is proposed.
+fn propose(probe: &Probe, stated: Option<RangePair>, swapped: &Probe, order: ChannelOrder) -> Proposal {
+    match probe.plausible().as_slice() {
+        several @ [_, _, ..] if stated.is_none() && probe.conclusion() == Conclusion::Assumed => {
+            let others: Vec<String> =
+                several.iter().filter(|pair| **pair != probe.usual).map(ToString::to_string).collect();
+            return Proposal::without_lines(format!(
+                "With {} its images are plausible; a run assumes these usual ranges and warns. They are with {}, too; compare the page with the model's own examples.",
+                probe.usual,
+                others.join("; ")
+            ));
+        }
+        [pair] => {
+            let stated = stated.map_or_else(String::new, |stated| format!(" With {stated}, as set, they are not."));
+            let conclusion = format!("With {pair}, and with no other ranges, its images are plausible.{stated}");
+            return Proposal::for_ranges(*pair, conclusion);
+        }
+        [] => {}
+        several => {
+            let list: Vec<String> = several.iter().map(ToString::to_string).collect();
+            if let Some(pair) = probe.likeliest() {
+                let conclusion = format!(
+                    "With {pair} its images are plausible, and black and white change least. Other plausible ranges: {}.",
+                    list[1..].join("; ")
+                );
+                return Proposal::for_ranges(pair, conclusion);
+            }
+            let stated = stated.map_or_else(String::new, |pair| format!(" {pair}, as set, is not one of them."));
+            return Proposal::without_lines(format!(
+                "Its images are plausible with several value ranges: {}.{stated} Compare the page with the model's own examples, and set the ranges of its code.",
+                list.join("; ")
+            ));
+        }
+    }
+    let is_hue = probe.pairs.iter().any(|pair| {
+        pair.ranges == probe.usual && pair.verdict().is_some_and(|verdict| verdict.example.flaw == Flaw::Hue)
+    });
+    let plausible = swapped.plausible();
+    let pair = match &plausible[..] {
+        [pair] => Some(*pair),
+        several => stated.filter(|pair| several.contains(pair)),
+    };
+    if let Some(pair) = pair.filter(|_| is_hue) {
+        let order_of_input = order.to_string().to_lowercase();
+        let conclusion = format!(
+            "With {pair} and {order} in the output its images are plausible; or with it in the input: `color = \"{order_of_input}\"` and the other order for `color_out`."
+        );
+        let mut found = Proposal::for_ranges(pair, conclusion);
+        if stated == Some(pair) {
+            found.lines.clear();
+        }
+        found.lines.push(ProposedLine {
+            line: format!("color_out = \"{}\"", order.to_string().to_lowercase()),
+            reason: "with the other order, its images are blue where the frames are red".to_owned(),
+        });
+        return found;
+    }
+    Proposal::without_lines(
+        "No value range or colour order gives plausible images. Perhaps it needs the `mean` and `std`, or `mean_out` and `std_out`, of its code, another output is the image, the dimensions have another order, or the export has lost its weights.".to_owned(),
+    )
+}
+
+/// Threshold in codes, chosen. An output up to it for white may be a residual, and one whose difference between white
+/// and black is up to it may be a map. Models that return the image itself exceed 230.
+const MIN_CONTRAST: f64 = 64.0;
+
+/// Expressions that may give the image, with the kind of output that they suit. `OUTPUT` is the placeholder of the
+/// output's name.
+const EXPRESSIONS: [(&str, &str); 5] = [
+    ("input + OUTPUT", "a residual"),
+    ("input - OUTPUT", "a residual"),
+    ("input * OUTPUT", "a gain"),
+    // Not clipped, so that an output of faint noise gives values out of range and is rejected.
+    ("input / max(OUTPUT, 0.001)", "a light map"),
+    ("1 - OUTPUT", "the negative"),
+];
+
+/// Parts of the names of outputs that are not the image but are combined with the input.
+const NAMES: [&str; 8] = ["illu", "light_map", "lightmap", "gain", "curve", "residual", "noise", "mask"];
+
+/// Kind of an output that is not the image itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OutputKind {
+    /// Nearly black for a white image: to be added to the input.
+    Residual,
+    /// As bright for black as for white: to be multiplied with the input, or a divisor of it.
+    Map,
+}
+
+impl OutputKind {
+    /// Kind of an output with these values for black and white; `None` if it may be the image.
+    fn from_endpoints(endpoints: Endpoints) -> Option<Self> {
+        let Endpoints { black, white, .. } = endpoints;
+        if white <= MIN_CONTRAST {
+            Some(Self::Residual)
+        } else if white - black <= MIN_CONTRAST {
+            Some(Self::Map)
+        } else {
+            None
+        }
+    }
+}
+
+/// Trial of an expression of input and output.
+pub(super) struct ExpressionTrial {
+    /// The expression, such as `input + output`.
+    pub(super) text: String,
+    /// Kind of the output, such as `a residual`.
+    pub(super) kind: &'static str,
+    pub(super) pair: PairTrial,
+}
+
+impl Enhancer {
+    /// Trials of [`EXPRESSIONS`], in 0..1 where no range is stated; empty if the image is an expression already, or if
+    /// the model fails.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn expression_trials(&self, dark: &[Rgb]) -> Result<Vec<ExpressionTrial>> {
+        if !self.reads_plain_image() {
+            return Ok(Vec::new());
+        }
+        let ranges = self.stated_ranges().map(|range| range.or(Some(ValueRange::Unit)));
+        let name = expression_name(&self.graph().signature.outputs[0].port.name);
+        let texts = EXPRESSIONS.map(|(text, _)| text.replace("OUTPUT", &name));
+        let mut conventions = texts.clone().map(|_| self.convention().clone());
+        for (convention, text) in conventions.iter_mut().zip(&texts) {
+            convention.output = None;
+            let image = text.parse().map_err(|problem: String| self.error(problem))?;
+            convention.image = Some(image);
+        }
+        let conventions = conventions.each_ref();
+        let Some(Trials { probes, .. }) = self.trials(dark, conventions, ranges)? else {
+            return Ok(Vec::new());
+        };
+        let mut trials = Vec::new();
+        for (((probe, convention), text), (_, kind)) in probes.into_iter().zip(conventions).zip(texts).zip(EXPRESSIONS)
+        {
+            let Probe { pairs, .. } = probe;
+            for mut pair in pairs {
+                if pair.is_clean() {
+                    pair.endpoints = self.endpoints(convention, pair.ranges)?;
+                }
+                let text = text.clone();
+                trials.push(ExpressionTrial { text, kind, pair });
+            }
+        }
+        Ok(trials)
+    }
+
+    /// Sentence with the sidecar lines of the expressions that give plausible images; `None` if no expression does.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn better_expression(&self, dark: &[Rgb], flaw: Flaw) -> Result<Option<String>> {
+        let mut found = self.expression_trials(dark)?;
+        found.retain(|trial| trial.pair.is_clean() && trial.pair.is_near());
+        found.sort_by(|a, b| a.pair.distance().total_cmp(&b.pair.distance()));
+        let lines: Vec<String> =
+            found.iter().map(|trial| format!("`image = \"{}\"` (if it is {})", trial.text, trial.kind)).collect();
+        Ok((!lines.is_empty()).then(|| {
+            format!(
+                "Its output may not be the image itself; {ADD} the line that the model's code uses: {}{}",
+                lines.join(" or "),
+                if flaw == Flaw::Grey { "; if it is the enhanced luma, export it joined with the colours" } else { "" }
+            )
+        }))
+    }
+
+    /// Kind of the output, judged by its values for black and white in these ranges; `None` if it may be the image.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn kind_by_endpoints(&self, ranges: RangePair) -> Result<Option<OutputKind>> {
+        if !self.reads_plain_image() {
+            return Ok(None);
+        }
+        let endpoints = self.endpoints(self.convention(), ranges)?;
+        Ok(endpoints.and_then(OutputKind::from_endpoints))
+    }
+
+    /// Caveat about an output that is not an image, judged by its values for black and white; `None` if it may be one.
+    ///
+    /// # Errors
+    /// If the runtime fails.
+    pub(super) fn remark_on_endpoints(&self, ranges: RangePair) -> Result<Option<String>> {
+        let Some(kind) = self.kind_by_endpoints(ranges)? else {
+            return Ok(None);
+        };
+        let name = expression_name(&self.graph().signature.outputs[0].port.name);
+        Ok(Some(match kind {
+            OutputKind::Residual => format!(
+                "its output is nearly black for a white image, like a residual; if the model's code adds it, {ADD}: `image = \"input + {name}\"`; `darkqa-eval enhance doctor` shows both"
+            ),
+            OutputKind::Map => format!(
+                "its output is nearly as bright for black as for white, like a light map; if the model's code divides by it, {ADD}: `{}`; `darkqa-eval enhance doctor` shows both",
+                light_map_line(&name)
+            ),
+        }))
+    }
+
+    /// Caveat about an output that is read as the image but named like a map or a residual; `None` for other names.
+    pub(super) fn remark_on_name(&self) -> Option<String> {
+        if !self.reads_plain_image() || self.convention().output.is_some() {
+            return None;
+        }
+        let name = &self.graph().signature.outputs[0].port.name;
+        let lower_case = name.to_lowercase();
+        NAMES.iter().find(|word| lower_case.contains(**word))?;
+        let term = expression_name(name);
+        Some(format!(
+            "its output {name:?} is named like a map or a residual, but read as the image; {ADD} what the model's code does: `{}`, `image = \"input + {term}\"` or `output = {name:?}`",
+            light_map_line(&term)
+        ))
+    }
+
+    /// True if all channels of one output are read as the image, without an expression.
+    fn reads_plain_image(&self) -> bool {
+        let convention = self.convention();
+        convention.image.is_none()
+            && convention.channels != Some(Channels::Y)
+            && self.graph().signature.outputs[0].slice.is_none()
     }
 }

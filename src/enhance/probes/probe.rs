@@ -2,15 +2,19 @@
 //!
 //! A graph does not declare its value ranges. So every pair of ranges that sidecar, preset and element types allow is
 //! tried. A pair is implausible if at least half of the frames have a flaw.
+//!
+//! Mean output of a model for black and for white input: [`Endpoints`].
+//!
+//! The value ranges of a model's input and output: [`RangePair`].
 
 use std::fmt;
+use std::ops::Range;
 
-use super::endpoints::Endpoints;
 use super::plausible::{Gravity, UnclampedImage, Verdict, judge};
-use super::range_pair::RangePair;
 use crate::conventions::sidecar::ADD;
+use crate::conventions::{ValueRange, ValueScale};
 use crate::outputs::light_map_line;
-use darkqa_base::types::Flaw;
+use darkqa_base::types::{Flaw, Rgb};
 
 /// Number of dark frames of a probe. With 6, none of 9 trained models was flagged; with one frame, 5 % were.
 pub const FRAMES: usize = 6;
@@ -319,6 +323,143 @@ fn remedy(flaw: Flaw, ranges: StatedRanges) -> String {
     }
 }
 
+/// Height and width, in pixels, of the black and white test image if the model accepts any size; equal to the first
+/// size of the probe.
+pub(super) const SIZE: [usize; 2] = [96, 144];
+
+/// Mean output of a model for black and for white, in codes of 0..255.
+///
+/// With the right value ranges, a low-light enhancer keeps black nearly black and white nearly white. Measured on 9
+/// trained models: the distances add up to at most 20 codes (RUAS); with wrong ranges that still give plausible images,
+/// mostly to 100 and more.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Endpoints {
+    pub(super) black: f64,
+    pub(super) white: f64,
+    /// Sum of the two mean distances of the channels from 0 and 255.
+    pub(super) distance: f64,
+}
+
+/// Maximum [`Endpoints::distance`], in codes, at which black and white count as preserved. Chosen.
+const MAX_DISTANCE: f64 = 50.0;
+
+impl Endpoints {
+    /// True if black stays nearly black and white nearly white.
+    pub(super) fn are_near(self) -> bool {
+        self.distance <= MAX_DISTANCE
+    }
+
+    /// Means of the output for [`black_and_white`], in the middle of each half.
+    pub(super) fn from_codes(codes: &UnclampedImage) -> Self {
+        let half = codes.width / 2;
+        let quarter = half / 4;
+        let black = channel_means(codes, quarter..half - quarter);
+        let white = channel_means(codes, half + quarter..codes.width - quarter);
+        Self {
+            black: mean(black),
+            white: mean(white),
+            distance: mean(black.map(f64::abs)) + mean(white.map(|code| (code - 255.0).abs())),
+        }
+    }
+}
+
+/// Means of red, green and blue in these columns of the middle half of the rows, in codes.
+fn channel_means(codes: &UnclampedImage, columns: Range<usize>) -> [f64; 3] {
+    let UnclampedImage { height, width, .. } = *codes;
+    let rows = height / 4..(height - height / 4).max(1);
+    let pixels = rows.len() * columns.len();
+    let mut sums = [0.0; 3];
+    for row in rows {
+        let row = &codes.samples[3 * row * width..][..3 * width];
+        for pixel in row[3 * columns.start..3 * columns.end].chunks_exact(3) {
+            for (sum, sample) in sums.iter_mut().zip(pixel) {
+                *sum += f64::from(*sample);
+            }
+        }
+    }
+    sums.map(|sum| sum / pixels.max(1) as f64)
+}
+
+fn mean(channels: [f64; 3]) -> f64 {
+    channels.iter().sum::<f64>() / 3.0
+}
+
+/// An image with a black left half and a white right half. Both are in one image, because some models stretch an image
+/// to its darkest and brightest pixels.
+pub(super) fn black_and_white([height, width]: [usize; 2]) -> Rgb {
+    let mut image = Rgb::black(height, width);
+    for row in image.samples_mut().chunks_exact_mut(3 * width) {
+        row[3 * (width / 2)..].fill(u8::MAX);
+    }
+    image
+}
+
+/// Scale of the values of a model's input, and that of its output.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct RangePair {
+    pub(crate) input: ValueScale,
+    pub(crate) output: ValueScale,
+}
+
+impl RangePair {
+    /// All pairs of plain ranges with these stated ranges; `None` stands for every range.
+    pub(super) fn plain(input: Option<ValueRange>, output: Option<ValueRange>) -> Vec<Self> {
+        let ranges = ValueRange::ALL.map(ValueScale::Range);
+        pairs(&scales(input, &ranges), &scales(output, &ranges))
+    }
+
+    /// All pairs of these scales that are normalised by a mean and a deviation on at least one side.
+    pub(super) fn normalised(inputs: &[ValueScale], outputs: &[ValueScale]) -> Vec<Self> {
+        let mut all = pairs(inputs, outputs);
+        all.retain(|pair| !pair.is_plain());
+        all
+    }
+
+    /// True if neither side is normalised.
+    pub(super) fn is_plain(self) -> bool {
+        matches!(self, Self { input: ValueScale::Range(_), output: ValueScale::Range(_) })
+    }
+
+    /// Sidecar lines that state the pair.
+    pub(super) fn lines(self) -> Vec<String> {
+        let mut lines = scale_lines(self.input, ["range_in", "mean", "std"]);
+        lines.extend(scale_lines(self.output, ["range_out", "mean_out", "std_out"]));
+        lines
+    }
+
+    /// The lines of [`Self::lines`], joined for a sentence.
+    pub(super) fn stated(self) -> String {
+        self.lines().into_iter().map(|line| format!("`{line}`")).collect::<Vec<_>>().join(" and ")
+    }
+}
+
+impl fmt::Display for RangePair {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{} in and {} out", self.input, self.output)
+    }
+}
+
+/// Only the stated range, or `all` scales if none is stated.
+fn scales(stated: Option<ValueRange>, all: &[ValueScale]) -> Vec<ValueScale> {
+    match stated {
+        Some(range) => vec![ValueScale::Range(range)],
+        None => all.to_vec(),
+    }
+}
+
+/// Each input scale with each output scale, grouped by input.
+fn pairs(inputs: &[ValueScale], outputs: &[ValueScale]) -> Vec<RangePair> {
+    inputs.iter().flat_map(|&input| outputs.iter().map(move |&output| RangePair { input, output })).collect()
+}
+
+/// Sidecar lines for one side, with its keys for range, mean and deviation.
+fn scale_lines(scale: ValueScale, [range, mean, std]: [&str; 3]) -> Vec<String> {
+    match scale.mean_and_std() {
+        None => vec![format!("{range} = \"{}\"", scale.range())],
+        Some([means, deviations]) => vec![format!("{mean} = {means:?}"), format!("{std} = {deviations:?}")],
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -326,6 +467,7 @@ mod tests {
 
     const UNIT: RangePair =
         RangePair { input: ValueScale::Range(ValueRange::Unit), output: ValueScale::Range(ValueRange::Unit) };
+
     const BYTES: RangePair =
         RangePair { input: ValueScale::Range(ValueRange::Bytes), output: ValueScale::Range(ValueRange::Bytes) };
 
@@ -352,7 +494,9 @@ mod tests {
     }
 
     const FLAT: Option<Verdict> = Some(Verdict { flaw: Flaw::Flat, gravity: Gravity::Impossible, figure: 0.0 });
+
     const WHITE: Option<Verdict> = Some(Verdict { flaw: Flaw::White, gravity: Gravity::Doubtful, figure: 0.0 });
+
     const UNLIT: Option<Verdict> = Some(Verdict { flaw: Flaw::Unlit, gravity: Gravity::Doubtful, figure: 0.0 });
 
     #[test]
@@ -454,5 +598,46 @@ mod tests {
         assert!(matches!(doubtful.conclusion(), Conclusion::Doubtful(_)));
         let mixed = probe(StatedRanges::Both, vec![pair(UNIT, &[WHITE, WHITE, WHITE, FLAT, FLAT, FLAT])]);
         assert!(matches!(mixed.conclusion(), Conclusion::Implausible(_)));
+    }
+
+    #[test]
+    fn black_and_white_have_their_own_codes() {
+        let codes = UnclampedImage::from_rgb(&black_and_white([96, 144]));
+        let expected = Endpoints { black: 0.0, white: 255.0, distance: 0.0 };
+        assert_eq!(Endpoints::from_codes(&codes), expected);
+    }
+
+    #[test]
+    fn smallest_images_have_finite_endpoints() {
+        for size in [[1, 1], [1, 2], [2, 1]] {
+            let codes = UnclampedImage::from_rgb(&black_and_white(size));
+            assert!(Endpoints::from_codes(&codes).distance.is_finite(), "{size:?}");
+        }
+    }
+
+    #[test]
+    fn a_mean_and_a_deviation_are_lines_of_a_sidecar() {
+        let imagenet = RangePair {
+            input: ValueScale::Normalised(Normalisation::ImageNet),
+            output: ValueScale::Range(ValueRange::Unit),
+        };
+        assert_eq!(
+            imagenet.lines(),
+            ["mean = [0.485, 0.456, 0.406]", "std = [0.229, 0.224, 0.225]", "range_out = \"0..1\""]
+        );
+        let centred = RangePair { output: ValueScale::Normalised(Normalisation::Centred), ..imagenet };
+        assert_eq!(centred.lines()[2], "mean_out = [0.5, 0.5, 0.5]");
+    }
+
+    #[test]
+    fn only_ranges_that_are_not_stated_are_tried() {
+        let unit = Some(ValueRange::Unit);
+        assert_eq!(RangePair::plain(None, None).len(), 9);
+        assert_eq!(RangePair::plain(Some(ValueRange::Signed), None).len(), 3);
+        assert_eq!(RangePair::plain(unit, unit).len(), 1);
+        let (all, plain) = (ValueScale::ALL, [ValueScale::Range(ValueRange::Unit)]);
+        assert_eq!(RangePair::normalised(&all, &all).len(), 27);
+        assert_eq!(RangePair::normalised(&all, &plain).len(), 3);
+        assert!(RangePair::normalised(&plain, &plain).is_empty());
     }
 }

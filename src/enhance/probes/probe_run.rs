@@ -1,21 +1,26 @@
 //! Running the probe of a model on dark frames: [`Enhancer::probe`].
+//!
+//! Outputs of a model for the frames of a trial: [`run_frames`].
+//!
+//! Results of opening and probing an enhancer, to be stored and reused: [`Findings`].
 
-use super::endpoints::{self, Endpoints, black_and_white};
-use super::findings::warn_not_probed;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
 use super::plausible::UnclampedImage;
-use super::probe::{Conclusion, OUTPUT, PairTrial, Probe, StatedRanges};
-use super::range_pair::RangePair;
-use super::trial_images::run_frames;
-use super::usage::{ImageUse, Implausible, Judgement, doctor_advice, white_percent};
+use super::probe::{self, Conclusion, Endpoints, OUTPUT, PairTrial, Probe, RangePair, StatedRanges, black_and_white};
+use super::usage::{ImageUse, Implausible, Judgement, Usage, doctor_advice, white_percent};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
 use crate::enhancer::Enhancer;
-use crate::graphs::Graph;
+use crate::graphs::{Graph, RunResult};
 use crate::outputs::expression_name;
 use crate::planes::Planes;
+use crate::sizing::AcceptedSizes;
 use darkqa_base::error::Result;
-use darkqa_base::types::manifests::{ProbeNote, ProbeOutcome};
-use darkqa_base::types::{Flaw, Rgb};
+use darkqa_base::types::manifests::{ConventionLine, ProbeNote, ProbeOutcome};
+use darkqa_base::types::{EnhancerName, Flaw, Rgb};
 
 /// Sizes of probe frames, tried in this order; longer and shorter side in pixels. Most multiples that models need
 /// divide one of them.
@@ -268,7 +273,7 @@ impl Enhancer {
     /// If the runtime fails.
     pub(super) fn endpoints(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Option<Endpoints>> {
         let graph = self.read_by(convention, ranges)?;
-        let image = black_and_white(self.probe_size(endpoints::SIZE));
+        let image = black_and_white(self.probe_size(probe::SIZE));
         let made = run_frames(&[graph], &[image])?;
         let codes = made.into_iter().flatten().flatten().next();
         let endpoints = codes.as_ref().map(Endpoints::from_codes);
@@ -289,5 +294,123 @@ impl Enhancer {
         let planes = Planes::from_rgb(frame).resized(height, width);
         let planes = planes.map_err(|problem| self.error(problem))?;
         planes.to_rgb(Rounding::Round).ok_or_else(|| self.error("a frame of the probe has no pixel"))
+    }
+}
+
+/// Runs a model on frames, and decodes the outputs by the conventions of several graphs with the same input encoding.
+/// Returns the outputs by graph and frame; `None` if the model fails on a frame.
+pub(super) fn run_frames(graphs: &[Graph], frames: &[Rgb]) -> Result<Option<Vec<Vec<UnclampedImage>>>> {
+    let mut all = vec![Vec::with_capacity(frames.len()); graphs.len()];
+    let Some(graph) = graphs.first() else {
+        return Ok(Some(all));
+    };
+    for frame in frames {
+        graph.restart_clock();
+        let decodings = match graph.run_with_conventions(frame, graphs)? {
+            RunResult::Output(decodings) => decodings,
+            RunResult::Failed(_) => return Ok(None),
+            // The plausibility rules then report the flaw.
+            RunResult::Unusable(_) => {
+                vec![UnclampedImage::not_a_number([frame.height(), frame.width()]); graphs.len()]
+            }
+        };
+        for (made, codes) in all.iter_mut().zip(decodings) {
+            made.push(codes);
+        }
+    }
+    Ok(Some(all))
+}
+
+/// Results of opening an enhancer and probing it on dark frames: the content of its usage record before the first
+/// image.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    /// Rows of the table of the model's input and output convention.
+    convention: Vec<ConventionLine>,
+    /// Result of the probe; `None` if the model accepts none of its sizes.
+    probe: Option<ProbeNote>,
+    /// Caveats for readers of the results.
+    #[serde(default)]
+    remarks: Vec<String>,
+    /// Message about the accepted sizes, if they were found by trial.
+    sizes: Option<String>,
+}
+
+impl Findings {
+    /// True if a run with this reaction to implausible images may use the enhancer.
+    pub fn allow(&self, implausible: Implausible) -> bool {
+        let probe = self.probe.as_ref();
+        let is_overruled = probe.is_some_and(|probe| probe.outcome == ProbeOutcome::Overruled);
+        implausible != Implausible::Refused || !is_overruled
+    }
+
+    /// A usage record that starts with these findings.
+    pub fn usage(&self) -> Usage {
+        let usage = Usage::default();
+        usage.update(|note| {
+            note.convention.clone_from(&self.convention);
+            note.probe.clone_from(&self.probe);
+            note.remarks.clone_from(&self.remarks);
+        });
+        usage
+    }
+
+    /// Repeats the warnings of the probe.
+    pub fn warn(&self, name: &EnhancerName, path: &Path) {
+        if let Some(sizes) = &self.sizes {
+            tracing::warn!("{}: {sizes}", path.display());
+        }
+        for remark in &self.remarks {
+            tracing::warn!("{name}: {remark}");
+        }
+        match &self.probe {
+            None => warn_not_probed(name),
+            Some(probe) => {
+                if let Some(problem) = &probe.problem {
+                    tracing::warn!("{name}: {problem}");
+                }
+            }
+        }
+    }
+}
+
+/// Warns about a model that accepts none of the sizes of the probe.
+fn warn_not_probed(name: &EnhancerName) {
+    tracing::warn!(
+        "{name}: its images were not checked, because it fails at small sizes such as 144 × 96; look at some of them"
+    );
+}
+
+impl Enhancer {
+    /// Problem found by the probe, if the enhancer is used in spite of it; to be called after the probe.
+    pub fn overruled_problem(&self) -> Option<String> {
+        let probe = self.usage().note().probe?;
+        let is_overruled = probe.outcome == ProbeOutcome::Overruled;
+        probe.problem.filter(|_| is_overruled)
+    }
+
+    /// Results of opening and probing; to be called after the probe.
+    pub fn findings(&self) -> Findings {
+        let note = self.usage().note();
+        Findings {
+            convention: note.convention,
+            probe: note.probe,
+            remarks: note.remarks,
+            sizes: self.found_sizes().map(AcceptedSizes::message),
+        }
+    }
+
+    /// The enhancer with the findings of an earlier probe instead of a new one, and with a usage record that it
+    /// continues.
+    ///
+    /// # Errors
+    /// If the graph contradicts its own convention, which is a bug.
+    pub fn with_findings(self, findings: &Findings, usage: Usage) -> Result<Self> {
+        let mut enhancer = self.with_usage(usage);
+        enhancer.set_remarks(&findings.remarks);
+        if let Some(probe) = &findings.probe {
+            enhancer.set_probe_result(probe.clone())?;
+        }
+        Ok(enhancer)
     }
 }

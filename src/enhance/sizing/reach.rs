@@ -5,8 +5,7 @@
 //! with one pixel (2 · 10⁻⁷ for BrightsightNet at 512 × 512). So a quarter of the image is inverted, too, and changes
 //! far from that quarter also count.
 
-use super::size_plan::SizeRule;
-use super::texture::{CODES, texture};
+use super::size_plan::{CODES, SizeRule, texture};
 use crate::conventions::Locality;
 use crate::graphs::{Graph, RunResult};
 use crate::planes::Planes;

@@ -13,7 +13,7 @@ use std::str::FromStr;
 use darkqa_base::types::Rgb;
 
 /// Number of pixels beyond a seam that a tile provides for the comparison; chosen.
-pub(super) const GUARD: usize = 2;
+const GUARD: usize = 2;
 
 /// Maximum code of samples that count as nearly black, so that their equality proves little; chosen.
 const NEARLY_BLACK: u8 = 2;

@@ -3,6 +3,8 @@
 //! A draw is a pure function of (seed, frame, component, sensor row, sensor column, index of the draw), so that it does
 //! not depend on threads or order. The generator is Philox4x32-10 (Salmon et al., "Parallel random numbers: as easy as
 //! 1, 2, 3", SC 2011), which passes BigCrush on plain counters; its key is taken from a BLAKE3 digest.
+//!
+//! Batches of samples: [`Lanes`].
 
 use std::convert::Infallible;
 use std::f64::consts::PI;
@@ -11,7 +13,6 @@ use rand::TryRng;
 use rand::distr::{Distribution as _, Open01};
 use rand::rand_core::utils::{fill_bytes_via_next_word, next_u64_via_u32};
 
-use super::lanes::{LANES, Lanes};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{Digest, FrameId, Severity};
 
@@ -215,6 +216,12 @@ fn philox(mut counter: [u32; 4], mut key: [u32; 2]) -> [u32; 4] {
     }
     counter
 }
+
+/// Samples that a kernel processes at once.
+pub(crate) const LANES: usize = 64;
+
+/// Batch of [`LANES`] numbers, one per sample.
+pub(crate) type Lanes<T> = [T; LANES];
 
 #[cfg(test)]
 mod tests {

@@ -5,12 +5,13 @@
 //! from sums of 1, 2, 4 … pixels, which takes few additions at any length. For other paths, the weighted pixels are
 //! added in the order of their offsets.
 
+#[cfg(test)]
+mod tests;
+
 use rayon::prelude::*;
 
-use super::streak::{Streak, Tap};
-use crate::clean::Clean;
-use crate::codes::{display_light, encode};
-use crate::curve;
+use super::motion::{Streak, Tap};
+use crate::clean::{self, Clean, display_light, encode};
 use crate::draws::{LANES, Lanes};
 use darkqa_base::types::images::{Isa, Kernel};
 use darkqa_base::types::{Light, Rgb};
@@ -142,7 +143,7 @@ impl Blur {
                 }
                 Clean::Rgb16Image(codes) => {
                     for (light, code) in inside.iter_mut().zip(&codes.samples()[samples]) {
-                        *light = curve::gamma_expand(f64::from(*code) / 65_535.0) as f32;
+                        *light = clean::gamma_expand(f64::from(*code) / 65_535.0) as f32;
                     }
                 }
                 Clean::Light(light) | Clean::Scene(light) => {
@@ -289,6 +290,3 @@ fn double(sums: &mut [f32], distance: usize, needed: usize) {
         sums[at..at + LANES].copy_from_slice(&sum);
     }
 }
-
-#[cfg(test)]
-mod tests;

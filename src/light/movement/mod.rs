@@ -2,7 +2,5 @@
 
 pub mod blur;
 mod motion;
-mod streak;
 
-pub use motion::{FrameView, Motion, MotionAngle};
-pub use streak::{Streak, Tap};
+pub use motion::{FrameView, Motion, MotionAngle, Streak, Tap};

@@ -2,18 +2,18 @@
 
 use std::path::PathBuf;
 
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyFloat, PyInt, PyString};
+
+use super::arrays::{value_error, wrong_type};
+use crate::arrays::Batch;
 use darkqa_base::types::degradations::{Axis, Kind};
 use darkqa_base::types::{Degradation, FrameId, ProfileName, Severity};
 use darkqa_light::{
     AppliedDegradation, AutoExposure, AutoSettings, CameraModel, CaptureState, FrameView, Motion, NoiseKey,
     NoiseProfile, Streak, Synthesis,
 };
-use pyo3::exceptions::PyValueError;
-use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyFloat, PyInt, PyString};
-
-use crate::arrays::Batch;
-use crate::errors::{value_error, wrong_type};
 
 /// A level of darkness; `None` is L0, the unchanged image.
 #[derive(Debug, Clone, Copy)]

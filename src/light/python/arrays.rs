@@ -1,14 +1,16 @@
 //! Conversion between NumPy arrays and images: [`Batch`], [`to_numpy`].
+//!
+//! Python exceptions about arguments.
 
-use darkqa_base::types::Rgb;
-use darkqa_base::types::images::Sample;
 use numpy::{
     Element, IxDyn, PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
 };
 use pyo3::exceptions::{PyMemoryError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
-use crate::errors::wrong_type;
+use darkqa_base::error::Error;
+use darkqa_base::types::Rgb;
+use darkqa_base::types::images::Sample;
 
 /// Maximum number of pixels of an image; chosen. Even a huge array can be a view of a single sample.
 const MAX_PIXELS: usize = 1 << 28;
@@ -20,6 +22,7 @@ const IMAGE_OVERHEAD: usize = 128;
 pub(crate) trait Output: Sample + Element + Send + Sync {}
 
 impl Output for u8 {}
+
 impl Output for f32 {}
 
 /// Images of the argument `image`.
@@ -118,4 +121,20 @@ pub(crate) fn to_numpy<'py, T: Output>(
 ) -> PyResult<Bound<'py, PyAny>> {
     let array = PyArray1::from_vec(py, samples).reshape(IxDyn(shape))?;
     Ok(array.into_any())
+}
+
+/// `TypeError` with the argument's name, the expected value, and the type of the given one.
+pub(crate) fn wrong_type(name: &str, expected: &str, given: &Bound<'_, PyAny>) -> PyErr {
+    let given = match given.get_type().name() {
+        Ok(name) => name.to_string(),
+        Err(_) => "another type".to_owned(),
+    };
+    PyTypeError::new_err(format!("{name}: {expected} expected, got {given}"))
+}
+
+/// `ValueError` with the message of an error of the synthesis. The program's flag at its start becomes the argument's
+/// name.
+pub(crate) fn value_error(error: &Error) -> PyErr {
+    let text = error.to_string();
+    PyValueError::new_err(text.strip_prefix("--").unwrap_or(&text).to_owned())
 }

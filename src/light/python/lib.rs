@@ -4,31 +4,44 @@
 //! - [`arguments`]: conversion of arguments to settings, with a `TypeError` or `ValueError` about each wrong value.
 //! - [`arrays`]: conversion between NumPy arrays and images.
 //! - [`state`]: conversion between capture states and dictionaries.
-//! - [`pools`]: thread pools, one for each process and number of threads.
+//! - `pools`: thread pools, one for each process and number of threads.
 //!
 //! Images are computed without the GIL.
+//!
+//! Thread pools: [`pool`].
+//!
+//! The threads of a pool do not survive a fork. So each process, such as a worker of a `DataLoader`, starts its own
+//! pools when they are first needed. The table of pools, and the tables that the synthesis computes once, are filled
+//! only while the GIL is held. `os.fork` holds the GIL, too, so a forked process never inherits a locked mutex.
 
 mod arguments;
 mod arrays;
-mod errors;
-mod pools;
 mod state;
 
-use darkqa_base::types::degradations::Kind;
-use darkqa_base::types::{Image, Rgb};
-use darkqa_light::raw::negative;
-use darkqa_light::{CaptureState, Exposures, NoiseKey, NoiseTerms};
+use std::collections::HashMap;
+use std::process;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use arguments::{Level, Settings, noise_keys, numbered_keys};
 use arrays::{Batch, Output};
+use darkqa_base::types::degradations::Kind;
+use darkqa_base::types::{Degradation, FrameId, Image, Rgb, Severity};
+use darkqa_light::raw::negative;
+use darkqa_light::{
+    AppliedDegradation, AutoExposure, CaptureState, Exposures, FrameView, Motion, NoiseKey, NoiseTerms, Synthesis,
+};
 
 /// Dark images, as a camera would take them in less light.
 #[pymodule]
 mod _core {
     use super::{Bound, PyModule, PyModuleMethods, PyResult};
+
     #[pymodule_export]
     use super::{cameras, degrade, ladder, replay, sensor_state};
 
@@ -224,7 +237,7 @@ fn replay<'py>(
     threads: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let py = image.py();
-    let state = state.cast::<PyDict>().map_err(|_| errors::wrong_type("state", "a dict of sensor_state()", state))?;
+    let state = state.cast::<PyDict>().map_err(|_| arrays::wrong_type("state", "a dict of sensor_state()", state))?;
     let replay = state::from_dict(state)?;
     let noise = terms(arguments::switch("noise", noise, true)?);
     let is_linear = arguments::switch("linear", linear, false)?;
@@ -256,7 +269,7 @@ fn output<'py, T: Output>(
     // Three copies at most: single images, the images of each frame joined, and all frames joined.
     let bytes = shape.iter().fold(size_of::<T>(), |product, n| product.saturating_mul(*n));
     arrays::require_memory(3, bytes)?;
-    let pool = pools::pool(py, threads)?;
+    let pool = pool(py, threads)?;
     let samples: Vec<T> = py.detach(|| {
         pool.install(|| {
             if let [only] = &batch.images[..] {
@@ -277,4 +290,51 @@ fn output<'py, T: Output>(
 /// Concatenated samples of images of one size.
 fn join_samples<T: Output>(images: impl Iterator<Item = Image<T>>) -> Vec<T> {
     images.map(Image::into_samples).collect::<Vec<Vec<T>>>().concat()
+}
+
+type Pools = HashMap<(u32, usize), Arc<ThreadPool>>;
+
+static POOLS: Mutex<Option<Pools>> = Mutex::new(None);
+
+/// Pool of this process with this number of threads.
+///
+/// # Errors
+/// `RuntimeError` if the threads cannot be started.
+fn pool(_attached: Python<'_>, threads: usize) -> PyResult<Arc<ThreadPool>> {
+    let mut pools = POOLS.lock().unwrap_or_else(PoisonError::into_inner);
+    let is_first = pools.is_none();
+    let pools = pools.get_or_insert_default();
+    let process = process::id();
+    if let Some(pool) = pools.get(&(process, threads)) {
+        return Ok(Arc::clone(pool));
+    }
+    // Pools of a parent process stay in the table: dropping them would wait for threads that do not exist here.
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .thread_name(|index| format!("darkqa-light-{index}"))
+        .build()
+        .map_err(|problem| PyRuntimeError::new_err(format!("threads: {threads} cannot be started: {problem}")))?;
+    if is_first {
+        pool.install(fill_tables);
+    }
+    let pool = Arc::new(pool);
+    pools.insert((process, threads), Arc::clone(&pool));
+    Ok(pool)
+}
+
+/// Computes a small image of each variant, so that all tables of the synthesis are filled.
+fn fill_tables() {
+    let clean = Rgb::black(4, 4);
+    let key = NoiseKey::new(0, &FrameId(String::new()));
+    let (auto, motion) = (AutoExposure::default(), Motion::default());
+    let view = FrameView { width: 640, focal: None };
+    for kind in Kind::ALL {
+        let applied = Degradation::new(kind, Severity::L3, None)
+            .and_then(|how| AppliedDegradation::new(&how, &Synthesis::default(), &auto, &motion, view, &key));
+        if let Ok(applied) = applied {
+            let state = CaptureState::new(&applied, &key);
+            drop(state.image((&clean).into(), &key, NoiseTerms::All));
+            drop(state.light((&clean).into(), &key, NoiseTerms::All));
+        }
+    }
 }

@@ -1,14 +1,14 @@
 //! Dictionary from which an image can be computed again: [`Replay`], [`to_dict`], [`from_dict`].
 
-use darkqa_base::types::degradations::Kind;
-use darkqa_light::{CameraState, CaptureState, SensorState, Streak, version};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value, json};
 
-use crate::errors::value_error;
+use super::arrays::value_error;
+use darkqa_base::types::degradations::Kind;
+use darkqa_light::{CameraState, CaptureState, SensorState, Streak, version};
 
 /// Everything needed to compute an image again from its frame.
 pub(crate) struct Replay {

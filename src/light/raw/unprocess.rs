@@ -6,8 +6,7 @@ use rayon::prelude::*;
 
 use super::bayer::{Bayer, Plane, RawRow};
 use crate::camera::CameraState;
-use crate::clean::Clean;
-use crate::curve;
+use crate::clean::{self, Clean};
 use crate::draws::{LANES, Lanes, Piecewise};
 use darkqa_base::types::images::{Isa, Kernel};
 
@@ -49,7 +48,7 @@ trait ToSceneLight {
 
 /// Light of each 8-bit code in front of the camera.
 static LINEAR_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
-    std::array::from_fn(|code| curve::gamma_expand(curve::inverse_smoothstep(code as f64 / 255.0)) as f32)
+    std::array::from_fn(|code| clean::gamma_expand(clean::inverse_smoothstep(code as f64 / 255.0)) as f32)
 });
 
 /// Codes of 8 bits.
@@ -65,7 +64,7 @@ impl ToSceneLight for &[f32; 256] {
 /// Light of each 16-bit code in front of the camera.
 static LINEAR_LIGHT_16: LazyLock<Box<[f32; 65_536]>> = LazyLock::new(|| {
     let light: Vec<f32> = (0..=u16::MAX)
-        .map(|code| curve::gamma_expand(curve::inverse_smoothstep(f64::from(code) / 65_535.0)) as f32)
+        .map(|code| clean::gamma_expand(clean::inverse_smoothstep(f64::from(code) / 65_535.0)) as f32)
         .collect();
     light.try_into().unwrap_or_else(|_| unreachable!("there are 65 536 codes"))
 });
@@ -127,8 +126,8 @@ impl InverseToneTable {
 /// Light in front of the camera for display light.
 fn scene_light(display_light: f64) -> f64 {
     // Not `gamma_compress`, whose floor would make all darker light equal.
-    let display = libm::pow(display_light.max(0.0), 1.0 / curve::GAMMA);
-    curve::gamma_expand(curve::inverse_smoothstep(display))
+    let display = libm::pow(display_light.max(0.0), 1.0 / clean::GAMMA);
+    clean::gamma_expand(clean::inverse_smoothstep(display))
 }
 
 fn zero_if_negligible(x: f64) -> f64 {
@@ -397,8 +396,8 @@ mod tests {
         let mut last = 0.0;
         for step in 0..=200_000 {
             let at = (f64::from(step) / 200_000.0).powi(3) as f32;
-            let display = libm::pow(f64::from(at), 1.0 / curve::GAMMA);
-            let expected = curve::gamma_expand(curve::inverse_smoothstep(display));
+            let display = libm::pow(f64::from(at), 1.0 / clean::GAMMA);
+            let expected = clean::gamma_expand(clean::inverse_smoothstep(display));
             let found = table.light(at);
             let off = (f64::from(found) - expected).abs();
             // Light below the smallest one is black.

@@ -2,9 +2,7 @@
 
 use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
 
-use super::conversion::Conversion;
-use super::curve::ToneCurve;
-use super::primaries::{IDENTITY, xyz_to_srgb};
+use super::conversion::{Conversion, IDENTITY, ToneCurve, xyz_to_srgb};
 
 /// Maximum number of characters of a profile's name in messages; chosen.
 const MAX_NAME: usize = 60;

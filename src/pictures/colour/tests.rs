@@ -152,3 +152,39 @@ fn an_hdr_profile_counts_by_its_code_points() {
     assert!(with([1, 13, 0, 1]).meaning(CodeDepth::Eight).is_err());
     assert!(ColourTag::Profile(profile).meaning(CodeDepth::Eight).is_err());
 }
+
+fn conversion(primaries: u8, transfer: u8) -> Option<FrameConversion> {
+    StatedColours { primaries, transfer }.conversion().unwrap()
+}
+
+#[test]
+fn frames_have_the_codes_of_images() {
+    let samples: Vec<u16> = (0..3000_u32).map(|i| (i * 7919 % 65_536) as u16).collect();
+    for (primaries, transfer) in [(9, 16), (9, 18), (9, 1), (12, 13), (1, 5)] {
+        let (frame, _) = conversion(primaries, transfer).unwrap().convert(&samples);
+        let points = CodePoints { primaries, transfer };
+        let Ok(Meaning::Other(space)) = points.meaning(CodeDepth::Sixteen) else { panic!("{primaries}/{transfer}") };
+        let mut image = samples.clone();
+        space.conversion.convert_16(&mut image);
+        for (code, deep) in frame.iter().zip(&image) {
+            assert!((f64::from(*code) - f64::from(*deep) / 257.0).abs() < 0.51);
+        }
+    }
+}
+
+#[test]
+fn pixels_above_white_are_counted() {
+    let hlg = conversion(9, 18).unwrap();
+    assert!(hlg.is_hdr());
+    let [grey, white, above] = [0.5, 0.749, 0.8].map(|value| [(value * 65_535.0) as u16; 3]);
+    let (codes, clipped) = hlg.convert(&[grey, white, above].concat());
+    assert_eq!((clipped, codes[6]), (1, 255));
+    assert!(codes[0] < 200 && codes[3] < 255, "{codes:?}");
+    assert!(!conversion(9, 1).unwrap().is_hdr());
+}
+
+#[test]
+fn codes_of_sdr_video_are_kept() {
+    assert!(conversion(1, 1).is_none());
+    assert!(conversion(2, 2).is_none());
+}

@@ -8,7 +8,7 @@ use exr::meta::attribute::{Chromaticities, SampleType, Text};
 use exr::meta::header::Header;
 use exr::prelude::{ReadChannels as _, ReadLayers as _, Vec2, read as read_image};
 
-use crate::colour::primaries::Primaries;
+use crate::colour::conversion::Primaries;
 use crate::decode_rule::DecodeRule;
 
 /// The first four bytes of every OpenEXR file.

@@ -1,16 +1,24 @@
 //! Facts in the headers of an image file ([`FileFacts`]), and detection of truncated and damaged files ([`fault`]).
+//!
+//! Parser for the tags of the first image in a TIFF file: [`TiffProperties`].
+//!
+//! The decoder of the crate `tiff` is not enough here. It returns no tags if it cannot decode the first image (a
+//! camera's RAW file, a mask, a broken file). It returns no tag longer than 1 MiB, and some ICC profiles are longer.
+//! For some compressions it decodes the missing part of a truncated file as if it were samples.
+//!
+//! The format is that of TIFF 6.0, section 2, and BigTIFF as in libtiff.
+
+use std::collections::BTreeSet;
 
 use image::metadata::Orientation;
 
 use super::exr_layers::ExrFile;
 use super::format::FileFormat;
-use super::jpeg_markers::{self, JpegProperties};
-use super::png_chunks::{self, PngFault, PngProperties};
-use super::tiff_tags::TiffProperties;
-use super::webp_chunks::{self, WebpProperties};
+use super::jpeg::{self, JpegProperties};
+use super::png_chunks::{self, PngFault, PngProperties, WebpProperties};
 use crate::colour::ColourTag;
 use crate::decode_rule::DecodeRule;
-use darkqa_base::files::guarded::guarded;
+use darkqa_base::files::guarded;
 
 /// Facts in the headers of an image file that decide how it is decoded.
 #[derive(Debug)]
@@ -165,8 +173,8 @@ pub(super) fn fault(file: &[u8], format: FileFormat, facts: &FileFacts) -> Optio
             PngFault::Cut => no_end_mark(file),
             PngFault::Checksum => "a checksum in it is wrong".to_owned(),
         }),
-        FileFormat::Jpeg => (!jpeg_markers::has_end(file)).then(|| no_end_mark(file)),
-        FileFormat::WebP => truncation(file, webp_chunks::stated_length(file)?),
+        FileFormat::Jpeg => (!jpeg::has_end(file)).then(|| no_end_mark(file)),
+        FileFormat::WebP => truncation(file, png_chunks::stated_length(file)?),
         FileFormat::Tiff => truncation(file, facts.complete_length?),
         FileFormat::Bmp => {
             // The header states the length of the file; some programs leave it at 0.
@@ -185,4 +193,290 @@ fn no_end_mark(file: &[u8]) -> String {
 /// The fault of a file that is shorter than `complete_length` bytes; `None` if it is not.
 fn truncation(file: &[u8], complete_length: u64) -> Option<String> {
     (complete_length > file.len() as u64).then(|| format!("the file ends at byte {} of {complete_length}", file.len()))
+}
+
+/// Maximum number of directories counted after the first (chosen). The limit also ends a circular chain.
+const MAX_PAGES: usize = 10_000;
+
+/// Maximum number of entries of a directory that are read (chosen): real ones have fewer than 100. A stated count may
+/// be any number.
+const MAX_ENTRIES: u64 = 4096;
+
+/// Maximum number of values read from a tag (chosen). The tallest image has fewer strips, even at one row per strip.
+const MAX_VALUES: u64 = 1 << 20;
+
+// Tags (TIFF 6.0, appendix A; DNG 1.7).
+const NEW_SUBFILE_TYPE: u16 = 254;
+const BITS_PER_SAMPLE: u16 = 258;
+const COMPRESSION: u16 = 259;
+const PHOTOMETRIC: u16 = 262;
+const STRIP_OFFSETS: u16 = 273;
+const ORIENTATION: u16 = 274;
+const SAMPLES_PER_PIXEL: u16 = 277;
+const STRIP_BYTE_COUNTS: u16 = 279;
+const PLANAR_CONFIGURATION: u16 = 284;
+const TILE_OFFSETS: u16 = 324;
+const TILE_BYTE_COUNTS: u16 = 325;
+const INK_SET: u16 = 332;
+const SAMPLE_FORMAT: u16 = 339;
+const ICC_PROFILE: u16 = 34675;
+const DNG_VERSION: u16 = 50706;
+
+/// Photometric interpretation for ink amounts, usually CMYK.
+const SEPARATED: u64 = 5;
+
+/// Sample format for IEEE floats.
+const FLOAT: u64 = 3;
+
+/// Properties of a TIFF file that decide how it is decoded.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct TiffProperties<'a> {
+    /// Orientation, 1 to 8, as in EXIF; 0 without the tag.
+    pub(super) orientation: u64,
+    /// Number of pages. Reduced-resolution copies after the first page are not counted.
+    pub(super) pages: usize,
+    /// True for interleaved samples of cyan, magenta, yellow and black with 8 bits each.
+    pub(super) is_cmyk: bool,
+    /// Description of an unsupported colour space; `None` for grey, RGB and the inks of `is_cmyk`.
+    pub(super) colours: Option<&'static str>,
+    /// ICC profile, if the file has one.
+    pub(super) profile: Option<&'a [u8]>,
+    /// True for a camera's RAW file: its first image is a preview, or it is a DNG file.
+    pub(super) is_raw: bool,
+    /// Bits per sample.
+    pub(super) bits: u64,
+    /// True if the samples are floats.
+    pub(super) is_float: bool,
+    /// Name of a compression that is not read; `None` for one that is.
+    pub(super) unread_compression: Option<String>,
+    /// Byte offset at which the last strip or tile of the first image ends.
+    pub(super) end: u64,
+}
+
+impl<'a> TiffProperties<'a> {
+    /// Parses the tags. Fields whose tags cannot be read have default values.
+    pub(super) fn parse(file: &'a [u8]) -> Self {
+        let mut properties = Self::default();
+        let Some((reader, first)) = Reader::open(file) else {
+            return properties;
+        };
+        let Some((directory, mut next)) = reader.directory(first) else {
+            return properties;
+        };
+        let value = |tag| reader.first_value(&directory, tag);
+        properties.pages = 1;
+        properties.orientation = value(ORIENTATION).unwrap_or(0);
+        properties.bits = value(BITS_PER_SAMPLE).unwrap_or(1);
+        properties.is_cmyk = value(PHOTOMETRIC) == Some(SEPARATED)
+            && properties.bits == 8
+            && value(SAMPLES_PER_PIXEL) == Some(4)
+            && value(INK_SET).is_none_or(|set| set == 1)
+            && value(PLANAR_CONFIGURATION).is_none_or(|planes| planes == 1);
+        if !properties.is_cmyk {
+            properties.colours = unsupported_colours(value(PHOTOMETRIC));
+        }
+        properties.profile = reader.bytes(&directory, ICC_PROFILE);
+        let is_preview = value(NEW_SUBFILE_TYPE).is_some_and(is_reduced);
+        properties.is_raw = is_preview || directory.iter().any(|entry| entry.tag == DNG_VERSION);
+        properties.is_float = value(SAMPLE_FORMAT) == Some(FLOAT);
+        properties.unread_compression = value(COMPRESSION).and_then(unread_compression);
+        for (offsets, counts) in [(STRIP_OFFSETS, STRIP_BYTE_COUNTS), (TILE_OFFSETS, TILE_BYTE_COUNTS)] {
+            let end = reader
+                .values(&directory, offsets)
+                .zip(reader.values(&directory, counts))
+                .map(|(offset, count)| offset.saturating_add(count))
+                .max()
+                .unwrap_or(0);
+            properties.end = properties.end.max(end);
+        }
+        let mut visited = BTreeSet::from([first]);
+        while visited.len() < MAX_PAGES
+            && visited.insert(next)
+            && let Some((directory, following)) = reader.directory(next)
+        {
+            let kind = reader.first_value(&directory, NEW_SUBFILE_TYPE);
+            properties.pages += usize::from(!kind.is_some_and(is_copy_or_mask));
+            next = following;
+        }
+        properties
+    }
+}
+
+/// True if the subfile type marks a reduced-resolution copy of another image.
+fn is_reduced(subfile_type: u64) -> bool {
+    subfile_type & 1 == 1
+}
+
+/// True if the subfile type marks a copy of reduced resolution or a transparency mask of another image.
+fn is_copy_or_mask(subfile_type: u64) -> bool {
+    subfile_type & 0b101 != 0
+}
+
+/// Name of a compression without a decoder here; `None` for one that is read.
+fn unread_compression(method: u64) -> Option<String> {
+    Some(match method {
+        // In this order: none, fax group 4, LZW, JPEG, deflate, PackBits, deflate by its first number.
+        1 | 4 | 5 | 7 | 8 | 32773 | 32946 => return None,
+        2 | 3 => "fax (CCITT group 3)".to_owned(),
+        6 => "JPEG in the form of TIFF 6.0".to_owned(),
+        33003..=33005 | 34712 => "JPEG 2000".to_owned(),
+        22610 | 34934 => "JPEG XR".to_owned(),
+        34887 => "LERC".to_owned(),
+        34925 => "LZMA".to_owned(),
+        34933 => "PNG".to_owned(),
+        50000 => "ZSTD".to_owned(),
+        50001 => "WebP".to_owned(),
+        50002 | 52546 => "JPEG XL".to_owned(),
+        other => format!("method {other}"),
+    })
+}
+
+/// Description of an unsupported colour space; `None` for a supported one or without the tag.
+fn unsupported_colours(photometric: Option<u64>) -> Option<&'static str> {
+    match photometric? {
+        // In this order: grey with 0 as white, grey with 0 as black, RGB.
+        0..=2 => None,
+        3 => Some("a TIFF of palette colours"),
+        4 => Some("a mask"),
+        6 => Some("a TIFF of YCbCr colours"),
+        SEPARATED => Some("a CMYK image of another form than four inks of 8 bits, pixel by pixel"),
+        8..=10 => Some("a Lab image"),
+        32803 | 34892 => Some("a camera's RAW file"),
+        _ => Some("an image of unknown colours"),
+    }
+}
+
+/// One tag of an image file directory.
+struct Entry {
+    tag: u16,
+    value_type: u16,
+    /// Number of values.
+    count: u64,
+    /// Byte offset of the values in the file.
+    offset: u64,
+}
+
+/// Reader of a TIFF file in its byte order.
+struct Reader<'a> {
+    file: &'a [u8],
+    is_big_endian: bool,
+    /// True for BigTIFF, whose offsets have 8 bytes.
+    is_big_tiff: bool,
+}
+
+impl<'a> Reader<'a> {
+    /// Opens a file. Returns its reader and the offset of the first directory; `None` if the header is truncated.
+    fn open(file: &'a [u8]) -> Option<(Self, u64)> {
+        let is_big_endian = file.starts_with(b"MM");
+        let mut reader = Self { file, is_big_endian, is_big_tiff: false };
+        reader.is_big_tiff = reader.read_uint(2, 2)? == 43;
+        let first = if reader.is_big_tiff { reader.read_uint(8, 8)? } else { reader.read_uint(4, 4)? };
+        Some((reader, first))
+    }
+
+    /// Reads an unsigned integer of 1, 2, 4 or 8 bytes; `None` past the end of the file.
+    fn read_uint(&self, offset: u64, size: usize) -> Option<u64> {
+        let start = usize::try_from(offset).ok()?;
+        let bytes = self.file.get(start..start.checked_add(size)?)?;
+        let mut padded = [0; 8];
+        Some(if self.is_big_endian {
+            padded[8 - size..].copy_from_slice(bytes);
+            u64::from_be_bytes(padded)
+        } else {
+            padded[..size].copy_from_slice(bytes);
+            u64::from_le_bytes(padded)
+        })
+    }
+
+    /// Reads the entries of a directory and the offset of the next one (0 after the last); `None` at offset 0 or if an
+    /// entry is truncated.
+    fn directory(&self, at: u64) -> Option<(Vec<Entry>, u64)> {
+        if at == 0 {
+            return None;
+        }
+        let (count_size, offset_size) = if self.is_big_tiff { (8, 8) } else { (2, 4) };
+        let count = self.read_uint(at, count_size)?;
+        let entry_size = 4 + 2 * offset_size as u64;
+        let count = count.min(MAX_ENTRIES);
+        let mut entries = Vec::new();
+        let mut entry = at.checked_add(count_size as u64)?;
+        for _ in 0..count {
+            let (tag, value_type) = (self.read_uint(entry, 2)? as u16, self.read_uint(entry + 2, 2)? as u16);
+            let count = self.read_uint(entry + 4, offset_size)?;
+            let inline = entry + 4 + offset_size as u64;
+            let length = count.saturating_mul(size_of_type(value_type));
+            let offset = if length <= offset_size as u64 { inline } else { self.read_uint(inline, offset_size)? };
+            entries.push(Entry { tag, value_type, count, offset });
+            entry = entry.checked_add(entry_size)?;
+        }
+        Some((entries, self.read_uint(entry, offset_size).unwrap_or(0)))
+    }
+
+    /// Returns the bytes of a tag; `None` if the directory lacks it or the file ends too early.
+    fn bytes(&self, directory: &[Entry], tag: u16) -> Option<&'a [u8]> {
+        let entry = directory.iter().find(|entry| entry.tag == tag)?;
+        let start = usize::try_from(entry.offset).ok()?;
+        let end = start.checked_add(usize::try_from(entry.count).ok()?)?;
+        self.file.get(start..end)
+    }
+
+    /// Reads the values of a tag as unsigned integers, up to the end of the file; none if the directory lacks the tag.
+    fn values(&self, directory: &[Entry], tag: u16) -> impl Iterator<Item = u64> {
+        let entry = directory.iter().find(|entry| entry.tag == tag);
+        let (offset, count, size) =
+            entry.map_or((0, 0, 1), |entry| (entry.offset, entry.count, size_of_type(entry.value_type)));
+        (0..count.min(MAX_VALUES))
+            .map(move |index| offset.checked_add(index * size))
+            .map_while(move |offset| self.read_uint(offset?, size as usize))
+    }
+
+    /// Reads the first value of a tag; `None` if the directory lacks the tag.
+    fn first_value(&self, directory: &[Entry], tag: u16) -> Option<u64> {
+        self.values(directory, tag).next()
+    }
+}
+
+/// Size in bytes of one value of an unsigned integer type; 1 for every other type.
+fn size_of_type(value_type: u16) -> u64 {
+    match value_type {
+        3 => 2,
+        4 | 13 => 4,
+        16 | 18 => 8,
+        _ => 1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Size of a directory with only a subfile type, in bytes.
+    const DIRECTORY_SIZE: u32 = 18;
+
+    /// A TIFF file whose directories have these subfile types and indexes of their next directory.
+    fn file(directories: &[(u32, Option<u32>)]) -> Vec<u8> {
+        let mut file = [&b"II*\0"[..], &8_u32.to_le_bytes()].concat();
+        for (subfile_type, next) in directories {
+            let next = next.map_or(0, |index| 8 + index * DIRECTORY_SIZE);
+            for number in [1_u16, NEW_SUBFILE_TYPE, 4] {
+                file.extend(number.to_le_bytes());
+            }
+            for number in [1, *subfile_type, next] {
+                file.extend(number.to_le_bytes());
+            }
+        }
+        file
+    }
+
+    #[test]
+    fn parsing_ends_for_cyclic_directories() {
+        let circle = file(&[(0, Some(1)), (0, Some(2)), (0, Some(1))]);
+        assert_eq!(TiffProperties::parse(&circle).pages, 3);
+    }
+
+    #[test]
+    fn copies_and_masks_are_no_pages() {
+        let masked = file(&[(0, Some(1)), (4, Some(2)), (1, None)]);
+        assert_eq!(TiffProperties::parse(&masked).pages, 1);
+    }
 }

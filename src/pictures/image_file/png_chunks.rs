@@ -1,4 +1,6 @@
 //! Facts of a PNG file from its chunks: [`PngProperties`], and the first fault in them: [`fault`].
+//!
+//! Facts of a WebP file from its chunks: [`WebpProperties`], and the length in its header: [`stated_length`].
 
 use std::borrow::Cow;
 
@@ -34,7 +36,7 @@ impl<'a> PngProperties<'a> {
     pub(super) fn parse(file: &'a [u8]) -> Self {
         let mut properties = Self::default();
         let mut colour = ColourChunks::default();
-        for Chunk { kind, data, .. } in Chunks::new(file) {
+        for Chunk { kind, data, .. } in PngChunks::new(file) {
             match kind {
                 b"IHDR" => properties.bits = data.get(8).copied().unwrap_or(0),
                 b"IDAT" => colour.has_samples = true,
@@ -96,12 +98,12 @@ impl<'a> ColourChunks<'a> {
 /// any size.
 pub(super) fn without_metadata(file: &[u8]) -> Cow<'_, [u8]> {
     const NEEDED: [&[u8; 4]; 5] = [b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND"];
-    let mut chunks = Chunks::new(file);
+    let mut chunks = PngChunks::new(file);
     if chunks.by_ref().all(|chunk| NEEDED.contains(&chunk.kind)) {
         return Cow::Borrowed(file);
     }
     let mut reduced = SIGNATURE.to_vec();
-    let mut chunks = Chunks::new(file);
+    let mut chunks = PngChunks::new(file);
     for chunk in chunks.by_ref().filter(|chunk| NEEDED.contains(&chunk.kind)) {
         reduced.extend((chunk.data.len() as u32).to_be_bytes());
         reduced.extend(chunk.body);
@@ -114,7 +116,7 @@ pub(super) fn without_metadata(file: &[u8]) -> Cow<'_, [u8]> {
 
 /// The first fault in the chunks of a PNG file up to the last chunk, `IEND`; `None` without a fault.
 pub(super) fn fault(file: &[u8]) -> Option<PngFault> {
-    for chunk in Chunks::new(file) {
+    for chunk in PngChunks::new(file) {
         if crc32fast::hash(chunk.body) != chunk.checksum {
             return Some(PngFault::Checksum);
         }
@@ -135,15 +137,15 @@ struct Chunk<'a> {
 }
 
 /// Iterator over the complete chunks of a file.
-struct Chunks<'a>(&'a [u8]);
+struct PngChunks<'a>(&'a [u8]);
 
-impl<'a> Chunks<'a> {
+impl<'a> PngChunks<'a> {
     fn new(file: &'a [u8]) -> Self {
         Self(file.strip_prefix(SIGNATURE).unwrap_or_default())
     }
 }
 
-impl<'a> Iterator for Chunks<'a> {
+impl<'a> Iterator for PngChunks<'a> {
     type Item = Chunk<'a>;
 
     fn next(&mut self) -> Option<Chunk<'a>> {
@@ -154,5 +156,65 @@ impl<'a> Iterator for Chunks<'a> {
         let (kind, data) = body.split_first_chunk::<4>()?;
         self.0 = rest;
         Some(Chunk { kind, data, body, checksum: u32::from_be_bytes(*checksum) })
+    }
+}
+
+/// Facts of a WebP file that decide how it is decoded (WebP container specification; RFC 9649, section 2).
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub(super) struct WebpProperties<'a> {
+    /// EXIF data (a TIFF structure), if the file has any.
+    pub(super) exif: Option<&'a [u8]>,
+    /// ICC profile, if the file has one.
+    pub(super) profile: Option<&'a [u8]>,
+    /// Number of frames of an animation; 0 without animation.
+    pub(super) frames: usize,
+}
+
+impl<'a> WebpProperties<'a> {
+    /// Reads the chunks in order, up to the end of a truncated file.
+    pub(super) fn parse(file: &'a [u8]) -> Self {
+        let mut properties = Self::default();
+        for (kind, data) in WebpChunks::new(file) {
+            match kind {
+                b"ICCP" if properties.profile.is_none() => properties.profile = Some(data),
+                b"ANMF" => properties.frames += 1,
+                b"EXIF" if properties.exif.is_none() => {
+                    // Some programs also write the header of a JPEG segment.
+                    properties.exif = Some(data.strip_prefix(b"Exif\0\0").unwrap_or(data));
+                }
+                _ => {}
+            }
+        }
+        properties
+    }
+}
+
+/// The length of the file that its header states, in bytes; `None` if the header is truncated.
+pub(super) fn stated_length(file: &[u8]) -> Option<u64> {
+    let size = file.get(4..8).and_then(|size| size.try_into().ok())?;
+    Some(u64::from(u32::from_le_bytes(size)) + 8)
+}
+
+/// Iterator over the complete chunks of a file.
+struct WebpChunks<'a>(&'a [u8]);
+
+impl<'a> WebpChunks<'a> {
+    fn new(file: &'a [u8]) -> Self {
+        // The header has 12 bytes: RIFF, the size, WEBP.
+        Self(file.get(12..).unwrap_or_default())
+    }
+}
+
+impl<'a> Iterator for WebpChunks<'a> {
+    type Item = (&'a [u8; 4], &'a [u8]);
+
+    fn next(&mut self) -> Option<Self::Item> {
+        let (kind, rest) = self.0.split_first_chunk::<4>()?;
+        let (length, rest) = rest.split_first_chunk::<4>()?;
+        let length = u32::from_le_bytes(*length) as usize;
+        let (data, rest) = rest.split_at_checked(length)?;
+        // A chunk of odd length is padded by one byte.
+        self.0 = rest.get(length % 2..).unwrap_or_default();
+        Some((kind, data))
     }
 }

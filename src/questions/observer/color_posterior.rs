@@ -1,10 +1,8 @@
 //! Untouched colour of an object, inferred from the received pixels and the light of its surroundings:
 //! [`ColorPosterior`].
 
-use super::cells::Cells;
-use super::channel::{ChannelFit, Fit, ROUNDING};
-use super::local::{MIN_GAIN, NormalEquations};
-use super::outlines::PatchSums;
+use super::cells::{Cells, PatchSums};
+use super::local::{ChannelFit, Fit, MIN_GAIN, NormalEquations, ROUNDING};
 use super::tiles::Tiles;
 use crate::colors::{Color, Palette};
 

@@ -29,18 +29,14 @@
 //! Changed geometry counts as another image: a shift by four pixels at 640×480 is enough. `controls` makes images
 //! without any evidence; the answers must then be guesses.
 
-mod answers;
+pub(crate) mod answers;
 mod cells;
-mod channel;
 mod color_posterior;
 pub mod controls;
 mod local;
-mod outlines;
-pub(crate) mod question_topic;
-pub mod resample;
 #[cfg(test)]
 mod tests;
-mod tiles;
+pub mod tiles;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -49,15 +45,13 @@ use super::colors::Palette;
 use super::rules::Rules;
 use super::statistics::scene_maps::SceneMaps;
 use super::statistics::{FrameStatistics, measure};
+use cells::{Cells, MIN_CONFIRMED, Outline, TILE, outlines, patch_sums};
+use color_posterior::{ColorPosterior, LightEstimate};
 use darkqa_base::error::Result;
 use darkqa_base::types::{Digest, Frame, Labels, Rgb};
+use tiles::{Tiles, area_mean};
 
-use cells::{Cells, TILE};
-use color_posterior::{ColorPosterior, LightEstimate};
-use outlines::{MIN_CONFIRMED, Outline, outlines, patch_sums};
-pub use question_topic::is_in_rulebook;
-use resample::area_mean;
-use tiles::Tiles;
+pub use answers::is_in_rulebook;
 
 /// Version of the observer's method; it enters the digest of the model.
 pub const VERSION: u32 = 3;

@@ -1,10 +1,9 @@
 //! The observer on a disc in noise: its numbers are those of the textbook.
 
-use super::cells::{Cells, TILE};
+use super::cells::{Cells, Outline, TILE, outlines, patch_sums};
 use super::local;
-use super::outlines::{Outline, outlines, patch_sums};
 use super::tiles::Tiles;
-use crate::pick::Picker;
+use crate::rule_context::Picker;
 use darkqa_base::types::{FrameId, Rgb};
 
 const SIZE: [usize; 2] = [240, 180];

@@ -2,13 +2,7 @@
 //!
 //! The rules use only these measurements, so changed rules do not need the images again.
 
-mod components;
-mod erosion;
-mod light_samples;
-mod mask_core;
-mod mask_shapes;
 mod measure;
-mod opening;
 pub(crate) mod scene_maps;
 #[cfg(test)]
 mod tests;

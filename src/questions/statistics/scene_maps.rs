@@ -1,12 +1,15 @@
 //! Masks and labels of the pixels of a frame: [`SceneMaps`].
+//!
+//! Connected components of equal label: [`components`].
+//!
+//! Morphological opening of a mask, which removes thin margins: [`open_mask`].
+//!
+//! Erosion of all masks of an image in one pass: [`cores`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use ndarray::{CowArray, Ix2};
 
-use super::components::components;
-use super::erosion::runs;
-use super::opening::open_mask;
 use super::plain_word;
 use crate::rules::{CoarseRule, MeasureRule};
 use darkqa_base::error::{Error, Result};
@@ -250,4 +253,334 @@ fn values<'a, T>(map: &'a CowArray<'_, T, Ix2>) -> &'a [T] {
 /// Length in pixels, proportional to the height: round(height / per_height), at least 1.
 pub(super) fn scaled_length(height: usize, per_height: usize) -> usize {
     ((2 * height + per_height) / (2 * per_height)).max(1)
+}
+
+/// A run of one label in a row.
+struct LabelRun {
+    left: usize,
+    right: usize,
+    label: u32,
+}
+
+/// Returns the component of each pixel. Pixels with equal labels that touch by edges or corners form one component;
+/// components are numbered row by row from 1. `to_label` gives the label of a value; pixels with label 0 belong to no
+/// component and get 0.
+pub(super) fn components<T: Copy + PartialEq>(
+    values: &[T],
+    [width, height]: [usize; 2],
+    to_label: impl Fn(T) -> u32,
+) -> Vec<u32> {
+    let mut parents: Vec<u32> = Vec::new();
+    let mut rows: Vec<Vec<(LabelRun, u32)>> = Vec::with_capacity(height);
+    for y in 0..height {
+        let row = &values[y * width..][..width];
+        let mut found: Vec<(LabelRun, u32)> = Vec::new();
+        let above: &[(LabelRun, u32)] = rows.last().map_or(&[], |above| above);
+        // The runs of both rows are sorted from left to right. Runs above that end before this one begins are no longer
+        // needed.
+        let mut first = 0;
+        for (left, right) in runs(row) {
+            let label = to_label(row[left]);
+            if label == 0 {
+                continue;
+            }
+            while above.get(first).is_some_and(|(run, _)| run.right < left) {
+                first += 1;
+            }
+            let mut joined = None;
+            for (run, node) in above[first..].iter().take_while(|(run, _)| run.left <= right) {
+                if run.label != label {
+                    continue;
+                }
+                joined = Some(match joined {
+                    None => *node,
+                    Some(other) => join(&mut parents, other, *node),
+                });
+            }
+            let node = joined.unwrap_or_else(|| {
+                parents.push(parents.len() as u32);
+                parents.len() as u32 - 1
+            });
+            found.push((LabelRun { left, right, label }, node));
+        }
+        rows.push(found);
+    }
+    number_components(&rows, &mut parents, [width, height])
+}
+
+/// Joins the trees of two nodes and returns their common root, the older of the two roots.
+fn join(parents: &mut [u32], a: u32, b: u32) -> u32 {
+    let (a, b) = (root(parents, a), root(parents, b));
+    let (old, new) = (a.min(b), a.max(b));
+    parents[new as usize] = old;
+    old
+}
+
+/// Returns the root of a node and shortens the path to it.
+fn root(parents: &mut [u32], mut node: u32) -> u32 {
+    while parents[node as usize] != node {
+        parents[node as usize] = parents[parents[node as usize] as usize];
+        node = parents[node as usize];
+    }
+    node
+}
+
+/// Numbers the components row by row from 1 and returns the number of each pixel.
+fn number_components(rows: &[Vec<(LabelRun, u32)>], parents: &mut [u32], [width, height]: [usize; 2]) -> Vec<u32> {
+    let mut numbers = vec![0; parents.len()];
+    let mut next = 1;
+    let mut pieces = vec![0; width * height];
+    for (y, row) in rows.iter().enumerate() {
+        for (run, node) in row {
+            let root = root(parents, *node) as usize;
+            if numbers[root] == 0 {
+                numbers[root] = next;
+                next += 1;
+            }
+            pieces[y * width + run.left..y * width + run.right].fill(numbers[root]);
+        }
+    }
+    pieces
+}
+
+/// Opens a mask in place with a square of radius `radius`: only pixels covered by squares that are entirely within the
+/// mask remain. Pixels outside the image are not in the mask, so an unlabelled border around the image is also a
+/// margin.
+fn open_mask(set: &mut [bool], [width, height]: [usize; 2], radius: usize) {
+    let whole = 2 * radius + 1;
+    let mut streaks = vec![0_usize; width];
+    // The centers of such squares, widened by the radius along their rows.
+    let mut spread = vec![false; set.len()];
+    for y in 0..height {
+        let row = &set[y * width..][..width];
+        for (left, right) in runs(row) {
+            let is_long_enough = row[left] && right - left >= whole;
+            let (from, to) = if is_long_enough { (left + radius, right - radius) } else { (right, right) };
+            streaks[left..from].fill(0);
+            streaks[to..right].fill(0);
+            for streak in &mut streaks[from..to] {
+                *streak += 1;
+            }
+        }
+        let Some(center) = y.checked_sub(radius) else {
+            continue;
+        };
+        let row = &mut spread[center * width..][..width];
+        let mut filled = 0;
+        for (x, streak) in streaks.iter().enumerate() {
+            if *streak >= whole {
+                row[filled.max(x - radius)..=x + radius].fill(true);
+                filled = x + radius + 1;
+            }
+        }
+    }
+    // Then the same along the columns: `since` is the distance to the last center above, then to the next one below.
+    set.fill(false);
+    for direction in [Direction::Down, Direction::Up] {
+        let mut since = vec![radius + 1; width];
+        for i in 0..height {
+            let y = if direction == Direction::Down { i } else { height - 1 - i };
+            let (centers, row) = (&spread[y * width..][..width], &mut set[y * width..][..width]);
+            for ((since, center), pixel) in since.iter_mut().zip(centers).zip(row) {
+                *since = if *center { 0 } else { *since + 1 };
+                *pixel |= *since <= radius;
+            }
+        }
+    }
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Direction {
+    Down,
+    Up,
+}
+
+/// Calls `visit(y, left, right, mask)`, row by row, for every run of pixels whose square of radius `radius` is within
+/// their own mask. Masks continue beyond the edge of the image, because depth has no flying pixels there. Mask 0 is
+/// skipped.
+///
+/// Each run of a row is shortened by the radius. For each column, `streaks` counts the consecutive rows in which the
+/// column was inside such a shortened run of the same mask.
+pub(super) fn cores(
+    masks: &[u32],
+    [width, height]: [usize; 2],
+    radius: usize,
+    mut visit: impl FnMut(usize, usize, usize, u32),
+) {
+    let whole = 2 * radius as u32 + 1;
+    let mut streaks = vec![0_u32; width];
+    // Above the first row and below the last row, the masks of these rows continue.
+    for y in 0..height + radius {
+        if y < height {
+            let row = &masks[y * width..][..width];
+            let above = (y > 0).then(|| &masks[(y - 1) * width..][..width]);
+            for (left, right) in runs(row) {
+                let (from, to) = (
+                    if left == 0 { 0 } else { left + radius },
+                    if right == width { width } else { right.saturating_sub(radius) },
+                );
+                let (from, to) = (from.min(right), to.max(from.min(right)));
+                streaks[left..from].fill(0);
+                streaks[to..right].fill(0);
+                let streaks = &mut streaks[from..to];
+                match above {
+                    None => streaks.fill(radius as u32 + 1),
+                    Some(above) => {
+                        for (streak, above) in streaks.iter_mut().zip(&above[from..to]) {
+                            *streak = if *above == row[left] { *streak + 1 } else { 1 };
+                        }
+                    }
+                }
+            }
+        } else {
+            for streak in streaks.iter_mut().filter(|streak| **streak > 0) {
+                *streak += 1;
+            }
+        }
+        let Some(center) = y.checked_sub(radius) else {
+            continue;
+        };
+        let row = &masks[center * width..][..width];
+        let mut x = 0;
+        while x < width {
+            if streaks[x] < whole || row[x] == 0 {
+                x += 1;
+                continue;
+            }
+            let left = x;
+            while x < width && streaks[x] >= whole && row[x] == row[left] {
+                x += 1;
+            }
+            visit(center, left, x, row[left]);
+        }
+    }
+}
+
+/// Runs of equal values of a row, as left and right (exclusive).
+pub(super) fn runs<T: PartialEq>(row: &[T]) -> impl Iterator<Item = (usize, usize)> {
+    let mut left = 0;
+    std::iter::from_fn(move || {
+        let run = (left, left + run_length(row.get(left..)?)?);
+        left = run.1;
+        Some(run)
+    })
+}
+
+/// Number of equal values at the start; `None` if the list is empty.
+fn run_length<T: PartialEq>(values: &[T]) -> Option<usize> {
+    /// Number of values compared without a branch, so that the compiler can use SIMD.
+    const LANES: usize = 32;
+    let first = values.first()?;
+    let count_different = |lanes: &[T; LANES]| -> u32 { lanes.iter().map(|value| u32::from(value != first)).sum() };
+    let (chunks, _) = values.as_chunks::<LANES>();
+    let whole = LANES * chunks.iter().take_while(|lanes| count_different(lanes) == 0).count();
+    let rest = values[whole..].iter().take_while(|value| *value == first).count();
+    Some(whole + rest)
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    fn reference(labels: &[u32], [width, height]: [usize; 2]) -> Vec<u32> {
+        let mut pieces = vec![0; labels.len()];
+        let mut next = 0;
+        for start in 0..labels.len() {
+            if labels[start] == 0 || pieces[start] != 0 {
+                continue;
+            }
+            next += 1;
+            let mut open = vec![start];
+            pieces[start] = next;
+            while let Some(i) = open.pop() {
+                let (x, y) = (i % width, i / width);
+                for j in y.saturating_sub(1)..=(y + 1).min(height - 1) {
+                    for k in x.saturating_sub(1)..=(x + 1).min(width - 1) {
+                        let neighbour = j * width + k;
+                        if labels[neighbour] == labels[start] && pieces[neighbour] == 0 {
+                            pieces[neighbour] = next;
+                            open.push(neighbour);
+                        }
+                    }
+                }
+            }
+        }
+        pieces
+    }
+
+    proptest! {
+        #[test]
+        fn components_match_flood_fill(
+            (width, height, labels) in (1..12_usize, 1..12_usize).prop_flat_map(|(width, height)| {
+                (Just(width), Just(height), prop::collection::vec(0..3_u32, width * height))
+            }),
+        ) {
+            prop_assert_eq!(components(&labels, [width, height], |label| label), reference(&labels, [width, height]));
+        }
+    }
+
+    fn opening_reference(set: &[bool], [width, height]: [usize; 2], radius: usize) -> Vec<bool> {
+        let mut expected = vec![false; set.len()];
+        let side = 2 * radius + 1;
+        for top in 0..(height + 1).saturating_sub(side) {
+            for left in 0..(width + 1).saturating_sub(side) {
+                let square = (top..top + side).flat_map(|y| (left..left + side).map(move |x| y * width + x));
+                if square.clone().all(|i| set[i]) {
+                    square.for_each(|i| expected[i] = true);
+                }
+            }
+        }
+        expected
+    }
+
+    proptest! {
+        #[test]
+        fn pixels_covered_by_squares_remain(
+            width in 1..16_usize, height in 1..16_usize, radius in 1..4_usize, bits in any::<u128>(), coarse in 1..6_usize,
+        ) {
+            let mut set: Vec<bool> = (0..width * height)
+                .map(|i| {
+                    let cell = i % width / coarse * 5 + i / width / coarse * 17;
+                    bits >> (cell % 127) & 3 != 0
+                })
+                .collect();
+            let expected = opening_reference(&set, [width, height], radius);
+            open_mask(&mut set, [width, height], radius);
+            prop_assert_eq!(set, expected);
+        }
+    }
+
+    /// The core mask of each pixel, computed pixel by pixel.
+    fn erosion_reference(masks: &[u32], [width, height]: [usize; 2], radius: usize) -> Vec<u32> {
+        (0..width * height)
+            .map(|i| {
+                let (x, y) = (i % width, i / width);
+                let columns = x.saturating_sub(radius)..=(x + radius).min(width - 1);
+                let mut rows = y.saturating_sub(radius)..=(y + radius).min(height - 1);
+                let is_core = rows.all(|y| columns.clone().all(|x| masks[y * width + x] == masks[i]));
+                if is_core { masks[i] } else { 0 }
+            })
+            .collect()
+    }
+
+    proptest! {
+        #[test]
+        fn cores_match_reference(
+            width in 1..14_usize, height in 1..14_usize, radius in 0..4_usize, bits in any::<u64>(), coarse in 1..5_usize,
+        ) {
+            let masks: Vec<u32> = (0..width * height)
+                .map(|i| {
+                    let cell = i % width / coarse * 7 + i / width / coarse * 13;
+                    (bits >> (cell % 62) & 3) as u32
+                })
+                .collect();
+            let mut found = vec![0; width * height];
+            cores(&masks, [width, height], radius, |y, left, right, mask| {
+                found[y * width + left..y * width + right].fill(mask);
+            });
+            prop_assert_eq!(found, erosion_reference(&masks, [width, height], radius));
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! Sample images of the first frames by level, as a table of the page ([`samples`]) and as a figure ([`figure`]).
+//! Sample images of the first frames by level, as a table of the page ([`samples_of`]) and as a figure ([`figure`]).
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -37,7 +37,7 @@ const MAX_FRAMES: usize = 3;
 
 /// Sample images of the first frames: a table for each axis, with a row for each frame, variant and enhancer. Empty
 /// without thumbnails.
-pub(crate) fn samples(thumbnails: &[Thumbnail]) -> Vec<SampleTable> {
+pub(crate) fn samples_of(thumbnails: &[Thumbnail]) -> Vec<SampleTable> {
     Axis::present(|axis| thumbnails.iter().any(|thumbnail| thumbnail.condition.level().axis() == Some(axis)))
         .into_iter()
         .filter_map(|axis| {
@@ -115,6 +115,7 @@ fn row_lights<'a>(thumbnails: &[&'a Thumbnail]) -> BTreeSet<(Variant, Option<&'a
 
 /// Width and height of an image in the figure, in pixels.
 const CELL: [usize; 2] = [200, 150];
+
 /// Width of the row names and height of the level names, in pixels.
 const HEAD: [usize; 2] = [180, 28];
 
@@ -163,7 +164,7 @@ mod tests {
 
     /// The only table of some thumbnails.
     fn single_table(thumbnails: &[Thumbnail]) -> SampleTable {
-        let mut tables = samples(thumbnails);
+        let mut tables = samples_of(thumbnails);
         assert_eq!(tables.len(), 1);
         tables.remove(0)
     }
@@ -193,13 +194,13 @@ mod tests {
     #[test]
     fn each_axis_has_a_table() {
         let all = ["L0", "L3-auto", "T8.33-motion", "T33.33-motion"].map(thumbnail);
-        let tables = samples(&all);
+        let tables = samples_of(&all);
         let names: Vec<&str> = tables.iter().map(|table| table.name).collect();
         assert_eq!(names, ["samples", "blur_samples"]);
         assert_eq!(tables[0].levels, ["L0, 0 EV", "L3, 6 EV"]);
         assert_eq!(tables[1].levels, ["L0, 0 ms", "T8.33, 8.33 ms", "T33.33, 33.33 ms"]);
         assert!(tables[1].rows.len() == 1 && tables[1].rows[0].images.iter().all(Option::is_some));
-        assert!(samples(&[]).is_empty());
+        assert!(samples_of(&[]).is_empty());
     }
 
     #[test]

@@ -1,5 +1,10 @@
 //! The `report` command for one run or several: [`report`].
+//!
+//! `report --common`: a report on only the items that all models answered ([`keep_common_items`]).
+//!
+//! The curves of a run's story figure: [`story_curves`].
 
+use std::collections::HashSet;
 use std::fmt::Write;
 use std::path::PathBuf;
 
@@ -7,30 +12,27 @@ use clap::Args;
 
 use super::alerts::{alerts, duplicate_folder_alerts};
 use super::baseline::{Baseline, FAIL_IF_WORSE};
-use super::choice::{files as report_files, text, write_flip_rows, write_report};
 use super::combine::{Combined, combine};
-use super::common::keep_common_items;
-use super::enhancers;
-use super::lenient_change::LenientChange;
-use super::report_folder::write_in_place;
-use super::whole_report::no_records;
-use super::{open, own_answers};
+use super::enhancers::{self, LenientChange};
+use super::join::TrialPlaces;
+use super::listing::write_in_place;
+use super::open;
+use super::own_answers::{self, no_records};
+use super::whole::{files as report_files, text, write_flip_rows, write_report};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::report::charts::figures::{self, StoryCurves};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::json::SummaryRuns;
 use crate::report::products::PAGE;
 use crate::report::text::alert::Alert;
-use crate::runs::Outcome;
-use crate::runs::ShowArgs;
-use crate::runs::record_table;
 use crate::runs::sharded_run::{open_any_run, open_choice_run};
 use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
-use crate::runs::{StdoutFormat, Syntax};
-use crate::store::now;
-use crate::store::{AddressChange, Store};
+use crate::runs::{Outcome, ShowArgs, StdoutFormat, Syntax, record_table};
+use crate::store::{AddressChange, Store, now};
 use crate::types::manifests::{Counts, Status};
-use crate::types::{ChoiceDetail, Decides, ModelColumn, OpenDetail, TrialRef, Truths};
+use crate::types::{AskedItem, ChoiceDetail, Decides, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
+use darkqa_score::accuracies::shared_items;
 use darkqa_score::answers::record::{self, Detail as _};
 
 /// The flags of `report`.
@@ -369,4 +371,60 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
         *run = StoredRun::reread(&run.folder, run.manifest.clone())?;
     }
     Ok(lines)
+}
+
+/// Keeps only the trials of items to which every model with images has a reply in some condition. Models without any
+/// reply are ignored.
+///
+/// # Errors
+/// If there is no such item.
+fn keep_common_items(mut combined: Combined) -> Result<Combined> {
+    let shared: HashSet<(QuestionId, Vec<String>, u32)> = {
+        let grid = combined.grid();
+        grid.items
+            .iter()
+            .zip(shared_items(&grid))
+            .filter(|(_, is_shared)| *is_shared)
+            .map(|(item, _)| item_key(item.asked))
+            .collect()
+    };
+    if shared.is_empty() {
+        return Err(Error::usage("--common", "no item was answered by every model; leave it out"));
+    }
+    let is_shared: Vec<bool> = combined
+        .trials
+        .items()
+        .into_iter()
+        .map(|item| item.is_some_and(|item| shared.contains(&item_key(item))))
+        .collect();
+    // The new place of each trial; `None` if it is removed.
+    let mut places = Vec::with_capacity(combined.trials.len());
+    let mut next = 0;
+    for trial in combined.trials.iter() {
+        let is_kept = is_shared[trial.item_number()];
+        places.push(is_kept.then_some(next));
+        next += u32::from(is_kept);
+    }
+    for run in &mut combined.runs {
+        let kept = run.trials.iter().filter_map(|place| places[place]);
+        run.trials = TrialPlaces::Some(kept.collect());
+    }
+    combined.trials.retain(|trial| is_shared[trial.item_number()]);
+    let questions: HashSet<&QuestionId> = shared.iter().map(|(question, ..)| question).collect();
+    combined.questions.retain(|question| questions.contains(&question.id));
+    Ok(combined)
+}
+
+/// The identity of an item: question, order of choices and repeat.
+fn item_key(item: &AskedItem) -> (QuestionId, Vec<String>, u32) {
+    let (question, choices, repeat) = item.key();
+    (question.clone(), choices.to_vec(), repeat)
+}
+
+/// The curves of a run; `None` if no model was shown a dark image.
+///
+/// # Errors
+/// If a record of the run has no true choice.
+pub(crate) fn story_curves(run: StoredRun<ChoiceDetail>) -> Result<Option<StoryCurves>> {
+    Ok(figures::story_curves(combine(vec![run])?.findings().shown()))
 }

@@ -1,36 +1,36 @@
 //! The report on runs of open questions: [`Scores`] scores their records, and [`write()`] writes the report into the
 //! folder of a run.
+//!
+//! Checks that joined runs of open questions were marked by the same judge: [`check_same_judge`].
 
 use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+use serde_json::Value;
+
 use super::alerts::{empty_answer_alerts, joining_alerts, missing_alerts, open_early_ends, run_alerts};
 use super::combine::command_path;
 use super::enhancers;
 use super::join::join;
-use super::judges;
-use super::listing::listing;
-use super::report_folder::ReportFolder;
-use super::whole_report::{WholeReport, with_summary};
+use super::listing::{ReportFolder, listing};
+use super::own_answers::{WholeReport, with_summary};
+use super::settings::{Settings, differing_settings, reply_settings};
 use crate::error::{Error, Result};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
 use crate::report::products::PAGE;
 use crate::report::tables::EnhancerRow;
 use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::outcome_words;
 use crate::report::text::table::Table;
-use crate::runs::mark_index::MarkIndex;
-use crate::runs::mark_index::{JUDGE, PROTOCOL};
-use crate::runs::outcome::Outcome;
-use crate::runs::outcome::{StdoutFormat, Syntax};
+use crate::report::text::words;
+use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
+use crate::runs::outcome::{Outcome, ReportLength, StdoutFormat, Syntax};
 use crate::runs::predictions::{AnswerState, Prediction, predictions};
-use crate::runs::report_length::ReportLength;
 use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials, text_setting};
 use crate::store::Store;
 use crate::types::flags::read_word;
-use crate::types::manifests::{RunManifest, Status};
+use crate::types::manifests::{JUDGES, RunManifest, Status, judge_flag};
 use crate::types::{ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef};
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::model_in_condition::ModelInCondition;
@@ -229,7 +229,7 @@ pub(super) struct JoinedRuns {
 /// # Errors
 /// If the runs have different judges or protocols, or different questions under the same name.
 pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
-    judges::check_same_judge(&runs)?;
+    check_same_judge(&runs)?;
     check_questions(&runs)?;
     let joined = join(runs, is_answer)?;
     let mut alerts = run_alerts(&joined);
@@ -321,7 +321,7 @@ fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, ModelInCon
         .filter(|record| record.detail.step == Step::Answer)
         .filter_map(|record| {
             let failure = record.failure.as_ref()?;
-            let kind = outcome_words::failure_reason(failure.kind, failure.status);
+            let kind = words::failure_reason(failure.kind, failure.status);
             let subject = ModelInCondition::new(&record.model, record.condition.as_ref());
             let text = format!("{kind}: {}", failure.message);
             Some(((&record.question, subject), text))
@@ -351,4 +351,65 @@ fn question_groups(question: &RunQuestion) -> QuestionGroups {
         category: question.family.name().to_owned(),
         episode,
     }
+}
+
+/// Checks that all runs were marked by the same judge and protocol.
+///
+/// # Errors
+/// If two judges or protocols differ.
+fn check_same_judge(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+    let mut marked: Option<(&PathBuf, [Option<Value>; 2])> = None;
+    for run in runs {
+        let by = [JUDGE, PROTOCOL].map(|name| run.manifest.settings.get(name).cloned());
+        match &marked {
+            Some((other, other_by)) if *other_by != by => {
+                let path = run.folder.clone();
+                let problem = format!(
+                    "its answers were marked by {} and those of {} by {}: marks of two judges or protocols cannot be compared; report \
+                     each run alone, or run openeqa on its folder again with the other's --judge and --protocol: only marks are asked",
+                    judge_words(&by),
+                    other.display(),
+                    judge_words(other_by)
+                );
+                return Err(Error::Run { path, problem });
+            }
+            Some(_) => {}
+            None => marked = Some((&run.folder, by)),
+        }
+    }
+    check_same_settings(runs)
+}
+
+/// Checks that judges of the same name have the same settings, because marks are identified by the judge's name.
+fn check_same_settings(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
+    let judges: Vec<Option<Settings>> = runs.iter().map(|run| judge_settings(&run.manifest)).collect();
+    let names: Vec<String> = runs.iter().map(StoredRun::name).collect();
+    let differences = differing_settings(&judges);
+    let Some(first) = differences.first() else {
+        return Ok(());
+    };
+    let path = runs[first.values[0].0].folder.clone();
+    let words: Vec<String> = differences.iter().map(|one| one.words(&names)).collect();
+    let problem = format!(
+        "the judges of the runs have one name and differ: {}; marks of two judges cannot be compared: report each run alone",
+        words.join("; ")
+    );
+    Err(Error::Run { path, problem })
+}
+
+/// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the manifest does not state
+/// them.
+fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
+    let judge = text_setting(manifest, JUDGE)?;
+    // Runs of earlier versions list the judge only among the models.
+    let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));
+    let settings = columns.into_iter().flatten().next().map(reply_settings)?;
+    Some(settings.into_iter().map(|(flag, value)| (judge_flag(&flag), value)).collect())
+}
+
+/// A judge and a protocol in words.
+fn judge_words([judge, protocol]: &[Option<Value>; 2]) -> String {
+    let judge = judge.as_ref().and_then(Value::as_str);
+    let protocol = protocol.as_ref().and_then(Value::as_str);
+    format!("{} ({})", judge.unwrap_or("nobody"), protocol.unwrap_or("upstream"))
 }

@@ -1,23 +1,25 @@
 //! The report on runs without true answers, which compares each model with its own answers at L0.
+//!
+//! The report on one run, with all its files: [`WholeReport`].
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::alerts::alerts_without_truths;
 use super::combine::{Combined, frame_ties};
 use super::enhancers;
-use super::report_folder::ReportFolder;
-use super::whole_report::{WholeReport, with_summary};
-use crate::error::Result;
+use super::listing::ReportFolder;
+use crate::error::{Error, Result};
 use crate::report::json::SummaryRuns;
 use crate::report::markdown::MarkdownReport;
 use crate::report::products::PAGE;
 use crate::report::self_agreement::{AgreementReport, products, summary, text};
 use crate::report::text::alert::Alert;
-use crate::runs::report_length::ReportLength;
-use crate::runs::stored::run_name;
+use crate::runs::outcome::ReportLength;
+use crate::runs::stored::{ShownModels, StoredRun, run_name};
 use crate::runs::{StdoutFormat, Syntax};
 use crate::types::ChoiceDetail;
 use crate::types::manifests::RunManifest;
+use darkqa_score::answers::record::Detail;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 
 /// The files of a report, by name, and its text for standard output.
@@ -114,4 +116,39 @@ fn stdout_text(
 fn markdown(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
     let names = runs.iter().map(|(_, folder)| run_name(folder)).collect();
     MarkdownReport::for_own_answers(report, names, length).text()
+}
+
+/// Name of the file with the summary.
+const SUMMARY_JSON: &str = "summary.json";
+
+/// The report on one run.
+pub(crate) struct WholeReport {
+    /// Names and contents of the files that `report` writes into the folder of the run.
+    pub(crate) files: Vec<(String, Vec<u8>)>,
+    /// The findings and the table by level, as Markdown.
+    pub(crate) markdown: String,
+}
+
+/// Adds the summary as JSON to the files of a report.
+pub(super) fn with_summary(mut products: Vec<(String, Vec<u8>)>, summary: String) -> Vec<(String, Vec<u8>)> {
+    products.push((SUMMARY_JSON.to_owned(), summary.into_bytes()));
+    products
+}
+
+/// Removes the models that a report leaves out by default.
+///
+/// # Errors
+/// If the run has no records.
+pub(super) fn without_hidden_models<D: Detail>(mut run: StoredRun<D>) -> Result<StoredRun<D>> {
+    if run.trials.is_empty() {
+        return Err(no_records(run.folder));
+    }
+    run.leave_out(ShownModels::Current);
+    Ok(run)
+}
+
+/// The error for a run without records.
+pub(super) fn no_records(path: PathBuf) -> Error {
+    let problem = "the run has no records yet: nothing to report".to_owned();
+    Error::Run { path, problem }
 }

@@ -2,7 +2,7 @@
 
 use crate::report::tables::EnhancerRow;
 use crate::report::text::alert::Alert;
-use crate::report::text::noise_profiles::NoiseProfiles;
+use crate::report::text::words::NoiseProfiles;
 use crate::types::manifests::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 use darkqa_score::choice::llm_match::Protocol;

@@ -19,19 +19,23 @@ use darkqa_score::model_in_condition;
 /// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge
 /// ([`PageKind`]).
 pub(crate) const UNREAD: u8 = 26;
+
 /// Result code of a failed trial.
 pub(crate) const FAILED: u8 = 27;
+
 /// Result code of an item that the subject was not asked.
 pub(crate) const ABSENT: u8 = 28;
 
 /// Maximum lengths of a reply on the page in characters, tried in order until all replies fit into [`SizeLimit::text`].
 const MAX_REPLY_CHARS: [usize; 5] = [20_000, 2_000, 400, 100, 30];
+
 /// Size limits, tried in order until the packed items fit into [`MAX_PACKED_BYTES`].
 const SIZE_LIMITS: [SizeLimit; 3] = [
     SizeLimit { text: 12_000_000, pictures: 7_000_000 },
     SizeLimit { text: 4_000_000, pictures: 4_000_000 },
     SizeLimit { text: 1_000_000, pictures: 1_000_000 },
 ];
+
 /// Maximum size of the packed items in bytes, so that the page stays under 12 MB.
 const MAX_PACKED_BYTES: usize = 10_500_000;
 
@@ -70,7 +74,7 @@ pub(crate) struct PageData<'a> {
     pub(crate) frames: Vec<&'a str>,
     /// Width and height of each frame in pixels; `None` if no thumbnail records them.
     pub(crate) sizes: Vec<Option<[u32; 2]>>,
-    pub(crate) subjects: Vec<ModelInCondition<'a>>,
+    pub(crate) subjects: Vec<PageSubject<'a>>,
     pub(crate) questions: Vec<Question<'a>>,
     pub(crate) choices: Vec<&'a [String]>,
     pub(crate) items: Vec<Item>,
@@ -95,7 +99,7 @@ pub(crate) struct PageData<'a> {
 
 /// Subject of the report: a model in a condition.
 #[derive(Serialize)]
-pub(crate) struct ModelInCondition<'a> {
+pub(crate) struct PageSubject<'a> {
     pub(crate) name: String,
     pub(crate) model: &'a str,
     /// True if the model is a reference and not under test.
@@ -110,7 +114,7 @@ pub(crate) struct ModelInCondition<'a> {
     pub(crate) clean: Option<usize>,
 }
 
-impl<'a> ModelInCondition<'a> {
+impl<'a> PageSubject<'a> {
     /// A subject as the script needs it.
     pub(crate) fn new(subject: &'a model_in_condition::ModelInCondition, clean: Option<usize>) -> Self {
         Self {

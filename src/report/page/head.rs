@@ -1,17 +1,24 @@
 //! First screen of the page ([`PageHead`]): summary, chart, main finding of each group, and one frame at each level.
+//!
+//! Images of one frame at each level, with the models' answers: [`Strip`].
+
+use std::collections::{BTreeSet, HashSet};
 
 use serde::Serialize;
 
-use super::inputs::PageInputs;
-use super::strip::Strip;
+use super::run_usage::PageInputs;
 use crate::error::Result;
-use crate::report::charts::chart::figure_chart::FigureChart;
-use crate::report::charts::chart::{Chart, Figure};
+use crate::report::charts::chart::{Chart, Figure, FigureChart};
 use crate::report::charts::figures::{Names, overview, split};
 use crate::report::charts::paper::figure;
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{Effect, Finding, FindingGroups};
 use crate::report::sentences::capitalised;
+use crate::report::text::words::light;
+use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
+use darkqa_score::choice::ParsingMode;
+use darkqa_score::grid::{Grid, TrialResult};
+use darkqa_score::model_in_condition::{ModelInCondition, pooled_models};
 
 /// Half the width of the drawing of intervals, in its own units. The largest end of all intervals is drawn there.
 const MARK_REACH: f64 = 50.0;
@@ -142,6 +149,235 @@ fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
             figure("head", caption, &FigureChart::Lines(chart))
         })
         .transpose()
+}
+
+/// Maximum number of models whose answers are below an image (chosen to fit one screen).
+const MAX_MODELS: usize = 3;
+
+/// Maximum number of rows (chosen to fit one screen).
+const MAX_ROWS: usize = 4;
+
+/// Images of one frame at each level, raw and enhanced, with each model's answer to one question.
+#[derive(Serialize)]
+pub(super) struct Strip {
+    question: String,
+    /// True choice; empty if it is unknown.
+    truth: String,
+    levels: Vec<String>,
+    rows: Vec<StripRow>,
+}
+
+#[derive(Serialize)]
+struct StripRow {
+    name: String,
+    cells: Vec<Option<StripCell>>,
+}
+
+#[derive(Serialize)]
+struct StripCell {
+    url: String,
+    alt: String,
+    answers: Vec<Answer>,
+}
+
+/// A model's answer in one condition.
+#[derive(Serialize)]
+struct Answer {
+    class: &'static str,
+    sign: char,
+    /// Text of the choice or of the reason why there is none, after the model's name if there are several models.
+    text: String,
+}
+
+/// Variant and enhancer of a row of images.
+struct Row<'a> {
+    variant: Variant,
+    enhancer: Option<&'a EnhancerName>,
+}
+
+impl Strip {
+    /// Builds the strip of the first frame with thumbnails. The question is the one whose answers change most between
+    /// L0 and the other images. `None` without thumbnails at several levels.
+    ///
+    /// # Errors
+    /// If the question cannot be read.
+    pub(super) fn new(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<Option<Self>> {
+        let thumbnails: Vec<&Thumbnail> =
+            inputs.thumbnails.iter().filter(|thumbnail| thumbnail.condition.level().belongs_to(Axis::LIGHT)).collect();
+        let Some(frame) = thumbnails.iter().map(|thumbnail| &thumbnail.frame).min() else {
+            return Ok(None);
+        };
+        let levels: BTreeSet<AxisLevel> = thumbnails.iter().map(|thumbnail| thumbnail.condition.level()).collect();
+        let rows = rows(grid, &thumbnails);
+        let models = models(grid);
+        // `max_by_key` returns the last maximum, so the order is reversed to prefer the first item.
+        let Some(item) = grid
+            .items
+            .iter()
+            .enumerate()
+            .filter(|(_, item)| *item.asked.frame == *frame)
+            .map(|(index, _)| index)
+            .rev()
+            .max_by_key(|item| {
+                rows.iter()
+                    .flat_map(|row| levels.iter().map(move |level| (row, *level)))
+                    .filter(|(row, level)| row.has_lost_answer(grid, &models, *item, *level))
+                    .count()
+            })
+        else {
+            return Ok(None);
+        };
+        if rows.is_empty() || levels.len() < 2 {
+            return Ok(None);
+        }
+        let asked = grid.items[item].asked;
+        let question = (inputs.questions)(&HashSet::from([&*asked.question]))?
+            .remove(&*asked.question)
+            .map(|question| question.text);
+        let truth = asked.truth.and_then(|truth| asked.choices.get(truth));
+        Ok(Some(Self {
+            question: question.unwrap_or_else(|| asked.question.to_string()),
+            truth: truth.cloned().unwrap_or_default(),
+            rows: rows.iter().map(|row| row.strip_row(grid, &models, item, frame, &thumbnails, &levels)).collect(),
+            levels: levels.iter().map(AxisLevel::to_string).collect(),
+        }))
+    }
+}
+
+impl<'a> Row<'a> {
+    /// Trial of an item with a model at a level of this row.
+    fn trial(&'a self, grid: &'a Grid<'a>, model: &'a str, item: usize, level: AxisLevel) -> StripTrial<'a> {
+        StripTrial { grid, model, item, level, row: self }
+    }
+
+    /// True if a model answers an item right at L0, but wrong at a level.
+    fn has_lost_answer(&self, grid: &Grid<'_>, models: &[&str], item: usize, level: AxisLevel) -> bool {
+        models.iter().any(|model| {
+            self.trial(grid, model, item, level).is_right() == Some(false)
+                && self.trial(grid, model, item, AxisLevel::L0).is_right() == Some(true)
+        })
+    }
+
+    /// Builds the images of the row with the answers to an item.
+    fn strip_row(
+        &self,
+        grid: &Grid<'_>,
+        models: &[&str],
+        item: usize,
+        frame: &FrameId,
+        thumbnails: &[&Thumbnail],
+        levels: &BTreeSet<AxisLevel>,
+    ) -> StripRow {
+        let cells = levels.iter().map(|level| {
+            let thumbnail =
+                thumbnails.iter().find(|thumbnail| thumbnail.frame == *frame && self.contains(thumbnail, *level))?;
+            let answers: Vec<Answer> = models
+                .iter()
+                .filter_map(|model| self.trial(grid, model, item, *level).answer(models.len() > 1))
+                .collect();
+            let texts: Vec<String> = answers.iter().map(|answer| format!("{} {}", answer.sign, answer.text)).collect();
+            Some(StripCell {
+                url: thumbnail.small.clone(),
+                alt: format!("{frame} at {}: {}", thumbnail.condition, texts.join(", ")),
+                answers,
+            })
+        });
+        StripRow { name: light(&self.variant, self.enhancer), cells: cells.collect() }
+    }
+
+    /// True if a thumbnail belongs to this row at a level. The clean frame belongs to each row of raw images.
+    fn contains(&self, thumbnail: &Thumbnail, level: AxisLevel) -> bool {
+        let condition = &thumbnail.condition;
+        condition.level() == level
+            && condition.enhancer.as_ref() == self.enhancer
+            && (condition.variant() == self.variant || level == AxisLevel::L0)
+    }
+}
+
+/// Rows of a strip: another variant such as exposure drop alone, the main variant, and the main variant with each
+/// enhancer.
+fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
+    let Some(main) = grid.main_variant() else {
+        return Vec::new();
+    };
+    let lights: BTreeSet<(Variant, Option<&EnhancerName>)> = thumbnails
+        .iter()
+        .map(|thumbnail| {
+            let condition = &thumbnail.condition;
+            (condition.variant(), condition.enhancer.as_ref())
+        })
+        .filter(|(variant, _)| variant.is_degraded())
+        .collect();
+    let other_variant = lights.iter().find(|(variant, enhancer)| *variant != main && enhancer.is_none());
+    let main_variant = lights.iter().filter(|(variant, _)| *variant == main);
+    other_variant
+        .into_iter()
+        .chain(main_variant)
+        .take(MAX_ROWS)
+        .map(|(variant, enhancer)| Row { variant: variant.clone(), enhancer: *enhancer })
+        .collect()
+}
+
+/// First models that were shown images.
+fn models<'a>(grid: &'a Grid<'_>) -> Vec<&'a str> {
+    let mut models: Vec<&str> =
+        grid.subjects.iter().filter(|subject| subject.level.is_some()).map(|subject| &*subject.model).collect();
+    models.dedup();
+    let pooled = pooled_models(models.iter().copied());
+    models.retain(|model| pooled.contains(model));
+    models.truncate(MAX_MODELS);
+    models
+}
+
+/// One item asked of one model at a level of a row.
+#[derive(Clone, Copy)]
+struct StripTrial<'a> {
+    grid: &'a Grid<'a>,
+    model: &'a str,
+    item: usize,
+    level: AxisLevel,
+    row: &'a Row<'a>,
+}
+
+impl StripTrial<'_> {
+    /// Result with or without an enhancer; `None` if the model was not asked in this condition.
+    fn result(self, enhancer: Option<&EnhancerName>) -> Option<TrialResult> {
+        let subject = ModelInCondition::with_images(self.model, self.level, &self.row.variant, enhancer);
+        Some(self.grid.result(self.grid.find_up_to_group(&subject)?, self.item))
+    }
+
+    /// True if the answer by strict parsing is right; `None` without a reply or a true choice. At L0, the raw frame
+    /// counts even in a row with an enhancer.
+    fn is_right(self) -> Option<bool> {
+        let enhancer = self.row.enhancer.filter(|_| self.level != AxisLevel::L0);
+        let reading = self.result(enhancer)?.reading(ParsingMode::Strict)?;
+        let item = &self.grid.items[self.item];
+        item.asked.truth?;
+        Some(item.is_right(reading))
+    }
+
+    /// Answer with its mark; `None` if the item was not asked. `has_name` puts the model's name before the text.
+    fn answer(self, has_name: bool) -> Option<Answer> {
+        let result = self.result(self.row.enhancer)?;
+        if !result.is_asked() {
+            return None;
+        }
+        let item = &self.grid.items[self.item];
+        let (class, sign, text) = match result.reading(ParsingMode::Strict) {
+            None => ("none", '–', "no reply"),
+            Some(None) => ("none", '?', "not readable"),
+            Some(Some(chosen)) => {
+                let text = item.asked.choices.get(usize::from(chosen));
+                let text = text.map_or("", String::as_str);
+                match item.asked.truth {
+                    None => ("none", '·', text),
+                    Some(_) if item.is_right(Some(chosen)) => ("right", '✓', text),
+                    Some(_) => ("wrong", '✗', text),
+                }
+            }
+        };
+        Some(Answer { class, sign, text: if has_name { format!("{}: {text}", self.model) } else { text.to_owned() } })
+    }
 }
 
 #[cfg(test)]

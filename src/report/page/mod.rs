@@ -3,28 +3,23 @@
 //! Numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items and their
 //! thumbnails are packed data, which a script displays. The page needs no network, and its content security policy
 //! allows none.
+//!
+//! Sections of the page before the items: [`page_sections`].
+//!
+//! Tables of the page: [`page_tables`].
 
 pub(super) mod data;
 mod head;
-mod inputs;
 mod items;
 mod run_usage;
-mod sample;
-mod sections;
-mod strip;
-mod tables;
-
-pub(crate) use data::fitting_thumbnails;
-pub(crate) use head::PageHead;
-pub use inputs::PageInputs;
-pub(crate) use inputs::PageRun;
-pub(crate) use run_usage::RunUsage;
 
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use super::tables::ENHANCERS;
 use crate::error::Result;
 use crate::report::charts::chart::Figure;
+use crate::report::charts::samples::{SampleTable, samples_of};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{FindingGroup, FindingGroups};
 use crate::report::sentences::{Sentence, how_to_read};
@@ -32,21 +27,32 @@ use crate::report::short::{head, who_is_judged};
 use crate::report::tables::{SECTIONS, Section};
 use crate::report::template::render;
 use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::noise_profiles::NoiseProfiles;
-use crate::report::text::table::Table;
-use crate::types::Truths;
+use crate::report::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
+use crate::report::text::words::{NoiseProfiles, ends, interval, words};
 use crate::types::flags::setting_spelling;
 use crate::types::manifests::RunManifest;
+use crate::types::{Thumbnail, Truths};
 use darkqa_score::answers::confusion::Confusion;
+use darkqa_score::estimate::Estimate;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::models_under_test;
+use darkqa_score::significance::Significance;
+
+pub(crate) use data::fitting_thumbnails;
+pub(crate) use head::PageHead;
+pub(crate) use run_usage::{PageRun, RunUsage};
+
+pub use run_usage::PageInputs;
 
 /// Template of the page.
 const PAGE: &str = include_str!("page.html");
+
 /// CSS of the page.
 pub(super) const STYLE: &str = include_str!("page.css");
+
 /// Script of names, theme, and charts that are drawn at the available width.
 const CHART_SCRIPT: &str = concat!(include_str!("script/base.js"), include_str!("script/charts.js"));
+
 /// Script of the items and their images.
 const SCRIPT: &str =
     concat!(include_str!("script/images.js"), include_str!("script/open.js"), include_str!("script/items.js"));
@@ -72,7 +78,7 @@ struct Page<'a> {
     how_to_read: String,
     /// Heading of the confusion matrix.
     answers_title: &'static str,
-    sections: Vec<sections::PageSection<'a>>,
+    sections: Vec<PageSection<'a>>,
     runs: Vec<Value>,
     /// Items as compressed JSON in base64.
     data: String,
@@ -184,8 +190,8 @@ pub(crate) fn page_of<'a>(content: PageContent<'a>, figures: &[Figure], inputs: 
             groups: content.groups.all().iter().map(PageGroup::new).collect(),
             how_to_read: content.how_to_read,
             answers_title: content.answers_title,
-            intro: content.intro.into_iter().chain(notes).chain(sample::note(content.grid)).collect(),
-            sections: sections::sections(sections, content.tables, figures, inputs.thumbnails),
+            intro: content.intro.into_iter().chain(notes).chain(items::note(content.grid)).collect(),
+            sections: page_sections(sections, content.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(run_facts).collect(),
             data: items::packed(content.grid, content.confusions, inputs)?,
             css: STYLE,
@@ -228,7 +234,7 @@ pub(crate) fn page_of_open_questions(content: OpenContent<'_>, figures: &[Figure
             how_to_read: String::new(),
             answers_title: "",
             intro: content.intro,
-            sections: sections::sections(content.sections, content.tables, figures, &[]),
+            sections: page_sections(content.sections, content.tables, figures, &[]),
             runs: content
                 .runs
                 .iter()
@@ -344,4 +350,187 @@ fn status_facts(manifest: &RunManifest) -> Vec<(String, String)> {
         fact("created", manifest.created.clone()),
         fact("updated", manifest.updated.clone()),
     ]
+}
+
+/// Section for the template.
+#[derive(Serialize)]
+pub(super) struct PageSection<'a> {
+    id: &'static str,
+    title: &'static str,
+    note: &'static str,
+    figures: Vec<&'a Figure>,
+    samples: Vec<SampleTable>,
+    tables: Vec<PageTable<'a>>,
+}
+
+/// Sections that have a table, a figure or samples.
+fn page_sections<'a>(
+    sections: &[Section],
+    tables: &'a [Table],
+    figures: &'a [Figure],
+    thumbnails: &[Thumbnail],
+) -> Vec<PageSection<'a>> {
+    sections
+        .iter()
+        .filter_map(|&(id, title, note, figure_names)| {
+            let figures: Vec<&Figure> = figures.iter().filter(|figure| figure_names.contains(&figure.name)).collect();
+            let samples = match id {
+                ENHANCERS => samples_of(thumbnails),
+                _ => Vec::new(),
+            };
+            let tables = page_tables(tables, id);
+            let has_content = !tables.is_empty() || !figures.is_empty() || !samples.is_empty();
+            has_content.then_some(PageSection { id, title, note, figures, samples, tables })
+        })
+        .collect()
+}
+
+/// Maximum number of rows of a table that is not folded.
+const MAX_OPEN_ROWS: usize = 60;
+
+/// Minimum number of rows without a detected effect that are folded (chosen); fewer stay visible.
+const MIN_FOLDED_ROWS: usize = 3;
+
+/// Table for the template.
+#[derive(Serialize)]
+pub(crate) struct PageTable<'a> {
+    caption: &'a str,
+    /// True if the table is closed until the reader opens it.
+    folded: bool,
+    /// Line below the table; `None` without one.
+    foot: Option<&'a str>,
+    head: Vec<&'a str>,
+    rows: Vec<PageRow<'a>>,
+    /// Rows of tests without a detected effect, closed until the reader opens them; `None` without any.
+    unshown: Option<FoldedRows<'a>>,
+}
+
+/// Rows of tests without a detected effect.
+#[derive(Serialize)]
+struct FoldedRows<'a> {
+    /// Number of rows, and the largest effect among them.
+    summary: String,
+    rows: Vec<PageRow<'a>>,
+}
+
+#[derive(Serialize)]
+struct PageRow<'a> {
+    /// Heading above the row; `None` without one.
+    heading: Option<&'a str>,
+    cells: Vec<PageCell>,
+}
+
+#[derive(Serialize)]
+struct PageCell {
+    text: String,
+    /// Both ends of the interval, shown below the text; empty without an interval.
+    ends: String,
+    class: &'static str,
+}
+
+/// Tables of a section that have rows.
+fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
+    tables
+        .iter()
+        .filter(|table| table.section == section)
+        .map(|table| {
+            let (mut folded, mut visible): (Vec<&TableRow>, Vec<&TableRow>) =
+                table.rows_in(TableFormat::Page).partition(|row| is_undetected(row));
+            if folded.len() < MIN_FOLDED_ROWS {
+                folded.clear();
+                visible = table.rows_in(TableFormat::Page).collect();
+            }
+            let rows = page_rows(table, &visible);
+            PageTable {
+                caption: &table.caption,
+                folded: table.is_folded || rows.len() > MAX_OPEN_ROWS,
+                unshown: (!folded.is_empty())
+                    .then(|| FoldedRows { summary: summary(table, &folded), rows: page_rows(table, &folded) }),
+                foot: table.foot.as_deref(),
+                head: table
+                    .columns
+                    .iter()
+                    .filter_map(|column| column.heads.page.as_deref())
+                    // Columns of verdicts have no head; screen readers need one.
+                    .map(|head| if head.is_empty() { "verdict" } else { head })
+                    .collect(),
+                rows,
+            }
+        })
+        .filter(|table| !table.rows.is_empty() || table.unshown.is_some())
+        .collect()
+}
+
+/// True for the row of a test that detected no effect.
+fn is_undetected(row: &TableRow) -> bool {
+    row.cells.iter().any(|cell| match cell {
+        TableCell::Significance(significance) => !significance.is_shown(),
+        _ => false,
+    })
+}
+
+/// Rows for the template, with a heading where the group changes.
+fn page_rows<'a>(table: &'a Table, rows: &[&'a TableRow]) -> Vec<PageRow<'a>> {
+    let mut last_group: Option<&str> = None;
+    rows.iter()
+        .map(|row| {
+            let group = row.group.as_deref();
+            let heading = (group != last_group).then(|| group.unwrap_or_default());
+            last_group = group;
+            PageRow {
+                heading,
+                cells: table
+                    .cells(row)
+                    .filter(|(column, _)| column.heads.page.is_some())
+                    .map(|(column, cell)| page_cell(column.kind, cell))
+                    .collect(),
+            }
+        })
+        .collect()
+}
+
+/// First difference in a row, with its text.
+fn difference(table: &Table, row: &TableRow) -> Option<(Estimate, String)> {
+    table.cells(row).find_map(|(column, cell)| match (column.kind, cell) {
+        (ColumnKind::Points, TableCell::Estimate(difference)) => Some((*difference, words(column.kind, cell))),
+        _ => None,
+    })
+}
+
+/// Number of rows without a detected effect, and the largest difference among them with the names in its row.
+fn summary(table: &Table, rows: &[&TableRow]) -> String {
+    let count = match rows.len() {
+        1 => "1 row in which nothing is shown".to_owned(),
+        count => format!("{count} rows in which nothing is shown"),
+    };
+    let largest = rows
+        .iter()
+        .filter_map(|row| Some((row, difference(table, row)?)))
+        .max_by(|(_, (a, _)), (_, (b, _))| a.value.abs().total_cmp(&b.value.abs()));
+    let Some((row, (_, text))) = largest else {
+        return count;
+    };
+    let names: Vec<String> = table
+        .cells(row)
+        .filter(|(column, _)| column.heads.page.is_some())
+        .map_while(|(column, cell)| match (column.kind, cell) {
+            (ColumnKind::Text, cell) => Some(words(column.kind, cell)),
+            _ => None,
+        })
+        .filter(|name| !name.is_empty())
+        .collect();
+    format!("{count}; the largest difference is {text} ({})", names.join(", "))
+}
+
+/// Cell for the template.
+fn page_cell(kind: ColumnKind, cell: &TableCell) -> PageCell {
+    let class = match (kind, cell) {
+        (_, TableCell::Below(_)) => "below",
+        (_, TableCell::Significance(Significance::Better)) => "better",
+        (_, TableCell::Significance(Significance::Worse)) | (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
+        (_, TableCell::Significance(_)) => "unshown",
+        (ColumnKind::Text, _) => "text",
+        _ => "",
+    };
+    PageCell { text: words(kind, cell), ends: interval(kind, cell).map(ends).unwrap_or_default(), class }
 }

@@ -1,9 +1,13 @@
 //! Usage of a run: [`RunUsage`].
+//!
+//! Data of the page other than the findings: [`PageInputs`].
 
+use std::collections::{BTreeSet, HashMap, HashSet};
+
+use crate::error::Result;
+use crate::types::manifests::RunManifest;
 use crate::types::text::counted;
-use std::collections::BTreeSet;
-
-use crate::types::{ChoiceDetail, TrialRef, Usage};
+use crate::types::{ChoiceDetail, QuestionId, RunQuestion, TextPlace, Thumbnail, TrialRef, Usage};
 
 /// Usage of a run's trials at endpoints: requests, tokens, bytes of images, latency, and the model names that the
 /// servers returned. Built-in models need no endpoint.
@@ -89,6 +93,34 @@ fn median_and_95(values: &mut [u32]) -> Option<[u64; 2]> {
         let rank = (last as f64 * share).round() as usize;
         u64::from(*values.select_nth_unstable(rank).1)
     }))
+}
+
+/// A run on the page.
+#[derive(Debug, Clone)]
+pub struct PageRun<'a> {
+    /// Name of the run: its folder.
+    pub name: String,
+    /// Folder of the run, as for use in a command; an absolute path is shortened to `DIR/` and the folder's name.
+    pub folder: String,
+    pub manifest: &'a RunManifest,
+    pub usage: RunUsage,
+    /// Text for the cost of the replies; `None` if it is unknown.
+    pub cost: Option<String>,
+}
+
+/// Function that reads questions by id.
+pub(crate) type ReadQuestions<'a> = Box<dyn Fn(&HashSet<&QuestionId>) -> Result<HashMap<QuestionId, RunQuestion>> + 'a>;
+
+/// Data of the page other than the findings.
+pub struct PageInputs<'a> {
+    /// Runs on the page.
+    pub runs: Vec<PageRun<'a>>,
+    /// Reads the wanted questions, as far as the runs store them.
+    pub questions: ReadQuestions<'a>,
+    /// Thumbnails of the images; empty if the runs do not store them.
+    pub thumbnails: &'a [Thumbnail],
+    /// Reads the text of a reply, of a refusal, or of an error message.
+    pub texts: Box<dyn Fn(TextPlace) -> Result<String> + 'a>,
 }
 
 #[cfg(test)]

@@ -1,20 +1,28 @@
 //! Report on questions without true answers: its files ([`products`]), its summary ([`summary`]) and its text
-//! ([`text()`]).
+//! (`text()`).
 //!
 //! The measure is agreement with the model's own answer at L0. Reports always give it with its floor, its ceiling and
 //! other measures that are needed to interpret it, and never call it accuracy.
+//!
+//! Terminal text of a report on questions without true answers: [`text`].
+//!
+//! Sections of the page on questions without true answers: [`SECTIONS`].
+//!
+//! Figures of a report on questions without true answers: [`figures`].
 
-mod agreement_report;
-mod figures;
-mod levels;
-mod measure;
-mod sections;
 mod tables;
-mod text;
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+use std::path::Path;
 
 use serde::Serialize;
 
+use super::short::findings;
+use super::tables::{ENHANCERS, Section};
 use crate::error::Result;
+use crate::report::charts::chart::{Chart, Figure, FigureChart, LineContent, LineStyle, Panel, PlotLine};
+use crate::report::charts::paper::figure;
 use crate::report::finding_groups::FindingGroups;
 use crate::report::json::{Rows, RunsHead, SummaryRuns, document};
 use crate::report::page::{PageContent, PageHead, PageInputs, page_of};
@@ -22,24 +30,28 @@ use crate::report::products::files;
 use crate::report::sentences::Sentence;
 use crate::report::short::who_is_judged;
 use crate::report::text::alert::Alert;
-use crate::report::text::noise_profiles::NoiseProfiles;
+use crate::report::text::ladder::{Ladder, Series, SeriesByLevel};
 use crate::report::text::table::Table;
-use crate::runs::report_length::ReportLength;
-use crate::types::text::counted;
+use crate::report::text::terminal::{render, table, wrapped};
+use crate::report::text::words::NoiseProfiles;
+use crate::runs::outcome::ReportLength;
+use crate::types::manifests::RunManifest;
+use crate::types::text::{counted, plural};
+use crate::types::{AxisLevel, Truths};
+use darkqa_score::accuracies::Health;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
+use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
+use darkqa_score::estimate::Estimate;
+use tables::{AGREEMENT, HOW_TO_READ, levels, notes};
 
-pub(crate) use agreement_report::AgreementReport;
-pub(crate) use text::text;
-
-use self::measure::{AGREEMENT, HOW_TO_READ};
-use crate::types::Truths;
+pub(crate) use tables::AgreementReport;
 
 /// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
 ///
 /// # Errors
 /// If a file cannot be made.
 pub(crate) fn products<'a>(report: &'a AgreementReport<'a>, inputs: &PageInputs<'a>) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures = figures::figures(report.found)?;
+    let figures = figures(report.found)?;
     let groups = FindingGroups::new(&report.sentences);
     let content = PageContent {
         who: who_is_judged(&report.found.grid),
@@ -49,7 +61,7 @@ pub(crate) fn products<'a>(report: &'a AgreementReport<'a>, inputs: &PageInputs<
         groups,
         how_to_read: HOW_TO_READ.to_owned(),
         tables: &report.tables,
-        sections: &sections::SECTIONS,
+        sections: &SECTIONS,
         grid: &report.found.grid,
         confusions: &report.found.confusions,
         answers_title: "Answers given against those at L0",
@@ -89,7 +101,7 @@ pub(super) struct MarkdownParts<'a> {
 /// Selects the content for a Markdown report.
 pub(super) fn markdown_parts<'a>(report: &'a AgreementReport<'_>) -> MarkdownParts<'a> {
     MarkdownParts {
-        head: text::head(report),
+        head: head(report),
         alerts: &report.alerts,
         sentences: &report.sentences,
         how_to_read: HOW_TO_READ,
@@ -126,4 +138,237 @@ pub(crate) fn summary(report: &AgreementReport<'_>, runs: SummaryRuns<'_>, lengt
         own_answers: own_answers.map(Rows::new),
     };
     document(head, &tables::summary(report.found), &report.tables, length)
+}
+
+/// Renders the report as text. `runs` are the manifests with the folders of their runs.
+#[must_use]
+pub(crate) fn text(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
+    let groups = FindingGroups::new(&report.sentences);
+    let mut text = findings(&head(report), &report.alerts, &groups, length, HOW_TO_READ);
+    match length {
+        ReportLength::Findings => return text,
+        ReportLength::Summary => text += &short_tables(report),
+        ReportLength::Full => text += &render(&report.tables),
+    }
+    if let Some(question) = NoiseProfiles::new(&report.found.grid.subjects).open_question() {
+        text += &wrapped(" ", &question, " ");
+    }
+    for (_, folder) in runs {
+        let _ = writeln!(text, "run: {}", folder.display());
+    }
+    text
+}
+
+/// Table of each axis with a wrapped heading, and the notes.
+fn short_tables(report: &AgreementReport<'_>) -> String {
+    let mut text = String::new();
+    for levels in levels(report.found) {
+        text += &wrapped(" ", levels.heading.as_deref().unwrap_or_default(), " ");
+        text += &table(&[levels]);
+    }
+    for note in notes(report.found) {
+        text += &wrapped(" ", &note, "   ");
+    }
+    text
+}
+
+/// Head line with the numbers of models, questions, images and replies.
+fn head(report: &AgreementReport<'_>) -> String {
+    let found = report.found;
+    let items = &found.grid.items;
+    let models = found.models();
+    let who = match &models[..] {
+        [one] => (*one).to_owned(),
+        several => counted(several.len(), "model"),
+    };
+    let questions: BTreeSet<_> = items.iter().map(|item| &*item.asked.question).collect();
+    let frames: BTreeSet<_> = items.iter().map(|item| &*item.asked.frame).collect();
+    let replies: usize = found.health.iter().map(|health| health.replies).sum();
+    let failed: usize = found.health.iter().map(Health::failures).sum();
+    format!(
+        "{who} · {} without answers · {} · {}, {failed} failed · intervals by {}",
+        counted(questions.len(), "question"),
+        counted(frames.len(), "image"),
+        plural(replies, "reply", "replies"),
+        found.unit
+    )
+}
+
+/// All sections of the page in order.
+const SECTIONS: [Section; 8] = [
+    (
+        "agreement",
+        "Agreement with its own answer at L0",
+        "The share of questions that a model answers as it does at L0, of those to which its answer at L0 could be read. Under L0 stands \
+         the ceiling: the same image asked again. The floor is the same model without an image. Evidence kept is the share of the way \
+         from the floor to the ceiling. κ takes off what equal habits give, question by question. Entropy is 0 if a question gets one \
+         answer about all images, and 1 if all its answers are equally frequent: a model that answers no to everything agrees with \
+         itself, and its entropy is 0.",
+        &["agreement", "evidence"],
+    ),
+    (
+        "thresholds",
+        "Darkness threshold",
+        "The exposure drop at which a model keeps half of its evidence: half-way from the ceiling to the floor.",
+        &[],
+    ),
+    (
+        "questions",
+        "The questions",
+        "What each model answers at L0. A question with one answer about 95 % of the images or more is not informative: agreement is \
+         given with and without such questions.",
+        &[],
+    ),
+    (
+        "models",
+        "The models at L0",
+        "How far two models agree with each other at L0. Each is compared with itself, so that their agreements can be compared only as far as that.",
+        &[],
+    ),
+    (
+        ENHANCERS,
+        "Images and enhancement",
+        "Enhanced less raw, in percentage points of agreement. At L0 an enhancer is compared with the same image asked again: less \
+         agreement there is harm, unless the photographs were taken in the dark.",
+        &[],
+    ),
+    ("answers", "What changes in the dark", "Answers against those at L0, not against the truth.", &[]),
+    ("comparisons", "Comparisons", "Each paired by item, in percentage points of agreement.", &[]),
+    (
+        "health",
+        "Parse health",
+        "What became of the trials, by the strict parsing. A reply that cannot be read does not agree; failed trials do not count.",
+        &[],
+    ),
+];
+
+/// Draws agreement by level with its floor, and the evidence kept, each with a panel for each variant. Empty if only
+/// one level was asked.
+///
+/// # Errors
+/// If a figure cannot be drawn.
+fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
+    let ladder = Ladder::new(found.whole().map(|cell| (&cell.subject, cell))).with_clean();
+    if ladder.levels.len() < 2 {
+        return Ok(Vec::new());
+    }
+    let note = format!(
+        "n = {} in {}; bands and bars are 95 % intervals by {unit}; strict parsing",
+        counted(found.items(), "item"),
+        counted(found.grid.clusters, &found.unit.to_string()),
+        unit = found.unit
+    );
+    let agreement = panels(found, &ladder, |cell| cell.agreement, |panel| panel.extend(floors(found)));
+    let evidence = panels(
+        found,
+        &ladder,
+        |cell| match cell.role() {
+            // The ceiling is 100 % by definition.
+            CellRole::Ceiling => None,
+            _ => cell.evidence?.ok(),
+        },
+        |_| {},
+    );
+    let charts = [
+        (
+            "agreement",
+            "Agreement of each model with its own answer at L0, not with the truth. L0: the same images asked again, the ceiling. \
+             Broken lines: without images, the floor.",
+            "agreement in %",
+            agreement,
+        ),
+        (
+            "evidence",
+            "Evidence kept: the share of the way from the floor to the ceiling. Below 0 and above 100 % the line lies on the edge.",
+            "evidence kept in %",
+            evidence,
+        ),
+    ];
+    let mut figures = Vec::new();
+    for (name, caption, measure, panels) in charts {
+        let panels: Vec<Panel> = panels.into_iter().filter(has_points).collect();
+        if panels.is_empty() {
+            continue;
+        }
+        let chart = Chart { measure, panels, columns: 2, note: note.clone() };
+        figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
+    }
+    Ok(figures)
+}
+
+/// True if a curve of the panel has a point.
+fn has_points(panel: &Panel) -> bool {
+    panel.lines.iter().any(|line| matches!(&line.content, LineContent::Curve(points) if !points.is_empty()))
+}
+
+/// One panel for each variant, raw or with one enhancer, with a line for each model. `add` adds further lines to a
+/// panel.
+fn panels(
+    found: &SelfAgreement<'_>,
+    ladder: &Ladder<'_, AgreementCell>,
+    value: impl Fn(&AgreementCell) -> Option<Estimate>,
+    add: impl Fn(&mut Vec<PlotLine>),
+) -> Vec<Panel> {
+    let mut panels: Vec<(String, Vec<PlotLine>)> = Vec::new();
+    for (series, cells) in &ladder.series {
+        // A series of clean frames alone has one level and makes no line.
+        if series.axis().is_none() {
+            continue;
+        }
+        let line = line(found, series, cells, &value);
+        let title = series.light(&[]);
+        match panels.iter_mut().find(|(known, _)| *known == title) {
+            Some((_, lines)) => lines.push(line),
+            None => panels.push((title, vec![line])),
+        }
+    }
+    panels
+        .into_iter()
+        .map(|(title, mut lines)| {
+            add(&mut lines);
+            Panel { title: format!("{title}, n {}", found.items()), lines, model: None }
+        })
+        .collect()
+}
+
+fn line(
+    found: &SelfAgreement<'_>,
+    series: &Series<'_>,
+    cells: &SeriesByLevel<'_, AgreementCell>,
+    value: impl Fn(&AgreementCell) -> Option<Estimate>,
+) -> PlotLine {
+    let points: Vec<(AxisLevel, Estimate)> =
+        cells.iter().filter_map(|(level, cell)| Some((*level, value(cell)?))).collect();
+    PlotLine {
+        name: series.model.to_owned(),
+        style: style(found, series.model),
+        content: LineContent::Curve(points),
+        model: Some(series.model.to_owned()),
+        items: None,
+    }
+}
+
+/// Line style of a model, by its index in the report.
+fn style(found: &SelfAgreement<'_>, model: &str) -> LineStyle {
+    let models = found.models();
+    let index = models.iter().position(|known| *known == model);
+    LineStyle(index.unwrap_or(models.len()))
+}
+
+/// Horizontal line for each model that was asked without images.
+fn floors(found: &SelfAgreement<'_>) -> Vec<PlotLine> {
+    found
+        .whole()
+        .filter(|cell| cell.role() == CellRole::Floor)
+        .filter_map(|cell| {
+            let model = &*cell.subject.model;
+            Some(PlotLine {
+                name: format!("{model} without images"),
+                style: style(found, model),
+                content: LineContent::Flat(cell.agreement?.value),
+                model: Some(model.to_owned()),
+                items: None,
+            })
+        })
+        .collect()
 }

@@ -1,23 +1,33 @@
 //! Tables of a report on questions without true answers: [`tables`].
+//!
+//! Content of a report on questions without true answers: [`AgreementReport`].
+//!
+//! Tables of agreement by level, with a row for each measure: [`levels`].
+//!
+//! Texts on the measure of a report without true answers: [`AGREEMENT`], [`HOW_TO_READ`].
 
-use super::levels::{levels, no_evidence_reason};
-use super::measure::AGREEMENT;
+use std::collections::BTreeSet;
+
+use crate::report::sentences::{Sentence, self_agreement};
 use crate::report::tables::{
-    agreement_comparisons, commonest_answers, counted_answers, health, missing_threshold_reason, reading,
+    EnhancerRow, agreement_comparisons, commonest_answers, counted_answers, enhancers, health,
+    missing_threshold_reason, with_training,
 };
-use crate::report::text::table::ColumnKind::{self, Count, Number, Percent, Ratio, Share, Text};
-use crate::report::text::table::SUMMARY;
-use crate::report::text::table::{Table, TableBuilder, TableCell, TableFormat};
-use crate::report::text::words::light;
-use crate::types::RunGroup;
+use crate::report::text::alert::Alert;
+use crate::report::text::ladder::{Ladder, SeriesByLevel};
+use crate::report::text::table::ColumnKind::{self, Accuracy, Count, Number, Percent, Ratio, Share, Text};
+use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell, TableFormat};
+use crate::report::text::words::{light, percent, with_interval};
 use crate::types::text::counted;
+use crate::types::{Axis, AxisLevel, RunGroup};
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
-use darkqa_score::comparisons::self_agreement::evidence::NoHalf;
+use darkqa_score::comparisons::self_agreement::evidence::{MIN_DISTANCE, NoEvidence, NoHalf};
 use darkqa_score::comparisons::self_agreement::light::LightReplies;
 use darkqa_score::comparisons::self_agreement::models_in_light::ModelsInLight;
+use darkqa_score::estimate::Estimate;
 
 /// Name of the table of all agreements.
 pub(super) const OWN_ANSWERS: &str = "own_answers";
@@ -52,7 +62,7 @@ pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
         .column(Count, "csv unparsed", |cell| unread(cell))
         .column(Count, "csv failed", |cell| cell.failed)
         .column(Share, "csv value low high", |cell| cell.agreement)
-        .column(Text, "csv reading", |cell| reading(&cell.subject))
+        .column(Text, "csv reading", |cell| TableCell::profile(&cell.subject))
         .model_facts(&found.grid.listing, |cell| &cell.subject);
     let has_groups = found.cells.iter().any(|cell| run_group(cell).is_some());
     let builder = if has_groups { builder.column(Text, "csv light", |cell| run_group(cell)) } else { builder };
@@ -234,3 +244,264 @@ fn most_frequent_answers(confusions: &[Confusion]) -> Table {
 fn confusion_with_l0(confusions: &[Confusion]) -> Table {
     counted_answers("answers_against_light", "csv at_l0", confusions)
 }
+
+/// Results of one or more runs on questions without true answers, as sentences and as tables.
+pub(crate) struct AgreementReport<'a> {
+    pub(super) found: &'a SelfAgreement<'a>,
+    /// Warnings at the top of the report.
+    pub(super) alerts: Vec<Alert>,
+    /// Findings as sentences.
+    pub(super) sentences: Vec<Sentence>,
+    /// All tables; the first is the summary.
+    pub(super) tables: Vec<Table>,
+}
+
+impl<'a> AgreementReport<'a> {
+    /// Writes the sentences and the tables of a report. `enhancer_rows` describe the use of each enhancer.
+    pub(crate) fn new(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>, enhancer_rows: &[EnhancerRow]) -> Self {
+        let mut tables = with_training(tables(found), &found.grid.listing);
+        tables.extend(enhancers(enhancer_rows));
+        Self { sentences: self_agreement(found), found, alerts, tables }
+    }
+}
+
+/// Measure of a series; each has a row of the table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Measure {
+    Agreement,
+    Informative,
+    Kappa,
+    Evidence,
+    Entropy,
+    Unread,
+    Refused,
+    CannotTell,
+}
+
+impl Measure {
+    const ALL: [Self; 8] = [
+        Self::Agreement,
+        Self::Informative,
+        Self::Kappa,
+        Self::Evidence,
+        Self::Entropy,
+        Self::Unread,
+        Self::Refused,
+        Self::CannotTell,
+    ];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Agreement => "agreement",
+            Self::Informative => "informative",
+            Self::Kappa => "κ",
+            Self::Evidence => "evidence kept",
+            Self::Entropy => "entropy",
+            Self::Unread => "not read",
+            Self::Refused => "refused",
+            Self::CannotTell => "cannot tell",
+        }
+    }
+
+    /// Table cell of the measure. At L0, entropy and unusable replies are of the first replies, agreement is of the
+    /// repeated ones.
+    fn cell(self, found: &SelfAgreement<'_>, cell: &AgreementCell) -> TableCell {
+        let is_light = cell.role() == CellRole::Ceiling;
+        let light = found.light_of(&cell.subject.model).filter(|_| is_light);
+        match self {
+            Self::Agreement => cell.agreement.into(),
+            Self::Informative => share(cell.informative),
+            Self::Kappa => decimals(cell.kappa.map(|kappa| kappa.value)),
+            Self::Evidence => match cell.evidence {
+                Some(Ok(kept)) => kept.into(),
+                Some(Err(_)) => TableCell::Missing,
+                None => TableCell::Blank,
+            },
+            Self::Entropy if is_light => decimals(cell.entropies[0]),
+            Self::Entropy => decimals(cell.entropies[1]),
+            Self::Unread => match light.and_then(|light| light.read) {
+                Some(read) => TableCell::Text(percent(1.0 - read.value)),
+                None => share(cell.unread),
+            },
+            Self::Refused => match light {
+                Some(light) => share_of_replies(light.refused, light.replies()),
+                None => share_of_replies(cell.refused, cell.replies()),
+            },
+            Self::CannotTell => match light {
+                Some(light) => share_of_replies(light.cannot_tell, light.replies()),
+                None => share(cell.cannot_tell),
+            },
+        }
+    }
+
+    /// True if the measure is meaningful for a series: informative questions only if some questions are not
+    /// informative, refusals only if they occur, and "cannot tell" only if the questions have this choice.
+    fn applies_to(self, found: &SelfAgreement<'_>, cells: &SeriesByLevel<'_, AgreementCell>) -> bool {
+        let mut cells = cells.values();
+        match self {
+            Self::Refused => cells.any(|cell| {
+                let light = found.light_of(&cell.subject.model);
+                cell.refused > 0 || light.is_some_and(|light| light.refused > 0)
+            }),
+            Self::CannotTell => cells.any(|cell| cell.cannot_tell.is_some()),
+            Self::Informative => cells.next().is_some_and(|cell| {
+                let (informative, all) = found.informative(&cell.subject.model);
+                informative < all && informative > 0
+            }),
+            _ => true,
+        }
+    }
+}
+
+/// Number with two decimals.
+fn decimals(value: Option<f64>) -> TableCell {
+    let Some(value) = value else {
+        return TableCell::Missing;
+    };
+    let text = format!("{value:.2}");
+    TableCell::Text(if text == "-0.00" { "0.00".to_owned() } else { text.replace('-', "−") })
+}
+
+/// Share of some replies in percent; missing without replies.
+fn share_of_replies(count: usize, replies: usize) -> TableCell {
+    (replies > 0).then(|| TableCell::Text(percent(count as f64 / replies as f64))).into()
+}
+
+fn share(share: Option<Estimate>) -> TableCell {
+    share.map_or(TableCell::Missing, |share| TableCell::Text(percent(share.value)))
+}
+
+/// Row of the table.
+struct MeasureRow {
+    /// Model and condition.
+    series: String,
+    measure: Measure,
+    /// One cell for each level.
+    cells: Vec<TableCell>,
+}
+
+/// One table for each axis, with a block of rows for each model in each variant.
+pub(super) fn levels(found: &SelfAgreement<'_>) -> Vec<Table> {
+    let mut ladder = Ladder::new(found.whole().map(|cell| (&cell.subject, cell))).with_clean();
+    ladder.set = found.set.light;
+    let ladders = ladder.by_axis();
+    let last = ladders.len().saturating_sub(1);
+    ladders
+        .into_iter()
+        .enumerate()
+        .map(|(index, (axis, ladder))| {
+            let mut table = axis_table(found, axis, &ladder);
+            if index == last {
+                table.notes = notes(found);
+            }
+            table
+        })
+        .collect()
+}
+
+fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, AgreementCell>) -> Table {
+    // L0 has a column even if it was not asked a second time.
+    let mut levels: BTreeSet<AxisLevel> = ladder.levels.clone();
+    levels.insert(AxisLevel::L0);
+    let mut rows = Vec::new();
+    for (series, cells) in &ladder.series {
+        let model = found.grid.listing.label(series.model);
+        for measure in Measure::ALL {
+            if !measure.applies_to(found, cells) {
+                continue;
+            }
+            rows.push(MeasureRow {
+                series: format!("{model}, {}", ladder.light(series)),
+                measure,
+                cells: levels
+                    .iter()
+                    .map(|level| match cells.get(level) {
+                        Some(cell) => measure.cell(found, cell),
+                        None => TableCell::Blank,
+                    })
+                    .collect(),
+            });
+        }
+    }
+    let by = if axis == Axis::LIGHT { "level".to_owned() } else { format!("{} of {}", axis.title, axis.cause) };
+    let caption = format!("Agreement with its own answer at L0 by {by}, and the measures to read with it");
+    let mut table = TableBuilder::new(AGREEMENT, rows)
+        .page("agreement", &caption)
+        .group(|row| Some(row.series.clone()))
+        .column(Text, "terminal | page measure | latex Measure", |row| row.measure.name());
+    let has_enhanced_clean =
+        ladder.series.iter().any(|(series, cells)| series.is_enhanced() && cells.contains_key(&AxisLevel::L0));
+    let (again, first) = if has_enhanced_clean {
+        ("", "L0: the same images asked again, the ceiling; in a row with an enhancer, these images enhanced")
+    } else {
+        (" again", "L0 again: the same images asked again, the ceiling")
+    };
+    for (index, level) in levels.iter().enumerate() {
+        let again = if *level == AxisLevel::L0 { again } else { "" };
+        let names = format!("terminal {level}{again} | page {level}{again} | latex {level}{again}");
+        table = table.column(Accuracy, &*names, |row| row.cells[index].clone());
+    }
+    let mut table = table.build();
+    table.heading = Some(format!(
+        "Agreement with its own answer at L0 by {by}, in % (κ and entropy from 0 to 1); {first}; 95 %: how far the widest interval of the row reaches down and up"
+    ));
+    table.latex = Some(format!(
+        "Agreement of each model with its own answer at L0 by {by} (strict parsing), not with the truth; intervals by {}.",
+        found.unit
+    ));
+    table
+}
+
+/// Notes on each model: its answers at L0, its floor, and the reason if the evidence kept is unknown.
+pub(super) fn notes(found: &SelfAgreement<'_>) -> Vec<String> {
+    let mut notes = Vec::new();
+    for model in found.models() {
+        if let Some(light) = found.light_of(model) {
+            let read = light.read.map_or("no reply".to_owned(), |read| format!("{} %", percent(read.value)));
+            let (informative, all) = found.informative(model);
+            notes.push(format!(
+                "{model} at L0: an answer to {read} of {} questions; {informative} of {all} questions of the bank are informative",
+                light.asked
+            ));
+        }
+        let mut cells = found.whole().filter(|cell| cell.subject.model == model);
+        let floor = cells.clone().find(|cell| cell.role() == CellRole::Floor);
+        if let Some((cell, share)) = floor.and_then(|cell| Some((cell, cell.agreement?))) {
+            let kappa =
+                cell.kappa.map_or("not defined".to_owned(), |kappa| format!("{:.2}", kappa.value).replace('-', "−"));
+            let entropy = cell.entropies[1].map_or("–".to_owned(), |h| format!("{h:.2}"));
+            notes.push(format!(
+                "{model} without images, the floor: {}, κ {kappa}, entropy {entropy}",
+                with_interval(share)
+            ));
+        }
+        let reason = cells.find_map(|cell| cell.evidence?.err());
+        notes.extend(
+            reason.map(|reason| format!("{model}: evidence kept is not given: {}", no_evidence_reason(reason))),
+        );
+    }
+    notes
+}
+
+/// Text for the reason why the evidence kept is unknown.
+fn no_evidence_reason(reason: NoEvidence) -> String {
+    match reason {
+        NoEvidence::NotAgain => "the images at L0 were not asked about again (--repeats)".to_owned(),
+        NoEvidence::NotBlind => "it was not asked without images".to_owned(),
+        NoEvidence::Close(distance) => format!(
+            "the ceiling is {} points above the floor, and {} are needed",
+            percent(distance).replace('-', "−"),
+            percent(MIN_DISTANCE)
+        ),
+        NoEvidence::Unsure(low) => format!(
+            "the ceiling may be no higher than the floor: the 95 % interval of their distance begins at {} points",
+            percent(low).replace('-', "−")
+        ),
+    }
+}
+
+/// Name of the measure in files.
+pub(super) const AGREEMENT: &str = "agreement";
+
+/// Remark below all sentences, on how to interpret agreement.
+pub(super) const HOW_TO_READ: &str = "Agreement is with the model's own answer at L0, whether that is true or not; whatever the truth is, the share of right answers falls by at most one minus the agreement. It says little alone: read it between the floor (no image) and the ceiling (the same image asked again), beside κ and the entropy of the answers. Signs and p are corrected over all tests behind these sentences; an interval is of one test, 95 %.";

@@ -1,8 +1,7 @@
 //! Sentences about noise and enhancers, over all models together.
 
-use super::format::format_alone;
-use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
-use super::undecided::Undecided;
+use super::sample::Undecided;
+use super::sentence::{Numbers, Sentence, Tone, format_alone, level_runs, models};
 use crate::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};

@@ -8,7 +8,7 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::models_under_test;
-use darkqa_score::photographs::pair_darkness::PairDarkness;
+use darkqa_score::photographs::PairDarkness;
 use darkqa_score::significance::Significance;
 
 /// Sentences about each model and each photograph: compared with the lit frame, with synthetic images of the same

@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use crate::report::text::readable::readable;
 use crate::report::text::table::{ColumnKind, TableCell};
+use crate::report::text::terminal::readable;
 use crate::report::text::words::{ends, interval, words};
 
 /// Table for the template.

@@ -1,10 +1,10 @@
 //! Leaderboard rows of models that answered multiple-choice questions: [`ChoiceRow`].
 
 use super::board::{BoardCell, BoardRow, BoardTable};
-use super::run_link::{GroupDigests, RunLink};
+use super::open::{GroupDigests, RunLink};
 use crate::report::tables::missing_threshold_reason;
-use crate::report::text::table::ColumnKind::{Count, Points, Share, Text, Threshold};
-use crate::report::text::table::{ColumnKind, Table, TableBuilder, TableCell};
+use crate::report::text::table::ColumnKind::{self, Count, Points, Share, Text, Threshold};
+use crate::report::text::table::{Table, TableBuilder, TableCell};
 use crate::report::text::words::points;
 use crate::types::{AxisLevel, Variant, View};
 use darkqa_score::accuracies::Curve;

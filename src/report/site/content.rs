@@ -3,8 +3,7 @@
 use serde::Serialize;
 
 use super::choices::ChoiceRow;
-use super::open::OpenRow;
-use super::run_link::{GroupDigests, RunLink};
+use super::open::{GroupDigests, OpenRow, RunLink};
 
 /// Name of the file with all rows of the site.
 pub(crate) const DATA: &str = "data.json";

@@ -1,12 +1,22 @@
 //! Tables of paired differences and their tests. Each kind of comparison has a table over all families and one by
 //! family.
+//!
+//! Table of the use of each enhancer: preprocessing, resizing, and the brightness of its images.
+//!
+//! File of first failing levels, with a row for each item and curve: [`write_flips`]. The table can be large, so it is
+//! written in parts.
+
+use std::io::Write;
+use std::ops::Range;
 
 use super::pooled::too_few_clusters;
 use super::sections::{ENHANCERS, REAL};
+use crate::error::Result;
 use crate::report::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
-use crate::report::text::table::{Column, Table, TableBuilder, TableCell, TableFormat};
+use crate::report::text::table::{self, Column, Table, TableBuilder, TableCell, TableFormat};
 use crate::report::text::words::{marked_reference, name};
 use crate::types::text::counted;
+use darkqa_score::accuracies::FirstFailure;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Comparison, ComparisonKind, MIN_PAIRS};
@@ -288,4 +298,65 @@ fn second_side_label(comparison: &Comparison) -> String {
         (false, ComparisonKind::Light | ComparisonKind::RealSynthetic) => second.condition(),
         (false, _) => String::new(),
     }
+}
+
+/// Use of an enhancer in a run, as texts.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) struct EnhancerRow {
+    /// Name of the enhancer, with the name of its run if there are several.
+    pub(crate) name: String,
+    /// Input and output conventions of the model, and changes of image size.
+    pub(crate) how: String,
+    /// Appearance of its images of the probe and of the run's dark frames.
+    pub(crate) looks: String,
+}
+
+/// Builds the table; `None` without an enhancer.
+pub(crate) fn enhancers(rows: &[EnhancerRow]) -> Option<Table> {
+    if rows.is_empty() {
+        return None;
+    }
+    let name = "csv enhancer | terminal enhancer | page enhancer";
+    let how = "csv how | terminal fed and read | page fed and read";
+    let looks = "csv dark_images | terminal dark images | page its images of dark frames";
+    let table = TableBuilder::new("enhancer_use", rows)
+        .page(ENHANCERS, "How each enhancer was used")
+        .column(Text, name, |row| row.name.clone())
+        .column(Text, how, |row| row.how.clone())
+        .column(Text, looks, |row| row.looks.clone())
+        .build();
+    Some(table)
+}
+
+/// Name of the file.
+pub(crate) const FLIPS: &str = "flips.csv";
+
+/// Number of rows in a part (chosen): small enough for memory, large enough for speed.
+const PART_ROWS: usize = 4096;
+
+/// Writes the first failing levels. The level is empty if the item never fails or if an earlier level has no reply.
+///
+/// # Errors
+/// If the output cannot be written.
+pub(crate) fn write_flips(findings: &Findings<'_>, out: &mut dyn Write) -> Result<()> {
+    let items = findings.grid.items.len();
+    let parts = findings.first_failures.iter().flat_map(|failure| {
+        (0..items).step_by(PART_ROWS).map(move |start| part(findings, failure, start..items.min(start + PART_ROWS)))
+    });
+    table::write(out, parts)
+}
+
+/// Part of the file: the rows of one curve for some items.
+fn part(findings: &Findings<'_>, failure: &FirstFailure, items: Range<usize>) -> Table {
+    let grid = &findings.grid;
+    let rows = items.map(|item| (grid.items[item].asked, failure.first(grid, item)));
+    let curve = &failure.curve;
+    TableBuilder::new("flips", rows)
+        .column(Text, "csv question", |(asked, _)| asked.question.to_string())
+        .column(Text, "csv frame", |(asked, _)| asked.frame.to_string())
+        .family(|(asked, _)| Some(&*asked.family))
+        .column(Count, "csv repeat", |(asked, _)| asked.repeat as usize)
+        .curve(|_| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
+        .column(Text, "csv first_failing", |(_, first)| first.map(|level| level.to_string()))
+        .build()
 }

@@ -1,16 +1,23 @@
 //! Tables of differences pooled over all models.
+//!
+//! Table of pairwise differences between models in mean accuracy in the dark, with tests.
+//!
+//! Table of new runs compared with an old run, with a row for each model and condition.
 
 use std::collections::BTreeSet;
 
-use crate::report::sentences::left_out;
+use crate::report::sentences::{dark_levels, left_out};
+use crate::report::text::latex::escape;
 use crate::report::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::{light, p};
+use crate::report::text::words::{light, p, points};
 use crate::types::EnhancerName;
 use crate::types::text::counted;
 use darkqa_score::answers::confusion::FalseAnswer;
 use darkqa_score::choice::ParsingMode;
-use darkqa_score::comparisons::{PooledFinding, PooledKind};
+use darkqa_score::comparisons::{
+    BaselineRow, BaselineSide, BestInTheDark, DarkAccuracy, DarkPair, MIN_PAIRS, PooledFinding, PooledKind,
+};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::{Significance, SwapMethod};
 
@@ -170,4 +177,137 @@ pub(super) fn too_few_clusters(least: impl Iterator<Item = (f64, usize)>, unit: 
         counted(clusters, unit),
         p(least)
     ))
+}
+
+/// Two models with the comparison that they belong to.
+struct PairRow<'b> {
+    best: &'b BestInTheDark,
+    pair: &'b DarkPair,
+}
+
+impl<'b> PairRow<'b> {
+    /// Accuracy of the first model over the dark levels.
+    fn first(&self) -> Option<&'b DarkAccuracy> {
+        self.accuracy(&self.pair.first)
+    }
+
+    /// Accuracy of the second model over the dark levels.
+    fn second(&self) -> Option<&'b DarkAccuracy> {
+        self.accuracy(&self.pair.second)
+    }
+
+    fn accuracy(&self, model: &str) -> Option<&'b DarkAccuracy> {
+        self.best.models.iter().find(|row| row.model == model)
+    }
+}
+
+/// Difference of a model from its accuracy at L0; `None` if that is not above chance.
+fn loss(accuracy: Option<&DarkAccuracy>) -> Option<String> {
+    Some(points(accuracy?.loss?.value))
+}
+
+/// Builds the table; it has no rows if there are fewer than two models.
+pub(super) fn best(findings: &Findings<'_>) -> Table {
+    let is_detected = findings.detected_best().is_some();
+    let pairs = findings.best.iter().flat_map(|best| best.pairs.iter().map(move |pair| PairRow { best, pair }));
+    let variant = findings.best.as_ref().map(|best| light(&best.variant, None));
+    let levels = findings.best.as_ref().map(dark_levels);
+    let caption = format!(
+        "Mean accuracy over the dark levels ({}), {}: model less model, on shared items",
+        levels.unwrap_or_default(),
+        variant.unwrap_or_default()
+    );
+    let mut table = TableBuilder::new("best", pairs)
+        .page("thresholds", &caption)
+        .column(Text, "csv model | page model", |row| row.pair.first.clone())
+        .column(Text, "csv against_model | page against", |row| row.pair.second.clone())
+        .column(Text, "csv variant", |row| row.best.variant.to_string())
+        .column(Number, "csv first", |row| row.first().map(|model| model.mean.value))
+        .column(Number, "csv second", |row| row.second().map(|model| model.mean.value))
+        .column(Percent, "page first", |row| row.first().map(|model| model.mean.value))
+        .column(Percent, "page second", |row| row.second().map(|model| model.mean.value))
+        .column(Text, "page first less L0", |row| loss(row.first()))
+        .column(Text, "page second less L0", |row| loss(row.second()))
+        .column(Points, "csv difference low high n | page difference [95 %]", |row| row.pair.difference)
+        .column(P, "csv p | page p", |row| row.pair.p)
+        .column(Text, "csv p_by", |row| row.pair.p_by.to_string())
+        .column(P, "csv p_holm | page p (Holm)", |row| row.pair.holm)
+        .column(ColumnKind::Significance, "page", |row| TableCell::verdict(row.best.verdict(row.pair, is_detected)))
+        .column(Text, "csv verdict", |row| {
+            let verdict = row.best.verdict(row.pair, is_detected);
+            verdict.map_or("", |verdict| verdict.word())
+        })
+        .column(Text, "csv shown", |row| {
+            let verdict = row.best.verdict(row.pair, is_detected);
+            verdict.is_some_and(darkqa_score::significance::Significance::is_shown).to_string()
+        })
+        .column(Text, "csv levels", |row| row.best.levels.iter().map(ToString::to_string).collect::<Vec<_>>().join(";"))
+        .build();
+    table.is_folded = true;
+    table
+}
+
+/// Name of the table, and id of its section on the page.
+pub(crate) const BASELINE: &str = "baseline";
+
+/// Builds the table of paired differences; `old` is the name of the baseline run.
+#[must_use]
+pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
+    let difference = "csv difference low high | terminal new less old, 95 % interval | page new less old [95 %] \
+                      | latex Difference [95\\,\\%]";
+    let builder = TableBuilder::new(BASELINE, rows)
+        .page(BASELINE, &format!("New less {old}"))
+        .column(Text, "csv model | terminal model | page model | latex Model", |row| row.subject.model.clone())
+        .column(Text, "csv condition | terminal condition | page condition | latex Condition", |row| {
+            row.subject.condition()
+        })
+        .column(Count, "csv n | terminal n | page n | latex $n$", |row| row.paired.difference.n)
+        .column(Count, "csv other_images", |row| row.other_images)
+        .column(Percent, "csv old | page old in %", |row| row.paired.second)
+        .column(Percent, "csv new | page new in %", |row| row.paired.first)
+        .column(Points, difference, |row| row.paired.difference)
+        .column(Count, "csv only_new | terminal only new | page only new | latex Only new", |row| row.paired.gained)
+        .column(Count, "csv only_old | terminal only old | page only old | latex Only old", |row| row.paired.lost)
+        .column(P, "csv p", |row| row.paired.p)
+        .column(P, "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)", |row| row.holm);
+    let mut table = reply_columns(builder)
+        .column(ColumnKind::Significance, "csv verdict | terminal | page | latex", |row| row.significance)
+        .build();
+    table.heading = Some(format!("New less {old}, paired by question and image"));
+    table.latex = Some(format!("New less {}, paired by question, in percentage points.", escape(old)));
+    let too_few = rows.iter().filter(|row| row.significance == Significance::TooFew).count();
+    if too_few > 0 {
+        let line = format!("too few: fewer than {MIN_PAIRS} items are shared, so no verdict is given");
+        table.notes.push(line);
+    }
+    if rows.is_empty() {
+        table.notes.push(format!("no model answered the same item about the same image in {old}"));
+    }
+    table
+}
+
+/// An old and a new count, as in `3 → 5`.
+fn old_and_new(row: &BaselineRow, count: fn(&BaselineSide) -> usize) -> String {
+    let [new, old] = row.sides.each_ref().map(count);
+    format!("{old} → {new}")
+}
+
+/// Adds columns of unreadable replies, failures and costs in the old and the new run.
+fn reply_columns(builder: TableBuilder<&BaselineRow>) -> TableBuilder<&BaselineRow> {
+    builder
+        .column(Count, "csv unread_old", |row| row.sides[1].unread)
+        .column(Count, "csv unread_new", |row| row.sides[0].unread)
+        .column(Count, "csv failed_old", |row| row.sides[1].failed)
+        .column(Count, "csv failed_new", |row| row.sides[0].failed)
+        .column(Number, "csv cost_old", |row| row.sides[1].cost)
+        .column(Number, "csv cost_new", |row| row.sides[0].cost)
+        .column(Count, "terminal unread | page unread", |row| old_and_new(row, |side| side.unread))
+        .column(Count, "terminal failed | page failed", |row| old_and_new(row, |side| side.failed))
+        .column(Number, "terminal cost in $ | page cost in $", |row| {
+            let [new, old] = row.sides.map(|side| side.cost);
+            match new.zip(old) {
+                Some((new, old)) => TableCell::Text(format!("{old:.2} → {new:.2}")),
+                None => TableCell::Missing,
+            }
+        })
 }

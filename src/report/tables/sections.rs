@@ -1,7 +1,17 @@
 //! Sections of the page of an evaluation: [`SECTIONS`].
+//!
+//! Table of the accuracy of each model in each condition, with intervals and counts.
+//!
+//! Notes below tables on the training data of enhancers: [`with_training`].
 
-use super::baseline::BASELINE;
 use super::calibration::CONFIDENCE;
+use super::pooled::BASELINE;
+use crate::report::text::table::ColumnKind::{Count, Percent, Share, Text};
+use crate::report::text::table::{Table, TableBuilder, TableCell};
+use crate::report::text::words::{names_enhancer, percent};
+use crate::types::ModelListing;
+use darkqa_score::accuracies::AccuracySummary;
+use darkqa_score::choice::ParsingMode;
 
 /// Section of the page: id, title, text below the title, and names of its figures.
 pub(crate) type Section = (&'static str, &'static str, &'static str, &'static [&'static str]);
@@ -121,3 +131,86 @@ pub(crate) const REAL: &str = "real";
 
 /// Id of the section on enhancers, which also has the sample images.
 pub(crate) const ENHANCERS: &str = "enhancers";
+
+pub(super) fn subjects(summary: &AccuracySummary) -> Table {
+    let builder = TableBuilder::new("subjects", summary.family_cells(None, ParsingMode::Strict))
+        .page("accuracy", "Accuracy of every subject, all families together")
+        .column(Text, "page model", |cell| cell.subject.model.clone())
+        .column(Text, "page condition", |cell| match cell.subject.view {
+            None => "guessing".to_owned(),
+            Some(_) => cell.subject.condition(),
+        })
+        .column(Share, "page accuracy in % [95 %]", |cell| match (cell.subject.view, cell.accuracy) {
+            (None, Some(chance)) => TableCell::Guess(chance),
+            (_, accuracy) => TableCell::from(accuracy),
+        })
+        .column(Percent, "page lenient", |cell| summary.cell(&cell.subject, None, ParsingMode::Lenient)?.accuracy)
+        .column(Count, "page n", |cell| cell.replies())
+        .column(Count, "page not readable", |cell| cell.unparsed)
+        .column(Count, "page failed", |cell| cell.failed);
+    let has_bounds = summary.cells.iter().any(|cell| cell.bounds().is_some());
+    let builder = if has_bounds {
+        builder.column(Text, "page if failed are wrong–right", |cell| {
+            let [wrong, right] = cell.bounds()?.map(percent);
+            Some(format!("{wrong}–{right}"))
+        })
+    } else {
+        builder
+    };
+    let mut table = builder.build();
+    table.is_folded = true;
+    table
+}
+
+/// Adds a note on the training data of an enhancer, if known, to each table that has its results.
+pub(crate) fn with_training(mut tables: Vec<Table>, listing: &ModelListing) -> Vec<Table> {
+    for (enhancer, training) in listing.trainings() {
+        for table in tables.iter_mut().filter(|table| has_results(table, enhancer)) {
+            let line = format!("{enhancer}: {training}");
+            table.foot = Some(match table.foot.take() {
+                Some(foot) => format!("{foot}; {line}"),
+                None => line,
+            });
+        }
+    }
+    tables
+}
+
+/// True if a row of the table is about an enhancer.
+fn has_results(table: &Table, enhancer: &str) -> bool {
+    table.rows.iter().any(|row| {
+        row.cells
+            .iter()
+            .filter_map(|cell| match cell {
+                TableCell::Text(text) => Some(&**text),
+                _ => None,
+            })
+            .chain(row.group.as_deref())
+            .any(|text| names_enhancer(text, enhancer))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::text::table::ColumnKind::Text;
+    use crate::report::text::table::TableBuilder;
+
+    fn table(condition: &'static str) -> Table {
+        TableBuilder::new("levels", [condition])
+            .page("accuracy", "Accuracy")
+            .column(Text, "page condition", |row| (*row).to_owned())
+            .build()
+    }
+
+    #[test]
+    fn only_tables_with_results_have_a_training_note() {
+        let mut listing = ModelListing::default();
+        listing.add_training("lift", "drawn rooms".to_owned());
+        let tables = ["L3-noise+lift", "with noise + lift", "lift-2", "raw"].map(table);
+        let tables = with_training(tables.to_vec(), &listing);
+        let feet: Vec<Option<&str>> = tables.iter().map(|table| table.foot.as_deref()).collect();
+        let line = Some("lift: trained on drawn rooms");
+        assert_eq!(feet, [line, line, None, None]);
+    }
+}

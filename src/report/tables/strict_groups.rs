@@ -10,8 +10,6 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition};
 
-use super::summary::reading;
-
 /// Row of the table.
 enum Line<'a> {
     /// Score of a model in a condition.
@@ -89,7 +87,7 @@ fn table(
             Line::Cell(_) | Line::Chance(..) => "strict",
         });
     let builder = number_columns(builder, findings, score)
-        .column(Text, "csv reading", |line| reading(line.subject()))
+        .column(Text, "csv reading", |line| TableCell::profile(line.subject()))
         .model_facts(&findings.grid.listing, Line::subject);
     let has_light = score.cells.iter().any(|cell| run_group(&cell.subject).is_some());
     let mut builder =

@@ -2,14 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use crate::report::text::table::ColumnKind::Text;
-use crate::report::text::table::{ColumnKind, TableBuilder, TableCell, TableFormat};
+use crate::report::text::table::ColumnKind::{self, Text};
+use crate::report::text::table::{TableBuilder, TableCell, TableFormat};
 use crate::report::text::words::{light, marked_reference};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, ModelListing, RunGroup, SetLight, Variant, View};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, is_reference};
-use darkqa_score::photographs::pair_darkness::PairDarkness;
+use darkqa_score::photographs::PairDarkness;
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]

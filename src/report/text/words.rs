@@ -1,8 +1,23 @@
 //! Formatting of names and numbers in reports, such as [`family`] and [`percent`]; [`words`] formats any table cell.
+//!
+//! The outcome of a trial in words: [`outcome`], the reason why a reply was not read ([`unread_reason`]), and why no
+//! reply came ([`failure_reason`]).
+//!
+//! The number of frames in a report, in words: [`frames`].
+//!
+//! [`NoiseProfiles`]: the noise profiles of the images in a report.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde::Serialize;
 
 use crate::report::text::table::{ColumnKind, TableCell};
-use crate::types::{EnhancerName, Family, Variant};
+use crate::types::text::counted;
+use crate::types::{
+    EnhancerName, FailureKind, Family, FrameId, ProfileName, Record, SentImages, TrialOutcome, UnreadReason, Variant,
+};
 use darkqa_score::estimate::Estimate;
+use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::ALPHA;
 
@@ -238,9 +253,111 @@ pub(crate) fn first_names<S: AsRef<str>>(names: &[S], most: usize) -> String {
     }
 }
 
+/// The outcome of a trial of a question with choices, by the strict parsing: `✓ right`, `not read (cut at the token
+/// limit)`.
+pub(crate) fn outcome(record: &Record) -> String {
+    match record.detail.outcome {
+        TrialOutcome::Right => "✓ right".to_owned(),
+        TrialOutcome::Wrong => "✗ wrong".to_owned(),
+        TrialOutcome::Answered => "answered".to_owned(),
+        TrialOutcome::Unparsed => match record.detail.strict.and_then(|strict| strict.why) {
+            None => "not read".to_owned(),
+            Some(UnreadReason::CannotTell) => unread_reason(UnreadReason::CannotTell).to_owned(),
+            Some(why) => format!("not read ({})", unread_reason(why)),
+        },
+        TrialOutcome::Failed => match &record.failure {
+            None => "failed".to_owned(),
+            Some(failure) => format!("failed ({})", failure_reason(failure.kind, failure.status)),
+        },
+    }
+}
+
+/// The reason in words why the strict parsing found no choice in a reply.
+pub(crate) fn unread_reason(why: UnreadReason) -> &'static str {
+    match why {
+        UnreadReason::Empty => "the reply is empty",
+        UnreadReason::Refused => "the model refused",
+        UnreadReason::Truncated => "cut at the token limit before an answer",
+        UnreadReason::Filtered => "withheld by a content filter",
+        UnreadReason::Ambiguous => "names more than one choice",
+        UnreadReason::OutOfRange => "names a letter that no choice has",
+        UnreadReason::Contradiction => "names the letter of one choice with the text of another",
+        UnreadReason::Negated => "names a choice only to deny it",
+        UnreadReason::NoChoice => "names no choice in the form that was asked for",
+        UnreadReason::CannotTell => "“I cannot tell”",
+    }
+}
+
+/// The reason in words why no reply came, with the HTTP status if the server sent one.
+pub(crate) fn failure_reason(kind: FailureKind, status: Option<u16>) -> String {
+    let kind = match kind {
+        FailureKind::Connection => "no connection",
+        FailureKind::Timeout => "no whole reply in time",
+        FailureKind::RateLimit => "refused by a rate limit",
+        FailureKind::Server => "the server failed",
+        FailureKind::Request => "the request was refused",
+        FailureKind::Filtered => "refused by moderation",
+        FailureKind::Response => "the response was no reply",
+        FailureKind::Image => "the image could not be made",
+    };
+    match status {
+        None => kind.to_owned(),
+        Some(status) => format!("{kind}, HTTP {status}"),
+    }
+}
+
+/// The number of frames that were asked about, as `3 frames (2 of 2 to 4 images)` if some questions show several
+/// images.
+pub(crate) fn frames(grid: &Grid<'_>) -> String {
+    let mut images = BTreeMap::<&FrameId, usize>::new();
+    for (place, item) in grid.items.iter().enumerate() {
+        let counts = (0..grid.subjects.len())
+            .filter_map(|subject| grid.trial(subject, place))
+            .map(|trial| trial.images().map_or(0, SentImages::count));
+        let most = images.entry(&*item.asked.frame).or_default();
+        *most = counts.max().unwrap_or(0).max(*most);
+    }
+    let frames = counted(images.len(), "frame");
+    let several: Vec<usize> = images.into_values().filter(|images| *images > 1).collect();
+    match (several.iter().min(), several.iter().max()) {
+        (Some(least), Some(most)) if least == most => {
+            format!("{frames} ({} of {most} images)", several.len())
+        }
+        (Some(least), Some(most)) => {
+            format!("{frames} ({} of {least} to {most} images)", several.len())
+        }
+        _ => frames,
+    }
+}
+
+/// The noise profiles of the subjects with noise, `paper` first.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[serde(transparent)]
+pub(crate) struct NoiseProfiles(BTreeSet<ProfileName>);
+
+impl NoiseProfiles {
+    pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {
+        Self(subjects.into_iter().filter_map(|subject| subject.variant.reading.clone()).collect())
+    }
+
+    /// A note that other noise profiles were not run, with the flags to run them; `None` without noise or with several
+    /// noise profiles.
+    pub(crate) fn open_question(&self) -> Option<String> {
+        let mut readings = self.0.iter();
+        let (Some(only), None) = (readings.next(), readings.next()) else {
+            return None;
+        };
+        Some(format!(
+            "One noise profile was run ({only}). Results under the others are unknown: --profile all --resume DIR, with the \
+             flags of the run, asks the missing trials."
+        ))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::types::Condition;
 
     #[test]
     fn zero_percent_has_no_sign() {
@@ -271,5 +388,37 @@ mod tests {
         assert_eq!(ends(share(0.999_999, 1.0)), "99.9999–100.0000");
         assert_eq!(with_interval(share(0.9, 1.0)), "90.0 [90.0, 100.0]");
         assert_eq!(with_interval(share(0.25, 0.25)), "25.0");
+    }
+
+    #[test]
+    fn reasons_have_different_words() {
+        let reasons: std::collections::BTreeSet<&str> = UnreadReason::ALL.into_iter().map(unread_reason).collect();
+        assert_eq!(reasons.len(), UnreadReason::ALL.len());
+        let kinds: std::collections::BTreeSet<String> =
+            FailureKind::ALL.into_iter().map(|kind| failure_reason(kind, None)).collect();
+        assert_eq!(kinds.len(), FailureKind::ALL.len());
+        let status = failure_reason(FailureKind::RateLimit, Some(429));
+        assert_eq!(status, "refused by a rate limit, HTTP 429");
+    }
+
+    #[test]
+    fn single_profile_leaves_a_question_open() {
+        let one = profiles(&["L0", "L3-ev", "L3-noise@eld", "L5-noise@eld+lift"]);
+        let note = one.open_question().unwrap();
+        assert!(note.starts_with("One noise profile was run (eld). "));
+        for conditions in [&["L0", "L3-ev"][..], &["L3-noise", "L3-noise@physical"]] {
+            assert_eq!(profiles(conditions).open_question(), None, "{conditions:?}");
+        }
+        let several = profiles(&["L3-noise@eld", "L3-noise"]);
+        assert_eq!(serde_json::to_string(&several).unwrap(), r#"["paper","eld"]"#);
+    }
+
+    fn profiles(conditions: &[&str]) -> NoiseProfiles {
+        let subjects: Vec<ModelInCondition> = conditions
+            .iter()
+            .map(|text| text.parse::<Condition>().unwrap())
+            .map(|condition| ModelInCondition::new("m", Some(&condition)))
+            .collect();
+        NoiseProfiles::new(&subjects)
     }
 }

@@ -1,24 +1,19 @@
 //! `records.parquet`, the records of a run as a table for other programs: [`update`] writes it. The log stays the
 //! source of truth.
 
-mod batches;
-mod choice;
-mod common;
-mod open;
-mod places;
+mod columns;
 mod reader;
-mod row;
 
 use std::path::Path;
 
-use self::batches::RowBatches;
-pub use self::reader::{Records, RunRecord, StoredRun};
-use self::row::TableDetail;
 use crate::error::Result;
 use crate::runs::outcome::RecordTable;
 use crate::runs::stored::ExperimentKind;
 use crate::store::{CREATED_BY, ColumnFile, FileMetadata, LogMark};
 use crate::types::{ChoiceDetail, OpenDetail};
+use reader::{RowBatches, TableDetail};
+
+pub use self::reader::{Records, RunRecord, StoredRun};
 
 pub(crate) const RECORDS_PARQUET: &str = "records.parquet";
 

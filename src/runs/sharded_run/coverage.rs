@@ -1,14 +1,21 @@
 //! Coverage of a run's sources by shards: [`Coverage`].
+//!
+//! Checks whether the shards of a run are complete, using its plan if it has one: [`check`], [`warn_unfinished`].
+//!
+//! One shard of a run: [`StoredShard`].
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::num::NonZeroU32;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
-use crate::types::manifests::RunManifest;
+use crate::runs::stored::read_run_manifest;
+use crate::types::manifests::{RunManifest, RunPart, Status};
+use crate::types::text::counted;
 
 /// The sources (frames or walks) of a run that are in some shard. The shards may come from several divisions.
 pub(super) struct Coverage {
@@ -136,6 +143,165 @@ impl Coverage {
             None => true,
         })
     }
+}
+
+/// Treatment of sources of a run that are in no shard.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum MissingShards {
+    /// Return an error.
+    Refuse,
+    /// Print a warning, and leave these sources out.
+    Accept,
+}
+
+/// Reads the plan in the parent folder of the shards. Returns `None` if there is none, or, with a warning, if its
+/// number of sources differs from that of the run.
+///
+/// # Errors
+/// If the plan cannot be read.
+pub(super) fn plan(parts: &[StoredShard], coverage: &Coverage) -> Result<Option<RunPlan>> {
+    let Some(run) = parts.first().and_then(|part| part.folder.parent()) else {
+        return Ok(None);
+    };
+    let plan = RunPlan::read(run)?;
+    let Some(other) = plan.as_ref().filter(|plan| plan.frame_count() != coverage.sources()) else {
+        return Ok(plan);
+    };
+    tracing::warn!(
+        "{}: the plan is about {} frames, and the parts are of a run about {}: it says nothing about them",
+        run.display(),
+        other.frame_count(),
+        coverage.sources()
+    );
+    Ok(None)
+}
+
+/// Returns true if sources are in no shard, with a warning that names the missing shards and the command to run.
+///
+/// # Errors
+/// If sources are in no shard and `missing` is [`MissingShards::Refuse`].
+pub(super) fn check(
+    parts: &[StoredShard],
+    coverage: &Coverage,
+    plan: Option<&RunPlan>,
+    missing: MissingShards,
+) -> Result<bool> {
+    let absent = coverage.absent(|shard| plan.map(|plan| plan.shard_range(shard)));
+    let (Some(problem), Some(first)) = (coverage.missing(&absent), parts.first()) else {
+        return Ok(false);
+    };
+    let counts = plan.map_or_else(String::new, |plan| {
+        format!(
+            " ({} of {} frames, {})",
+            coverage.gaps().count(),
+            coverage.sources(),
+            counted(plan.request_count(coverage.gaps()), "trial")
+        )
+    });
+    match missing {
+        MissingShards::Refuse => Err(Error::Run {
+            path: first.folder.clone(),
+            problem: format!("{problem}{counts}; --partial merges the others; {}", remedy(parts, plan, &absent)),
+        }),
+        MissingShards::Accept => {
+            tracing::warn!("{problem}{counts}; the summary covers only the others; {}", remedy(parts, plan, &absent));
+            Ok(true)
+        }
+    }
+}
+
+/// Warns about each shard that is not complete, unless complete shards together have all its trials.
+pub(super) fn warn_unfinished(parts: &[StoredShard], plan: Option<&RunPlan>) {
+    let (complete, unfinished) =
+        parts.iter().partition::<Vec<&StoredShard>, _>(|part| part.manifest.status == Status::Complete);
+    for part in unfinished.into_iter().filter(|part| !part.is_covered_by(&complete)) {
+        let counts = part.manifest.counts;
+        tracing::warn!(
+            "{}: shard {} is {}: {} of {} trials answered; {}",
+            part.folder.display(),
+            part.shard,
+            part.manifest.status,
+            counts.answered,
+            counts.trials,
+            remedy(parts, plan, &[part.shard])
+        );
+    }
+}
+
+/// The advice to run the command that asks the missing trials of these shards.
+fn remedy(parts: &[StoredShard], plan: Option<&RunPlan>, shards: &[Shard]) -> String {
+    let models = parts
+        .iter()
+        .filter_map(|part| part.manifest.columns.get("model"))
+        .flat_map(|models| models.keys().map(String::as_str));
+    let command =
+        plan.and_then(|plan| plan.command(models)).unwrap_or_else(|| "the command of the parts with".to_owned());
+    match shards {
+        [] => format!("{command} --shard I/N, for all I of one N, asks only what no other part in the same folder has"),
+        [only] => format!("{command} --shard {only} asks what is left"),
+        [first, ..] => {
+            let numbers: Vec<String> = shards.iter().map(|shard| (shard.index() + 1).to_string()).collect();
+            format!("{command} --shard I/{} asks them, with I = {}", first.count(), numbers.join(", "))
+        }
+    }
+}
+
+/// A shard as read from its folder.
+pub(super) struct StoredShard {
+    pub(super) shard: Shard,
+    pub(super) folder: PathBuf,
+    pub(super) manifest: RunManifest,
+}
+
+impl StoredShard {
+    /// Reads the shard in a folder.
+    ///
+    /// # Errors
+    /// If the folder has no shard, or a file in it cannot be read.
+    pub(super) fn open(folder: &Path) -> Result<Self> {
+        let manifest = read_run_manifest(folder)?;
+        let Some(shard) = manifest.shard.as_deref() else {
+            return Err(Error::Run {
+                path: folder.to_owned(),
+                problem: "the run is not a shard: it was made without --shard".to_owned(),
+            });
+        };
+        Ok(Self { shard: shard.parse()?, folder: folder.to_owned(), manifest })
+    }
+
+    /// True if every source of this shard is in another one with at least as many trials, and the other has all models,
+    /// enhancers and other column values of this one.
+    pub(super) fn is_covered_by(&self, others: &[&Self]) -> bool {
+        let Some(own) = &self.manifest.part else {
+            return false;
+        };
+        let candidates: Vec<&RunPart> = others
+            .iter()
+            .filter(|other| self.has_columns_in(other))
+            .filter_map(|other| other.manifest.part.as_ref())
+            .collect();
+        own.trials.iter().zip(own.place.first..).all(|(trials, source)| {
+            candidates.iter().any(|part| {
+                source
+                    .checked_sub(part.place.first)
+                    .and_then(|place| part.trials.get(place))
+                    .is_some_and(|other| other >= trials)
+            })
+        })
+    }
+
+    /// True if another shard has every column value of this one.
+    fn has_columns_in(&self, other: &Self) -> bool {
+        self.manifest.columns.iter().all(|(column, values)| {
+            let known = other.manifest.columns.get(column);
+            values.keys().all(|value| known.is_some_and(|known| known.contains_key(value)))
+        })
+    }
+}
+
+/// The error for a command without a shard.
+pub(super) fn no_shard_error() -> Error {
+    Error::usage("RUN", "no shard is named")
 }
 
 #[cfg(test)]

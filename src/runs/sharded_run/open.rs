@@ -4,8 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::ShardedRun;
-use super::missing::MissingShards;
-use super::stored_shard::no_shard_error;
+use super::coverage::{MissingShards, no_shard_error};
 use crate::error::{Error, Result};
 use crate::runs::missing_thumbnails::MissingThumbnails;
 use crate::runs::run_texts::RunTexts;

@@ -1,23 +1,25 @@
 //! The files of a run folder, and the check that a folder belongs to the requested run.
+//!
+//! Check that a run folder has no links: [`check_own`].
+//!
+//! A run folder may have been downloaded. Through a link in it, this program would write to a file or folder outside of
+//! the run.
 
 use std::collections::{BTreeMap, HashSet};
 use std::ffi::OsStr;
-use std::fs::{self, TryLockError};
+use std::fs::{self, DirEntry, Metadata, TryLockError};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-use rayon::slice::ParallelSliceMut;
-
-use super::damaged_file::{each_readable_line, set_file_aside};
-use super::lines::{StoredLine, each_line, each_placed_line, lines};
-use super::pieces::{LinePlace, open_if_exists};
-use super::stored_trial::StoredTrial;
 use jiff::Timestamp;
+use rayon::slice::ParallelSliceMut;
 use serde_json::Value;
 
+use super::lines::{StoredLine, each_line, each_placed_line, each_readable_line, lines, set_file_aside};
+use super::pieces::{LinePlace, open_if_exists};
+use super::stored_trial::StoredTrial;
 use darkqa_base::error::{Error, Result};
-use darkqa_base::files::folder_access::FolderAccess;
-use darkqa_base::files::{self, is_unfinished, reading};
+use darkqa_base::files::{self, FolderAccess, is_unfinished};
 use darkqa_base::types::flags::setting_spelling;
 use darkqa_base::types::manifests::{
     ColumnDifference, Columns, JUDGES, RecordedNames, RunManifest, differences, judge_flag,
@@ -32,17 +34,22 @@ pub fn now() -> String {
 
 pub(super) const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
+
 /// The file of a run's questions, with their texts and scenes.
 pub(super) const QUESTIONS: &str = "questions.jsonl";
+
 /// The file of small copies of the images that were sent.
 pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
+
 /// The file of similarities of images to their clean frames.
 pub(super) const FIDELITY: &str = "fidelity.jsonl";
 
 /// The subfolder of a run for Batch API files.
 pub const BATCH: &str = "batch";
+
 /// The file with the state of each batch.
 pub const BATCH_STATE: &str = "state.jsonl";
+
 /// The subfolder of a run for its plan, which is written before the run.
 pub const PLAN: &str = "plan";
 
@@ -66,7 +73,7 @@ const ENHANCER_FILE: &str = "--llie";
 
 /// Writes a file into a folder, completely or not at all; a file with the same content is left untouched.
 pub(super) fn write(folder: &Path, name: &str, content: &[u8]) -> Result<()> {
-    if reading::read(&folder.join(name)).is_ok_and(|existing| existing == content) {
+    if files::read(&folder.join(name)).is_ok_and(|existing| existing == content) {
         return Ok(());
     }
     files::write_synced(&folder.join(name), content)
@@ -280,7 +287,7 @@ fn any_manifest(folder: &Path) -> Result<Option<RunManifest>> {
     {
         return Ok(None);
     }
-    let text = reading::at_most(&path, MAX_MANIFEST_BYTES)?;
+    let text = files::at_most(&path, MAX_MANIFEST_BYTES)?;
     serde_json::from_slice(&text).map(Some).map_err(|e| Error::Run {
         path: path.clone(),
         problem: format!("not the manifest of a run: {e}; the command that made the run, called again, makes it again"),
@@ -430,4 +437,70 @@ pub(super) fn create_run(folder: &Path, manifest: &RunManifest) -> Result<()> {
         return Err(Error::Run { path: folder.to_owned(), problem });
     }
     write_manifest(folder, manifest)
+}
+
+/// The subfolders of a run with files that are appended to.
+const INNER: [&str; 1] = [BATCH];
+
+/// The files that are appended to. All others are replaced by new files, so that the target of a link stays unchanged.
+const APPENDED: [&str; 4] = [RECORDS, THUMBNAILS, FIDELITY, BATCH_STATE];
+
+/// Refuses a run folder in which a folder or a file that is appended to is a link, or an entry is a pipe or a device.
+/// The folder itself may be reached by a link.
+///
+/// # Errors
+/// Names the link.
+pub(super) fn check_own(folder: &Path) -> Result<()> {
+    check_entries(folder)?;
+    for inner in INNER {
+        let inner = folder.join(inner);
+        if inner.is_dir() {
+            check_entries(&inner)?;
+        }
+    }
+    Ok(())
+}
+
+fn check_entries(folder: &Path) -> Result<()> {
+    for entry in fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))? {
+        let entry = entry.map_err(|e| Error::file(folder, "read", e))?;
+        if let Some(what) = foreign_kind(&entry) {
+            return Err(Error::Run {
+                path: entry.path(),
+                problem: format!(
+                    "this is {what}, and what is written into the run would go there; put a file or folder of its own in its place, or use a \
+                     copy of the run"
+                ),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Description of an entry through which the program would write elsewhere; `None` for a regular entry.
+fn foreign_kind(entry: &DirEntry) -> Option<&'static str> {
+    let name = entry.file_name();
+    // The metadata of the entry itself, without following a link.
+    let own = entry.metadata().ok()?;
+    if own.is_symlink() {
+        let is_list = Path::new(&name).extension() == Some(OsStr::new("jsonl"));
+        return (is_list || entry.path().is_dir()).then_some("a link");
+    }
+    if !own.is_file() && !own.is_dir() {
+        return Some("a pipe or a device");
+    }
+    let is_appended = APPENDED.iter().any(|appended| name == *appended);
+    (is_appended && own.is_file() && link_count(&own) > 1).then_some("a file with a second name (a hard link)")
+}
+
+/// The number of hard links of a file.
+#[cfg(unix)]
+fn link_count(file: &Metadata) -> u64 {
+    std::os::unix::fs::MetadataExt::nlink(file)
+}
+
+/// 1, because the number of hard links is not available.
+#[cfg(not(unix))]
+fn link_count(_: &Metadata) -> u64 {
+    1
 }

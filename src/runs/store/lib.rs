@@ -9,20 +9,15 @@
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
 mod changed_questions;
-mod column_file;
-mod damaged_file;
+pub(crate) mod column_file;
 mod folder;
 mod image_notes;
 mod lines;
-mod log_mark;
-mod lost_questions;
-mod own_files;
 mod pieces;
 mod record_log;
-mod reread_record;
 mod stored_trial;
-mod trial_line;
-mod unlocked_log;
+#[cfg(test)]
+mod tests;
 
 use std::borrow::Cow;
 use std::collections::{BTreeSet, HashMap, HashSet};
@@ -32,6 +27,7 @@ use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
+use changed_questions::{ChangedQuestions, LostQuestions};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files::write_with;
 use darkqa_base::types::manifests::{RecordedNames, RunManifest};
@@ -40,29 +36,21 @@ use darkqa_base::types::{
     Via,
 };
 use darkqa_score::answers::record::Detail;
-
-use changed_questions::ChangedQuestions;
-use damaged_file::{each_readable_line, repair_notes};
-use folder::{FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, create_run, write, write_manifest};
-use lines::{append, each_line, json_lines, lines, repair, set_aside};
-
-use own_files::check_own;
-use unlocked_log::UnlockedLog;
+use folder::{FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_own, create_run, write, write_manifest};
+use lines::{append, each_line, each_readable_line, json_lines, lines, repair, repair_notes, set_aside};
+use record_log::UnlockedLog;
 
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
-pub use damaged_file::set_file_aside;
-pub use image_notes::{missing_fidelity, missing_thumbnails};
-pub use log_mark::LogMark;
-use lost_questions::LostQuestions;
-pub use pieces::LinePlace;
-pub use record_log::{QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
-pub use stored_trial::StoredTrial;
-
 pub use folder::{
     AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question, find, has_batches,
     is_locked, is_run, manifest_damage, now, read_columns, read_fidelity, read_manifest, read_questions, read_records,
     read_settings, read_thumbnails, read_trials, reply_count, restore_manifest, schema,
 };
+pub use image_notes::{missing_fidelity, missing_thumbnails};
+pub use lines::set_file_aside;
+pub use pieces::LinePlace;
+pub use record_log::{LogMark, QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
+pub use stored_trial::StoredTrial;
 
 /// The trials that were sent in batches.
 const TRIALS: &str = "trials.jsonl";
@@ -402,6 +390,3 @@ impl<D: Detail> Store<D> {
         write(&self.folder, name, content)
     }
 }
-
-#[cfg(test)]
-mod tests;

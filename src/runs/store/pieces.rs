@@ -5,7 +5,7 @@ use std::io::{ErrorKind, Read};
 use std::path::Path;
 
 use darkqa_base::error::{Error, Result};
-use darkqa_base::files::reading;
+use darkqa_base::files;
 
 /// The size of a piece in bytes; larger only for a longer line. Chosen: enough lines for all cores.
 const PIECE_BYTES: u64 = 4 << 20;
@@ -65,7 +65,7 @@ pub(super) struct FileLine<'p> {
 /// # Errors
 /// If it cannot be opened.
 pub(super) fn open_if_exists(path: &Path) -> Result<Option<File>> {
-    match reading::open(path) {
+    match files::open(path) {
         Ok(file) => Ok(Some(file)),
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
         Err(e) => Err(Error::file(path, "open", e)),

@@ -1,11 +1,17 @@
 //! [`StoredTrial`]: the fields of a stored trial that a resumed run needs.
+//!
+//! [`TrialLine`]: the fields of a record that identify its trial.
+//!
+//! [`RereadRecord`]: a record whose reply is parsed again by the rules of this version.
 
 use std::num::NonZeroU32;
 
 use serde::{Deserialize, Deserializer};
 
 use darkqa_base::types::records::{SmallNumber, Tokens};
-use darkqa_base::types::{FailureKind, Finish, LostAttempts, Shared, TrialKey, Usage, Via};
+use darkqa_base::types::{
+    Condition, FailureKind, Finish, LostAttempts, QuestionId, Record, Shared, TrialKey, Usage, Via,
+};
 
 /// A trial of a run, without question and answer: 72 bytes.
 #[derive(Debug, Clone, Deserialize)]
@@ -144,6 +150,25 @@ fn read_end<'de, D: Deserializer<'de>>(deserializer: D) -> Result<End, D::Error>
         Some(_) => End::Other,
     })
 }
+
+/// Fields of a record's line that identify the trial.
+#[derive(Debug, Deserialize)]
+pub struct TrialLine {
+    /// The key of the trial.
+    pub key: TrialKey,
+    /// The question that it asks.
+    pub question: QuestionId,
+    /// The condition of its image; `None` if it has none.
+    pub condition: Option<Condition>,
+    /// The name of the model in the records.
+    pub model: String,
+    /// Number of the repetition, from 0.
+    #[serde(default)]
+    pub repeat: u32,
+}
+
+/// A record whose reply is parsed again when its line is read.
+pub(super) struct RereadRecord<D>(pub(super) Record<D>);
 
 #[cfg(test)]
 mod tests {

@@ -1,4 +1,8 @@
 //! Accuracy of each model in each condition: [`AccuracySummary`].
+//!
+//! Items that all models were asked: [`CommonItems`].
+//!
+//! Accuracy of uniform guesses: [`chance`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -6,13 +10,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::balance::{UnbalancedFamily, balanced_accuracy};
-use super::chance::{OfferedChoices, chance, chance_of_questions};
-use super::health::Health;
+use super::health::{Health, healths};
 use crate::choice::ParsingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem};
 use crate::model_in_condition::{CHANCE, ModelInCondition};
-use darkqa_base::types::{Family, UnreadReason, Variant};
+use darkqa_base::types::{AskedItem, Family, Question, QuestionId, UnreadReason, Variant, View};
 
 /// Accuracy of one subject on one family in one parsing.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -222,4 +225,177 @@ fn chance_cells(questions: &[OfferedChoices]) -> Vec<AccuracyCell> {
             })
         })
         .collect()
+}
+
+/// Number of questions that a model was asked, in any condition.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AskedQuestions {
+    pub model: String,
+    /// True if the model was asked without images.
+    pub is_blind: bool,
+    /// Number of questions.
+    pub questions: usize,
+}
+
+/// Items that models share although they were not asked the same questions.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CommonItems {
+    /// Number of questions of each model, with and without images.
+    pub asked: Vec<AskedQuestions>,
+    /// Number of questions that at least one model was asked.
+    pub questions: usize,
+    /// Number of questions to which every model with images replied.
+    pub shared_questions: usize,
+    /// Accuracies on the items to which every model with images replied, with chance on the same items.
+    pub summary: AccuracySummary,
+}
+
+impl CommonItems {
+    /// Finds the common items of a grid; `None` if all models were asked the same questions.
+    #[must_use]
+    pub fn new(grid: &Grid<'_>) -> Option<Self> {
+        let all: BTreeSet<&QuestionId> = grid.items.iter().map(|item| &*item.asked.question).collect();
+        let mut asked = BTreeMap::<(bool, &str), BTreeSet<&QuestionId>>::new();
+        for (index, subject) in model_subjects(grid) {
+            let model = (subject.view == Some(View::Blind), &*subject.model);
+            let questions = asked.entry(model).or_default();
+            if questions.len() == all.len() {
+                continue;
+            }
+            let items = grid.items.iter().enumerate().filter(|(item, _)| grid.trial(index, *item).is_some());
+            questions.extend(items.map(|(_, item)| &*item.asked.question));
+        }
+        if asked.values().all(|questions| questions.len() == all.len()) {
+            return None;
+        }
+        let shared = shared_items(grid);
+        let restricted = grid.select_items(&shared);
+        let offers: Vec<OfferedChoices> =
+            restricted.items.iter().map(|item| OfferedChoices::from_item(item.asked)).collect();
+        let shared_questions: BTreeSet<&QuestionId> =
+            restricted.items.iter().map(|item| &*item.asked.question).collect();
+        Some(Self {
+            asked: asked
+                .into_iter()
+                .map(|((is_blind, model), questions)| AskedQuestions {
+                    model: model.to_owned(),
+                    is_blind,
+                    questions: questions.len(),
+                })
+                .collect(),
+            questions: all.len(),
+            shared_questions: shared_questions.len(),
+            summary: summarize(&restricted, &healths(&restricted), offers),
+        })
+    }
+}
+
+/// Subjects with their indices. People are left out if there are models.
+fn model_subjects<'g>(grid: &'g Grid<'_>) -> impl Iterator<Item = (usize, &'g ModelInCondition)> {
+    let models = grid.subjects.iter().map(|subject| &*subject.model);
+    let models: BTreeSet<&str> = grid.listing.without_people(models).into_iter().collect();
+    grid.subjects.iter().enumerate().filter(move |(_, subject)| models.contains(&*subject.model))
+}
+
+/// For each item, returns whether every model with images replied to it, in any condition. Models without any reply do
+/// not count, and people count only if there are no models.
+#[must_use]
+pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
+    let mut models = BTreeMap::<&str, Vec<bool>>::new();
+    for (index, subject) in model_subjects(grid) {
+        if subject.view != Some(View::Image) {
+            continue;
+        }
+        let replied = models.entry(&subject.model).or_insert_with(|| vec![false; grid.items.len()]);
+        for (item, replied) in replied.iter_mut().enumerate() {
+            *replied |= grid.result(index, item).is_reply();
+        }
+    }
+    models.retain(|_, replied| replied.contains(&true));
+    (0..grid.items.len()).map(|item| models.values().all(|replied| replied[item])).collect()
+}
+
+/// Family of a question, number of choices, and number of their orders that are asked.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OfferedChoices {
+    /// Family of the question.
+    pub family: Family,
+    /// Number of its choices.
+    pub choices: usize,
+    /// Number of orders of the choices; each counts as one question.
+    pub orders: usize,
+}
+
+impl OfferedChoices {
+    /// Creates the entry of an item.
+    pub fn from_item(item: &AskedItem) -> Self {
+        Self { family: item.family.as_ref().clone(), choices: item.choices.len(), orders: 1 }
+    }
+}
+
+impl From<&Question> for OfferedChoices {
+    fn from(question: &Question) -> Self {
+        Self { family: question.family.clone(), choices: question.choices.len(), orders: 1 }
+    }
+}
+
+/// Exact accuracy of a uniform guess: the mean of 1 / number of choices over all orders that are asked. `None` without
+/// questions.
+///
+/// Questions are grouped by their number of choices, so that their order cannot change the rounding of the sum.
+pub(crate) fn chance<'a>(questions: impl IntoIterator<Item = &'a OfferedChoices>) -> Option<Estimate> {
+    mean(questions, |question| question.orders)
+}
+
+/// Accuracy of a uniform guess with each question counted once, as in the paper (DarkQA, section IV); `None` if it
+/// equals [`chance`]. The two differ if several orders are asked, because a question with many choices has many orders.
+pub(crate) fn chance_of_questions<'a>(
+    questions: impl IntoIterator<Item = &'a OfferedChoices> + Clone,
+) -> Option<Estimate> {
+    let once = mean(questions.clone(), |_| 1)?;
+    let all = chance(questions)?;
+    ((once.value - all.value).abs() > 1e-9).then_some(once)
+}
+
+fn mean<'a>(
+    questions: impl IntoIterator<Item = &'a OfferedChoices>,
+    weight: fn(&OfferedChoices) -> usize,
+) -> Option<Estimate> {
+    let mut counts = std::collections::BTreeMap::<usize, usize>::new();
+    for question in questions {
+        *counts.entry(question.choices).or_default() += weight(question);
+    }
+    let n: usize = counts.values().sum();
+    let sum: f64 = counts.iter().map(|(&choices, &questions)| questions as f64 / choices as f64).sum();
+    (n > 0).then(|| Estimate::exact(sum / n as f64, n))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn question(choices: usize) -> OfferedChoices {
+        OfferedChoices { family: Family::Closest, choices, orders: 1 }
+    }
+
+    /// A question that is asked once for each rotation of its choices.
+    fn rotated(choices: usize) -> OfferedChoices {
+        OfferedChoices { orders: choices, ..question(choices) }
+    }
+
+    #[test]
+    fn with_all_orders_long_questions_count_more() {
+        let questions = [rotated(2), rotated(4)];
+        assert_eq!(chance(&questions).unwrap(), Estimate::exact(2.0 / 6.0, 6));
+        assert_eq!(chance_of_questions(&questions).unwrap(), Estimate::exact(0.375, 2));
+        assert_eq!(chance_of_questions(&[rotated(4), rotated(4)]), None);
+        assert_eq!(chance_of_questions(&[question(2), question(4)]), None);
+    }
+
+    #[test]
+    fn chance_is_the_mean_of_one_over_the_choices() {
+        let questions = [question(2), question(4), question(2)];
+        assert_eq!(chance(&questions).unwrap(), Estimate::exact(1.25 / 3.0, 3));
+        assert_eq!(chance([]), None);
+    }
 }

@@ -2,24 +2,16 @@
 
 mod accuracy;
 mod balance;
-mod chance;
-mod common;
-mod coverage;
 mod curve;
-mod flips;
 mod health;
 mod strict_score;
 
-pub(super) use accuracy::summarize;
-pub use accuracy::{AccuracyCell, AccuracySummary};
+pub(super) use accuracy::{CommonItems, summarize};
+pub(super) use curve::{CurvePoints, Floor, first_failures};
+pub(super) use health::{Coverage, Lacking, shared};
+
+pub use accuracy::{AccuracyCell, AccuracySummary, OfferedChoices, shared_items};
 pub use balance::{MAX_ANSWER_SHARE, UnbalancedFamily};
-pub use chance::OfferedChoices;
-pub(super) use common::CommonItems;
-pub use common::shared_items;
-pub(super) use coverage::{Coverage, Lacking, shared};
-pub use curve::{Curve, FloorKind, curves};
-pub(super) use curve::{CurvePoints, Floor};
-pub use flips::FirstFailure;
-pub(super) use flips::first_failures;
+pub use curve::{Curve, FirstFailure, FloorKind, curves};
 pub use health::{Health, healths};
 pub use strict_score::{GroupCell, GroupChance, StrictScore};

@@ -15,12 +15,15 @@
 //!
 //! Only untouched images are used, because a model may fall back on the text in the dark.
 
+#[cfg(test)]
+mod tests;
+
 use std::collections::BTreeMap;
 
 use statrs::function::beta::beta_reg;
 
 use super::record::Detail;
-use crate::statistics::split_mix::SplitMix;
+use crate::statistics::bootstrap::SplitMix;
 use darkqa_base::types::{Condition, Digest, Record, Treatment, TrialRef, Via};
 
 /// A reply about an untouched image whose true answer is known.
@@ -314,6 +317,3 @@ impl EqualPairs {
         pairs
     }
 }
-
-#[cfg(test)]
-mod tests;

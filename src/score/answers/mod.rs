@@ -1,6 +1,5 @@
 //! Answers: their records, their mistakes, and their dependence on the image.
 
-pub mod checks;
 pub mod confusion;
 mod image_dependence;
 pub mod record;

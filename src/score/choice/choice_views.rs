@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
-use super::text::words::Role;
-use super::text::{Clauses, clean, fold, plain, tokens};
+use super::text::{Clauses, fold, tokens};
+use crate::choice::text::plain;
+use crate::choice::text::tokens::Role;
 use darkqa_base::types::questions::Choices;
 
 /// Kind of thing that a choice names.
@@ -36,7 +37,7 @@ const MIN_JOINED: usize = 6;
 
 impl ChoiceViews {
     pub(super) fn new(choices: &Choices) -> Self {
-        let texts: Vec<String> = choices.texts().iter().map(|text| plain(&clean::tidy(text))).collect();
+        let texts: Vec<String> = choices.texts().iter().map(|text| plain(&plain::tidy(text))).collect();
         let mut folded: Vec<(String, usize)> = texts
             .iter()
             .map(|text| fold(text.strip_suffix('.').unwrap_or(text)))

@@ -5,9 +5,9 @@ use std::sync::LazyLock;
 use regex::Regex;
 
 use super::names::{Delimiting, Name, NameState, continues_word, index_of_letter, is_unspaced};
-use super::text::clean::compiled;
-use super::text::words::Role;
 use super::text::{Clauses, RANGE};
+use crate::choice::text::plain::compiled;
+use crate::choice::text::tokens::Role;
 
 /// Words that can follow the letter A but not the article.
 pub(super) static AFTER_A: LazyLock<Regex> = LazyLock::new(|| {

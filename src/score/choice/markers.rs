@@ -7,8 +7,8 @@ use std::sync::LazyLock;
 use regex::Regex;
 
 use super::text::Clauses;
-use super::text::clean::compiled;
-use super::text::words::Role;
+use crate::choice::text::plain::compiled;
+use crate::choice::text::tokens::Role;
 
 /// The meaning of a marker for the choice that follows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -142,6 +142,7 @@ static CONFIRMATION: LazyLock<Regex> = LazyLock::new(|| {
         r"|\A[)\].]*\s*(?:가|이)\s*(?:정답|답)"
     ))
 });
+
 static LETTER_CONFIRMATION: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(
         r"\A[)\].]*\s*(?:is|seems|would be|must be)\s+(?:clearly |definitely |probably |most likely |likely )?(?:correct|right|best|true)\b",

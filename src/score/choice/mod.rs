@@ -20,14 +20,12 @@ mod states;
 #[cfg(test)]
 mod tests;
 mod text;
-mod texts;
 mod view;
 
 use serde::Serialize;
 
 use darkqa_base::types::questions::{Answer, Choices, UnreadReason};
 use darkqa_base::types::replies::{Finish, Reply};
-
 use rules::{lenient, strict};
 use text::reasoning::{Asked, separate_sections};
 

@@ -5,7 +5,7 @@ use crate::choice::ParsingMode;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
-use crate::statistics::quantiles::{degrees_of_freedom, student};
+use crate::statistics::estimate::{degrees_of_freedom, student};
 
 /// Agreement of two models in one condition, in the strict parsing.
 #[derive(Debug, Clone, PartialEq)]

@@ -4,8 +4,9 @@ use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::{Grid, GridItem};
 use crate::significance::{ALPHA, PValues, SwapMethod, least_p, mcnemar, swap_test};
-use crate::statistics::quantiles::{degrees_of_freedom, quantile, two_sided_tail};
-use crate::statistics::residuals::{residuals, unknown_design_effect, variance_of_few};
+use crate::statistics::estimate::{
+    degrees_of_freedom, quantile, residuals, two_sided_tail, unknown_design_effect, variance_of_few,
+};
 use darkqa_base::types::Family;
 
 /// Comparison of two subjects on the items to which both replied.
@@ -368,7 +369,7 @@ const ROUNDING: f64 = 1e-9;
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::quantiles::student;
+    use crate::statistics::estimate::student;
 
     /// A small generator of whole numbers, for designs of many shapes.
     fn designs() -> impl Iterator<Item = Vec<ClusterNet>> {

@@ -2,10 +2,11 @@
 //!
 //! The models are fixed: a finding is about these models, not about models in general. The sample consists of items,
 //! grouped in clusters.
+//!
+//! Replies of all models to one item: [`PooledItem`].
 
 mod contrast;
 mod finding;
-mod item;
 mod left_out;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,15 +23,14 @@ use crate::model_in_condition::{ModelInCondition, pooled_models};
 use crate::significance::{PValues, Significance, least_p};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant, View};
-
 use finding::is_severe;
-use item::{PooledItem, PooledState, SideCounts};
 
 pub(crate) use contrast::family_contrasts;
+pub(crate) use left_out::models_left_out;
+
 pub use contrast::{ContrastTest, FamilyContrast};
 pub use finding::{PooledDifference, PooledFinding};
 pub use left_out::ModelsLeftOut;
-pub(crate) use left_out::models_left_out;
 
 /// Models that findings are about, sorted: models with images, without people and without reference models. If only
 /// reference models ran, one of them.
@@ -456,4 +456,80 @@ fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
         }
     }
     set
+}
+
+/// Replies of all models to one item on both sides.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PooledItem {
+    /// Index of the item in the grid.
+    index: usize,
+    /// Replies of each side.
+    sides: [SideCounts; 2],
+    state: PooledState,
+}
+
+impl PooledItem {
+    /// Smallest and largest difference of the counted replies of both sides, which are equal if all replied; `counted`
+    /// gives their number. `None` if a model was not asked, or without any reply, which tells nothing about the two
+    /// sides.
+    fn net_bounds(&self, counted: impl Fn(&SideCounts) -> u32) -> Option<[i64; 2]> {
+        let is_usable = match self.state {
+            PooledState::Answered => true,
+            PooledState::Missing => self.sides.iter().any(|side| side.replies > 0),
+            PooledState::Unasked => false,
+        };
+        let [first, second] = [&self.sides[0], &self.sides[1]].map(|side| i64::from(counted(side)));
+        let [first_missing, second_missing] = [0, 1].map(|side| i64::from(self.sides[side].missing));
+        is_usable.then_some([first - second - second_missing, first + first_missing - second])
+    }
+}
+
+/// Which models have a reply to an item.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PooledState {
+    /// Every model replied on both sides.
+    Answered,
+    /// Every model was asked on both sides, and some replies are missing.
+    Missing,
+    /// Some model was not asked on a side.
+    Unasked,
+}
+
+impl PooledState {
+    /// State of an item over several models or levels.
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::Answered, Self::Answered) => Self::Answered,
+            (Self::Unasked, _) | (_, Self::Unasked) => Self::Unasked,
+            _ => Self::Missing,
+        }
+    }
+}
+
+/// Numbers of replies of all models to one item on one side. If a model has no reply on either side, neither side
+/// counts it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct SideCounts {
+    /// Counted replies in the strict parsing: right replies, or false answers.
+    strict: u32,
+    /// Counted replies in the lenient parsing.
+    lenient: u32,
+    /// Replies in which the strict parsing finds a choice.
+    read: u32,
+    /// Replies.
+    replies: u32,
+    /// Missing replies of models that replied on the other side.
+    missing: u32,
+}
+
+impl SideCounts {
+    fn add(self, other: Self) -> Self {
+        Self {
+            strict: self.strict + other.strict,
+            lenient: self.lenient + other.lenient,
+            read: self.read + other.read,
+            replies: self.replies + other.replies,
+            missing: self.missing + other.missing,
+        }
+    }
 }

@@ -1,9 +1,9 @@
 //! The area under the receiver operating characteristic (AUC) for clustered replies: how well a number predicts right
 //! replies ([`PairCounts`]).
 
-use super::estimate::Estimate;
-use super::quantiles::{degrees_of_freedom, student};
 use statrs::distribution::{ContinuousCDF as _, StudentsT};
+
+use super::estimate::{Estimate, degrees_of_freedom, student};
 
 /// Minimum number of clusters for an interval (chosen): with fewer, the variance estimate is too poor.
 const MIN_CLUSTERS: usize = 8;

@@ -6,14 +6,10 @@
 //! - [`bootstrap`]: resamples of clusters; [`threshold`]: the exposure drop at which half of the accuracy above chance
 //!   is lost.
 //! - [`auc`]: how well a number predicts right replies.
-//! - [`quantiles`], [`residuals`], [`trapezoid`], [`split_mix`]: helpers of these modules.
+//! - [`estimate`], [`estimate`], [`threshold`], [`bootstrap`]: helpers of these modules.
 
 pub mod auc;
 pub mod bootstrap;
 pub mod estimate;
-pub(crate) mod quantiles;
-pub(crate) mod residuals;
 pub mod significance;
-pub(crate) mod split_mix;
 pub mod threshold;
-pub(crate) mod trapezoid;

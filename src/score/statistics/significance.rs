@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use super::split_mix::SplitMix;
+use super::bootstrap::SplitMix;
 
 /// Significance level of the tests (conventional).
 pub const ALPHA: f64 = 0.05;
@@ -132,10 +132,13 @@ impl fmt::Display for SwapMethod {
 
 /// Maximum size of the table of exact probabilities (clusters × possible sums): 0.3 s on one core (chosen).
 const MAX_CELLS: u64 = 1 << 28;
+
 /// Number of random swaps if the table would be larger (chosen): p = 0.05 is then known to ± 0.0014.
 const SWAPS: usize = 100_000;
+
 /// Minimum effective number of clusters for the normal approximation (chosen; see [`normal_swaps`]).
 const MIN_EFFECTIVE_CLUSTERS: f64 = 1000.0;
+
 /// Seed of the random swaps (chosen). It is fixed, so that the same records give the same p-value.
 const SEED: u64 = 0x7377_6170;
 
@@ -237,7 +240,7 @@ pub fn mcnemar(gained: usize, lost: usize) -> f64 {
 /// McNemar's exact test. Unlike McNemar's test, it keeps its size if the pairs of a cluster are correlated (the
 /// permutation form of Durkalski et al. 2003, Stat. Med. 22:2417).
 #[must_use]
-pub fn sign_flip(differences: &[i64]) -> f64 {
+fn sign_flip(differences: &[i64]) -> f64 {
     let reduced = reduce(differences);
     let total = reduced.iter().sum::<i64>().unsigned_abs() as usize;
     let mut sizes: Vec<usize> = reduced.iter().map(|d| d.unsigned_abs() as usize).collect();

@@ -1,15 +1,19 @@
 //! Threshold and area of one accuracy curve, from counts by level and cluster: [`LevelCounts`], [`CurveSummary`].
+//!
+//! Weights of the trapezoid rule for the mean height of a curve: [`weights`].
 
 use super::bootstrap::Resamples;
 use super::estimate::{ClusterCount, Estimate, fill_missing};
-use super::trapezoid::weights;
+use super::significance::gcd;
 use darkqa_base::types::AxisLevel;
 
 /// Minimum number of replies of a level for a threshold (chosen).
 const MIN_REPLIES: usize = 30;
+
 /// Minimum number of clusters of a level for a threshold (chosen): the intervals of 5 held at least 94 % in each
 /// simulated cell.
 const MIN_CLUSTERS: usize = 5;
+
 /// Minimum number of replies of a level as a share of those at L0 (chosen).
 const MIN_SHARE: f64 = 0.1;
 
@@ -363,6 +367,17 @@ fn non_increasing(values: &[f64], weights: &[f64]) -> Vec<f64> {
     blocks.into_iter().flat_map(|(value, _, length)| std::iter::repeat_n(value, length)).collect()
 }
 
+/// Weights of the levels in the trapezoid rule, as integers without a common divisor, so that sums are exact.
+#[must_use]
+pub(crate) fn weights(levels: &[AxisLevel]) -> Vec<u64> {
+    let drops: Vec<u64> = levels.iter().map(|level| (100.0 * level.value()).round() as u64).collect();
+    let last = drops.len().saturating_sub(1);
+    let widths: Vec<u64> =
+        (0..drops.len()).map(|index| drops[(index + 1).min(last)] - drops[index.saturating_sub(1)]).collect();
+    let divisor = widths.iter().copied().fold(0, gcd).max(1);
+    widths.into_iter().map(|width| width / divisor).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -478,5 +493,18 @@ mod tests {
         for (fitted, expected) in fitted.iter().zip([0.8, 0.8, 0.3, 0.3]) {
             assert!((fitted - expected).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn weights_follow_the_trapezoid_rule() {
+        let paper = Severity::LADDER.map(|severity| AxisLevel::new(Kind::Sensor, severity));
+        let paper = [&[AxisLevel::L0][..], &paper].concat();
+        assert_eq!(weights(&paper), [4, 8, 8, 7, 6, 3]);
+        let odd = [
+            AxisLevel::L0,
+            AxisLevel::new(Kind::Sensor, Severity::from_hundredths(330)),
+            AxisLevel::new(Kind::Sensor, Severity::L5),
+        ];
+        assert_eq!(weights(&odd), [11, 30, 19]);
     }
 }

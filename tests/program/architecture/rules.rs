@@ -4,14 +4,14 @@ use super::files::Files;
 use super::map::Map;
 use super::source::{Kind, Part, Source};
 
-/// The files that have too many lines.
+/// The files that have too many lines of code.
 pub(crate) fn long_files(files: &Files, most: usize) -> Vec<String> {
     files
         .iter()
-        .filter(|source| source.lines > most)
+        .filter(|source| source.code_lines > most)
         .map(|source| {
-            let rule = format!("{} lines, and a file may have {most}", source.lines);
-            at(source, source.lines, &rule)
+            let rule = format!("{} lines of code, and a file may have {most}", source.code_lines);
+            at(source, 1, &rule)
         })
         .collect()
 }
@@ -103,7 +103,7 @@ pub(crate) fn library(files: &Files, name: &str, places: &[&str]) -> Vec<String>
 /// places that do neither, or are folders, in which nothing would be checked. Tests are free.
 pub(crate) fn listings(files: &Files, readers: &[&str], places: &[&str]) -> Vec<String> {
     const WAYS: [[&str; 2]; 6] = [
-        ["reading", "entries"],
+        ["files", "entries"],
         ["fs", "read"],
         ["fs", "read_dir"],
         ["fs", "read_to_string"],

@@ -1,5 +1,8 @@
 //! One file of Rust, and what stands in it.
 
+use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
+
 use proc_macro2::{Delimiter, Ident, Spacing, Span, TokenStream, TokenTree};
 use syn::ext::IdentExt as _;
 use syn::punctuated::Punctuated;
@@ -12,8 +15,8 @@ pub(crate) struct Source {
     pub(crate) path: String,
     /// Its place as a module, from the crate's root.
     pub(crate) module: Vec<String>,
-    /// The number of its lines.
-    pub(crate) lines: usize,
+    /// The number of its lines of code: those with more than comments, outside of modules for tests.
+    pub(crate) code_lines: usize,
     /// Its parts, in their order.
     pub(crate) parts: Vec<Part>,
     /// Whether it is for tests alone.
@@ -59,8 +62,10 @@ impl Source {
         let module = module.strip_suffix("/mod").unwrap_or(module);
         let module: Vec<String> = module.split('/').filter(|name| *name != "lib").map(str::to_owned).collect();
         let mut reader = Reader { scope: module.clone(), parts: Vec::new(), in_test: false, in_attribute: false };
-        reader.visit_file(&syn::parse_file(text)?);
-        Ok(Self { path: path.to_owned(), module, lines: text.lines().count(), parts: reader.parts, is_test: false })
+        let file = syn::parse_file(text)?;
+        reader.visit_file(&file);
+        let code_lines = code_lines(&file, text.parse()?);
+        Ok(Self { path: path.to_owned(), module, code_lines, parts: reader.parts, is_test: false })
     }
 
     /// The path behind a name that a `use` at the top of the file brings in.
@@ -242,6 +247,58 @@ impl<'a> Visit<'a> for Reader {
         self.add(Kind::Function, std::slice::from_ref(&node.ident));
         visit::visit_signature(self, node);
     }
+}
+
+/// The number of lines with code, outside of modules for tests.
+fn code_lines(file: &syn::File, tokens: TokenStream) -> usize {
+    let mut lines = BTreeSet::new();
+    add_lines(tokens, &mut lines);
+    for item in &file.items {
+        if let syn::Item::Mod(module) = item
+            && let Some((braces, _)) = &module.content
+            && let Some(first) = module.attrs.iter().find(|attribute| is_for_tests(attribute))
+        {
+            let module = first.pound_token.span.start().line..=braces.span.close().end().line;
+            lines.retain(|line| !module.contains(line));
+        }
+    }
+    lines.len()
+}
+
+/// Adds the lines of all tokens but those of documentation.
+fn add_lines(tokens: TokenStream, lines: &mut BTreeSet<usize>) {
+    let mut tokens = tokens.into_iter().peekable();
+    while let Some(token) = tokens.next() {
+        if matches!(&token, TokenTree::Punct(sign) if sign.as_char() == '#') {
+            let is_sign = |token: &TokenTree| matches!(token, TokenTree::Punct(sign) if sign.as_char() == '!');
+            let inner = tokens.next_if(is_sign);
+            if tokens.next_if(is_documentation).is_some() {
+                continue;
+            }
+            lines.extend(inner.iter().flat_map(|sign| lines_of(sign.span())));
+        }
+        match token {
+            TokenTree::Group(group) => {
+                lines.extend([group.span_open(), group.span_close()].into_iter().flat_map(lines_of));
+                add_lines(group.stream(), lines);
+            }
+            token => lines.extend(lines_of(token.span())),
+        }
+    }
+}
+
+/// Whether a token is the `[doc = …]` that a comment of documentation stands for.
+fn is_documentation(token: &TokenTree) -> bool {
+    match token {
+        TokenTree::Group(group) => {
+            matches!(group.stream().into_iter().next(), Some(TokenTree::Ident(name)) if name == "doc")
+        }
+        _ => false,
+    }
+}
+
+fn lines_of(span: Span) -> RangeInclusive<usize> {
+    span.start().line..=span.end().line
 }
 
 /// The paths of a `use`, each with the name that it brings in; each begins with the names `before`.

@@ -8,7 +8,7 @@ use crate::support::run::{Called, PROGRAM, called};
 use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use darkqa_base::types::{DepthKind, Frame, FrameId};
-use darkqa_eval::internals::dataset::Dataset;
+use darkqa_eval::internals::dataset::{Dataset, open_frames};
 use image::{GrayImage, ImageBuffer, Luma, Rgb, RgbImage, Rgba, RgbaImage};
 use serde_json::Value;
 use tempfile::TempDir;
@@ -84,7 +84,7 @@ impl Scene {
     /// Imports, and reads what came of it.
     fn import(&self, kind: &str, flags: &[&str]) -> Dataset {
         self.run(kind, flags).ended(0);
-        Dataset::from_frames(&self.out(), &[]).unwrap()
+        open_frames(&self.out(), &[]).unwrap()
     }
 
     /// Imports in vain, and returns what is said.
@@ -150,7 +150,7 @@ fn habitat_renders_of_hm3d() {
     typical depth: 2.00 m
     without a class of mpcat40, taken as misc: "bed, made" 1
     "#);
-    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
+    let set = open_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|id| id.0.as_str()).collect();
     assert_eq!(names, ["00800-x/000", "00800-x/003"]);
     let frame = frame(&set, "00800-x/003");
@@ -259,7 +259,7 @@ fn render_of_eight_bits_is_skipped() {
     ERROR 00800-x/001: [TMP]/src/00800-x/semantic/001.png: a grey PNG of 8 bits; 16-bit grey expected, whose
         samples are the values themselves
     ");
-    assert_eq!(Dataset::from_frames(&scene.out(), &[]).unwrap().frames().count(), 4);
+    assert_eq!(open_frames(&scene.out(), &[]).unwrap().frames().count(), 4);
 }
 
 #[test]
@@ -271,7 +271,7 @@ fn existing_frames_need_force() {
         both
     ");
     scene.run("habitat", &["--force", "--count", "2"]).ended(0);
-    assert_eq!(Dataset::from_frames(&scene.out(), &[]).unwrap().frames().count(), 2);
+    assert_eq!(open_frames(&scene.out(), &[]).unwrap().frames().count(), 2);
 }
 
 #[test]
@@ -450,7 +450,7 @@ fn folders_of_images_and_maps() {
             .arg(&again),
     )
     .ended(0);
-    let twice = frame(&Dataset::from_frames(&again, &[]).unwrap(), "home/a");
+    let twice = frame(&open_frames(&again, &[]).unwrap(), "home/a");
     assert_eq!((twice.depth, twice.semantic, twice.segments), (found.depth, found.semantic, found.segments));
     assert_eq!(twice.rgb, found.rgb);
 }
@@ -517,7 +517,7 @@ fn array_class_maps_are_read() {
     typical depth: 2.00 m
     not read: 3 normals/*.exr, home/notes
     ");
-    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
+    let set = open_frames(&scene.out(), &[]).unwrap();
     let found = frame(&set, "home/0");
     assert_eq!(sides(found.semantic.as_ref()), (4, 0));
     assert_eq!(sides(found.depth.as_ref()), (2_000, 4_000));
@@ -555,7 +555,7 @@ fn hypersim_maps_in_hdf5_are_read() {
     typical depth: 2.00 m
     not read: 2 scene_cam_01_geometry_hdf5/*.hdf5, image.png
     ");
-    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
+    let set = open_frames(&scene.out(), &[]).unwrap();
     let found = frame(&set, "ai_001_002/cam_01-0003");
     assert_eq!(found.depth_kind, DepthKind::Euclid);
     assert_eq!(sides(found.depth.as_ref()), (2_000, 4_000));
@@ -633,7 +633,7 @@ fn folders_join_with_distinct_scenes() {
         called(&mut command).ended(0)
     };
     import("nyu40");
-    let set = Dataset::from_frames(&scene.out(), &[]).unwrap();
+    let set = open_frames(&scene.out(), &[]).unwrap();
     let names: Vec<&str> = set.frames().map(|frame| frame.0.as_str()).collect();
     assert_eq!(names, ["1-home/0", "2-home/0", "only-one/0", "only-two/0"]);
     assert_eq!(sides(frame(&set, "1-home/0").semantic.as_ref()), (4, 9));

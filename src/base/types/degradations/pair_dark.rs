@@ -1,5 +1,11 @@
 //! The darkness of a pair, a frame and a photograph of its scene in the dark: [`PairDark`], and the photograph's name:
 //! [`PhotoName`].
+//!
+//! The darkness of a frame's photograph: [`PairFacts`].
+//!
+//! Camera settings of a simulated exposure: [`ExposureFacts`].
+//!
+//! The light in which the photographs of a set were taken: [`SetLight`].
 
 use std::fmt;
 use std::str::FromStr;
@@ -191,6 +197,121 @@ fn match_error(text: &str, problem: &str) -> Error {
     Error::usage("condition", format!("{text:?}: {problem}"))
 }
 
+/// How much darker a photograph is than its frame, in EV, for records. All numbers are finite.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PairFacts {
+    /// Drop in EV computed from the exposure times and gains in the data; `None` if the data do not state them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stated: Option<f64>,
+    /// Measured drop in EV: log₂ of the ratio of the mean linear luminances; `None` if one of the images is black.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mean: Option<f64>,
+    /// Median over the pixels of log₂ of the luminance ratio, in EV; `None` if too many pixels are black.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub median: Option<f64>,
+    /// The drop in EV with which synthesis makes the frame as dark as the photograph. It differs from `mean`, because
+    /// synthesis computes light as codes to the power of 2.2.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub synthesis: Option<f64>,
+}
+
+impl PairFacts {
+    /// The largest drop in EV that can be measured. Above it, noise clipped at black hides a part of the drop: on a dim
+    /// frame with a noise deviation of 0.002 in linear light, 6 EV are measured as 5.9, 7.5 EV as 6.8 and 9 EV as 7.3.
+    pub const MEASURABLE: f64 = 6.0;
+
+    /// The stated drop in EV, otherwise the measured one; `None` if neither is known.
+    #[must_use]
+    pub fn ev(&self) -> Option<f64> {
+        self.stated.or(self.mean)
+    }
+
+    /// The drop in EV with which synthesis matches the photograph: the stated one, otherwise `synthesis`.
+    #[must_use]
+    pub fn matching(&self) -> Option<f64> {
+        self.stated.or(self.synthesis)
+    }
+
+    /// True if the drop is measured and the real one may be larger.
+    #[must_use]
+    pub fn is_lower_bound(&self) -> bool {
+        self.stated.is_none() && self.mean.is_some_and(|ev| ev > Self::MEASURABLE)
+    }
+}
+
+// No number is NaN.
+impl Eq for PairFacts {}
+
+/// Camera settings of a simulated exposure, for records and sidecars. All numbers are finite.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ExposureFacts {
+    /// Longer exposure time, in EV; `None` without automatic exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shutter: Option<f64>,
+    /// Gain, in EV; `None` without automatic exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gain: Option<f64>,
+    /// Remaining darkness that the exposure did not compensate, in EV; `None` without automatic exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub dark: Option<f64>,
+    /// Exposure time, in milliseconds.
+    pub time_ms: f64,
+    /// System gain K, in ADU per electron; `None` without automatic exposure.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub system_gain: Option<f64>,
+    /// Length of the motion blur, in pixels of the frame; `None` for several frames in which it differs.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blur_px: Option<f64>,
+    /// Direction of the motion blur in degrees: 0 is along a row, 90 down a column; `None` as for the length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blur_angle: Option<f64>,
+}
+
+impl ExposureFacts {
+    /// The settings of a walk: blur length and angle only if they are equal in all frames, the others from the first
+    /// frame. `None` if a frame has no settings.
+    #[must_use]
+    pub fn shared(mut all: impl Iterator<Item = Option<Self>>) -> Option<Self> {
+        let first = all.next()??;
+        all.try_fold(first, |shared, other| {
+            let other = other?;
+            Some(Self {
+                blur_px: shared.blur_px.filter(|px| other.blur_px == Some(*px)),
+                blur_angle: shared.blur_angle.filter(|angle| other.blur_angle == Some(*angle)),
+                ..shared
+            })
+        })
+    }
+}
+
+// No number is NaN.
+impl Eq for ExposureFacts {}
+
+/// The light in which the photographs of a set were taken.
+#[cfg_attr(feature = "program", derive(clap::ValueEnum))]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SetLight {
+    /// Well lit: L0 is the frame in the light
+    #[default]
+    Lit,
+    /// In the dark: L0 is the photograph as it was taken, and nothing is darker by default
+    Dark,
+}
+
+impl SetLight {
+    /// The label of L0 in tables and figures: `L0`, or `as photographed`.
+    #[must_use]
+    pub fn l0_label(self) -> &'static str {
+        match self {
+            Self::Lit => "L0",
+            Self::Dark => "as photographed",
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -218,5 +339,29 @@ mod tests {
         for text in ["match-", "match-motion", "match-ev@eld", "match-noise@paper", "match"] {
             assert!(text.parse::<PairDark>().is_err(), "{text}");
         }
+    }
+
+    #[test]
+    fn frames_share_equal_settings() {
+        let [first, second] = [10.0, 20.0].map(|blur_angle| {
+            Some(ExposureFacts {
+                shutter: Some(2.0),
+                gain: None,
+                dark: None,
+                time_ms: 8.33,
+                system_gain: None,
+                blur_px: Some(2.0),
+                blur_angle: Some(blur_angle),
+            })
+        });
+        let one = ExposureFacts::shared([first, second].into_iter()).unwrap();
+        assert_eq!((one.blur_px, one.blur_angle), (Some(2.0), None));
+        assert_eq!(one.shutter, Some(2.0));
+        assert_eq!(ExposureFacts::shared([first].into_iter()), first);
+        assert_eq!(ExposureFacts::shared([first, None].into_iter()), None);
+        assert_eq!(ExposureFacts::shared([].into_iter()), None);
+        let text = serde_json::to_string(&one).unwrap();
+        assert_eq!(text, r#"{"shutter":2.0,"time_ms":8.33,"blur_px":2.0}"#);
+        assert_eq!(serde_json::from_str::<ExposureFacts>(&text).unwrap(), one);
     }
 }

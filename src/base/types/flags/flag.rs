@@ -1,14 +1,31 @@
 //! Parsers for flags whose values are numbers or words, and the macro `flag_words`.
 //!
 //! Errors name the expected value; the command line adds the name of the flag.
+//!
+//! [`Decides`]: which part of a run a flag decides.
 
 use std::fmt;
 use std::num::NonZeroUsize;
 use std::time::Duration;
 
-use clap::ValueEnum;
+use clap::builder::ArgExt;
+use clap::{Arg, ValueEnum};
 
 use crate::error::{self, Error};
+
+/// Implements `Display` for enums: the word of the value on the command line.
+#[macro_export]
+macro_rules! flag_words {
+    ($($type:ty),+ $(,)?) => {
+        $(impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                $crate::types::flags::write_word(self, f)
+            }
+        })+
+    };
+}
+
+pub use flag_words;
 
 /// The maximum of `--threads`; chosen: more than any machine needs, and few enough not to exhaust one.
 const MAX_THREADS: usize = 1024;
@@ -69,18 +86,40 @@ pub fn read_word<T: ValueEnum>(word: &str) -> error::Result<T> {
     })
 }
 
-/// Implements `Display` for enums: the word of the value on the command line.
-#[macro_export]
-macro_rules! flag_words {
-    ($($type:ty),+ $(,)?) => {
-        $(impl std::fmt::Display for $type {
-            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-                $crate::types::flags::write_word(self, f)
-            }
-        })+
-    };
+/// The part of a run that a flag decides. Each flag states its class in its definition: `#[arg(long, add =
+/// Decides::Pixels)]`. The help, the manual and the list of all flags show the class. `tests/program/runs/identity.rs`
+/// checks it: a flag that decides something changes the keys of trials, the columns or the identity of a run; a flag
+/// that decides nothing changes none of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Decides {
+    /// The set of trials: questions, models, conditions.
+    Trials,
+    /// The request to a model besides the pixels, and the model that answers.
+    Reply,
+    /// The pixels of images and maps.
+    Pixels,
+    /// None of these: speed, cost, keys, and the place of the output.
+    Nothing,
 }
-pub use flag_words;
+
+impl ArgExt for Decides {}
+
+impl Decides {
+    /// The class of a flag; `None` for flags that clap adds.
+    pub fn from_arg(arg: &Arg) -> Option<Self> {
+        arg.get::<Self>().copied()
+    }
+
+    /// The word for the class in help and lists.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Trials => "trials",
+            Self::Reply => "reply",
+            Self::Pixels => "pixels",
+            Self::Nothing => "nothing",
+        }
+    }
+}
 
 #[cfg(test)]
 mod tests {

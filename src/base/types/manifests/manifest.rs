@@ -1,14 +1,19 @@
 //! [`RunManifest`]: the content of a run's `manifest.json`.
+//!
+//! [`RecordedNames`]: model names in a run's records that differ from those of its tables.
+//!
+//! [`StoredViews`]: the inputs that each model of a stored run was shown, from its manifest.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use super::enhancer_note::EnhancerNote;
 use super::input_note::InputSummary;
 use super::model_listing::ListedModel;
+use crate::types::View;
 
 /// The progress of a run, and how it ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -229,4 +234,204 @@ pub struct RunManifest {
     pub reply_reading: Option<String>,
     /// The trial counts.
     pub counts: Counts,
+}
+
+/// The key of the names in a manifest's settings.
+const RENAMED: &str = "renamed models";
+
+/// A map from model names in records to names in tables, for the names that differ.
+///
+/// Records are never changed. A name in records always refers to one model with one set of settings that decide its
+/// replies. If a model is renamed, or another model takes its name, it keeps its records.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct RecordedNames(BTreeMap<String, String>);
+
+impl RecordedNames {
+    /// Reads the names from a manifest.
+    pub fn from_manifest(manifest: &RunManifest) -> Self {
+        let names = manifest.settings.get(RENAMED).and_then(|names| serde_json::from_value(names.clone()).ok());
+        Self(names.unwrap_or_default())
+    }
+
+    /// Writes the names to a manifest.
+    pub fn write_to(&self, manifest: &mut RunManifest) {
+        if self.0.is_empty() {
+            manifest.settings.remove(RENAMED);
+        } else {
+            manifest.settings.insert(RENAMED.to_owned(), json!(self.0));
+        }
+    }
+
+    /// The name in tables of a name in records.
+    pub fn table_name<'n>(&'n self, recorded: &'n str) -> &'n str {
+        self.0.get(recorded).map_or(recorded, String::as_str)
+    }
+
+    /// The name in records of a name in tables: the same, unless records use it for another model.
+    pub fn record_name<'n>(&'n self, name: &'n str) -> &'n str {
+        if self.table_name(name) == name {
+            return name;
+        }
+        self.other_record_name(name).unwrap_or(name)
+    }
+
+    /// Renames models in tables, from old name to new name, all at once.
+    pub fn rename(&mut self, moves: &BTreeMap<String, String>) {
+        for name in moves.keys() {
+            self.0.entry(name.clone()).or_insert_with(|| name.clone());
+        }
+        for name in self.0.values_mut() {
+            if let Some(new) = moves.get(name) {
+                name.clone_from(new);
+            }
+        }
+        self.0.retain(|recorded, name| recorded != name);
+    }
+
+    /// Makes sure that a name in tables has a name in records: `spare` if records use the same name for another model.
+    pub fn ensure(&mut self, name: &str, spare: impl FnOnce() -> String) {
+        if self.table_name(name) != name && self.other_record_name(name).is_none() {
+            self.0.insert(spare(), name.to_owned());
+        }
+    }
+
+    /// A different name in records that is shown under this name in tables.
+    fn other_record_name(&self, name: &str) -> Option<&str> {
+        self.0.iter().find(|(_, shown)| *shown == name).map(|(recorded, _)| recorded.as_str())
+    }
+}
+
+/// The key in a manifest's settings for the views of models that are asked without images.
+const VIEWS: &str = "views of models";
+
+/// Inputs shown to each model, by its name in tables.
+pub type Views = BTreeMap<String, BTreeSet<View>>;
+
+/// How the inputs of a stored model compare with those of a model in the command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Fit {
+    /// No view in common: one is shown images alone, the other none.
+    Disjoint,
+    /// The manifest does not record the views.
+    Unknown,
+    /// One is asked with and without images, the other in one of these ways.
+    Overlapping,
+    /// The same views.
+    Equal,
+}
+
+/// The inputs that the models of a stored run were shown, as far as its manifest records them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StoredViews {
+    known: Views,
+    /// True if the views of all models are known: a model that is not in `known` was shown images alone.
+    is_complete: bool,
+}
+
+/// A model in the settings of an older manifest.
+#[derive(Deserialize)]
+struct ManifestModel {
+    name: String,
+    view: BTreeSet<View>,
+}
+
+impl StoredViews {
+    /// Reads the views that a manifest records.
+    pub fn from_manifest(manifest: &RunManifest) -> Self {
+        if let Some(known) =
+            manifest.settings.get(VIEWS).and_then(|value| serde_json::from_value::<Views>(value.clone()).ok())
+        {
+            return Self { known, is_complete: true };
+        }
+        // Older manifests contain only the models in the models file of the last command.
+        let known = manifest
+            .settings
+            .get("models")
+            .and_then(|models| serde_json::from_value::<Vec<ManifestModel>>(models.clone()).ok())
+            .into_iter()
+            .flatten()
+            .map(|model| (model.name, model.view))
+            .collect();
+        Self { known, is_complete: false }
+    }
+
+    /// True if the manifest records the views of all models.
+    pub fn is_complete(&self) -> bool {
+        self.is_complete
+    }
+
+    /// Compares the stored views of a model with those of a model in the command.
+    pub fn compare(&self, stored: &str, now: &BTreeSet<View>) -> Fit {
+        match self.views(stored) {
+            None => Fit::Unknown,
+            Some(views) if views == *now => Fit::Equal,
+            Some(views) if views.is_disjoint(now) => Fit::Disjoint,
+            Some(_) => Fit::Overlapping,
+        }
+    }
+
+    /// Writes the views to a manifest: those of the stored models, each under its new name, and those of the command's
+    /// models.
+    pub fn write_to<'a>(
+        &self,
+        manifest: &mut RunManifest,
+        stored: impl Iterator<Item = (&'a String, String)>,
+        now: &Views,
+    ) {
+        let mut views = Views::new();
+        for (name, new) in stored {
+            views.entry(new).or_default().extend(self.views(name).into_iter().flatten());
+        }
+        for (name, shown) in now {
+            views.entry(name.clone()).or_default().extend(shown);
+        }
+        views.retain(|_, views| views.contains(&View::Blind));
+        if views.is_empty() {
+            manifest.settings.remove(VIEWS);
+        } else {
+            manifest.settings.insert(VIEWS.to_owned(), json!(views));
+        }
+    }
+
+    fn views(&self, name: &str) -> Option<BTreeSet<View>> {
+        self.known.get(name).cloned().or_else(|| self.is_complete.then(|| BTreeSet::from([View::Image])))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn moved(names: &mut RecordedNames, moves: &[(&str, &str)]) {
+        let moves = moves.iter().map(|(old, new)| ((*old).to_owned(), (*new).to_owned()));
+        names.rename(&moves.collect());
+    }
+
+    #[test]
+    fn record_names_keep_their_model_after_renaming() {
+        let mut names = RecordedNames::default();
+        moved(&mut names, &[("m", "m (before)")]);
+        names.ensure("m", || "m [1]".to_owned());
+        assert_eq!((names.table_name("m"), names.record_name("m")), ("m (before)", "m [1]"));
+        assert_eq!(names.table_name("m [1]"), "m");
+        // Rename back and forth again.
+        moved(&mut names, &[("m (before)", "m"), ("m", "m (before)")]);
+        assert_eq!((names.table_name("m"), names.record_name("m")), ("m", "m"));
+        assert_eq!(names.table_name("m [1]"), "m (before)");
+        assert_eq!(names.record_name("m (before)"), "m [1]");
+        moved(&mut names, &[("m (before)", "m"), ("m", "m (before)")]);
+        names.ensure("m", || unreachable!());
+        assert_eq!((names.table_name("m"), names.record_name("m")), ("m (before)", "m [1]"));
+    }
+
+    #[test]
+    fn renaming_applies_to_earlier_records() {
+        let mut names = RecordedNames::default();
+        moved(&mut names, &[("a", "b")]);
+        moved(&mut names, &[("b", "c")]);
+        assert_eq!((names.table_name("a"), names.table_name("b"), names.table_name("c")), ("c", "c", "c"));
+        assert_eq!(names.record_name("c"), "c");
+        moved(&mut names, &[("c", "a")]);
+        assert_eq!((names.table_name("a"), names.table_name("b")), ("a", "a"));
+    }
 }

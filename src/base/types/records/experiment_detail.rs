@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use super::detail::{ChoiceLine, OpenLine};
+use super::record::{ChoiceLine, OpenLine};
 use super::trials::{AskedParts, ChoiceFacts, ChoiceTables, SentImages};
 use crate::types::{ChoiceDetail, Digest, Family, OpenDetail, Record, StoredDetail};
 

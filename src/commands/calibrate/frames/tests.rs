@@ -89,3 +89,35 @@ fn frames_of_another_camera_are_refused() {
     assert!(error.contains("other.tif: taken by B 2, but"), "{error}");
     assert!(error.contains("first.tif by A 1"), "{error}");
 }
+
+#[test]
+fn patterns_name_their_first_four_sites() {
+    for (cfa, planes) in [
+        (Cfa::Rggb, [0, 1, 2, 3]),
+        (Cfa::Bggr, [3, 2, 1, 0]),
+        (Cfa::Grbg, [1, 0, 3, 2]),
+        (Cfa::Gbrg, [2, 3, 0, 1]),
+        (Cfa::Mono, [0; 4]),
+    ] {
+        let found = [[0, 0], [0, 1], [1, 0], [1, 1]];
+        let found = found.map(|[row, parity]| cfa.plane(row, parity));
+        assert_eq!(found, planes, "{cfa}");
+        // The colours by name: both greens are on a diagonal.
+        let letters: String = found.iter().map(|plane| &cfa.plane_names()[*plane][..1]).collect();
+        if cfa != Cfa::Mono {
+            assert_eq!(letters, cfa.to_string());
+        }
+    }
+}
+
+#[test]
+fn tiles_cover_a_plane() {
+    let layout = Layout { cfa: Cfa::Rggb, height: 514, width: 300 };
+    assert_eq!(layout.plane_size(), [257, 150]);
+    assert_eq!(layout.plane_rows(), 1028);
+    let covered: usize = (0..TILES).map(|tile| Layout::tile(150, tile).len()).sum();
+    assert_eq!(covered, 150);
+    assert_eq!([0, 513].map(|row| layout.tile_row(row)), [0, 7]);
+    // Row 64 of the plane is the last of the third tile: 2 · 257 / 8 = 64.25.
+    assert_eq!([127, 128].map(|row| layout.tile_row(row)), [1, 2]);
+}

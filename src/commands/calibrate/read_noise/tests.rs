@@ -1,6 +1,5 @@
 use super::*;
-use crate::commands::calibrate::hot_pixels::HotPixels;
-use crate::commands::calibrate::layout::{Cfa, Layout};
+use crate::commands::calibrate::frames::{Cfa, HotPixels, Layout};
 use crate::commands::calibrate::sums::{Centres, PlaneSums, STEPS};
 use darkqa_light::draws::tukey_lambda;
 
@@ -83,4 +82,22 @@ fn frames_without_noise_are_refused() {
     let none = Residuals::new(layout, &samples, &sums, &hot, Centres::RowsAndPlanes);
     let problem = ReadNoise::fit(&[none]).unwrap_err();
     assert!(problem.contains("without any noise"), "{problem}");
+}
+
+/// Rosenbrock's valley. Its minimum, 0, is at (1, 1).
+fn valley([x, y]: [f64; 2]) -> f64 {
+    (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2)
+}
+
+#[test]
+fn finds_the_minimum_outside_excluded_points() {
+    let start = Start { at: [-1.2, 1.0], step: [0.5, 0.5] };
+    let ([x, y], value) = minimize(start, &valley);
+    assert!((x - 1.0).abs() < 1e-5 && (y - 1.0).abs() < 1e-5, "{x}, {y}");
+    assert!(value < 1e-10);
+    // With x > 0.5 excluded, the search ends at the boundary.
+    let ([x, _], _) = minimize(start, &|at: [f64; 2]| {
+        if at[0] > 0.5 { f64::INFINITY } else { valley(at) }
+    });
+    assert!(x <= 0.5 && x > 0.49, "{x}");
 }

@@ -175,3 +175,35 @@ fn frames_can_be_listed() {
         assert!(error.contains("frames.csv") && error.contains(part), "{error}");
     }
 }
+
+#[test]
+fn numbers_are_compared_by_value() {
+    let sorted = [
+        "1.tif",
+        "2.tif",
+        "03.tif",
+        "10.tif",
+        "12.tif",
+        "a",
+        "a1",
+        "a1b",
+        "a1b2",
+        "a1b10",
+        "a007",
+        "a7",
+        "a8",
+        "b",
+        // Longer than any number of a type.
+        "b99999999999999999999999999999999999998",
+        "b99999999999999999999999999999999999999",
+        "é2",
+        "é10",
+    ];
+    let mut mixed = sorted;
+    mixed.reverse();
+    mixed.sort_by(|a, b| by_numbers(a, b));
+    assert_eq!(mixed, sorted);
+    // The control: the order of texts is another one.
+    mixed.sort_unstable();
+    assert_ne!(mixed, sorted);
+}

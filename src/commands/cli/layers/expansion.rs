@@ -1,11 +1,15 @@
 //! Replaces keyed flags by the hidden flags that their keys set: [`Expansion`].
+//!
+//! The value of a flag that was not typed: [`LayeredValue`].
+//!
+//! A value of TOML as a word of the command line: [`text_of`].
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 
 use clap::{Arg, ArgAction, Command};
+use toml::Value;
 
-use super::layered_value::LayeredValue;
 use crate::commands::cli::keyed::{name_of, with_value};
 use crate::error::{Error, Result};
 use crate::types::flags::{KEYED_FLAGS, KeyedFlag, KeyedSetting, flag_spelling};
@@ -156,5 +160,21 @@ impl Expansion<'_> {
             }
         }
         Ok(())
+    }
+}
+
+/// The value of one flag from the environment or a file.
+pub(super) struct LayeredValue {
+    /// The source of the value for messages: a variable, or a file and a key in it.
+    pub(super) origin: String,
+    pub(super) values: Vec<OsString>,
+}
+
+/// The text of a value; `None` if it is not a text, a number or a switch.
+pub(super) fn text_of(value: &Value) -> Option<OsString> {
+    match value {
+        Value::String(text) => Some(text.into()),
+        Value::Integer(_) | Value::Float(_) | Value::Boolean(_) => Some(value.to_string().into()),
+        _ => None,
     }
 }

@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::layered_value::LayeredValue;
+use super::expansion::LayeredValue;
 use crate::ask::{BaseUrl, OPENAI_KEY, vendor_variables};
 use crate::error::{Error, Result};
 use crate::types::flags::flag_spelling;

@@ -382,3 +382,32 @@ fn the_default_key_goes_to_no_address_that_only_a_file_names() {
         assert_eq!(parsed(&words, &set, file).err(), None, "{words:?} {file}");
     }
 }
+
+fn current(line: &str) -> String {
+    let words = line.split(' ').map(OsString::from).collect();
+    let words: Vec<String> = in_current_form(words, 1).iter().map(|word| word.to_string_lossy().into()).collect();
+    words.join(" ")
+}
+
+#[test]
+fn modes_become_subcommands() {
+    for (earlier, now) in [
+        ("d synthesize --check dir", "d synthesize check dir"),
+        ("d synthesize a --out b --from=c", "d synthesize from c a --out b"),
+        ("d synthesize a --from c --out b", "d synthesize from c a --out b"),
+        ("d enhance m --describe", "d enhance describe m"),
+        ("d enhance m a --doctor --write --out b", "d enhance doctor m a --write --out b"),
+        ("d import habitat --script", "d import script habitat"),
+    ] {
+        assert_eq!(current(earlier), now);
+    }
+}
+
+#[test]
+fn other_words_stay() {
+    for line in
+        ["d synthesize a --out b", "d enhance m -- --describe", "d enhance m a --out b --describe=1", "d check --check"]
+    {
+        assert_eq!(current(line), line);
+    }
+}

@@ -1,13 +1,14 @@
 //! `check`: checks everything that a run needs before any cost arises. Uses no network and no key.
 //!
 //! Cheap steps come first. A problem skips only the steps that depend on the broken part.
+//!
+//! Checks of the flags and of the files that they name: [`check_settings`].
+//!
+//! Checks of the questions: [`check_questions`].
 
-mod findings;
 mod images;
-mod questions;
-mod settings;
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
@@ -16,24 +17,27 @@ use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
 use super::estimate;
-use super::power::power_forecast;
 use super::settings::EvaluateArgs;
-use super::unnamed_scenes::unnamed_scenes;
+use super::setup::unnamed_scenes;
+use super::write_plan::power_forecast;
+use crate::ask::Prompts;
 use crate::data::{DataPlace, Dataset, Picture};
 use crate::engine::dark_already::DarkImages;
+use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
 use crate::engine::images::progress::Progress;
-use crate::engine::images::trials::questions::{QuestionBank, open_data, rules, select};
+use crate::engine::images::trials::{QuestionBank, check_used, open_data, rules, select};
 use crate::error::{Error, Result};
 use crate::files::write;
+use crate::report::text::words::first_names;
 use crate::runs::Outcome;
-use crate::types::Decides;
-use crate::types::Question;
-use crate::types::text::counted;
+use crate::types::questions::letter;
+use crate::types::text::{counted, excerpt};
+use crate::types::{Decides, Question, Rgb};
+use darkqa_enhance::{Install, RuntimeSearch};
 use darkqa_light::LightSettings;
+use darkqa_score::accuracies::MAX_ANSWER_SHARE;
 use darkqa_score::tested_sentences::RunContents;
-
-use findings::{Finding, Findings, Mark, lines};
-use images::Depth;
+use images::{Depth, Finding, Findings, Mark, lines};
 
 /// The flags of `check` besides those of the evaluation.
 #[derive(Debug, Clone, Args)]
@@ -60,7 +64,7 @@ pub(crate) fn check(mut args: EvaluateArgs, check: &CheckArgs, progress: &Progre
     let is_json = std::mem::take(&mut args.job.output.show.json);
     args.job.money.dry_run = true;
     let mut findings = Findings::default();
-    settings::check_settings(&args, &mut findings);
+    check_settings(&args, &mut findings);
     let asked = check_data(&args, check, progress, &mut findings)?;
     check_plan(args, progress, &mut findings);
     let problems = findings.problem_count();
@@ -122,7 +126,7 @@ fn check_data(args: &EvaluateArgs, check: &CheckArgs, progress: &Progress, findi
             return Ok(0);
         }
     };
-    questions::check_questions(&asked, findings);
+    check_questions(&asked, findings);
     if let Some(warning) = unnamed_scenes(&dataset, &asked) {
         findings.warn(warning);
     }
@@ -204,4 +208,170 @@ fn hex(bytes: &[u8]) -> String {
         let _ = write!(text, "{byte:02x}");
         text
     })
+}
+
+/// Checks the flags and the files that they name. No data is read.
+fn check_settings(args: &EvaluateArgs, findings: &mut Findings) {
+    let place = args.scene.place(args.data.place());
+    let set = args.scene.set_light(&place, &args.data.set.root.data_root);
+    let light = set.and_then(|set| Ok((set, LightSettings::resolve(&args.job.light, set)?)));
+    match &light {
+        Ok((set, light)) => {
+            let used = check_used(light, &args.job.enhancers.clone().for_set(*set));
+            add(findings, used.map(|()| None));
+        }
+        Err(e) => findings.problem(e.to_string()),
+    }
+    let rulebook = args.selection.rules.as_deref();
+    add(findings, rules(rulebook).map(|_| file_line("rules", rulebook)));
+    let folder = args.choice.prompts.as_deref();
+    let prompts = folder.map_or_else(Prompts::built_in, Prompts::load);
+    add(findings, prompts.map(|_| file_line("prompts", folder)));
+    if !args.job.models.is_empty() {
+        let models = args
+            .job
+            .check_models(&args.experiment())
+            .map(|names| Some(format!("models: {}; the keys that they need are there", names.join(", "))));
+        add(findings, models);
+    }
+    add(findings, try_enhancers(args));
+}
+
+/// The line about a usable file or folder; `None` if none was named.
+fn file_line(what: &str, path: Option<&Path>) -> Option<String> {
+    path.map(|path| format!("{what}: {}", path.display()))
+}
+
+/// Adds the line or the error of a step to the findings.
+fn add(findings: &mut Findings, result: Result<Option<String>>) {
+    match result {
+        Ok(Some(line)) => findings.ok(line),
+        Ok(None) => {}
+        Err(e) => findings.problem(e.to_string()),
+    }
+}
+
+/// Loads the enhancers and enhances one image with each. A missing runtime is not installed.
+fn try_enhancers(args: &EvaluateArgs) -> Result<Option<String>> {
+    let files = enhancers::read_models(&args.job.enhancers.llie)?;
+    if files.is_empty() {
+        return Ok(None);
+    }
+    let names: Vec<String> = files.iter().map(|file| file.name().to_string()).collect();
+    let search = RuntimeSearch { install: Install::Offline, ..args.job.loading.runtime.search() };
+    let version = search.open()?.version().to_owned();
+    let mut loading: EnhancerRunArgs = args.job.loading.clone();
+    loading.runtime.offline = true;
+    let mut enhancers = EnhancerModels::load(files, &loading)?.take()?;
+    // A gradient, because an image of a single value has no structure.
+    let samples = (0..64 * 64 * 3).map(|index| (index / 192) as u8);
+    let image = Rgb::new(64, 64, samples.collect())?;
+    for enhancer in &mut enhancers {
+        enhancer.enhance(&image)?;
+    }
+    Ok(Some(format!("enhancers: {}, each tried on an image of 64×64; ONNX Runtime {version}", names.join(", "))))
+}
+
+/// Maximum number of families listed.
+const MAX_FAMILIES: usize = 12;
+
+/// Reports families, numbers of choices and chance accuracy, and warns of questions that give their answers away.
+fn check_questions(questions: &[Question], findings: &mut Findings) {
+    let (mut families, mut sizes) = (BTreeMap::new(), BTreeMap::new());
+    let mut chance = 0.0;
+    for question in questions {
+        *families.entry(question.family.name()).or_insert(0_usize) += 1;
+        *sizes.entry(question.choices.len()).or_insert(0_usize) += 1;
+        chance += 1.0 / question.choices.len() as f64;
+    }
+    let sizes: Vec<String> = sizes.iter().map(|(size, count)| format!("{count} with {size} choices")).collect();
+    findings.ok(format!(
+        "{}, {}; chance {:.1} %",
+        counted(questions.len(), "question"),
+        sizes.join(", "),
+        100.0 * chance / questions.len().max(1) as f64
+    ));
+    let mut families: Vec<(&str, usize)> = families.into_iter().collect();
+    families.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let families: Vec<String> =
+        families.iter().map(|(family, count)| format!("{} {count}", excerpt(family, 30))).collect();
+    findings.ok(format!("families: {}", first_names(&families, MAX_FAMILIES)));
+    warn_of_common_answers(questions, findings);
+    warn_of_repeats(questions, findings);
+    warn_of_contained_answers(questions, findings);
+}
+
+/// Warns of an answer or letter that is true so often that a constant reply scores well.
+fn warn_of_common_answers(questions: &[Question], findings: &mut Findings) {
+    let letters: Vec<String> =
+        questions.iter().filter_map(|question| Some(letter(question.choices.truth()?).to_string())).collect();
+    let texts: Vec<String> = questions
+        .iter()
+        .filter_map(|question| {
+            let truth = question.choices.truth()?;
+            Some(question.choices.texts()[truth].to_lowercase())
+        })
+        .collect();
+    for (what, answers) in [("letter", letters), ("answer", texts)] {
+        let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+        for answer in &answers {
+            *counts.entry(answer).or_default() += 1;
+        }
+        let most = counts.iter().max_by_key(|(_, count)| **count);
+        let Some((answer, count)) = most else {
+            continue;
+        };
+        let share = *count as f64 / questions.len() as f64;
+        if share >= MAX_ANSWER_SHARE {
+            findings.warn(format!(
+                "always the {what} {:?} scores {:.0} %; ask the model without images too (--blind-model NAME), or show the choices in other orders (--choice-order shuffle)",
+                excerpt(answer, 60),
+                100.0 * share
+            ));
+        }
+    }
+}
+
+/// Warns of questions that occur twice.
+fn warn_of_repeats(questions: &[Question], findings: &mut Findings) {
+    let mut seen = HashMap::new();
+    for question in questions {
+        let content = (&question.frame, &question.text, question.choices.texts());
+        if let Some(first) = seen.insert(content, &question.id) {
+            let text =
+                format!("the questions {:?} and {:?} are the same", excerpt(&first.0, 60), excerpt(&question.id.0, 60));
+            findings.add_of_kind("questions that occur twice", Mark::Warning, text);
+        }
+    }
+}
+
+/// Warns of questions whose text contains the true choice and no other.
+fn warn_of_contained_answers(questions: &[Question], findings: &mut Findings) {
+    for question in questions {
+        let text = format!(" {} ", words(&question.text));
+        let texts = question.choices.texts();
+        let Some(truth) = question.choices.truth().map(|truth| &texts[truth]) else {
+            continue;
+        };
+        let is_other_contained = texts.iter().any(|choice| choice != truth && contains_words(&text, choice));
+        if words(truth).len() > 2 && contains_words(&text, truth) && !is_other_contained {
+            let line = format!(
+                "the question {:?} holds its answer {:?}: {:?}",
+                excerpt(&question.id.0, 60),
+                excerpt(truth, 60),
+                excerpt(&question.text, 120)
+            );
+            findings.add_of_kind("questions that hold their answers", Mark::Warning, line);
+        }
+    }
+}
+
+fn contains_words(text: &str, choice: &str) -> bool {
+    text.contains(&format!(" {} ", words(choice)))
+}
+
+/// The words of a text in lower case, separated by single spaces.
+fn words(text: &str) -> String {
+    let lower = text.to_lowercase();
+    lower.split(|c: char| !c.is_alphanumeric()).filter(|word| !word.is_empty()).collect::<Vec<&str>>().join(" ")
 }

@@ -3,11 +3,12 @@
 //! Camera drivers have no common message for exposure. Two kinds of ROS messages are therefore read: flat messages that
 //! begin with a header and have a field with “exposure” or “gain” in its name, and messages with JSON in a field
 //! `json_data`, as of RealSense cameras.
+//!
+//! Supported serializations of messages: [`Encoding`].
 
 use serde_json::{Map, Value, json};
 
 use super::Nanoseconds;
-use super::encoding::Encoding;
 use super::fields::FieldReader;
 
 /// Maximum length of a definition that is searched, in bytes (chosen).
@@ -150,6 +151,28 @@ impl Primitive {
             Self::Float(_) => json!(reader.f64()?),
             Self::Text => json!(reader.text()?),
         })
+    }
+}
+
+/// Serialization of messages.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Encoding {
+    Cdr,
+    Ros1,
+    Protobuf,
+    Json,
+}
+
+impl Encoding {
+    /// Serialization with this name in a channel; `None` if it is not supported.
+    pub(super) fn from_name(name: &str) -> Option<Self> {
+        match name {
+            "cdr" => Some(Self::Cdr),
+            "ros1" => Some(Self::Ros1),
+            "protobuf" => Some(Self::Protobuf),
+            "json" => Some(Self::Json),
+            _ => None,
+        }
     }
 }
 

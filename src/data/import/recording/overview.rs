@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::io::{Read, Seek};
 
 use super::channel::ChannelContent;
-use super::encoding::Encoding;
+use super::exposure::Encoding;
 use super::image_message::{ImageMessage, MessageImage, has_unread_kind};
 use super::mcap::{Event, MAX_MESSAGE_BYTES, McapReader, Message};
 use super::{Nanoseconds, seconds};

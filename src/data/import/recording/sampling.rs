@@ -1,14 +1,16 @@
 //! Choice of frames from a recording or video: [`SamplingArgs`] and [`Sampler`].
+//!
+//! Division of a drive into stretches of equal duration, one scene each: [`Stretches`].
+//!
+//! Small grey copy of a frame, to compare frames: [`Thumbnail`].
 
 use std::num::NonZeroUsize;
 
 use clap::Args;
 
-use super::stretches::Place;
-use super::thumbnail::Thumbnail;
 use super::{Nanoseconds, seconds};
-use crate::types::Decides;
 use crate::types::flags::positive;
+use crate::types::{Decides, Rgb};
 
 /// Default interval between two frames, in seconds, as in DarkQA.
 const INTERVAL: f64 = 2.0;
@@ -172,6 +174,153 @@ impl Sampler {
     }
 }
 
+/// Maximum time that a message arrives out of order (chosen). A frame that goes further back starts a new clock, as in
+/// a recording that is played again.
+const MAX_REORDERING: Nanoseconds = 5_000_000_000;
+
+/// Maximum difference between the delays of two topics to the recorder (chosen). If the first frames of two topics
+/// differ more than this, the topics have different clocks.
+const MAX_DELAY_DIFFERENCE: Nanoseconds = 1_000_000_000;
+
+/// Position of a frame in a drive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Place {
+    /// Time of the frame on the clock of its topic.
+    pub(crate) time: Nanoseconds,
+    /// Time since the first frame of the drive, at least 0.
+    pub(crate) since: Nanoseconds,
+    /// Number of the stretch, from 0.
+    pub(crate) stretch: u64,
+}
+
+/// Clock of one topic.
+#[derive(Debug, Default)]
+pub(crate) struct TopicClock(Option<ClockRun>);
+
+/// Run of a clock without a jump back.
+#[derive(Debug, Clone, Copy)]
+struct ClockRun {
+    /// Time of the first frame on this clock.
+    first: Nanoseconds,
+    /// Time of the first frame since the first frame of the drive.
+    since: Nanoseconds,
+    /// Latest time of a frame on this clock.
+    latest: Nanoseconds,
+    /// Log time of the last frame.
+    log_time: Nanoseconds,
+}
+
+impl ClockRun {
+    /// Converts a time on this clock to the time since the first frame of the drive.
+    fn since(self, time: Nanoseconds) -> Nanoseconds {
+        let passed = time.saturating_sub(self.first);
+        self.since.saturating_add(passed).max(0)
+    }
+}
+
+/// Stretches of equal duration, counted from the first frame of the drive, whether or not it is chosen. The topics may
+/// have different clocks; the log time relates them, also after a clock jumped back. If the log time jumped back, too,
+/// the next stretch starts.
+#[derive(Debug)]
+pub(crate) struct Stretches {
+    /// Duration of a stretch.
+    length: Nanoseconds,
+    start: Option<DriveStart>,
+}
+
+/// Times of the first frame of a drive.
+#[derive(Debug, Clone, Copy)]
+struct DriveStart {
+    time: Nanoseconds,
+    log_time: Nanoseconds,
+}
+
+impl Stretches {
+    /// Stretches of this duration.
+    pub(crate) fn new(seconds: f64) -> Self {
+        Self { length: ((seconds * 1e9) as Nanoseconds).max(1), start: None }
+    }
+
+    /// Log time of the first frame.
+    pub(crate) fn log_start(&self) -> Option<Nanoseconds> {
+        self.start.map(|start| start.log_time)
+    }
+
+    /// Position of the next frame of a topic, from its time on the clock of its topic and its log time.
+    pub(crate) fn place(&mut self, clock: &mut TopicClock, time: Nanoseconds, log_time: Nanoseconds) -> Place {
+        let start = *self.start.get_or_insert(DriveStart { time, log_time });
+        let mut run = match clock.0 {
+            Some(run) if run.latest.saturating_sub(time) <= MAX_REORDERING => run,
+            previous => ClockRun {
+                first: time,
+                since: self.start_of_run(start, time, log_time, previous),
+                latest: time,
+                log_time,
+            },
+        };
+        run.latest = run.latest.max(time);
+        run.log_time = log_time;
+        clock.0 = Some(run);
+        let since = run.since(time);
+        Place { time, since, stretch: (since / self.length).unsigned_abs() }
+    }
+
+    /// Time from the first frame of the drive to the first frame of a clock run: by the clock if it is the same as the
+    /// clock of the drive's first frame, else by the log time. If both jumped back, the run starts with the next
+    /// stretch.
+    fn start_of_run(
+        &self,
+        start: DriveStart,
+        time: Nanoseconds,
+        log_time: Nanoseconds,
+        previous: Option<ClockRun>,
+    ) -> Nanoseconds {
+        let by_log = log_time.saturating_sub(start.log_time);
+        let Some(previous) = previous else {
+            let by_clock = time.saturating_sub(start.time);
+            let is_same_clock = by_clock.saturating_sub(by_log).saturating_abs() <= MAX_DELAY_DIFFERENCE;
+            return if is_same_clock { by_clock } else { by_log.max(0) };
+        };
+        if log_time > previous.log_time {
+            return by_log.max(0);
+        }
+        let passed = previous.since(previous.latest) / self.length;
+        let next = passed.saturating_add(1).saturating_mul(self.length);
+        by_log.max(next)
+    }
+}
+
+/// Blocks along each side.
+const SIDE: usize = 16;
+
+/// Mean grey codes of 16 × 16 blocks; grey is the mean of the three channels.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Thumbnail(Vec<f64>);
+
+impl Thumbnail {
+    /// Makes the thumbnail of an image.
+    pub(crate) fn new(image: &Rgb) -> Self {
+        let mut blocks = vec![(0_u64, 0_u64); SIDE * SIDE];
+        for (y, row) in image.samples().chunks_exact(image.width() * 3).enumerate() {
+            let line = &mut blocks[y * SIDE / image.height() * SIDE..][..SIDE];
+            for (x, pixel) in row.chunks_exact(3).enumerate() {
+                let (sum, count) = &mut line[x * SIDE / image.width()];
+                *sum += pixel.iter().map(|code| u64::from(*code)).sum::<u64>();
+                *count += 3;
+            }
+        }
+        // An image smaller than the grid has empty blocks, the same ones in every frame.
+        Self(blocks.into_iter().filter(|(_, count)| *count > 0).map(|(sum, count)| sum as f64 / count as f64).collect())
+    }
+
+    /// Mean absolute difference of the blocks, in 8-bit codes. Frames of other sizes may have fewer blocks; only the
+    /// blocks that both have are compared.
+    pub(crate) fn difference(&self, other: &Self) -> f64 {
+        let count = self.0.len().min(other.0.len()).max(1);
+        self.0.iter().zip(&other.0).map(|(a, b)| (a - b).abs()).sum::<f64>() / count as f64
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -244,5 +393,85 @@ mod tests {
             .collect();
         // 15 differs by 5 from the last chosen frame, 10, and 16 by 6.
         assert_eq!(found, [true, false, false, true, false]);
+    }
+
+    fn nanoseconds(seconds: f64) -> Nanoseconds {
+        (seconds * 1e9) as Nanoseconds
+    }
+
+    fn stretches(times: &[f64]) -> Vec<u64> {
+        let (mut stretches, mut clock) = (Stretches::new(10.0), TopicClock::default());
+        times
+            .iter()
+            .map(|time| nanoseconds(*time))
+            .map(|time| stretches.place(&mut clock, time, time).stretch)
+            .collect()
+    }
+
+    #[test]
+    fn stretches_are_counted_from_the_first_frame() {
+        assert_eq!(stretches(&[5.0, 14.9, 15.0, 44.0]), [0, 0, 1, 3]);
+    }
+
+    #[test]
+    fn clock_that_jumps_back_starts_the_next_stretch() {
+        assert_eq!(stretches(&[100.0, 125.0, 3.0, 12.0, 14.0]), [0, 2, 3, 3, 4]);
+        // A drive that is played again repeats its first time.
+        assert_eq!(stretches(&[100.0, 125.0, 100.0, 111.0]), [0, 2, 3, 4]);
+        // Frames that are slightly out of order do not start a stretch.
+        assert_eq!(stretches(&[100.0, 100.9, 100.2, 99.95]), [0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn topics_with_different_clocks_share_stretches() {
+        for milliseconds in [0, 900, -1200, 2000, -1_600_000_000_000] {
+            let offset = milliseconds * 1_000_000;
+            let mut stretches = Stretches::new(10.0);
+            let [mut front, mut rear] = [(); 2].map(|()| TopicClock::default());
+            for second in 0..40 {
+                let time = second * 1_000_000_000;
+                let log_time = time + 20_000_000;
+                let places =
+                    [stretches.place(&mut front, time, log_time), stretches.place(&mut rear, time + offset, log_time)];
+                let [front, rear] = places.map(|place| place.since);
+                let difference = rear.saturating_sub(front);
+                let expected = if milliseconds.abs() < 1000 { offset } else { 0 };
+                assert_eq!(difference, expected, "{milliseconds}");
+            }
+        }
+    }
+
+    #[test]
+    fn replayed_drive_continues_by_log_time() {
+        let (mut stretches, mut clock) = (Stretches::new(10.0), TopicClock::default());
+        let found = [(0, 0), (24, 24), (0, 25), (24, 49)].map(|(time, log_time)| {
+            let [time, log_time] = [time, log_time].map(|seconds| seconds * 1_000_000_000);
+            stretches.place(&mut clock, time, log_time).stretch
+        });
+        assert_eq!(found, [0, 2, 2, 4]);
+    }
+
+    #[test]
+    fn extreme_times_do_not_overflow() {
+        let (mut stretches, mut clock) = (Stretches::new(1e-9), TopicClock::default());
+        for time in [i64::MIN, i64::MAX, 0, i64::MIN, -1, i64::MAX] {
+            for log_time in [i64::MIN, 0, i64::MAX] {
+                stretches.place(&mut clock, time, log_time);
+            }
+        }
+    }
+
+    fn flat(code: u8) -> Thumbnail {
+        Thumbnail::new(&Rgb::new(20, 33, vec![code; 20 * 33 * 3]).unwrap())
+    }
+
+    #[test]
+    fn the_difference_is_in_codes() {
+        assert!((flat(10).difference(&flat(17)) - 7.0).abs() < 1e-9);
+        let mut half = vec![0; 32 * 32 * 3];
+        half[..16 * 32 * 3].fill(200);
+        let half = Thumbnail::new(&Rgb::new(32, 32, half).unwrap());
+        let black = Thumbnail::new(&Rgb::black(32, 32));
+        assert!((half.difference(&black) - 100.0).abs() < 1e-9);
     }
 }

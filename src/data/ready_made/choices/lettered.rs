@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use crate::data::ready_made::columns::names::split_instructions;
+use crate::data::ready_made::columns::map::split_instructions;
 use crate::types::Choices;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;

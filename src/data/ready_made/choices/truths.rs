@@ -7,8 +7,7 @@ use super::answer_format::{
 };
 use super::option_list::OptionList;
 use crate::data::ready_made::cells::{Cell, Table};
-use crate::data::ready_made::columns::map::{CellFormat, map_flag};
-use crate::data::ready_made::columns::names::Role;
+use crate::data::ready_made::columns::map::{CellFormat, Role, map_flag};
 use crate::data::ready_made::columns::{Column, Roles, answer_column, describe_columns};
 use crate::data::ready_made::items::{AnswerCell, Item};
 use crate::data::ready_made::omissions::{OmissionReason, Omissions};

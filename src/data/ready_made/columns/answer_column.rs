@@ -4,8 +4,7 @@
 //! exclude it.
 
 use super::column::Column;
-use super::map::map_flag;
-use super::names::Role;
+use super::map::{Role, map_flag};
 use super::roles::Roles;
 use crate::data::ready_made::cells::Table;
 use crate::data::ready_made::choices::{AnswerFormat, OptionList, digit_index, yes_no_index};

@@ -4,9 +4,7 @@ pub(super) mod answer_column;
 mod column;
 mod family_source;
 pub(super) mod map;
-pub(super) mod names;
 mod roles;
-mod template;
 
 pub(super) use column::Column;
 pub(super) use family_source::FamilySource;

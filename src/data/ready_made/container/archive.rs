@@ -1,4 +1,6 @@
 //! A set in a ZIP file, read without unpacking the whole file: [`Archive`].
+//!
+//! Decompression of files up to a limit: [`decompress_gzip`], [`max_decompressed_size`].
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -7,12 +9,12 @@ use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use flate2::read::MultiGzDecoder;
 use tempfile::NamedTempFile;
 use zip::ZipArchive;
 
-use super::decompress::max_decompressed_size;
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
 use crate::types::FrameId;
 
 /// Maximum number of entries (chosen).
@@ -73,7 +75,7 @@ impl Archive {
     /// # Errors
     /// If it is not a ZIP file, or an entry is a link or has a path that is absolute or leads outside.
     pub(crate) fn open(path: &Path) -> Result<Self> {
-        let file = reading::open(path).map_err(|e| Error::file(path, "read", e))?;
+        let file = files::open(path).map_err(|e| Error::file(path, "read", e))?;
         let remaining = Arc::new(AtomicU64::new(MAX_DIRECTORY_BYTES));
         let bounded = BoundedFile { file, remaining: Arc::clone(&remaining) };
         let opened = ZipArchive::new(BufReader::new(bounded));
@@ -211,4 +213,28 @@ impl Archive {
 fn is_inside(name: &str) -> bool {
     let mut parts = Path::new(name).components();
     !name.contains(['\\', '\0']) && parts.all(|part| matches!(part, Component::Normal(_) | Component::CurDir))
+}
+
+/// Maximum decompressed size of a file with this compressed size, in bytes: a gigabyte, or 200 times the compressed
+/// size (chosen). No table compresses better, but decompression bombs do.
+fn max_decompressed_size(compressed: u64) -> u64 {
+    compressed.saturating_mul(200).max(1 << 30)
+}
+
+/// Decompresses a file to a temporary copy. A compressed file does not allow to read images at their offsets.
+pub(super) fn decompress_gzip(path: &Path) -> Result<NamedTempFile> {
+    let file = files::open(path).map_err(|e| Error::file(path, "read", e))?;
+    let mut copy = NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
+    let max = max_decompressed_size(file.metadata().map_or(0, |metadata| metadata.len()));
+    let mut content = MultiGzDecoder::new(BufReader::new(file)).take(max + 1);
+    let copied = std::io::copy(&mut content, &mut copy)
+        .map_err(|e| Error::data(path.display(), format_args!("cannot be unpacked: {e}")))?;
+    if copied > max {
+        let problem = format_args!(
+            "unpacks to more than {} MB, which no table of its length does; unpack it and name the file in it",
+            max >> 20
+        );
+        return Err(Error::data(path.display(), problem));
+    }
+    Ok(copy)
 }

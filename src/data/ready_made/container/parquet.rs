@@ -2,8 +2,11 @@
 //!
 //! [`read()`] decodes every row once, for a table that keeps only the digests of images. [`bytes()`] later reads one
 //! image: it skips the pages before the image by their headers.
+//!
+//! Names of the classes in a Parquet file that the library `datasets` of Hugging Face wrote: [`ClassLabels`].
 
 use std::cell::RefCell;
+use std::collections::HashMap;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
@@ -11,25 +14,24 @@ use std::sync::{Arc, OnceLock};
 use parquet::basic::Compression;
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::{ByteArray, ByteArrayType};
-
-use parquet::file::metadata::{ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
+use parquet::file::metadata::{FileMetaData, ParquetMetaData, ParquetMetaDataReader, RowGroupMetaData};
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
+use serde_json::Value;
 
-use super::super::cells::{Cell, MAX_ROWS, RowPlace, Step, Table, parse_list, too_many_rows};
-use super::class_labels::ClassLabels;
-use super::json_scan::MAX_ROW_BYTES;
+use super::super::cells::{MAX_ROWS, RowPlace, Step, Table, parse_list, too_many_rows};
+use super::json::MAX_ROW_BYTES;
+use crate::data::ready_made::cells::Cell;
 use crate::error::{Error, Result};
-use crate::files::guarded::guarded;
-use crate::files::reading;
+use crate::files::{self, guarded};
 use crate::types::shell_word;
 
 /// Rows that are decoded together; the images of all of them are in memory at once.
 const BATCH_ROWS: usize = 8;
 
 pub(super) fn open(path: &Path) -> Result<File> {
-    reading::open(path).map_err(|e| Error::file(path, "read", e))
+    files::open(path).map_err(|e| Error::file(path, "read", e))
 }
 
 /// Footer of a Parquet file, parsed on first use.
@@ -208,7 +210,7 @@ thread_local! {
 
 impl Cursor {
     fn open(path: &Path, footer: &ParquetMetaData, group: usize, leaf: usize) -> Result<Self, String> {
-        let file = reading::open(path).map_err(|e| e.to_string())?;
+        let file = files::open(path).map_err(|e| e.to_string())?;
         let row_group = &footer.row_groups()[group];
         let chunk = &row_group.columns()[leaf];
         let rows = usize::try_from(row_group.num_rows()).unwrap_or(0);
@@ -318,4 +320,49 @@ fn leaf_index(columns: &[parquet::file::metadata::ColumnChunkMetaData], column: 
             && fields.iter().all(|field| parts.any(|part| part == *field))
             && fields.last().is_none_or(|field| path.last() == Some(*field))
     })
+}
+
+/// Names of the classes by column. The cells of such a column are the numbers of classes, counted from 0.
+#[derive(Debug, Default)]
+pub(super) struct ClassLabels(HashMap<String, Vec<String>>);
+
+impl ClassLabels {
+    /// Reads the features in the metadata of a file; none if it has no such metadata.
+    ///
+    /// Classes that are named after columns of the file, as `choice1` and `choice2`, are left out: their numbers select
+    /// the column.
+    pub(super) fn new(file: &FileMetaData) -> Self {
+        let features = file
+            .key_value_metadata()
+            .into_iter()
+            .flatten()
+            .find(|entry| entry.key == "huggingface")
+            .and_then(|entry| serde_json::from_str::<Value>(entry.value.as_deref()?).ok())
+            .unwrap_or_default();
+        let features = features.pointer("/info/features").and_then(Value::as_object);
+        let columns = file.schema().get_fields();
+        let labels = features.into_iter().flatten().filter_map(|(column, feature)| {
+            let names: Vec<String> = feature
+                .get("names")
+                .filter(|_| feature["_type"] == "ClassLabel")?
+                .as_array()?
+                .iter()
+                .map(|name| name.as_str().map(str::to_owned))
+                .collect::<Option<_>>()?;
+            let are_columns = names.iter().all(|name| columns.iter().any(|column| column.name() == name));
+            (!are_columns).then(|| (column.clone(), names))
+        });
+        Self(labels.collect())
+    }
+
+    /// The name of the class in place of its number; other cells are unchanged.
+    pub(super) fn named(&self, column: &str, cell: Cell) -> Cell {
+        let name = match &cell {
+            Cell::Number(number) => {
+                self.0.get(column).zip(number.parse::<usize>().ok()).and_then(|(names, number)| names.get(number))
+            }
+            _ => None,
+        };
+        name.map_or(cell, |name| Cell::Text(name.clone()))
+    }
 }

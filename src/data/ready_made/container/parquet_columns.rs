@@ -12,7 +12,7 @@ use super::super::cells::Step;
 use super::parquet::{Footer, bytes, check_codecs, corrupt_file, open};
 use super::refuse_lfs_pointer;
 use crate::error::{Error, Result};
-use crate::files::guarded::guarded;
+use crate::files::guarded;
 use crate::types::text::excerpt;
 
 /// Rows that are decoded together (chosen).

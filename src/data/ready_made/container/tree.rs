@@ -8,7 +8,7 @@ use super::SetFile;
 use super::archive::Archive;
 use crate::data::root::{Location, Root};
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
 
 /// A folder or a ZIP file. Paths are relative to it.
 pub(super) enum Tree {
@@ -65,7 +65,7 @@ impl Tree {
     /// Reads the text of a file.
     pub(super) fn read_text(&self, path: &str) -> Result<String> {
         match self {
-            Self::Folder { folder, .. } => reading::text(&folder.join(path)),
+            Self::Folder { folder, .. } => files::text(&folder.join(path)),
             Self::Archive(archive) => archive.read_text(path),
         }
     }
@@ -95,7 +95,7 @@ pub(crate) fn cached_snapshot(place: &Path) -> Result<(PathBuf, Option<PathBuf>)
         let repository = canonical.ancestors().nth(2).filter(|path| is_cached_repository(path));
         return Ok((place.to_owned(), repository.and_then(own_blobs)));
     }
-    let head = reading::text(&place.join("refs/main"))?;
+    let head = files::text(&place.join("refs/main"))?;
     let snapshot = place.join("snapshots").join(head.trim());
     let is_own = snapshot.canonicalize().is_ok_and(|real| real.starts_with(&canonical));
     if !snapshot.is_dir() || !is_own || head.trim().contains(['/', '\\']) {
@@ -127,7 +127,7 @@ struct Scan {
 
 impl Scan {
     fn add_folder(&mut self, folder: &Path) -> Result<()> {
-        for path in reading::entries(folder)? {
+        for path in files::entries(folder)? {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             if name.starts_with('.') {
                 continue;

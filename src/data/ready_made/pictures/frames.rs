@@ -7,11 +7,10 @@ use std::sync::Arc;
 
 use super::images::{CellPart, EmbeddedImage, ImageForm, RowImage, images};
 use crate::data::Root;
-use crate::data::image_source::ImageSource;
+use crate::data::openeqa::ImageSource;
 use crate::data::ready_made::cells::{Cell, FileFacts, MAX_NAME_LENGTH, Step, Table};
 use crate::data::ready_made::choices::ParsedQuestion;
-use crate::data::ready_made::columns::map::map_flag;
-use crate::data::ready_made::columns::names::Role;
+use crate::data::ready_made::columns::map::{Role, map_flag};
 use crate::data::ready_made::columns::{Column, Roles};
 use crate::data::ready_made::container::{Archive, SetFile};
 use crate::data::ready_made::settings::SeveralImages;

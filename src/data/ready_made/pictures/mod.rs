@@ -2,15 +2,12 @@
 
 mod frames;
 mod ids;
-mod image_marks;
 mod images;
-mod scenes;
 
 pub(super) use frames::Frames;
+pub(super) use ids::{Ids, Scenes};
+pub(super) use images::{ImageForm, ImageMarks, images};
+
 pub(crate) use frames::Series;
-pub(super) use ids::Ids;
-pub(super) use image_marks::ImageMarks;
+pub(crate) use ids::SceneNames;
 pub(crate) use images::EmbeddedImage;
-pub(super) use images::{ImageForm, images};
-pub(crate) use scenes::SceneNames;
-pub(super) use scenes::Scenes;

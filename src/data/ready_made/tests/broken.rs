@@ -130,7 +130,7 @@ fn unusable_images_are_left_out_with_skip_bad() {
         let (_folder, path) = set("set.tsv", &rows);
         let skip = SetArgs { bad: Some(crate::data::SkipBad::default()), ..SetArgs::default() };
         let dataset = open(&path, &skip).unwrap();
-        assert_eq!(dataset.questions.len(), 39, "{image}");
+        assert_eq!(dataset.questions().len(), 39, "{image}");
     }
     let (_folder, path) = set("set.tsv", &[question(1, &"QUJD".repeat(2000)[1..])]);
     let problem = refusal(&path, &SetArgs::default());
@@ -172,7 +172,7 @@ fn csv_may_have_tabs() {
     let (_folder, path) = set("set.tsv", &[question(1, &base64(1))]);
     let csv = path.with_extension("csv");
     std::fs::rename(path, &csv).unwrap();
-    assert_eq!(open(&csv, &SetArgs::default()).unwrap().questions.len(), 1);
+    assert_eq!(open(&csv, &SetArgs::default()).unwrap().questions().len(), 1);
 }
 
 #[test]
@@ -234,14 +234,14 @@ fn by_index(index: u8) -> Map<String, Value> {
 fn columns_by_index_and_in_lists_are_read() {
     let (_folder, path) = set("set.jsonl", &[by_index(0), by_index(1)]);
     let dataset = open(&path, &SetArgs::default()).unwrap();
-    assert_eq!(dataset.questions[1].choices.truth(), Some(1));
+    assert_eq!(dataset.questions()[1].choices.truth(), Some(1));
     let turns = json!([{"value": "Which? (A) x (B) y"}, {"value": "B"}]);
     let listed = row(json!({"id": 1, "conversations": turns, "image": base64(1)}));
     let (_folder, path) = set("set.jsonl", &[listed]);
     let map = "question=conversations.0.value,answer=conversations.1.value";
     let args = SetArgs { map: vec![map.parse().unwrap()], ..SetArgs::default() };
     let dataset = open(&path, &args).unwrap();
-    assert_eq!(dataset.questions[0].choices.truth(), Some(1));
+    assert_eq!(dataset.questions()[0].choices.truth(), Some(1));
     let with_pixels = row(
         json!({"id": 1, "question": "?", "options": ["x", "y"], "answer": "x", "image": "none.png", "pixels": bytes(1)}),
     );

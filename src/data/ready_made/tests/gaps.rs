@@ -102,6 +102,6 @@ fn preset_config_is_ignored_for_a_single_file() {
         json!({"question": "?", "options": "['x', 'y']", "answer": "A", "image_1": base64(1), "image_2": null}),
     ]);
     let place = crate::data::parse_data_place(&format!("mmmu:{}", path.display())).unwrap();
-    let dataset = crate::data::Dataset::open(&place, None, &SetArgs::default()).unwrap();
+    let dataset = place.open(None, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 1);
 }

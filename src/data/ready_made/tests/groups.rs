@@ -126,7 +126,7 @@ fn stored_questions_keep_their_groups() {
 
 fn open_preset(name: &str, path: &std::path::Path, args: &SetArgs) -> Dataset {
     let place = crate::data::parse_data_place(&format!("{name}:{}", path.display())).unwrap();
-    Dataset::open(&place, None, args).unwrap()
+    place.open(None, args).unwrap()
 }
 
 fn mme_question(number: usize) -> Map<String, Value> {

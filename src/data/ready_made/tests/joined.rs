@@ -249,7 +249,7 @@ fn numbered_row(id: i64) -> [Map<String, Value>; 1] {
 fn open_joined(paths: &[&PathBuf]) -> Result<Dataset> {
     let paths = paths.iter().map(|path| (*path).clone()).collect();
     let place = DataPlace::Files(paths);
-    Dataset::open(&place, None, &SetArgs::default())
+    place.open(None, &SetArgs::default())
 }
 
 #[test]

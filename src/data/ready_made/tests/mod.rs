@@ -22,7 +22,7 @@ use crate::error::Result;
 
 /// Opens the set at a path with these flags.
 fn open(path: &Path, args: &SetArgs) -> Result<Dataset> {
-    Dataset::open(&DataPlace::Path(path.to_owned()), None, args)
+    DataPlace::Path(path.to_owned()).open(None, args)
 }
 
 /// Flags with this map.

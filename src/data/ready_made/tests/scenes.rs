@@ -61,7 +61,7 @@ fn questions_assign_scenes_to_frames() {
         .collect();
     let (folder, _path) = made("questions.jsonl", &rows);
     let place = DataPlace::Path(folder.path().to_owned());
-    let read = Dataset::open(&place, None, &SetArgs::default()).unwrap();
+    let read = place.open(None, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["a", "a", "b"]);
     // The set is still in this program's own format.
     assert_eq!(read.printed_summary().count(), 0);

@@ -1,21 +1,17 @@
 //! Parametric furniture: each function makes one piece, or a [`FurnitureSet`] of pieces that belong together.
 
-pub(super) mod bath;
 pub(super) mod beds;
-pub(super) mod kitchen;
+pub(super) mod fixtures;
 pub(super) mod parts;
 pub(super) mod plants;
 pub(super) mod seats;
 pub(super) mod storage;
-pub(super) mod tables;
-pub(super) mod textiles;
 pub(super) mod walls;
 
 use glam::{Vec3, vec3};
 
-use super::mesh::{Mesh, bounds};
-use super::scene::{Piece, Pose};
-use super::surface::Surface;
+use super::mesh::{Mesh, Piece, Pose, bounds};
+use super::pattern::Surface;
 
 /// Pieces that belong together, each with its pose within the set. A set is placed like one piece.
 #[derive(Debug, Clone, Default)]

@@ -8,11 +8,10 @@ use std::sync::LazyLock;
 use glam::{Vec3, vec3};
 
 use super::super::mesh::Mesh;
-use super::super::paint::{self, ALL_COLORS, Paint, linear_rgb};
 use super::super::pattern::Pattern;
-use super::super::scene::{LightSource, Piece, ThingKind};
 use super::super::seeded_rng::SeededRng;
-use super::super::surface::{Surface, SurfaceFinish};
+use crate::mesh::{LightSource, Piece, ThingKind};
+use crate::pattern::{self, ALL_COLORS, Paint, Surface, SurfaceFinish, linear_rgb};
 
 const TABLE: &str = include_str!("parts.txt");
 
@@ -174,7 +173,7 @@ fn pairs(numbers: &[f32]) -> Vec<(f32, f32)> {
 fn parse_paint(word: &str, rng: &mut SeededRng) -> Paint {
     let number = u32::from_str_radix(word, 16).ok();
     match number.filter(|_| word.len() == 6) {
-        Some(number) => Paint::nameless(paint::codes_from_hex(number)),
+        Some(number) => Paint::nameless(pattern::codes_from_hex(number)),
         None => Paint::random(&[word], rng),
     }
 }

@@ -3,10 +3,9 @@
 use glam::{Vec3, vec3};
 
 use super::super::mesh::{Mesh, cos_sin};
-use super::super::paint::Paint;
-use super::super::scene::{Piece, kind};
 use super::super::seeded_rng::SeededRng;
-use super::super::surface::Surface;
+use crate::mesh::{Piece, kind};
+use crate::pattern::{Paint, Surface};
 
 /// A plant in its pot, with its height in metres.
 pub(crate) fn plant(height: f32, rng: &mut SeededRng) -> Piece {

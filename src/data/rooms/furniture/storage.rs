@@ -3,11 +3,10 @@
 use glam::{Vec3, vec3};
 
 use super::super::mesh::Mesh;
-use super::super::paint::{ALL_COLORS, Paint, linear_rgb};
 use super::super::pattern::Pattern;
-use super::super::scene::{Piece, ThingKind, kind};
 use super::super::seeded_rng::SeededRng;
-use super::super::surface::{Surface, SurfaceFinish};
+use crate::mesh::{Piece, ThingKind, kind};
+use crate::pattern::{ALL_COLORS, Paint, Surface, SurfaceFinish, linear_rgb};
 
 /// Colours of storage furniture. A colour that is listed twice is twice as likely.
 const COLORS: [&str; 10] = ["brown", "brown", "brown", "white", "grey", "grey", "black", "blue", "green", "yellow"];

@@ -3,12 +3,11 @@
 use glam::{Vec3, vec2, vec3};
 
 use super::super::mesh::Mesh;
-use super::super::paint::Paint;
 use super::super::pattern::Pattern;
-use super::super::scene::{LightSource, Piece, ThingKind, kind};
 use super::super::seeded_rng::SeededRng;
-use super::super::surface::{Surface, SurfaceFinish};
 use super::parts;
+use crate::mesh::{LightSource, Piece, ThingKind, kind};
+use crate::pattern::{Paint, Surface, SurfaceFinish};
 
 /// Adds a frame of four bars around a rectangle with its lower edge at y = 0. `bar` is the width of a bar, `thick` its
 /// depth.

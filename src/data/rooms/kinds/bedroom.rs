@@ -1,17 +1,19 @@
 //! Furnishing of bedrooms.
+//!
+//! Furnishing of bathrooms.
 
 use glam::vec3;
 
-use super::super::furniture::{FurnitureSet, beds, seats, storage, walls};
-use super::super::openings::WindowDressing;
-use super::super::paint::{ALL_COLORS, Paint};
-use super::super::plan::FloorPlan;
-use super::super::scene::{Pose, kind};
-use super::super::seeded_rng::SeededRng;
-use super::super::shell::{Flooring, WALLS, Wall};
+use super::super::furniture::seats;
 use super::shared::{dresser, low_stool, nightstand};
+use crate::furniture::{FurnitureSet, beds, fixtures, parts, storage, walls};
+use crate::mesh::{Pose, kind};
+use crate::openings::WindowDressing;
+use crate::pattern::{ALL_COLORS, Paint};
+use crate::plan::{FloorPlan, Flooring, WALLS, Wall};
+use crate::seeded_rng::SeededRng;
 
-pub(super) fn furnish(mut rng: SeededRng) -> FloorPlan {
+pub(super) fn furnish_bedroom(mut rng: SeededRng) -> FloorPlan {
     let size = vec3(rng.between(3.6, 4.6), 2.6, rng.between(3.6, 4.6));
     let flooring = rng.pick(&[Flooring::Wood, Flooring::Carpet]);
     let mut plan = FloorPlan::new(size, flooring, false, rng);
@@ -73,4 +75,59 @@ fn add_bed(plan: &mut FloorPlan, wall: Wall) {
         let piece = walls::picture(&mut plan.rng);
         plan.hang_above(&pose, piece, 1.4);
     }
+}
+
+pub(super) fn furnish_bathroom(mut rng: SeededRng) -> FloorPlan {
+    let size = vec3(rng.between(2.6, 3.3), 2.5, rng.between(2.8, 3.6));
+    let mut plan = FloorPlan::new(size, Flooring::Tiles, true, rng);
+    let door = plan.rng.pick(&WALLS);
+    plan.add_door(&[door]);
+    let tub = plan.rng.chance(0.65);
+    if tub {
+        plan.focus_on_next();
+        let set = FurnitureSet::from_piece(fixtures::bathtub(&mut plan.rng));
+        plan.place_in_corner(&set, &WALLS);
+    }
+    if !tub || plan.rng.chance(0.5) {
+        plan.focus_on_next();
+        let set = FurnitureSet::from_piece(parts::piece(["shower", "shower:2"][plan.rng.below(2)], &mut plan.rng));
+        plan.place_in_corner(&set, &WALLS);
+    }
+    if plan.rng.chance(0.92) {
+        plan.focus_on_next();
+        let set = FurnitureSet::from_piece(parts::piece("toilet", &mut plan.rng));
+        if let Some(pose) = plan.place_at_wall(&set, &WALLS) {
+            plan.add_part(&pose, "toilet paper", vec3(0.42, 0.72, -0.01));
+        }
+    }
+    if plan.rng.chance(0.85) {
+        let set = if plan.rng.chance(0.7) {
+            fixtures::vanity(&mut plan.rng)
+        } else {
+            FurnitureSet::from_piece(parts::piece("sink", &mut plan.rng))
+        };
+        plan.focus_on_next();
+        if let Some(pose) = plan.place_at_wall(&set, &WALLS)
+            && plan.rng.chance(0.6)
+        {
+            let width = plan.rng.between(0.45, 0.65);
+            let piece = walls::mirror(width, 0.7, &mut plan.rng);
+            plan.hang_above(&pose, piece, 1.22);
+        }
+    }
+    let dressing = plan.rng.pick(&[WindowDressing::Blinds, WindowDressing::Bare, WindowDressing::Curtains]);
+    plan.add_window(&WALLS, 0.75, 1.25, dressing);
+    for _ in 0..2 {
+        plan.maybe_hang(0.7, 1.35, beds::towel);
+    }
+    plan.maybe_place_at_wall(0.4, low_stool);
+    plan.maybe_place_at_wall(0.35, |rng| parts::piece("laundry basket", rng));
+    if plan.rng.chance(0.3) {
+        plan.maybe_place_plant(1.0);
+    }
+    plan.maybe_hang(0.35, 1.45, storage::wall_shelf);
+    let middle = vec3(size.x / 2.0, 0.0, size.z / 2.0);
+    plan.maybe_add_rug(0.5, middle, [0.9, 0.6], 0.0);
+    plan.add_ceiling_lamp();
+    plan
 }

@@ -1,11 +1,8 @@
 //! Kinds of rooms: size and furniture, one file for each kind.
 
-mod bathroom;
 mod bedroom;
-mod dining_room;
 mod kitchen;
 mod living_room;
-mod office;
 mod shared;
 
 use super::plan::FloorPlan;
@@ -42,12 +39,12 @@ impl RoomKind {
     /// Creates a furnished room of this kind.
     pub(super) fn furnish(self, rng: SeededRng) -> FloorPlan {
         let (mut plan, floor) = match self {
-            Self::Bedroom => (bedroom::furnish(rng), "floor"),
-            Self::Bathroom => (bathroom::furnish(rng), "bathfloor"),
-            Self::Kitchen => (kitchen::furnish(rng), "kitchenfloor"),
-            Self::LivingRoom => (living_room::furnish(rng), "floor"),
-            Self::DiningRoom => (dining_room::furnish(rng), "floor"),
-            Self::Office => (office::furnish(rng), "floor"),
+            Self::Bedroom => (bedroom::furnish_bedroom(rng), "floor"),
+            Self::Bathroom => (bedroom::furnish_bathroom(rng), "bathfloor"),
+            Self::Kitchen => (kitchen::furnish_kitchen(rng), "kitchenfloor"),
+            Self::LivingRoom => (living_room::furnish_living_room(rng), "floor"),
+            Self::DiningRoom => (kitchen::furnish_dining_room(rng), "floor"),
+            Self::Office => (living_room::furnish_office(rng), "floor"),
         };
         plan.add_clutter(floor);
         plan.add_walls();

@@ -2,11 +2,12 @@
 
 use glam::{Vec3, vec3};
 
-use super::super::furniture::{FurnitureSet, parts, plants, storage, textiles, walls};
+use super::super::furniture::{FurnitureSet, parts, plants, storage, walls};
 use super::super::plan::FloorPlan;
-use super::super::scene::{Piece, Pose};
 use super::super::seeded_rng::SeededRng;
-use super::super::shell::WALLS;
+use crate::furniture::beds;
+use crate::mesh::{Piece, Pose};
+use crate::plan::WALLS;
 
 impl FloorPlan {
     /// Makes the next added thing a camera target.
@@ -67,7 +68,7 @@ impl FloorPlan {
     /// Adds a rug of this width and depth, with this probability.
     pub(super) fn maybe_add_rug(&mut self, probability: f32, position: Vec3, [width, depth]: [f32; 2], angle: f32) {
         if self.rng.chance(probability) {
-            let piece = textiles::rug(width, depth, &mut self.rng);
+            let piece = beds::rug(width, depth, &mut self.rng);
             self.add(piece, Pose::new(position, angle));
         }
     }

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use crate::engine::images::frame_work::FrameWork;
 use crate::engine::images::frames::Source;
-use crate::engine::images::image_steps::ImageSteps;
+use crate::engine::images::timings::ImageSteps;
 use crate::engine::images::trials::SourcePlan;
 use crate::error::Result;
 use crate::types::{Condition, EnhancerName, Rgb, Severity};

@@ -12,7 +12,7 @@ use crate::engine::images::frames::SourceFrame;
 use crate::engine::images::recipes::ImageRecipe;
 use crate::engine::images::stored::{Sidecar, differing_fields};
 use crate::error::{Error, Result};
-use crate::files::reading;
+use crate::files;
 use crate::pictures::image_file::format::FileFormat;
 use crate::pictures::{DecodeRule, ImageFile};
 use crate::report::text::words::first_names;
@@ -21,6 +21,7 @@ use darkqa_enhance::{EnhancedFolder, ImageUse, Implausible, Usage};
 
 /// Maximum number of files named per fault in a message; chosen.
 const NAMED: usize = 4;
+
 /// Maximum depth of subfolders that are searched; chosen as protection against cyclic links.
 const MAX_DEPTH: usize = 16;
 
@@ -298,7 +299,7 @@ fn path(frame: &FrameId, condition: &Condition) -> Result<String> {
 /// Adds the files of a folder and its subfolders except JSON and hidden files. `below` is the path of the folder below
 /// the first one.
 fn add_files(folder: &Path, below: &str, depth: usize, files: &mut Vec<String>) -> Result<()> {
-    for path in reading::entries(folder)? {
+    for path in files::entries(folder)? {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if name.starts_with('.') || name.ends_with(".json") {
             continue;

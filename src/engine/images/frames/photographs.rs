@@ -4,13 +4,13 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use crate::engine::images::frames::photograph::{SourcePhotograph, matching_degradation};
+use super::source::{SourcePhotograph, matching_degradation};
 use crate::engine::images::frames::source::{Frames, Source, SourceFrame};
 use crate::engine::images::progress::Progress;
 use crate::error::{Error, Result};
 use crate::types::{PairDark, PairFacts, PhotoName};
-use darkqa_score::photographs::pair_darkness::PairDarkness;
-use darkqa_score::photographs::realism::scene::SceneMatch;
+use darkqa_score::photographs::PairDarkness;
+use darkqa_score::photographs::realism::SceneMatch;
 
 /// Maximum number of frames whose photographs are measured before a run; chosen.
 const SAMPLED: usize = 24;

@@ -1,15 +1,24 @@
 //! Frames that are shown together: [`Source`], read once before anything is asked.
+//!
+//! Thread-safe counts of changes made to images when they were read: [`InputTally`].
+//!
+//! A photograph of a frame's scene in the dark, and how dark it is: [`SourcePhotograph`].
 
 use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
 use crate::data::{Dataset, Picture};
-use crate::engine::images::frames::photograph::{SourcePhotograph, matching_degradation};
 use crate::engine::images::progress::Progress;
 use crate::error::{Error, Result};
+use crate::types::degradations::Kind;
 use crate::types::text::excerpt;
-use crate::types::{Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PhotoName, Question};
+use crate::types::{
+    Condition, Degradation, Digest, FrameId, InputNote, InputSummary, PairDark, PairFacts, PhotoName, ProfileName,
+    Question, Rgb, Severity,
+};
+use darkqa_light::PairEv;
 
 /// Access to the files of frames.
 pub(crate) trait Frames: Sync {
@@ -237,4 +246,67 @@ pub(crate) fn inspect_all(dataset: &Dataset, questions: &[Question], progress: &
             Ok(source)
         })
         .collect()
+}
+
+/// Changes to the images of a command so far.
+#[derive(Debug, Default)]
+pub(crate) struct InputTally(Mutex<InputSummary>);
+
+impl InputTally {
+    /// Counts one image.
+    pub(crate) fn add(&self, frame: &FrameId, note: &InputNote) {
+        let mut summary = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        summary.add(frame, note);
+    }
+
+    /// Logs one warning per kind of change.
+    pub(crate) fn warn(self) {
+        let summary = self.0.into_inner();
+        warn_of_inputs(&summary.unwrap_or_else(PoisonError::into_inner));
+    }
+}
+
+/// A photograph of a frame's scene in the dark.
+#[derive(Debug, Clone)]
+pub(crate) struct SourcePhotograph {
+    /// Name of the condition in which it is shown.
+    pub(crate) name: PhotoName,
+    /// Digest of the file and of its reading rule.
+    pub(crate) digest: Digest,
+    /// Changes that reading the file makes besides decoding its codes.
+    pub(crate) note: InputNote,
+    /// Exposure drop stated in the data set, in EV; `None` if unknown.
+    pub(crate) stated: Option<f64>,
+    /// How dark the photograph is; `None` before it is measured. No store key depends on it.
+    pub(crate) facts: Option<PairFacts>,
+}
+
+impl SourcePhotograph {
+    /// Measures how dark the photograph (`low`) is compared with its frame (`normal`).
+    pub(crate) fn measure(&self, normal: &Rgb, low: &Rgb) -> PairFacts {
+        let measured = PairEv::measure(normal, low);
+        PairFacts {
+            stated: self.stated,
+            mean: measured.map(|ev| ev.mean),
+            median: measured.and_then(|ev| ev.median),
+            synthesis: measured.map(|ev| ev.synthesis),
+        }
+    }
+}
+
+/// The degradation of this kind that is as dark as the first of these photographs, rounded to a hundredth of an EV;
+/// `None` if the exposure drop is unknown or cannot be synthesised.
+pub(crate) fn matching_degradation(
+    photos: &[SourcePhotograph],
+    kind: Kind,
+    reading: Option<&ProfileName>,
+) -> Option<(Degradation, PairFacts)> {
+    let facts = photos.first()?.facts?;
+    let hundredths = (100.0 * facts.matching()?).round();
+    if !(1.0..=f64::from(kind.max_severity().hundredths())).contains(&hundredths) {
+        return None;
+    }
+    let severity = Severity::from_hundredths(hundredths as u16);
+    let how = Degradation::new(kind, severity, reading.cloned()).ok()?;
+    Some((how, facts))
 }

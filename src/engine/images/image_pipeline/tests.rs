@@ -3,13 +3,12 @@
 use std::num::NonZeroU32;
 
 use super::*;
-use crate::data::Dataset;
+use crate::data::{Dataset, open_images};
 use crate::engine::images::frames::{CameraScope, DegradeStage};
 use crate::engine::images::notes::WantedNotes;
 use crate::engine::images::recipes::Recipe;
 use crate::engine::images::timings::Timings;
-use crate::pictures::PayloadFormat;
-use crate::pictures::Scaling;
+use crate::pictures::{PayloadFormat, Scaling};
 use darkqa_light::KindSettings;
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.
@@ -19,7 +18,7 @@ fn frame() -> (tempfile::TempDir, Dataset, Source) {
     let pixels = Rgb::new(40, 60, samples).unwrap();
     let payload = Payload::encode(&pixels, PayloadFormat::Png).unwrap();
     std::fs::write(folder.path().join("a.png"), payload.file()).unwrap();
-    let dataset = Dataset::from_images(folder.path(), &[]).unwrap();
+    let dataset = open_images(folder.path(), &[]).unwrap();
     let name = dataset.frames().next().unwrap().clone();
     let source = Source::from_questions(&dataset, &name).unwrap();
     (folder, dataset, source)
@@ -72,14 +71,9 @@ fn thumbnails_show_the_sent_image() {
         for (format, max_side) in [("png", None), ("png", Some(50)), ("jpeg:60", Some(50))] {
             let (image, notes, _) = pipeline_output(condition, format, max_side, true);
             let thumbnail = notes.thumbnail.unwrap();
-            let from_payload = crate::engine::images::notes::thumbnail::thumbnail(
-                &thumbnail.frame,
-                &thumbnail.condition,
-                &image,
-                None,
-                None,
-            )
-            .unwrap();
+            let from_payload =
+                crate::engine::images::notes::thumbnail(&thumbnail.frame, &thumbnail.condition, &image, None, None)
+                    .unwrap();
             assert_eq!(thumbnail, from_payload, "{condition} {format} {max_side:?}");
         }
     }

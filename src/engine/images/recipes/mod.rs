@@ -1,11 +1,9 @@
 //! Recipes: the settings and inputs that decide the pixels of an image.
 
-mod image_maker;
-mod image_recipe;
-pub(crate) mod image_words;
+pub(crate) mod image_recipe;
 mod recipe;
 
-pub(crate) use image_maker::Maker;
 pub(crate) use image_recipe::ImageRecipe;
+pub(crate) use recipe::{Maker, Recipe};
+
 pub(super) use recipe::ImageKeyFacts;
-pub(crate) use recipe::Recipe;

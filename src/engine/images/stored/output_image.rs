@@ -3,18 +3,20 @@
 //! A sidecar contains the recipe of its image and the digest of the image file. An existing image is kept if its recipe
 //! and bytes match, or else its pixels; other images are refused. The image is written before its sidecar, so that no
 //! sidecar exists without its image.
+//!
+//! Images that were not made because other images exist in their place: [`Refusals`].
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::error::{Error, Result};
-use crate::files::{reading, write};
-use crate::pictures::png;
-use crate::pictures::{DecodeRule, ImageFile};
+use crate::files::{self, write};
+use crate::pictures::{DecodeRule, ImageFile, png};
 use crate::types::{Digest, Rgb};
 
 /// The origin of an image, as written in its JSON sidecar.
@@ -86,7 +88,7 @@ impl<R: ImageOrigin> Sidecar<R> {
     /// # Errors
     /// If it cannot be read or parsed, or has an unknown schema.
     pub(crate) fn read(path: &Path) -> Result<Self> {
-        let text = reading::text(path)?;
+        let text = files::text(path)?;
         let sidecar: Self = serde_json::from_str(&text)
             .map_err(|e| Error::data(path.display(), format_args!("not a JSON file of an image: {e}")))?;
         if !R::SCHEMAS.contains(&&*sidecar.schema) {
@@ -238,7 +240,7 @@ impl OutputImage {
                 if existing != make()? {
                     return Ok(self.refuse(&problem));
                 }
-                let bytes = reading::bytes(&self.image)?;
+                let bytes = files::bytes(&self.image)?;
                 Sidecar::new(recipe.clone(), self, &bytes).write(&self.json)?;
                 Ok(ImageOutcome::Unchanged)
             }
@@ -256,7 +258,7 @@ impl OutputImage {
         if self.is_forced || !self.image.exists() {
             return Ok(OutputAction::Make(None));
         }
-        let bytes = reading::bytes(&self.image)?;
+        let bytes = files::bytes(&self.image)?;
         if !self.json.exists() {
             let problem = "no JSON file describes it, and its pixels differ".to_owned();
             return Ok(match decode(&self.image, &bytes) {
@@ -317,4 +319,30 @@ fn decode(path: &Path, bytes: &[u8]) -> Option<Rgb> {
     let rule = DecodeRule { max_pixels: u64::MAX / 8, ..DecodeRule::default() };
     let file = ImageFile::new(bytes.to_vec(), path.display().to_string(), rule);
     file.decode().ok()
+}
+
+/// The refused images of a command by reason; thread-safe.
+#[derive(Debug, Default)]
+pub(crate) struct Refusals(Mutex<BTreeMap<String, BTreeSet<PathBuf>>>);
+
+impl Refusals {
+    pub(crate) fn add(&self, Refusal { image, problem }: Refusal) {
+        let mut refused = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        refused.entry(problem).or_default().insert(image);
+    }
+
+    /// Logs each reason once, with its first image and the number of the others.
+    pub(crate) fn log(self) {
+        let refused = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        for (problem, images) in refused {
+            let Some(first) = images.first() else {
+                continue;
+            };
+            let more = match images.len() {
+                1 => String::new(),
+                n => format!(" and {} more", n - 1),
+            };
+            tracing::error!("{}{more}: {problem}", first.display());
+        }
+    }
 }

@@ -1,19 +1,26 @@
 //! Images in the image store: [`StoredImages`], and the place of one image ([`StoredPlace`]).
+//!
+//! Thumbnails in the image store: [`ThumbnailPlace`].
+//!
+//! Cached findings about enhancers in the image store: opened models and results of their probes ([`StoredFindings`]).
+
+#[cfg(test)]
+mod tests;
 
 use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
 use crate::engine::image_cache::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
+use crate::engine::images::enhancement::enhancers::{EnhancerModels, Model};
 use crate::engine::images::frames::{Source, SourceFrame};
-use crate::engine::images::notes::thumbnail::ShownObjects;
+use crate::engine::images::notes::{self, ShownObjects};
 use crate::engine::images::recipes::{ImageKeyFacts, Maker, Recipe};
-use crate::engine::images::stored::stored_findings::StoredFindings;
-use crate::engine::images::stored::stored_thumbnails::ThumbnailPlace;
 use crate::error::Result;
 use crate::pictures::Payload;
-use crate::types::{Condition, FrameId};
-use darkqa_enhance::ImageUse;
+use crate::types::questions::PixelBox;
+use crate::types::{Condition, Digest, FrameId, Thumbnail};
+use darkqa_enhance::{self, Findings, ImageUse};
 
 /// The image store, with the settings that decide images besides their recipes.
 #[derive(Debug, Clone, Copy)]
@@ -219,5 +226,189 @@ impl<'a> StoredPlace<'a> {
     }
 }
 
-#[cfg(test)]
-mod tests;
+/// The place of the thumbnail of an image in the store.
+#[derive(Debug)]
+pub(crate) struct ThumbnailPlace<'a> {
+    store: &'a ImageStore,
+    key: Key,
+    shown: Shown,
+}
+
+/// The facts that decide a thumbnail.
+#[derive(Serialize)]
+struct ThumbnailRecipe<'a> {
+    content: Content,
+    version: u32,
+    /// Digest of the image's key.
+    image: &'a Digest,
+    frame: &'a FrameId,
+    condition: &'a Condition,
+    /// Width and height of the frame, and the boxes of the cropped objects in it.
+    objects: Option<([u32; 2], &'a [PixelBox])>,
+}
+
+impl<'a> ThumbnailPlace<'a> {
+    /// The place of the thumbnail of the image with this key; `None` if no key can be made.
+    pub(crate) fn new(
+        store: &'a ImageStore,
+        image: &Key,
+        shown: &Shown,
+        frame: &FrameId,
+        condition: &Condition,
+        objects: Option<ShownObjects<'_>>,
+    ) -> Option<Self> {
+        let key = Key::from_recipe(&ThumbnailRecipe {
+            content: Content::Thumbnail,
+            version: notes::VERSION,
+            image: image.digest(),
+            frame,
+            condition,
+            objects: objects.map(|shown| (shown.size, shown.objects)),
+        })
+        .ok()?;
+        Some(Self { store, key, shown: Shown { content: Content::Thumbnail, ..shown.clone() } })
+    }
+
+    /// Reads the thumbnail of the image with this digest; `None` if the store does not have it.
+    pub(crate) fn read(&self, image: Digest) -> Option<Thumbnail> {
+        let mut stored = None;
+        self.store.get(&self.key, Content::Thumbnail, |entry| {
+            let read: Option<Thumbnail> = serde_json::from_slice(&entry.image).ok();
+            stored = read.filter(|thumbnail| thumbnail.image == image);
+            stored.is_some()
+        })?;
+        stored
+    }
+
+    /// Adds a thumbnail that took this many milliseconds to make.
+    pub(crate) fn write(&self, thumbnail: &Thumbnail, milliseconds: u64) {
+        let entry = Entry {
+            image: serde_json::json!(thumbnail).to_string().into_bytes(),
+            size: [0, 0],
+            facts: EntryFacts::new(self.shown.clone(), milliseconds, serde_json::Value::Null),
+        };
+        self.store.put(&self.key, &entry);
+    }
+}
+
+/// Findings in the image store that were made with one set of enhancer settings.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct StoredFindings<'a> {
+    store: &'a ImageStore,
+    maker: &'a Maker,
+}
+
+/// Inputs of a store key: everything that can change the findings about a model.
+#[derive(Serialize)]
+struct FindingsRecipe<'a> {
+    /// Digest of the model, its sidecar and its preset.
+    stated: Digest,
+    version: u32,
+    maker: &'a Maker,
+    /// Inputs of the probe's dark images, one list per source. `None` in the key that records an opened model.
+    frames: Option<Vec<Vec<ImageKeyFacts<'a>>>>,
+}
+
+impl<'a> StoredFindings<'a> {
+    pub(crate) fn new(store: &'a ImageStore, maker: &'a Maker) -> Self {
+        Self { store, maker }
+    }
+
+    fn key(self, model: &Model, frames: Option<Vec<Vec<ImageKeyFacts<'_>>>>) -> Result<Key> {
+        Key::from_recipe(&FindingsRecipe {
+            stated: model.stated()?,
+            version: darkqa_enhance::VERSION,
+            maker: self.maker,
+            frames,
+        })
+    }
+
+    /// True if all models of a command were opened and probed before. Such models need not be opened again to be
+    /// checked.
+    ///
+    /// # Errors
+    /// If a sidecar has a number that is infinite or NaN.
+    pub(crate) fn has_all(self, models: &EnhancerModels<'_>) -> Result<bool> {
+        for model in models.models() {
+            if !self.store.contains(&self.key(model, None)?) {
+                return Ok(false);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Location in the store of the findings of a model's probe on these frames and conditions.
+    ///
+    /// # Errors
+    /// If a frame cannot be shown in one of its conditions, or a sidecar has a number that is infinite or NaN.
+    pub(crate) fn place(
+        self,
+        recipe: &Recipe,
+        model: &Model,
+        frames: &[(&Source, Vec<Condition>)],
+    ) -> Result<FindingsPlace<'a>> {
+        let facts = frames
+            .iter()
+            .map(|(source, conditions)| middle_frame_facts(recipe, source, conditions))
+            .collect::<Result<Vec<_>>>()?;
+        Ok(FindingsPlace {
+            store: self.store,
+            opened_key: self.key(model, None)?,
+            probe_key: self.key(model, Some(facts))?,
+            shown: Shown { content: Content::Probe, enhancer: Some(model.name().to_string()), ..Shown::default() },
+        })
+    }
+}
+
+/// Key facts of a source's middle frame in each condition, before enhancement; empty if the source has no middle frame.
+fn middle_frame_facts<'a>(
+    recipe: &'a Recipe,
+    source: &'a Source,
+    conditions: &[Condition],
+) -> Result<Vec<ImageKeyFacts<'a>>> {
+    let Some(frame) = source.middle() else {
+        return Ok(Vec::new());
+    };
+    conditions
+        .iter()
+        .map(|condition| {
+            let unenhanced = Condition { enhancer: None, ..condition.clone() };
+            recipe.key_facts(&source.name, frame, &unenhanced)
+        })
+        .collect()
+}
+
+/// Location of the findings of a probe in the image store.
+#[derive(Debug, Clone)]
+pub(crate) struct FindingsPlace<'a> {
+    store: &'a ImageStore,
+    /// Key of the entry that marks the model as opened.
+    opened_key: Key,
+    /// Key of the entry with the findings.
+    probe_key: Key,
+    shown: Shown,
+}
+
+impl FindingsPlace<'_> {
+    /// Reads the findings; `None` if the store does not have them.
+    pub(crate) fn read(&self) -> Option<Findings> {
+        let mut findings: Option<Findings> = None;
+        self.store.get(&self.probe_key, Content::Probe, |entry| {
+            findings = serde_json::from_value(entry.facts.notes.clone()).ok();
+            findings.is_some()
+        })?;
+        findings
+    }
+
+    /// Writes the findings, then marks the model as opened. `took` is the duration of opening and probing.
+    pub(crate) fn write(&self, findings: &Findings, took: Duration) {
+        let milliseconds = took.as_millis() as u64;
+        for (key, milliseconds, notes) in [
+            (&self.probe_key, milliseconds, serde_json::json!(findings)),
+            (&self.opened_key, 0, serde_json::Value::Null),
+        ] {
+            let facts = EntryFacts::new(self.shown.clone(), milliseconds, notes);
+            self.store.put(key, &Entry::from_facts(facts));
+        }
+    }
+}

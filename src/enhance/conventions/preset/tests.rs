@@ -68,7 +68,7 @@ fn every_preset_is_documented() {
     let texts = [
         include_str!("../../../docs/enhancers.md"),
         include_str!("../../settings.rs"),
-        include_str!("../../../commands/enhance/mod.rs"),
+        include_str!("../../../commands/enhance.rs"),
     ];
     for (name, content) in all_presets().unwrap() {
         for text in texts {

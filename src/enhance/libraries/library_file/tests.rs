@@ -135,3 +135,53 @@ fn huge_offsets_cause_no_panic() {
         assert!(problem.contains("is incomplete"), "{problem}");
     }
 }
+
+#[test]
+fn libraries_are_recognised_by_name() {
+    for (os, name, expected) in [
+        ("linux", "libonnxruntime.so", true),
+        ("linux", "libonnxruntime.so.1.31.1", true),
+        ("linux", "libonnxruntime_providers_shared.so", false),
+        ("linux", "libonnxruntime.dylib", false),
+        ("macos", "libonnxruntime.1.31.1.dylib", true),
+        ("macos", "libonnxruntime_providers.dylib", false),
+        ("windows", "onnxruntime.dll", true),
+        ("windows", "onnxruntime_providers_shared.dll", false),
+    ] {
+        assert_eq!(is_library_name(os, name), expected, "{os} {name}");
+    }
+}
+
+#[test]
+fn minor_versions_are_parsed() {
+    assert_eq!(minor("1.31.1"), Some(31));
+    assert_eq!(minor("1.17.0-dev"), Some(17));
+    for wrong in ["", "1", "2.1.0", "1.x", "one"] {
+        assert_eq!(minor(wrong), None, "{wrong}");
+    }
+}
+
+#[test]
+fn files_that_are_not_libraries_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = folder.path().join("libonnxruntime.so");
+    std::fs::write(&text, "not a library").unwrap();
+    for (path, part) in [
+        (folder.path().join("missing.so"), "cannot be read"),
+        (folder.path().to_owned(), "is not a file"),
+        (text, "is not a dynamic library"),
+    ] {
+        let problem = probe(&path).unwrap_err();
+        assert!(problem.contains(part), "{problem}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn other_libraries_are_refused() {
+    let loaded = std::fs::read_to_string("/proc/self/maps").unwrap();
+    let libc =
+        loaded.lines().filter_map(|line| line.split_whitespace().nth(5)).find(|path| path.contains("libc.so")).unwrap();
+    let problem = probe(Path::new(libc)).unwrap_err();
+    assert!(problem.contains("OrtGetApiBase"), "{problem}");
+}

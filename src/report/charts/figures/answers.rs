@@ -1,10 +1,20 @@
 //! Figures of wrong answers in the dark: hallucinated objects, and collapse to one answer.
+//!
+//! Figure of mean confidence and accuracy by level.
+//!
+//! Figure of accuracy raw and with each enhancer.
+//!
+//! Bar chart for a data set that was photographed in the dark: accuracy raw and with each enhancer.
 
-use super::FigureBuilder;
-use crate::report::charts::chart::{Chart, LineContent, LineStyle, Panel, PlotLine};
+use super::{ACCURACY, FigureBuilder, FigureSpec};
+use crate::report::charts::chart::{
+    Bar, BarChart, BarPanel, Chart, FigureChart, LineContent, LineItems, LineStyle, Panel, PlotLine,
+};
 use crate::report::text::words::family as family_name;
-use crate::types::{Family, Variant};
+use crate::types::{AxisLevel, Family, SetLight, Variant, View};
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
+use darkqa_score::calibration::Calibration;
+use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
 
 impl FigureBuilder<'_> {
@@ -92,4 +102,154 @@ fn commonest_truth(confusion: &Confusion) -> Option<(f64, usize)> {
     let (all, highest) =
         confusion.shares().into_iter().fold((0, 0), |(all, highest), (_, n)| (all + n, highest.max(n)));
     (all > 0).then(|| (highest as f64 / all as f64, all))
+}
+
+/// Reads the value of a line from a calibration result.
+type Quantity = fn(&Calibration) -> Estimate;
+
+/// Lines of each panel: name and value.
+const LINES: [(&str, Quantity); 2] = [("confidence", |row| row.confidence), ("accuracy", |row| row.accuracy)];
+
+impl FigureBuilder<'_> {
+    /// Confidence and accuracy of each model in each variant, without enhancement. The gap between the two lines is
+    /// overconfidence.
+    pub(super) fn confidence(&self) -> Option<(String, Chart)> {
+        let mut panels = Vec::new();
+        for variant in self.tested_variants() {
+            for model in &self.models {
+                let mut lines = Vec::new();
+                for (style, (name, quantity)) in LINES.into_iter().enumerate() {
+                    let points = self.points(model, &variant, None, |subject| {
+                        self.findings.calibrations.iter().find(|row| row.subject == *subject).map(quantity)
+                    });
+                    if !points.is_empty() {
+                        lines.push(PlotLine {
+                            name: name.to_owned(),
+                            style: LineStyle(style),
+                            content: LineContent::Curve(points),
+                            model: Some((*model).to_owned()),
+                            items: None,
+                        });
+                    }
+                }
+                if !lines.is_empty() {
+                    let name = self.names.display_name(model);
+                    let title = format!("{name}, {}", self.condition_text(&variant, None));
+                    panels.push(Panel { title, lines, model: Some((*model).to_owned()) });
+                }
+            }
+        }
+        let caption = "Does confidence fall as fast as accuracy in the dark? The mean greatest probability of a choice, and the \
+                       accuracy of the same replies, by level.";
+        let (caption, mut chart) = self.chart("%", panels, 2, caption)?;
+        chart.note = format!("bands and bars are 95 % intervals by {}; strict parsing", self.findings.unit);
+        Some((caption, chart))
+    }
+}
+
+impl FigureBuilder<'_> {
+    /// Accuracy raw and with each enhancer by level: one panel for each model in each variant.
+    pub(super) fn enhancers(&self) -> Option<(String, Chart)> {
+        let mut panels = Vec::new();
+        for variant in self.tested_variants() {
+            for model in &self.models {
+                let mut lines = Vec::new();
+                for (index, enhancer) in self.raw_and_enhanced().enumerate() {
+                    let points = self.accuracy_points(model, &variant, enhancer);
+                    // A single level makes no line, except L0 enhanced, which is drawn as a point.
+                    let has_clean = points.first().is_some_and(|(level, _)| *level == AxisLevel::L0);
+                    if points.len() > 1 || has_clean {
+                        lines.push(PlotLine {
+                            name: self.enhancer_line_name(enhancer),
+                            style: LineStyle(index),
+                            content: LineContent::Curve(points),
+                            model: Some((*model).to_owned()),
+                            items: LineItems::for_model(&[*model], &variant, enhancer),
+                        });
+                    }
+                }
+                if lines.len() > 1 {
+                    let (name, light) = (self.curve_name(model), self.condition_text(&variant, None));
+                    let title = format!("{name}, {light}, n {}", self.item_count(None));
+                    panels.push(Panel { title, lines, model: Some((*model).to_owned()) });
+                }
+            }
+        }
+        let caption = if self.has_enhanced_clean() {
+            "Each enhancer against the raw images, by level. L0 is the untouched frame, in the line of an enhancer enhanced with it where that was asked."
+        } else {
+            "Each enhancer against the raw dark images, by level. L0 is the untouched frame."
+        };
+        self.chart(ACCURACY, panels, 2, caption)
+    }
+
+    /// True if clean frames (L0) were enhanced.
+    fn has_enhanced_clean(&self) -> bool {
+        self.findings
+            .grid
+            .subjects
+            .iter()
+            .any(|subject| subject.level == Some(AxisLevel::L0) && subject.enhancer.is_some())
+    }
+}
+
+impl FigureBuilder<'_> {
+    /// Accuracy of each model on the photographs, raw and with each enhancer; `None` for data sets photographed in good
+    /// light, which have curves over levels instead.
+    pub(super) fn photographed(&self) -> Option<FigureSpec> {
+        let findings = self.findings;
+        if findings.set.light == SetLight::Lit || self.models.is_empty() {
+            return None;
+        }
+        let chance = findings
+            .summary
+            .family_cells(None, ParsingMode::Strict)
+            .filter(|cell| cell.subject.view.is_none())
+            .find_map(|cell| Some(cell.accuracy?.value));
+        let panels = self.models.iter().map(|model| BarPanel {
+            title: format!("{}: accuracy in %, n {}", self.names.display_name(model), self.item_count(None)),
+            bars: self.photograph_bars(model),
+            chance,
+        });
+        let chart = BarChart {
+            panels: panels.filter(|panel| !panel.bars.is_empty()).collect(),
+            note: format!("lines are 95 % intervals by {}; strict parsing", findings.unit),
+        };
+        if chart.panels.is_empty() {
+            return None;
+        }
+        Some(FigureSpec {
+            name: "photographed",
+            caption: "Accuracy on photographs in the dark, raw (as photographed) and with each enhancer. Broken line: chance."
+                .to_owned(),
+            chart: FigureChart::Bars(chart),
+        })
+    }
+
+    /// Accuracy of a model on the photographs, raw and with each enhancer.
+    fn photograph_bars(&self, model: &str) -> Vec<Bar> {
+        self.findings
+            .grid
+            .subjects
+            .iter()
+            .filter(|subject| {
+                subject.model == *model && subject.view == Some(View::Image) && !subject.variant.is_degraded()
+            })
+            .filter_map(|subject| {
+                let name = match &subject.enhancer {
+                    None => "raw".to_owned(),
+                    Some(name) => {
+                        let name = self.names.display_name(name.as_str());
+                        format!("{name}{}", subject.variant.group_suffix())
+                    }
+                };
+                let index = self.enhancers.iter().position(|known| Some(*known) == subject.enhancer.as_ref());
+                Some(Bar {
+                    name,
+                    style: LineStyle(index.map_or(0, |index| index + 1)),
+                    share: self.accuracy_of(subject, None)?,
+                })
+            })
+            .collect()
+    }
 }

@@ -1,20 +1,17 @@
 //! Figures and tables for reports and papers: functions from [`Findings`] to a [`Chart`] or a table, not yet drawn.
+//!
+//! Mean of curves: [`mean`].
 
 mod answers;
-mod confidence;
-mod enhancers;
-mod mean;
 mod names;
 mod overview;
-mod photographed;
 mod split;
 mod story;
 mod tables;
-mod thresholds;
 
 use std::collections::BTreeSet;
 
-use crate::report::charts::chart::figure_chart::FigureChart;
+use super::chart::FigureChart;
 use crate::report::charts::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine};
 use crate::report::text::words::{family as family_name, light_with, marked_reference, names_enhancer};
 use crate::types::degradations::{Axis, Kind};
@@ -25,13 +22,11 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, models_under_test, pooled_models};
 
-use mean::mean;
 pub(crate) use names::{KnownNames, Names};
 pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use split::split;
 pub(crate) use story::{StoryCurves, story_curves};
-pub(crate) use tables::paper_tables;
-pub(crate) use thresholds::missing_threshold_message;
+pub(crate) use tables::{missing_threshold_message, paper_tables};
 
 /// Name, caption and chart of a figure that is not yet drawn.
 #[derive(Debug, Clone)]
@@ -506,4 +501,32 @@ impl<'a> FigureBuilder<'a> {
         let chart = Chart { measure, note: self.note() + &self.training_note(&panels), panels: split(panels), columns };
         Some((caption.to_owned(), chart))
     }
+}
+
+/// Mean of curves at the levels that all of them have, with the curves' range as interval. A single curve is returned
+/// unchanged.
+fn mean(curves: &[Vec<(AxisLevel, Estimate)>]) -> Vec<(AxisLevel, Estimate)> {
+    if let [single] = curves {
+        return single.clone();
+    }
+    let levels: BTreeSet<AxisLevel> = curves.iter().flatten().map(|(level, _)| *level).collect();
+    levels.into_iter().filter_map(|level| Some((level, mean_at(curves, level)?))).collect()
+}
+
+/// Mean of curves at one level, with their range; `None` if a curve has no point there.
+fn mean_at(curves: &[Vec<(AxisLevel, Estimate)>], level: AxisLevel) -> Option<Estimate> {
+    let values: Option<Vec<f64>> = curves
+        .iter()
+        .map(|curve| {
+            let point = curve.iter().find(|(other, _)| *other == level);
+            point.map(|(_, estimate)| estimate.value)
+        })
+        .collect();
+    let values = values.filter(|values| !values.is_empty())?;
+    Some(Estimate {
+        value: values.iter().sum::<f64>() / values.len() as f64,
+        low: values.iter().copied().fold(f64::INFINITY, f64::min),
+        high: values.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+        n: values.len(),
+    })
 }

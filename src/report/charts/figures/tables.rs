@@ -1,13 +1,18 @@
 //! Tables for a paper, with models in rows and levels or families in columns: [`paper_tables`].
+//!
+//! Figures of thresholds: one of darkness thresholds, one of blur thresholds.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use super::{FigureBuilder, Names};
+use super::{FigureBuilder, FigureSpec, Names};
+use crate::report::charts::chart::{FigureChart, Scale, ThresholdChart, ThresholdRow};
+use crate::report::tables::missing_threshold_reason;
 use crate::report::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
-use crate::report::text::words::family as family_name;
+use crate::report::text::words::{family as family_name, stops};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::text::counted;
 use crate::types::{AxisLevel, EnhancerName, Family, Variant, View};
+use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
@@ -247,5 +252,78 @@ impl FigureBuilder<'_> {
             self.basis()
         );
         Some(table(caption, levels.iter().map(ToString::to_string), rows))
+    }
+}
+
+/// Name and axis of each figure.
+const NAMES: [(&str, Axis); 2] = [("thresholds", Axis::LIGHT), ("blur_thresholds", Axis::MOTION)];
+
+/// Message that a threshold figure is missing because no curve has a threshold, with the reasons; `None` if that is not
+/// the cause.
+pub(crate) fn missing_threshold_message(findings: &Findings<'_>, figure: &str) -> Option<String> {
+    let (_, axis) = NAMES.into_iter().find(|(name, _)| *name == figure)?;
+    let reasons: BTreeSet<String> = curves_on(findings, axis)
+        .filter_map(|curve| curve.summary.threshold.as_ref().err())
+        .map(missing_threshold_reason)
+        .collect();
+    let reasons: Vec<String> = reasons.into_iter().collect();
+    (!reasons.is_empty()).then(|| format!("no curve has a threshold: {}", reasons.join("; ")))
+}
+
+/// Curves on an axis that are over all families together.
+fn curves_on<'f>(findings: &'f Findings<'_>, axis: Axis) -> impl Iterator<Item = &'f Curve> {
+    findings.curves.iter().filter(move |curve| curve.family.is_none() && curve.axis() == axis)
+}
+
+impl FigureBuilder<'_> {
+    /// One figure for each axis on which a curve has a threshold.
+    pub(super) fn thresholds(&self) -> Vec<FigureSpec> {
+        Axis::ALL.into_iter().filter_map(|axis| self.thresholds_on(axis)).collect()
+    }
+
+    /// One row for each curve on an axis, with its threshold and interval; `None` if no curve has a threshold.
+    fn thresholds_on(&self, axis: Axis) -> Option<FigureSpec> {
+        let rows: Vec<ThresholdRow> = curves_on(self.findings, axis)
+            .filter_map(|curve| {
+                let threshold = *curve.summary.threshold.as_ref().ok()?;
+                let darkest = curve.summary.darkest.value();
+                let light = self.condition_text(&curve.variant, curve.enhancer.as_ref());
+                Some(ThresholdRow {
+                    name: format!("{}, {light}", self.curve_name(&curve.model)),
+                    threshold,
+                    text: format!(
+                        "{} [{}, {}]",
+                        stops(threshold.value, darkest),
+                        stops(threshold.low, darkest),
+                        stops(threshold.high, darkest)
+                    ),
+                })
+            })
+            .collect();
+        if rows.is_empty() {
+            return None;
+        }
+        let (name, caption) = if axis == Axis::MOTION {
+            (
+                "blur_thresholds",
+                "Threshold of motion blur: the exposure time at which accuracy is half-way between that at L0 and that without images (or guessing, if that is higher). Arrows: \
+                 beyond the longest time asked.",
+            )
+        } else {
+            (
+                "thresholds",
+                "Darkness threshold: the exposure drop at which accuracy is half-way between that at L0 and that without images (or guessing, if that is higher). Arrows: \
+                 beyond the darkest level asked.",
+            )
+        };
+        Some(FigureSpec {
+            name,
+            caption: caption.to_owned(),
+            chart: FigureChart::Thresholds(ThresholdChart {
+                rows,
+                scale: Scale::for_axis(axis),
+                unit: self.findings.unit.to_string(),
+            }),
+        })
     }
 }

@@ -1,24 +1,28 @@
 //! Drawing of line charts over the levels: [`lines`].
 
-use super::axes::Axes;
 use super::legend::Legend;
 use super::look::Look;
 use super::sheet::{PAPER, Point, Shape, Sheet, Stroke};
-use super::title::Title;
+use super::title::{Axes, Title};
 use crate::report::charts::chart::{Chart, DarkMark, LineContent, LineStyle, Panel};
 use crate::types::AxisLevel;
 use darkqa_score::estimate::Estimate;
 
 /// Minimum width of a panel in em.
 const MIN_WIDTH: f64 = 14.0;
+
 /// Height of the plot area as a share of its width.
 const RATIO: f64 = 0.62;
+
 /// Minimum and maximum height of the plot area in em.
 const HEIGHTS: [f64; 2] = [9.0, 17.0];
+
 /// Space between panels in em.
 const GAP: f64 = 0.9;
+
 /// Intervals are drawn as bands in panels of up to this many curves, and as bars in others.
 const MAX_BANDS: usize = 3;
+
 /// Opacity of a band.
 const BAND: f64 = 0.16;
 

@@ -3,9 +3,6 @@
 //! A chart becomes a [`Sheet`] of shapes in points; PDF and SVG write the same shapes. Captions are separate texts, not
 //! part of a sheet.
 
-mod axes;
-mod bars;
-mod counts;
 mod figure;
 mod font;
 mod legend;
@@ -13,17 +10,13 @@ mod lines;
 mod look;
 mod overview;
 mod pdf;
-mod pdf_font;
-mod points;
-mod reliability;
-mod rows;
-mod samples;
 mod sheet;
 mod svg;
 mod tables;
 mod tex;
-mod thresholds;
 mod title;
+
+use super::chart::FigureChart;
 
 pub(crate) use figure::{count_figure, figure, point_figure};
 pub(crate) use look::{Look, Palette};
@@ -34,14 +27,12 @@ pub(crate) use svg::svg;
 pub(crate) use tables::tables;
 pub(crate) use tex::tex;
 
-use crate::report::charts::chart::figure_chart::FigureChart;
-
 /// Draws a figure as a sheet.
 pub(crate) fn sheet(figure: &FigureChart, look: &Look) -> Sheet {
     match figure {
         FigureChart::Lines(chart) => lines::lines(chart, look),
-        FigureChart::Bars(chart) => bars::bars(chart, look),
-        FigureChart::Reliability(chart) => reliability::reliability(chart, look),
-        FigureChart::Thresholds(chart) => thresholds::thresholds(chart, look),
+        FigureChart::Bars(chart) => figure::bars(chart, look),
+        FigureChart::Reliability(chart) => figure::reliability(chart, look),
+        FigureChart::Thresholds(chart) => figure::thresholds(chart, look),
     }
 }

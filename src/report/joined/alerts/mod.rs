@@ -1,26 +1,10 @@
 //! Alerts at the top of a report: problems of its runs, differences between them, and limitations of its numbers
 //! ([`alerts`]).
 
-mod adapted;
-mod clusters;
-mod confidence;
-mod constraints;
 mod images;
-mod limits;
-mod missing;
 mod models;
-mod noise;
-mod parsing;
-mod providers;
 mod questions;
 mod replies;
-mod served;
-mod servers;
-mod settings;
-mod words;
-
-pub(super) use missing::missing_alerts;
-pub(super) use replies::empty_answer_alerts;
 
 use std::collections::BTreeMap;
 
@@ -28,7 +12,7 @@ use super::combine::Combined;
 use super::enhancers::enhancer_alerts;
 use super::join::{Joined, JoinedRun};
 use crate::report::text::alert::{Alert, AlertKind};
-use crate::runs::over_budget::OverBudget;
+use crate::runs::outcome::OverBudget;
 use crate::types::manifests::Status;
 use crate::types::text::plural;
 use crate::types::{InputSummary, OpenDetail, StoredDetail as _, TrialRef};
@@ -36,14 +20,15 @@ use darkqa_score::answers::record::Detail;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::{compares_enhancers, compares_models};
 use darkqa_score::findings::Findings;
-use darkqa_score::photographs::PhotographedSet;
-use darkqa_score::photographs::pair_darkness::PairDarkness;
+use darkqa_score::photographs::{PairDarkness, PhotographedSet};
+
+pub(super) use replies::{empty_answer_alerts, missing_alerts};
 
 /// All alerts of a report on multiple-choice questions, ordered by kind.
 pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
-    alerts.extend(missing_alerts(&missing::counts(&findings.health), "Replies"));
+    alerts.extend(missing_alerts(&replies::counts(&findings.health), "Replies"));
     alerts.extend(replies::reply_alerts(&findings.health, "count as wrong"));
     alerts.extend(unread_early_ends(combined, "count as wrong"));
     alerts.extend(replies::empty_choice_alerts(combined));
@@ -51,14 +36,14 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
     alerts.extend(replies::people_alerts(combined));
     alerts.extend(images::image_alerts(combined));
     alerts.extend(images::shrunk_alerts(combined));
-    alerts.extend(parsing::parsing_alerts(combined));
-    alerts.extend(confidence::confidence_alerts(&combined.runs, &combined.trials));
-    alerts.extend(constraints::constraint_alerts(&combined.runs, &combined.trials));
+    alerts.extend(replies::parsing_alerts(combined));
+    alerts.extend(replies::confidence_alerts(&combined.runs, &combined.trials));
+    alerts.extend(models::constraint_alerts(&combined.runs, &combined.trials));
     alerts.extend(questions::repeat_alert(combined));
     alerts.extend(questions::item_alerts(findings));
     alerts.extend(questions::balance_alert(findings));
-    alerts.extend(clusters::cluster_alerts(combined, findings.grid.clusters, findings.unit));
-    alerts.extend(clusters::rare_loss_alert(findings));
+    alerts.extend(questions::cluster_alerts(combined, findings.grid.clusters, findings.unit));
+    alerts.extend(questions::rare_loss_alert(findings));
     alerts.extend(dark_photographs_alert(findings.set));
     alerts.extend(many_models_alert(findings));
     alerts.extend(many_enhancers_alert(findings));
@@ -73,14 +58,14 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
 pub(super) fn alerts_without_truths(combined: &Combined, agreement: &SelfAgreement<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
-    alerts.extend(missing_alerts(&missing::counts(&agreement.health), "Replies"));
+    alerts.extend(missing_alerts(&replies::counts(&agreement.health), "Replies"));
     alerts.extend(replies::reply_alerts(&agreement.health, "do not agree"));
     alerts.extend(unread_early_ends(combined, "do not agree"));
     alerts.extend(replies::empty_choice_alerts(combined));
     alerts.extend(replies::broken_off_alert(combined));
-    alerts.extend(parsing::parsing_alerts(combined));
-    alerts.extend(constraints::constraint_alerts(&combined.runs, &combined.trials));
-    alerts.extend(clusters::cluster_alerts(combined, agreement.grid.clusters, agreement.unit));
+    alerts.extend(replies::parsing_alerts(combined));
+    alerts.extend(models::constraint_alerts(&combined.runs, &combined.trials));
+    alerts.extend(questions::cluster_alerts(combined, agreement.grid.clusters, agreement.unit));
     alerts.extend(dark_photographs_alert(agreement.set));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
@@ -128,18 +113,18 @@ fn dark_photographs_alert(set: PhotographedSet) -> Option<Alert> {
 pub(super) fn run_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let mut alerts = progress_alerts(&joined.runs);
     alerts.extend(cost_alerts(&joined.runs));
-    alerts.extend(servers::server_alerts(joined));
-    alerts.extend(served::served_alerts(joined));
-    alerts.extend(providers::provider_alerts(&joined.trials));
-    alerts.extend(limits::limit_alerts(joined));
+    alerts.extend(models::server_alerts(joined));
+    alerts.extend(models::served_alerts(joined));
+    alerts.extend(models::provider_alerts(&joined.trials));
+    alerts.extend(models::limit_alerts(joined));
     alerts.extend(enhancer_alerts(&joined.runs));
     alerts.extend(input_alerts(&joined.runs));
-    alerts.extend(adapted::adaptation_alerts(&joined.runs));
-    alerts.extend(adapted::change_alerts(&joined.runs));
-    alerts.extend(noise::noise_alerts(joined));
-    alerts.extend(noise::rounding_alert(joined));
+    alerts.extend(images::adaptation_alerts(&joined.runs));
+    alerts.extend(images::change_alerts(&joined.runs));
+    alerts.extend(images::noise_alerts(joined));
+    alerts.extend(images::rounding_alert(joined));
     if joined.runs.len() > 1 {
-        alerts.extend(settings::setting_alerts(joined));
+        alerts.extend(models::setting_alerts(joined));
         alerts.extend(questions::question_alerts(joined));
     }
     alerts.sort_by_key(|alert| alert.kind);

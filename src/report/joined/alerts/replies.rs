@@ -1,18 +1,31 @@
 //! Alerts about replies that are not scored, or are scored as wrong: [`reply_alerts`], [`ended_early_alerts`],
 //! [`broken_off_alert`], [`people_alerts`].
+//!
+//! Alerts about missing replies that may depend on the condition: [`missing_alerts`].
+//!
+//! Alerts about replies that were parsed by another version of the lenient rules: [`parsing_alerts`].
+//!
+//! Alerts about models whose replies lack the requested probabilities: [`confidence_alerts`].
 
 use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+
+use serde_json::Value;
 
 use crate::ask::is_context_full;
 use crate::report::joined::combine::Combined;
+use crate::report::joined::enhancers::LenientChange;
+use crate::report::joined::join::JoinedRun;
 use crate::report::joined::settings::has_human_answers;
 use crate::report::text::alert::{Alert, AlertKind, MAX_UNREAD};
-use crate::report::text::outcome_words::failure_reason;
-use crate::types::degradations::AxisLevel;
+use crate::report::text::words::failure_reason;
 use crate::types::text::counted;
-use crate::types::{Condition, FailureKind, Finish, OpenDetail, Record, StoredDetail, TrialRef, UnreadReason, Usage};
+use crate::types::{
+    AxisLevel, ChoiceDetail, Condition, FailureKind, Finish, OpenDetail, Record, StoredDetail, TrialRef, Trials,
+    UnreadReason, Usage,
+};
 use darkqa_score::accuracies::Health;
+use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Alerts about replies that could not be parsed and about failed trials. `unread_as` completes the sentence about the
 /// former, for example with "count as wrong".
@@ -246,6 +259,113 @@ pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
         .collect()
 }
 
+/// Share of missing replies in a condition above which an alert names it (chosen).
+const MAX_MISSING: f64 = 0.02;
+
+/// Numbers of missing replies and of all trials of a subject.
+pub(crate) type MissingCounts<'m> = (&'m ModelInCondition, [usize; 2]);
+
+/// Numbers of missing replies of each subject with images.
+pub(super) fn counts(health: &[Health]) -> Vec<MissingCounts<'_>> {
+    health
+        .iter()
+        .filter(|health| health.subject.level.is_some())
+        .map(|health| {
+            let failed = health.failures();
+            (&health.subject, [failed, failed + health.replies])
+        })
+        .collect()
+}
+
+/// One alert for each model with more than 2 % of its replies missing in a condition. It names the condition with the
+/// largest share, and the share at L0. `noun` is what is missing.
+pub(crate) fn missing_alerts(counts: &[MissingCounts<'_>], noun: &str) -> Vec<Alert> {
+    let mut models = BTreeMap::<&str, Vec<&MissingCounts<'_>>>::new();
+    for one in counts.iter().filter(|(_, [_, all])| *all > 0) {
+        models.entry(&one.0.model).or_default().push(one);
+    }
+    models
+        .into_iter()
+        .filter_map(|(model, conditions)| {
+            // Of equal shares, the first.
+            let (subject, worst) = conditions.iter().rev().max_by(|a, b| {
+                let [a, b] = [a, b].map(|(_, counts)| share(*counts));
+                a.total_cmp(&b)
+            })?;
+            if share(*worst) <= MAX_MISSING {
+                return None;
+            }
+            let clean = conditions
+                .iter()
+                .find(|(subject, _)| {
+                    subject.level == Some(AxisLevel::L0) && subject.enhancer.is_none()
+                })
+                .filter(|(clean, _)| clean != subject)
+                .map_or_else(String::new, |(_, counts)| {
+                    format!(", and of {:.1} % at L0", 100.0 * share(*counts))
+                });
+            let [missing, all] = worst;
+            let text = format!(
+                "{noun} of {model} are missing for {missing} of {all} questions at {} ({:.1} %){clean}. If that depends on the condition, \
+                 the others flatter the model: intervals and verdicts hold for all values of the missing ones.",
+                subject.condition(),
+                100.0 * share(*worst)
+            );
+            Some(Alert::new(AlertKind::MissingReplies, text))
+        })
+        .collect()
+}
+
+fn share([missing, all]: [usize; 2]) -> f64 {
+    missing as f64 / all as f64
+}
+
+/// One alert for each run whose lenient parsing would change under the rules of this version.
+pub(super) fn parsing_alerts(combined: &Combined) -> Vec<Alert> {
+    combined
+        .runs
+        .iter()
+        .filter_map(|run| {
+            let change = LenientChange::new(&run.manifest);
+            if change.is_current() {
+                return None;
+            }
+            let records =
+                combined.trials_of(run).map(TrialRef::text).map(|place| combined.texts[place.log()].record(place));
+            let text = match change.with_records(records) {
+                Ok(change) if change.has_changed() => {
+                    format!("{}: {}. --rescore stores what it reads now.", run.name, change.words())
+                }
+                Ok(_) => return None,
+                Err(error) => format!("{}: its replies cannot be read again: {error}", run.name),
+            };
+            Some(Alert::new(AlertKind::Reading, text))
+        })
+        .collect()
+}
+
+/// One alert for each model that was asked with `--request probabilities` and none of whose replies has probabilities.
+pub(super) fn confidence_alerts(runs: &[JoinedRun], trials: &Trials<ChoiceDetail>) -> Vec<Alert> {
+    let asked: BTreeSet<&String> = runs
+        .iter()
+        .filter_map(|run| run.manifest.columns.get("model"))
+        .flat_map(BTreeMap::iter)
+        .filter(|(_, content)| content["--probabilities"] == Value::Bool(true))
+        .map(|(name, _)| name)
+        .collect();
+    let stated: BTreeSet<&str> = trials.iter().filter(|trial| trial.options().is_some()).map(TrialRef::model).collect();
+    let replied: BTreeSet<&str> = trials.iter().filter(|trial| !trial.failed()).map(TrialRef::model).collect();
+    asked
+        .into_iter()
+        .filter(|name| replied.contains(&***name) && !stated.contains(&***name)).map(|name| {
+        let text = format!(
+            "The confidence of {name} is not available: its server states no probabilities of tokens, or its replies do not begin \
+             with a choice."
+        );
+        Alert::new(AlertKind::Parameters, text)
+    }).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -289,5 +409,26 @@ mod tests {
             reply_alerts(&several, "count as wrong")[0].text,
             "7 trials of m failed and are not scored: the server failed (5), no whole reply in time (2)."
         );
+    }
+
+    fn alert(failed_at_dark: usize) -> Vec<String> {
+        let subjects: Vec<ModelInCondition> = ["L0", "L3-noise", "L5-noise"]
+            .iter()
+            .map(|name| ModelInCondition::new("m", Some(&name.parse().unwrap())))
+            .collect();
+        let failed = [1, failed_at_dark / 2, failed_at_dark];
+        let counts: Vec<MissingCounts<'_>> =
+            subjects.iter().zip(failed).map(|(subject, failed)| (subject, [failed, 200])).collect();
+        let alerts = missing_alerts(&counts, "Replies");
+        alerts.into_iter().map(|alert| alert.text).collect()
+    }
+
+    #[test]
+    fn the_condition_with_the_largest_share_is_named() {
+        let expected = "Replies of m are missing for 90 of 200 questions at L5-noise (45.0 %), and of 0.5 % at L0. If that depends on the \
+                        condition, the others flatter the model: intervals and verdicts hold for all values of the missing ones.";
+        assert_eq!(alert(90), [expected]);
+        assert_eq!(alert(4), [""; 0]);
+        assert_eq!(alert(5).len(), 1);
     }
 }

@@ -1,7 +1,7 @@
 //! Expected sentences about the confidence of models.
 
 use super::checked;
-use crate::report::sentences::confidence::{Confidence, confidence};
+use crate::report::sentences::below_blind::{Confidence, confidence};
 use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Severity, Variant};
 use darkqa_score::calibration::{Calibration, RiskCoverage, TestedConfidence};

@@ -12,7 +12,7 @@ pub(crate) mod records;
 mod simulation;
 
 use super::sentence::{Sentence, level_runs};
-use super::{answers, below_blind as below, darkness, pooled, sample};
+use super::{below_blind as below, darkness, pooled, sample};
 use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, EnhancerName, Severity, Variant};
 use darkqa_score::auc::Auc;
@@ -230,7 +230,7 @@ fn fidelity_sentence([value, low, high]: [f64; 3]) -> String {
         p_report: Some(0.508),
         between: [None, None],
     });
-    checked(&answers::fidelity(&findings).unwrap())
+    checked(&super::fidelity(&findings).unwrap())
 }
 
 /// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.
@@ -355,7 +355,7 @@ fn sentences_never_claim_equality() {
         include_str!("../pooled.rs"),
         include_str!("../sample.rs"),
         include_str!("../models.rs"),
-        include_str!("../answers.rs"),
+        include_str!("../mod.rs"),
         include_str!("../hallucination.rs"),
         include_str!("../below_blind.rs"),
     ];

@@ -5,7 +5,7 @@ use crate::report::sentences::sentences;
 use crate::types::PhotoName;
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
-use darkqa_score::photographs::pair_darkness::PairDarkness;
+use darkqa_score::photographs::PairDarkness;
 
 #[test]
 fn unconfirmed_effects_on_photographs_are_stated() {

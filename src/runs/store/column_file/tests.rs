@@ -188,3 +188,21 @@ fn missing_and_damaged_files_have_no_metadata() {
         assert_eq!(FileMetadata::read(&path).unwrap(), None, "{cut}");
     }
 }
+
+#[test]
+fn numbers_that_do_not_fit_are_none() {
+    for (kind, number, stored) in [
+        (CellKind::Int8, 127, Some(127)),
+        (CellKind::Int8, 128, None),
+        (CellKind::Int8, -128, Some(-128)),
+        (CellKind::Int16, -32769, None),
+        (CellKind::Int32, 2_147_483_647, Some(i32::MAX)),
+        (CellKind::Int32, 2_147_483_648, None),
+        (CellKind::Int32, i128::from(u64::MAX), None),
+        (CellKind::Text, 1, None),
+    ] {
+        assert_eq!(kind.to_stored(number), stored, "{kind:?} {number}");
+    }
+    assert_eq!(Cell::int(Some(u64::MAX)), Cell::Int(u64::MAX.into()));
+    assert_eq!(Cell::int(None::<u8>), Cell::Null);
+}

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::by_rule::choices;
 use super::reply;
-use crate::choice::text::words::{Role, lists};
+use crate::choice::text::tokens::{Role, lists};
 use crate::choice::{ParsingMode, read};
 use darkqa_base::types::questions::Answer;
 

@@ -3,7 +3,7 @@
 use super::by_rule::choices;
 use super::choices_of;
 use crate::choice::choice_views::{ChoiceViews, Naming};
-use crate::choice::text::words::{Role, Roles, lists, phrase_at};
+use crate::choice::text::tokens::{Role, Roles, lists, phrase_at};
 use crate::choice::text::{fold, tokens};
 use crate::choice::{ParsingMode, read};
 use darkqa_base::types::questions::Answer;

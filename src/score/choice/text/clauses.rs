@@ -1,7 +1,6 @@
 //! [`Clauses`]: a text cut into words, phrases and clauses.
 
-use super::tokens::{Token, TokenKind};
-use super::words::{Role, Roles, phrase_at};
+use super::tokens::{Role, Roles, Token, TokenKind, phrase_at};
 
 /// The largest unit of the text that ends at an element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -7,7 +7,7 @@ use std::sync::LazyLock;
 use regex::{Captures, Regex};
 use serde::Deserialize;
 
-use super::clean::compiled;
+use super::plain::compiled;
 
 /// Words in the names of marks, a table of `reasoning.toml`.
 #[derive(Debug, Default, Deserialize)]

@@ -1,15 +1,12 @@
 //! The text of a reply: cleaned, without markup, and cut into words and clauses.
 
 mod clauses;
-pub(super) mod clean;
-mod headings;
 mod marks;
-mod plain;
+pub(super) mod plain;
 mod ranges;
 pub(super) mod reasoning;
 mod refusal;
-mod tokens;
-pub(super) mod words;
+pub(super) mod tokens;
 
 pub(super) use clauses::{Boundary, Clauses, Element};
 pub(super) use plain::{RANGE, fold, plain};

@@ -4,7 +4,7 @@ use std::sync::LazyLock;
 
 use regex::Regex;
 
-use super::clean::compiled;
+use super::plain::compiled;
 
 static REFUSAL: LazyLock<Regex> = LazyLock::new(|| {
     compiled(concat!(

@@ -7,8 +7,7 @@ use crate::comparisons::pooled_kind::PooledKind;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use crate::significance::ALPHA;
-use crate::statistics::quantiles::{degrees_of_freedom, student, two_sided_tail};
-use crate::statistics::residuals::{residuals, unknown_design_effect};
+use crate::statistics::estimate::{degrees_of_freedom, residuals, student, two_sided_tail, unknown_design_effect};
 use darkqa_base::types::{AxisLevel, Family, Variant};
 
 /// The two families of a variant whose losses at the darkest level are furthest apart, with a test of the difference.

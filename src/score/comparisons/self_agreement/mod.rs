@@ -18,13 +18,9 @@
 
 mod bank_index;
 pub mod cell;
-mod counts;
 pub mod evidence;
-mod kappa;
 pub mod light;
 pub mod models_in_light;
-pub mod question_in_light;
-
 #[cfg(test)]
 mod tests;
 
@@ -35,7 +31,6 @@ use self::cell::{AgreementCell, cells};
 use self::evidence::{EvidenceCurve, curves};
 use self::light::{LightAnswers, LightReplies};
 use self::models_in_light::{ModelsInLight, models_in_light};
-use self::question_in_light::{QuestionInLight, questions_in_light};
 use super::comparison::{Comparison, ComparisonKind, comparisons};
 use crate::accuracies::{Health, healths};
 use crate::answers::confusion::{Confusion, Hallucination, confusions, hallucinations};
@@ -44,8 +39,9 @@ use crate::choice::ParsingMode;
 use crate::cluster::{ClusterUnit, Clusters, FrameTies};
 use crate::grid::Grid;
 use crate::photographs::PhotographedSet;
-use crate::test_tree::{TestTree, adjust_p_values};
+use crate::tested_sentences::{TestTree, adjust_p_values};
 use darkqa_base::types::{ChoiceDetail, ModelListing, RunQuestion, Trials};
+use light::{QuestionInLight, questions_in_light};
 
 /// All results of a run without true answers.
 #[derive(Debug)]

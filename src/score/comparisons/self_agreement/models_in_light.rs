@@ -1,8 +1,7 @@
 //! Agreement of two models at L0: [`ModelsInLight`].
 
 use super::bank_index::BankIndex;
-use super::counts::BankCounts;
-use super::kappa::kappa;
+use super::cell::{BankCounts, kappa};
 use super::light::LightAnswers;
 use crate::choice::ParsingMode;
 use crate::cluster::Clusters;

@@ -8,20 +8,22 @@ use std::fmt;
 use serde::Serialize;
 
 use super::CameraOrigin;
-use super::mean::{MIN_VALUES, Mean};
-use super::quantile::quantile;
-use super::smooth::{BINS, SpreadCurve};
+use super::smooth::{BINS, MIN_VALUES, Mean, SpreadCurve, quantile};
 use darkqa_base::types::ProfileName;
 
 /// Number of gains for which synthetic images are made (chosen).
 pub const LADDER_STEPS: usize = 15;
+
 /// Minimum and maximum gain, in ADU per electron (chosen; the built-in cameras are between 0.09 and 29).
 pub const GAINS: [f64; 2] = [0.02, 30.0];
+
 /// Number of gains, evenly spaced in ln K, at which the curves are compared (chosen).
 const FINE: usize = 601;
+
 /// Maximum misfit of a fit, in ln spread (chosen: pairs simulated by this program have up to 0.1, a pair whose
 /// low-light image was made without a sensor at least 0.9).
-pub const MAX_MISFIT: f64 = 0.3;
+const MAX_MISFIT: f64 = 0.3;
+
 /// Minimum number of bins for a fit (chosen); fewer do not determine the shape of a curve.
 const MIN_BINS: usize = 4;
 

@@ -1,24 +1,33 @@
 //! Similarity of a synthetic image to a real one: [`psnr`], [`ssim`](ssim::ssim), and the divergence of their noise
 //! ([`residual`]). Also the camera gain estimated from the noise of a real image ([`gain`]), and the check that two
-//! images show the same scene ([`scene`]).
+//! images show the same scene (`scene`).
+//!
+//! Check that two images show the same scene in different light: [`SceneMatch`].
+//!
+//! Both images are divided into blocks, whose means have little noise. The mean of the surrounding 5 × 5 blocks is
+//! subtracted from each mean, which removes the large-scale distribution of light. The remaining structure correlates
+//! if the scene is the same. An exposure drop multiplies codes by 2^(−ΔEV/2.2), which does not change the correlation.
+//!
+//! Measured on 33 indoor photographs of 21 scenes at 600 × 400: the correlation is 0.37 to 1 (median 0.99) for 1,055
+//! synthetic partners of 2 to 9 EV, all noise profiles, K 0.1 and 6; at most 0.21 for 1,483 pairs of two scenes, 427 of
+//! them with real low-light images; 1.00 and 0.86 for a real and a synthetic pair of LOL-v2. An image at 4 EV that is
+//! shifted by 2 % of its shorter side has at least 0.67, by 4 % at least 0.25.
 
 pub mod gain;
-pub mod mean;
-pub(crate) mod quantile;
 pub mod residual;
-pub mod scene;
 pub mod smooth;
 pub mod ssim;
 
 use std::fmt;
 
-use residual::Divergence;
-use scene::SceneMatch;
 use serde::Serialize;
-pub use ssim::same_size;
 
+use super::dot;
 use darkqa_base::error::{Error, Result};
 use darkqa_base::types::{ProfileName, Rgb};
+use residual::Divergence;
+
+pub use ssim::same_size;
 
 /// Similarity of one synthetic image to the real one.
 #[derive(Debug, Clone, Copy, Serialize)]
@@ -155,6 +164,127 @@ pub fn exposure_drop(normal: &Rgb, low: &Rgb) -> Result<f32> {
     Ok(libm::log2(normal_light / low_light) as f32)
 }
 
+/// Minimum correlation of images of the same scene (chosen, see above).
+pub const MIN_CORRELATION: f64 = 0.25;
+
+/// Minimum correlation that the same scene would reach under the noise of the dark image (chosen). Below it, a low
+/// correlation is no evidence.
+const MIN_REACH: f64 = 0.5;
+
+/// Approximate number of blocks along the shorter side (chosen).
+const BLOCKS: usize = 25;
+
+/// Step of the side of a block in pixels, and its minimum (chosen).
+const SIDE_STEP: usize = 8;
+
+/// Radius of the surroundings of a block, in blocks (chosen).
+const SURROUNDING_RADIUS: usize = 2;
+
+/// Median of the absolute value of a standard normal variable.
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+
+/// Agreement of the structure of two images.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SceneMatch {
+    /// Correlation of the structure, from −1 to 1; `None` with too little structure or too much noise.
+    pub correlation: Option<f64>,
+}
+
+impl SceneMatch {
+    /// Compares an image in normal light with one of the same size that is `drop_ev` EV darker.
+    #[must_use]
+    pub fn new(normal: &Rgb, low: &Rgb, drop_ev: f64) -> Self {
+        let [normal, low] = [normal, low].map(BlockMeans::new);
+        let (clean, noisy) = (normal.structure(), low.structure());
+        let (squares, others) = (dot(&clean, &clean), dot(&noisy, &noisy));
+        let dropped = libm::exp2(-drop_ev / 2.2);
+        let signal = dropped * (squares / clean.len().max(1) as f64).sqrt();
+        let reach = signal / libm::hypot(signal, low.noise);
+        let is_clear = reach >= MIN_REACH && squares > 0.0;
+        Self {
+            correlation: is_clear
+                .then(|| if others > 0.0 { dot(&clean, &noisy) / (squares * others).sqrt() } else { 0.0 }),
+        }
+    }
+
+    /// True if the images show two different scenes.
+    #[must_use]
+    pub fn is_of_two_scenes(self) -> bool {
+        self.correlation.is_some_and(|correlation| correlation < MIN_CORRELATION)
+    }
+}
+
+/// Mean green code of each block of an image.
+struct BlockMeans {
+    /// Numbers of rows and columns of blocks.
+    size: [usize; 2],
+    means: Vec<f64>,
+    /// Standard deviation of a mean due to noise, in codes.
+    noise: f64,
+}
+
+impl BlockMeans {
+    fn new(image: &Rgb) -> Self {
+        let shorter = image.height().min(image.width());
+        let side = (shorter / BLOCKS / SIDE_STEP * SIDE_STEP).max(SIDE_STEP);
+        let size = [image.height() / side, image.width() / side];
+        let halves: Vec<[f64; 2]> = (0..size[0])
+            .flat_map(|down| (0..size[1]).map(move |across| [down, across]))
+            .map(|block| halves(image, block.map(|index| index * side), side))
+            .collect();
+        let mut differences: Vec<f64> = halves.iter().map(|[a, b]| (a - b).abs()).collect();
+        differences.sort_by(f64::total_cmp);
+        let middle = differences.get(differences.len() / 2).copied();
+        Self {
+            size,
+            means: halves.iter().map(|[a, b]| f64::midpoint(*a, *b)).collect(),
+            noise: middle.unwrap_or_default() / NORMAL_MEDIAN / 2.0,
+        }
+    }
+
+    /// Subtracts from each mean that of the surrounding blocks, then the overall mean. Blocks at the edges are repeated
+    /// beyond the image.
+    fn structure(&self) -> Vec<f64> {
+        let [height, width] = self.size;
+        let mut structure: Vec<f64> = (0..height)
+            .flat_map(|row| (0..width).map(move |column| (row, column)))
+            .map(|(row, column)| {
+                let sum: f64 = surrounding(row, height)
+                    .map(|y| {
+                        let line = &self.means[y * width..][..width];
+                        surrounding(column, width).map(|x| line[x]).sum::<f64>()
+                    })
+                    .sum();
+                let n = (2 * SURROUNDING_RADIUS + 1).pow(2) as f64;
+                self.means[row * width + column] - sum / n
+            })
+            .collect();
+        let mean = structure.iter().sum::<f64>() / structure.len().max(1) as f64;
+        for value in &mut structure {
+            *value -= mean;
+        }
+        structure
+    }
+}
+
+/// Indices around an index, inside 0..`size`; the ends are repeated.
+fn surrounding(index: usize, size: usize) -> impl Iterator<Item = usize> {
+    (index..=index + 2 * SURROUNDING_RADIUS).map(move |other| other.saturating_sub(SURROUNDING_RADIUS).min(size - 1))
+}
+
+/// Mean green codes of two halves of a block with the same center: of every eight rows, the outer four and the inner
+/// four. Their difference is noise.
+fn halves(image: &Rgb, [top, left]: [usize; 2], side: usize) -> [f64; 2] {
+    let mut sums = [0_u64; 2];
+    for row in 0..side {
+        let line = &image.samples()[((top + row) * image.width() + left) * 3..][..3 * side];
+        let greens = line.iter().skip(1).step_by(3).copied();
+        let half = usize::from((2..6).contains(&(row % SIDE_STEP)));
+        sums[half] += greens.map(u64::from).sum::<u64>();
+    }
+    sums.map(|sum| sum as f64 / (side * side / 2) as f64)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -193,5 +323,91 @@ mod tests {
         let [light, dark] = [200, 100].map(|code| Rgb::new(2, 2, vec![code; 12]).unwrap());
         assert!((exposure_drop(&light, &dark).unwrap() - 2.2).abs() < 1e-6);
         assert!(exposure_drop(&light, &Rgb::black(2, 2)).is_err());
+    }
+
+    /// Random numbers from 0 to 1.
+    struct Dice(u32);
+
+    impl Dice {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(self.0 >> 8) / f64::from(1 << 24)
+        }
+    }
+
+    const SIZE: [usize; 2] = [240, 320];
+
+    /// Rectangles of many codes: a scene for each number.
+    fn scene(number: u32) -> Rgb {
+        let [height, width] = SIZE;
+        let mut dice = Dice(number.wrapping_mul(2_654_435_761));
+        let mut image = Rgb::new(height, width, vec![110; height * width * 3]).unwrap();
+        for _ in 0..60 {
+            let [y, x] = SIZE.map(|size| (dice.next() * size as f64) as usize);
+            let code = 30 + (dice.next() * 200.0) as u8;
+            for row in y..(y + 40).min(height) {
+                let end = (x + 50).min(width);
+                image.samples_mut()[(row * width + x) * 3..(row * width + end) * 3].fill(code);
+            }
+        }
+        image
+    }
+
+    /// The image 4.4 EV darker, under uniform noise of ± `noise` codes.
+    fn low(image: &Rgb, noise: f64) -> Rgb {
+        let mut dice = Dice(77);
+        let codes = image
+            .samples()
+            .iter()
+            .map(|code| {
+                let noisy = f64::from(*code) / 4.0 + noise * (2.0 * dice.next() - 1.0);
+                noisy.clamp(0.0, 255.0) as u8
+            })
+            .collect();
+        Rgb::new(image.height(), image.width(), codes).unwrap()
+    }
+
+    #[test]
+    fn partners_correlate_and_images_of_two_scenes_do_not() {
+        for number in 0..6 {
+            let normal = scene(number);
+            for noise in [0.0, 20.0] {
+                let found = SceneMatch::new(&normal, &low(&normal, noise), 4.4);
+                assert!(found.correlation.unwrap() > 0.8, "{number}: {found:?}");
+                assert!(!found.is_of_two_scenes());
+                let other = low(&scene(number + 100), noise);
+                let found = SceneMatch::new(&normal, &other, 4.4);
+                assert!(found.is_of_two_scenes(), "{number}: {found:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_mirrored_image_is_another_scene() {
+        let normal = scene(3);
+        let mirrored = normal.samples().chunks(3 * SIZE[1]).flat_map(|row| row.chunks(3).rev().flatten().copied());
+        let mirrored = Rgb::new(SIZE[0], SIZE[1], mirrored.collect()).unwrap();
+        assert!(SceneMatch::new(&normal, &low(&mirrored, 4.0), 4.4).is_of_two_scenes());
+    }
+
+    /// Bare walls, structure below the noise and very small images are not judged.
+    #[test]
+    fn images_without_structure_are_not_judged() {
+        let [height, width] = SIZE;
+        let wall = Rgb::new(height, width, vec![120; height * width * 3]).unwrap();
+        let codes = scene(5).samples().iter().map(|code| 118 + code / 64).collect();
+        let faint = Rgb::new(height, width, codes).unwrap();
+        for (normal, low) in [
+            (&wall, low(&wall, 9.0)),
+            (&wall, low(&scene(1), 9.0)),
+            (&faint, low(&faint, 60.0)),
+            (&Rgb::black(5, 5), Rgb::black(5, 5)),
+        ] {
+            let found = SceneMatch::new(normal, &low, 4.4);
+            assert_eq!(found.correlation, None);
+            assert!(!found.is_of_two_scenes());
+        }
+        let black = SceneMatch::new(&scene(5), &Rgb::black(height, width), 4.4);
+        assert!(black.is_of_two_scenes(), "{black:?}");
     }
 }

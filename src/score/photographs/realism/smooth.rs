@@ -4,25 +4,38 @@
 //! low-light image is noise. A noise model must reproduce its spread as a function of the clean code, which is the
 //! green code that the exposure drop alone leaves. The spread about a fitted plane is biased by demosaicing, rounding
 //! and texture. Comparing a real with a synthetic image cancels this bias, because both pass through the same steps.
+//!
+//! Mean of few numbers with its interval: [`Mean`].
+//!
+//! Quantiles of a sample: [`quantile`].
 
-use super::quantile::quantile;
+use serde::Serialize;
+
+use crate::statistics::estimate::student;
 use darkqa_base::types::Rgb;
 
 /// Side of a block in pixels (chosen).
 const SIDE: usize = 8;
+
 /// Number of bins of the clean code, with equally many blocks each (chosen).
 pub(super) const BINS: usize = 8;
+
 /// Share of the blocks in a bin that count as smooth (chosen).
 const SMOOTH_SHARE: f64 = 0.3;
+
 /// Minimum number of blocks in a bin (chosen).
 const MIN_BLOCKS: usize = 20;
+
 /// Minimum number of smooth blocks in a bin (chosen).
 const MIN_SMOOTH_BLOCKS: usize = 10;
+
 /// A block is excluded if a green code in normal light is this high or higher: near clipping, noise is cut off
 /// (chosen).
 const CLIPPING_CODE: u8 = 250;
+
 /// Clean code that a block must exceed: below it, rounding leaves no spread (chosen).
 const MIN_CLEAN_CODE: f64 = 1.0;
+
 /// Lower bound of a spread, in codes: rounding destroys smaller ones (chosen).
 const MIN_SPREAD: f64 = 0.05;
 
@@ -166,6 +179,50 @@ fn centred(i: usize) -> f64 {
     i as f64 - (SIDE - 1) as f64 / 2.0
 }
 
+/// Minimum number of values for an interval (chosen). With two values, the half-width is more than 6 times their
+/// distance, which can exceed the range of the quantity.
+pub const MIN_VALUES: usize = 3;
+
+/// A mean with its 95 % interval by Student's t distribution.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Mean {
+    /// Mean; null in JSON if it is infinite.
+    pub value: f64,
+    /// Bounds of the interval; `None` for fewer than [`MIN_VALUES`] numbers or an infinite mean.
+    pub interval: Option<[f64; 2]>,
+    /// Number of values.
+    pub n: usize,
+}
+
+impl Mean {
+    /// Computes the mean of numbers, some of which may be infinite; `None` without numbers.
+    #[must_use]
+    pub fn from_values(numbers: &[f64]) -> Option<Self> {
+        let n = numbers.len();
+        if n == 0 {
+            return None;
+        }
+        let value = numbers.iter().sum::<f64>() / n as f64;
+        let squares: f64 = numbers.iter().map(|x| (x - value) * (x - value)).sum();
+        let interval = (n >= MIN_VALUES && value.is_finite()).then(|| {
+            let error = (squares / (n - 1) as f64 / n as f64).sqrt();
+            let half = student((n - 1) as f64) * error;
+            [value - half, value + half]
+        });
+        Some(Self { value, interval, n })
+    }
+}
+
+/// Quantile of sorted numbers, with linear interpolation as in numpy's default; `None` without numbers.
+#[must_use]
+pub(crate) fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let position = share * sorted.len().checked_sub(1)? as f64;
+    let below = position.floor();
+    let low = *sorted.get(below as usize)?;
+    let high = *sorted.get(position.ceil() as usize)?;
+    Some(low + (position - below) * (high - low))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -213,5 +270,32 @@ mod tests {
             let curve = SmoothBlocks::new(&image, 1.0).spread(&image);
             assert_eq!(curve.bins, [None; BINS]);
         }
+    }
+
+    #[test]
+    fn an_interval_needs_three_numbers() {
+        assert_eq!(Mean::from_values(&[]), None);
+        for few in [&[3.0][..], &[1.0, 3.0]] {
+            assert_eq!(Mean::from_values(few).unwrap().interval, None);
+        }
+        let mean = Mean::from_values(&[1.0, 2.0, 3.0]).unwrap();
+        let [low, high] = mean.interval.unwrap();
+        // t of 2 degrees of freedom, times 1/√3.
+        let half = 4.302_652_730 / f64::sqrt(3.0);
+        assert!((mean.value - 2.0).abs() < 1e-12);
+        assert!((high - 2.0 - half).abs() < 1e-6 && (2.0 - low - half).abs() < 1e-6);
+        let infinite = Mean::from_values(&[1.0, 2.0, f64::INFINITY]).unwrap();
+        assert_eq!(infinite.interval, None);
+    }
+
+    #[test]
+    fn quantiles_match_numpy() {
+        let sorted = [1.0, 2.0, 4.0, 8.0];
+        for (share, expected) in [(0.0, 1.0), (0.1, 1.3), (0.5, 3.0), (0.9, 6.8), (1.0, 8.0)] {
+            let found = quantile(&sorted, share).unwrap();
+            assert!((found - expected).abs() < 1e-12, "{share}: {found}");
+        }
+        assert_eq!(quantile(&[], 0.5), None);
+        assert_eq!(quantile(&[3.0], 0.9), Some(3.0));
     }
 }

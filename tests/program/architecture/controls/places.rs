@@ -18,8 +18,24 @@ fn missing_code_and_long_files_reported() {
     );
     check(rules::unfinished, &[], &["error.rs: fn f(todo: bool) { made!(todo != true, \"todo!()\"); } // todo!()"]);
     let most = |files: &Files| rules::long_files(files, 2);
-    check(most, &["src/error.rs:3: 3 lines, and a file may have 2"], &["error.rs: \n\n\n"]);
-    check(most, &[], &["error.rs: \n\n"]);
+    check(
+        most,
+        &["src/error.rs:1: 3 lines of code, and a file may have 2"],
+        &[
+            "error.rs: struct A;\nstruct B;\nstruct C;",
+            "error.rs: #![allow(dead_code)]\nconst A: &str = \"\n\";",
+            "error.rs: #[cfg(test)] mod tests {\n}\n/// Two\nfn f() {\n\n}\nconst _: () = ();",
+        ],
+    );
+    check(
+        most,
+        &[],
+        &[
+            "error.rs: \n\n\n",
+            "error.rs: //! Head\n// one\n\nstruct A; /* a\nb */\n/// Doc\nstruct B;",
+            "error.rs: struct A;\n#[cfg(all(test, unix))]\nmod tests {\n    struct B;\n}\nstruct C;",
+        ],
+    );
 }
 
 #[test]
@@ -30,17 +46,17 @@ fn listings_in_other_places_are_reported() {
         rule,
         &["src/dataset/a.rs:1: a list of a folder or an open file may stand only in dataset/root.rs", unused],
         &[
-            "dataset/a.rs: use crate::files::reading::entries;",
+            "dataset/a.rs: use crate::files::entries;",
             "dataset/a.rs: fn f() { std::fs::read(p) }",
             "dataset/a.rs: fn f() { File::open(p) }",
         ],
     );
-    check(rule, &[], &["dataset/root.rs: fn f() { reading::entries(p) } ++ engine/a.rs: fn f() { std::fs::read(p) }"]);
+    check(rule, &[], &["dataset/root.rs: fn f() { files::entries(p) } ++ engine/a.rs: fn f() { std::fs::read(p) }"]);
     check(rule, &[unused], &["dataset/a.rs: #[cfg(test)] mod tests { fn f() { std::fs::read(p) } }"]);
     check(
         |files: &Files| rules::listings(files, &["dataset"], &["dataset"]),
         &["dataset is a folder: name its files"],
-        &["dataset/a.rs: use crate::files::reading::entries;"],
+        &["dataset/a.rs: use crate::files::entries;"],
     );
 }
 

@@ -53,7 +53,7 @@ enum Why {
 
 /// Folders and files with messages about data, imports and enhancers, in `src/`.
 const PLACES: [&str; 6] =
-    ["data/", "enhance/", "engine/images/enhancement/", "commands/import", "commands/enhance/", "commands/realism/"];
+    ["data/", "enhance/", "engine/images/enhancement/", "commands/import", "commands/enhance", "commands/realism/"];
 
 fn nothing(_: &Bench) {}
 

@@ -5,7 +5,7 @@ use std::panic::catch_unwind;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
+use darkqa_eval::internals::dataset::{DataPlace, SetArgs};
 use darkqa_questions::rules::Rules;
 
 use crate::robustness::hostile::mutators::{Form, step};
@@ -36,9 +36,9 @@ fn open(path: &Path) -> bool {
     }
     let place = DataPlace::Path(path.to_owned());
     let set = if path.is_dir() && !path.join("questions.jsonl").exists() {
-        Dataset::open_without_questions(&place, &[])
+        place.open_without_questions(&[])
     } else {
-        Dataset::open(&place, None, &SetArgs::default())
+        place.open(None, &SetArgs::default())
     };
     let Ok(set) = set else {
         return false;

@@ -1,12 +1,19 @@
 //! [`ChoiceFacts`]: the facts that reports keep of a trial with choices, and the tables that they refer to
 //! ([`ChoiceTables`]).
+//!
+//! [`SentImages`]: the images sent with a question.
+//!
+//! [`TrialFacts`]: one trial as held in memory.
 
 use std::collections::BTreeMap;
+use std::hash::{Hash, Hasher};
 
+use super::TextPlace;
 use super::interner::Interner;
-use super::sent_images::SentImages;
+use crate::types::degradations::PairFacts;
 use crate::types::questions::{UnreadReason, letter};
-use crate::types::{ChoiceDetail, FrameId, Observed, OptionProbabilities, ParsedAnswer, Record, TrialOutcome};
+use crate::types::records::small_number::{SmallNumber, Tokens};
+use crate::types::{ChoiceDetail, Digest, FrameId, Observed, OptionProbabilities, ParsedAnswer, Record, TrialOutcome};
 
 /// The index that means "no entry".
 const NONE: u32 = u32::MAX;
@@ -164,4 +171,108 @@ fn is_letter(reply: &str, choices: usize) -> bool {
     let mut characters = reply.chars();
     let first = characters.next();
     characters.next().is_none() && (0..choices).any(|index| Some(letter(index)) == first)
+}
+
+/// Facts about the images sent in one request.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SentImages {
+    /// The digest of the first image file.
+    pub first: Digest,
+    /// The number of files and the digest of all, if there are several.
+    several: Option<Box<(usize, Digest)>>,
+    /// The size of all files in bytes.
+    pub bytes: u64,
+    /// The width and the height of the first image, in pixels.
+    pub size: [u32; 2],
+    /// How dark the photograph of the frame is; only for images of a pair, which are as dark as the photograph.
+    pub pair: Option<Box<PairFacts>>,
+    /// The frame that was shown, if it differs from that of the question.
+    pub(super) shown_frame: Option<FrameId>,
+}
+
+impl SentImages {
+    /// The images of a record; `None` without images.
+    pub(super) fn from_detail(detail: &ChoiceDetail) -> Option<Self> {
+        let first = detail.image.as_ref()?;
+        let count = detail.images().count();
+        let all = detail.file_digest().filter(|_| count > 1);
+        Some(Self {
+            first: first.digest,
+            several: all.map(|all| Box::new((count, all))),
+            bytes: detail.images().map(|image| image.bytes as u64).sum(),
+            size: [first.width, first.height].map(|side| side as u32),
+            pair: first.pair.map(Box::new),
+            shown_frame: detail.shown_frame.clone(),
+        })
+    }
+
+    /// The number of files.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.several.as_ref().map_or(1, |several| several.0)
+    }
+
+    /// The digest of the file, or of all files in order.
+    #[must_use]
+    pub fn digest(&self) -> Digest {
+        self.several.as_ref().map_or(self.first, |several| several.1)
+    }
+}
+
+/// Hashes the first file only: equal images have equal first files.
+impl Hash for SentImages {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.first.hash(state);
+    }
+}
+
+/// Facts of one trial, without its key. Numbers are indices into the tables of its [`Trials`](super::Trials).
+#[derive(Debug, Clone)]
+pub(super) struct TrialFacts<F> {
+    pub(super) text: TextPlace,
+    /// Hash of the reply and refusal ([`hash_reply`]).
+    pub(super) reply: [u32; 2],
+    pub(super) item: u32,
+    pub(super) asked: u32,
+    pub(super) ending: u32,
+    pub(super) tokens: Tokens,
+    /// Duration of the last attempt, in milliseconds.
+    pub(super) latency: SmallNumber,
+    pub(super) facts: F,
+}
+
+/// Hashes a reply and a refusal, to compare them between trials. Zero means no reply.
+pub(super) fn hash_reply(reply: Option<&str>, refusal: Option<&str>) -> [u32; 2] {
+    if reply.is_none() && refusal.is_none() {
+        return [0; 2];
+    }
+    let mut hasher = blake3::Hasher::new();
+    for text in [reply, refusal] {
+        let length = text.map_or(u64::MAX, |text| text.len() as u64);
+        hasher.update(&length.to_le_bytes());
+        hasher.update(text.unwrap_or_default().as_bytes());
+    }
+    let [a, b, c, d, e, f, g, h, ..] = *hasher.finalize().as_bytes();
+    [u32::from_le_bytes([a, b, c, d]).max(1), u32::from_le_bytes([e, f, g, h])]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::records::trials::ChoiceFacts;
+
+    #[test]
+    fn a_trial_with_choices_takes_72_bytes() {
+        assert_eq!(size_of::<TrialFacts<ChoiceFacts>>(), 72);
+    }
+
+    #[test]
+    fn replies_and_refusals_have_different_hashes() {
+        let digests =
+            [(None, None), (Some(""), None), (None, Some("")), (Some("a"), Some("b")), (Some("ab"), Some(""))]
+                .map(|(reply, refusal)| hash_reply(reply, refusal));
+        for (place, one) in digests.iter().enumerate() {
+            assert!(!digests[place + 1..].contains(one));
+        }
+    }
 }

@@ -7,31 +7,26 @@ mod asked_item;
 mod asked_model;
 mod choice_facts;
 mod interner;
-mod sent_images;
-mod text_place;
-mod trial_facts;
 mod trial_ref;
-
-pub use asked_item::{AskedItem, AskedParts};
-pub use choice_facts::{ChoiceFacts, ChoiceTables};
-pub use sent_images::SentImages;
-pub use text_place::TextPlace;
-pub use trial_ref::TrialRef;
 
 use std::collections::BTreeMap;
 use std::hash::BuildHasher;
 
-use asked_model::{AskedModel, Ending};
 use hashbrown::hash_table::Entry;
 use hashbrown::{DefaultHashBuilder, HashTable};
-use interner::Interner;
 use rayon::slice::ParallelSliceMut;
-use trial_facts::{TrialFacts, hash_reply};
-
-use crate::error::Error;
 
 use super::record::{Record, StoredDetail};
+use crate::error::Error;
 use crate::types::{ChoiceDetail, Condition, Distinct, Family, Finish, FrameId, LostAttempts, QuestionId, TrialKey};
+use asked_model::{AskedModel, Ending};
+use choice_facts::{TrialFacts, hash_reply};
+use interner::Interner;
+
+pub use asked_item::{AskedItem, AskedParts};
+pub use choice_facts::{ChoiceFacts, ChoiceTables, SentImages};
+pub use interner::TextPlace;
+pub use trial_ref::TrialRef;
 
 /// Trials with the tables that they refer to.
 #[derive(Debug, Clone)]
@@ -430,6 +425,7 @@ impl<D: StoredDetail> FromIterator<Record<D>> for Trials<D> {
         trials
     }
 }
+
 /// The word for a reply that the server ended early, or for a generation that broke off; `None` for others.
 fn ended_by(finish: Option<Finish>, refusal: Option<&str>, has_failed: bool) -> Option<String> {
     match finish.filter(|finish| !finish.is_whole())? {

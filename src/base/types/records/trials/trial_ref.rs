@@ -1,7 +1,7 @@
 //! [`TrialRef`]: one trial in a table.
 
 use super::asked_model::Ending;
-use super::trial_facts::TrialFacts;
+use super::choice_facts::TrialFacts;
 use super::{AskedItem, KeptTrial, SentImages, TextPlace, Trials};
 use crate::types::records::record::{FailureKind, StoredDetail, Via, View};
 use crate::types::{

@@ -1,5 +1,5 @@
 use super::*;
-use crate::commands::calibrate::layout::Cfa;
+use crate::commands::calibrate::frames::Cfa;
 
 const BAYER: Layout = Layout { cfa: Cfa::Rggb, height: 64, width: 48 };
 

@@ -2,7 +2,7 @@ use std::num::NonZeroUsize;
 
 use super::*;
 use crate::engine::images::frames::{CameraScope, DegradeStage, SourceFrame};
-use crate::files::folder_access::FolderAccess;
+use crate::files::FolderAccess;
 use crate::pictures::Scaling;
 use crate::types::{Digest, EnhancerName, InputNote};
 use darkqa_enhance::SizeArgs;

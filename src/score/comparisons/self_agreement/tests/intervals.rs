@@ -2,7 +2,7 @@
 
 use super::simulated::{Draws, cell, record};
 use crate::comparisons::self_agreement::evidence::NoEvidence;
-use crate::statistics::split_mix::SplitMix;
+use crate::statistics::bootstrap::SplitMix;
 use darkqa_base::types::Record;
 
 /// Records of 30 images with eight questions each. The share of its answers that a model keeps differs from image to

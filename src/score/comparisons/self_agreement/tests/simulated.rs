@@ -5,7 +5,7 @@ use serde_json::json;
 use crate::cluster::FrameTies;
 use crate::comparisons::self_agreement::SelfAgreement;
 use crate::comparisons::self_agreement::cell::AgreementCell;
-use crate::statistics::split_mix::SplitMix;
+use crate::statistics::bootstrap::SplitMix;
 use darkqa_base::types::questions::BANK_ID;
 use darkqa_base::types::{
     ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId, Record, RunQuestion,
