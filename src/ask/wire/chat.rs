@@ -1,3 +1,5 @@
+//! Chat completions: requests ([`body`]), and the lenient parsing of replies ([`read`]).
+//!
 //! Requests for chat completions: [`body`].
 //!
 //! Lenient parsing of chat completions, because servers differ: [`read`].
@@ -184,12 +186,12 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     let (text, refusal_part) = reply_content(message.get("content")).map_err(unreadable)?;
     let chances = logprobs::positions(choice.get("logprobs")).map(|positions| TokenChances {
         positions,
-        thought: logprobs::thought(message, completion.get("usage"), &text),
+        thought: logprobs::thought(message, usage::raw(&completion), &text),
     });
     let refusal = refusal_field(message).map(str::to_owned).or(refusal_part);
     let has_thought = text.trim().is_empty()
         && refusal.is_none()
-        && logprobs::thought(message, completion.get("usage"), &text) == Thought::Before;
+        && logprobs::thought(message, usage::raw(&completion), &text) == Thought::Before;
     let (text, other_field) = match refusal {
         None if text.trim().is_empty() => message_fields::of_message(text, message),
         _ => (text, None),

@@ -1,3 +1,5 @@
+//! OpenAI's Responses API: requests ([`body`]) and replies ([`read`]).
+//!
 //! Requests to OpenAI's Responses API: the JSON [`body`], and the [`fields`] that servers may refuse.
 //!
 //! The form follows OpenAI's reference, `POST /responses`; `store` is false, so that the vendor does not store images.
@@ -235,7 +237,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
     let (text, refusal) = text_and_refusal(&messages);
     let chances = chances(&messages, items, &response, &text);
     let has_thought =
-        has_summary(items) || logprobs::thought(&response, response.get("usage"), &text) == Thought::Before;
+        has_summary(items) || logprobs::thought(&response, usage::raw(&response), &text) == Thought::Before;
     let (text, other_field) =
         if text.trim().is_empty() && refusal.is_empty() { other_field(text, items) } else { (text, None) };
     // The answer after the thoughts may have been lost, or the model gave none.
@@ -295,7 +297,7 @@ fn chances(messages: &[&Value], items: &[Value], response: &Value, text: &str) -
         .flatten()
         .map(|part| part.get("logprobs"))
         .find_map(logprobs::positions)?;
-    let thought = logprobs::thought(response, response.get("usage"), text);
+    let thought = logprobs::thought(response, usage::raw(response), text);
     Some(TokenChances { positions, thought: if has_summary(items) { Thought::Before } else { thought } })
 }
 

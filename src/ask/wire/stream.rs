@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::message_fields::refusal_field;
+use super::usage;
 use crate::ask::bounded_json::{MAX_ITEMS, parse};
 use crate::ask::failures::find_error;
 
@@ -58,7 +59,10 @@ pub(super) fn assemble(stream: &str) -> Result<Value, BrokenStream> {
         if let Some(error) = error_event(&event) {
             return Ok(error);
         }
-        for field in ["model", "provider", "usage", "service_tier"] {
+        if let Some(usage) = usage::raw(&event) {
+            completion.insert("usage".to_owned(), usage.clone());
+        }
+        for field in ["model", "provider", "service_tier"] {
             if let Some(value) = event.get(field).filter(|value| !value.is_null()) {
                 completion.insert(field.to_owned(), value.clone());
             }
@@ -69,7 +73,7 @@ pub(super) fn assemble(stream: &str) -> Result<Value, BrokenStream> {
             .into_iter()
             .flatten()
             .find(|choice| choice.get("index").is_none_or(|index| *index == 0));
-        ends_with_counts = choice.is_none() && states_tokens(&event);
+        ends_with_counts = choice.is_none() && usage::states_reply_tokens(&event);
         if let Some(choice) = choice {
             // Some gateways put an error into the choice.
             if choice.get("error").is_some_and(|error| !error.is_null()) {
@@ -85,14 +89,6 @@ pub(super) fn assemble(stream: &str) -> Result<Value, BrokenStream> {
     }
     completion.insert("choices".to_owned(), json!([joined.into_choice()]));
     Ok(Value::Object(completion))
-}
-
-/// True if an event states a number of reply tokens other than 0.
-fn states_tokens(event: &Value) -> bool {
-    ["completion_tokens", "output_tokens"]
-        .iter()
-        .filter_map(|field| event.get("usage")?.get(field)?.as_u64())
-        .any(|tokens| tokens > 0)
 }
 
 /// The error in an event, in the form of an error body; `None` without one.

@@ -25,11 +25,24 @@ use serde_json::{Map, Value, json};
 
 use crate::types::{ServiceTier, StatedCost, Usage};
 
+/// Where a body, or an event of a stream, has its token usage, as JSON pointers; the first that is there counts. A
+/// vendor with a place of its own is a row here, and names of its own are words in [`read`].
+const PLACES: [&str; 1] = ["/usage"];
+
+/// The token usage in a body or an event, as the server wrote it.
+pub(super) fn raw(body: &Value) -> Option<&Value> {
+    PLACES.iter().find_map(|place| body.pointer(place).filter(|usage| !usage.is_null()))
+}
+
+/// True if an event states a number of reply tokens other than 0.
+pub(super) fn states_reply_tokens(event: &Value) -> bool {
+    read(raw(event)).is_some_and(|usage| usage.completion_tokens > Some(0))
+}
+
 /// Parses the `usage` in a body, with the charge and the service tier that the body states. `None` if it states none of
 /// them.
 pub(super) fn in_body(body: &Value) -> Option<Usage> {
-    let usage =
-        Usage { cost: cost_in_body(body), service_tier: tier(body), ..read(body.get("usage")).unwrap_or_default() };
+    let usage = Usage { cost: cost_in_body(body), service_tier: tier(body), ..read(raw(body)).unwrap_or_default() };
     (usage != Usage::default()).then_some(usage)
 }
 
@@ -137,7 +150,7 @@ fn round_up(number: f64) -> Option<u64> {
 
 /// The charge in a body with its `usage`, in US dollars; the highest of several. `None` if the server states none.
 fn cost_in_body(body: &Value) -> Option<StatedCost> {
-    let usage = body.get("usage").and_then(Value::as_object);
+    let usage = raw(body).and_then(Value::as_object);
     let in_usage = usage.and_then(cost_in_usage);
     let beside = body.as_object().and_then(named_in_dollars);
     let gateway = body
