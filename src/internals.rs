@@ -10,7 +10,7 @@ pub mod ask {
 
 pub mod dataset {
     pub use crate::data::maps::Picture;
-    pub use crate::data::{DataPlace, Dataset, SetArgs, open_frames};
+    pub use crate::data::{DataSource, Dataset, SetArgs, open_frames};
 }
 
 pub mod report {

@@ -12,7 +12,7 @@ use base64::engine::general_purpose::STANDARD;
 use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
-use crate::data::{self, DataPlace, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
+use crate::data::{self, DataSource, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
 use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
 use crate::engine::images::frame_work::FrameWork;
 use crate::engine::images::frames::{Source, input_summary, inspect_all, photographs, warn_of_inputs};
@@ -43,7 +43,7 @@ pub(crate) struct ExportArgs {
     pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them)
     #[arg(value_name = "DATA", value_parser = data::parse_data_place, add = Decides::Reply)]
-    pub data: DataPlace,
+    pub data: DataSource,
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: PathBuf,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::json;
 
-use crate::data::{DataPlace, SceneArgs, SelectionArgs, SetArgs, open_images};
+use crate::data::{DataSource, SceneArgs, SelectionArgs, SetArgs, open_images};
 use crate::engine::images::progress::Progress;
 use crate::engine::images::trials::open_data;
 use crate::error::{Error, Result};
@@ -120,7 +120,7 @@ fn row(image: &str, question: &str, choices: &[String], truth: usize, category: 
 /// Writes images of built-in rooms, and returns rows with questions by rule about them.
 fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
     let rooms = ROOMS.parse().map_err(|e: String| Error::data("rooms", e))?;
-    let (place, rules) = (DataPlace::Rooms(rooms), Rules::built_in()?);
+    let (place, rules) = (DataSource::Rooms(rooms), Rules::built_in()?);
     let (set, selection) = (SetArgs::default(), SelectionArgs::default());
     let dataset = open_data(&place, &SceneArgs::default(), &set, &selection, &rules, DecodeRule::default(), progress)?;
     let mut rows = Vec::new();

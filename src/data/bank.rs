@@ -1,5 +1,5 @@
 //! Questions without known answers, asked about every photograph: [`Bank`], and its file or built-in name:
-//! [`BankPlace`].
+//! [`BankSource`].
 //!
 //! Each line is `{"id", "question", "choices", "family"}`; `family` is optional. A line has no image, because its
 //! question is asked about all images, and no answer, so replies are never scored as right or wrong.
@@ -28,7 +28,7 @@ const HOME: &str = include_str!("../../prompts/ask/home.jsonl");
 
 /// Value of `--ask`: the built-in bank or a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum BankPlace {
+pub(crate) enum BankSource {
     /// The built-in bank.
     Home(OptOut),
     /// A file of questions.
@@ -44,7 +44,7 @@ pub(crate) enum OptOut {
     CannotTell,
 }
 
-impl FromStr for BankPlace {
+impl FromStr for BankSource {
     type Err = Infallible;
 
     /// Parses `home`, `home:uncertain` or a path. An existing file named `home` is a path.
@@ -58,7 +58,7 @@ impl FromStr for BankPlace {
     }
 }
 
-impl fmt::Display for BankPlace {
+impl fmt::Display for BankSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Home(OptOut::None) => f.write_str("home"),
@@ -98,14 +98,14 @@ impl Bank {
     ///
     /// # Errors
     /// If the file cannot be read or a line is invalid; the error names the file and the line.
-    pub(crate) fn open(place: &BankPlace) -> Result<Self> {
+    pub(crate) fn open(place: &BankSource) -> Result<Self> {
         match place {
-            BankPlace::Home(opt_out) => Self::parse(HOME, Path::new("home"), *opt_out),
-            BankPlace::File(path) if !path.exists() => Err(Error::usage(
+            BankSource::Home(opt_out) => Self::parse(HOME, Path::new("home"), *opt_out),
+            BankSource::File(path) if !path.exists() => Err(Error::usage(
                 "--ask",
                 format_args!("{}: no such file; home and home:uncertain are built in", path.display()),
             )),
-            BankPlace::File(path) => Self::parse(&text(path)?, path, OptOut::None),
+            BankSource::File(path) => Self::parse(&text(path)?, path, OptOut::None),
         }
     }
 
@@ -306,7 +306,7 @@ mod tests {
 
     #[test]
     fn questions_per_image_are_drawn_by_photograph_name() {
-        let home = Bank::open(&BankPlace::Home(OptOut::None)).unwrap();
+        let home = Bank::open(&BankSource::Home(OptOut::None)).unwrap();
         let frames = frames(&["a.png", "b.png", "c.png"]);
         let (five, six) = (drawn(&home, &frames, 5), drawn(&home, &frames, 6));
         assert_eq!((five.len(), six.len()), (15, 18));
@@ -352,7 +352,7 @@ mod tests {
         }
         let error = bank("\n").unwrap_err().to_string();
         assert_eq!(error, "bank.jsonl: no questions in it");
-        let missing = Bank::open(&BankPlace::File("no-such-bank".into())).unwrap_err();
+        let missing = Bank::open(&BankSource::File("no-such-bank".into())).unwrap_err();
         assert!(missing.to_string().contains("home and home:uncertain are built in"), "{missing}");
     }
 

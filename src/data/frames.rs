@@ -457,7 +457,7 @@ mod tests {
     use image::{GrayImage, ImageBuffer, Luma, RgbImage};
     use ndarray::array;
 
-    use super::super::{DataPlace, Photographs};
+    use super::super::{DataSource, Photographs};
     use super::*;
 
     /// A folder of one image, its maps and a `frames.jsonl` of one line with these extra keys.
@@ -513,7 +513,7 @@ mod tests {
             fs::write(folder.path().join(std::ffi::OsStr::from_bytes(name)), "").unwrap();
         }
         let listed = sources(folder.path(), &[], MissingFiles::Refuse).map(|_| ());
-        let place = DataPlace::Path(folder.path().to_owned());
+        let place = DataSource::Path(folder.path().to_owned());
         let searched = Photographs::open(&place, &SetArgs::default()).map(|_| ());
         for problem in [listed, searched] {
             let problem = problem.unwrap_err().to_string();

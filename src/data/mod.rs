@@ -1,6 +1,6 @@
 //! Data sets: images, their maps, and the questions that came with them.
 //!
-//! The entry point is [`DataPlace::open`]. The path decides the reader: a folder of frames ([`frames`]) or a
+//! The entry point is [`DataSource::open`]. The path decides the reader: a folder of frames ([`frames`]) or a
 //! ready-made multiple-choice set ([`ready_made`]). Without a path the data are the built-in rooms ([`rooms`](crate::rooms)).
 
 mod bank;
@@ -20,7 +20,7 @@ mod root;
 mod scene_args;
 mod settings;
 
-pub(crate) use bank::{Bank, BankPlace};
+pub(crate) use bank::{Bank, BankSource};
 pub(crate) use frames::open_images;
 pub(crate) use maps::Picture;
 pub(crate) use openeqa::ImageSource;
@@ -32,5 +32,5 @@ pub(crate) use settings::{BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit
 
 pub use dataset::Dataset;
 pub use frames::open_frames;
-pub use place::DataPlace;
+pub use place::DataSource;
 pub use ready_made::SetArgs;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::dataset::{Dataset, stem};
 use super::frames::{self, ImagePaths, MissingFiles, is_image, open_images};
-use super::place::{DataPlace, is_lerobot_set, with_import_hint};
+use super::place::{DataSource, is_lerobot_set, with_import_hint};
 use super::ready_made::SetArgs;
 use super::root::Root;
 use crate::error::{Error, Result};
@@ -33,16 +33,16 @@ impl Photographs {
     ///
     /// # Errors
     /// If the place cannot be read, or has no image.
-    pub(crate) fn open(place: &DataPlace, set: &SetArgs) -> Result<Self> {
+    pub(crate) fn open(place: &DataSource, set: &SetArgs) -> Result<Self> {
         Self::open_place(place, set).map_err(|e| with_import_hint(place.path(), e))
     }
 
-    fn open_place(place: &DataPlace, set: &SetArgs) -> Result<Self> {
+    fn open_place(place: &DataSource, set: &SetArgs) -> Result<Self> {
         let dataset = match place {
-            DataPlace::Rooms(rooms) => Dataset::from_rooms(*rooms),
-            DataPlace::Path(path) if path.is_dir() => return Self::open_folder(path, set),
-            DataPlace::Path(path) if is_image(path) => open_images(path, &[])?,
-            DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. } => {
+            DataSource::Rooms(rooms) => Dataset::from_rooms(*rooms),
+            DataSource::Path(path) if path.is_dir() => return Self::open_folder(path, set),
+            DataSource::Path(path) if is_image(path) => open_images(path, &[])?,
+            DataSource::Path(_) | DataSource::Files(_) | DataSource::Known { .. } => {
                 return Self::open_set(place, set);
             }
         };
@@ -50,7 +50,7 @@ impl Photographs {
     }
 
     /// The images of a ready-made set, whose rows need no questions.
-    fn open_set(place: &DataPlace, set: &SetArgs) -> Result<Self> {
+    fn open_set(place: &DataSource, set: &SetArgs) -> Result<Self> {
         let set = SetArgs { images_alone: true, ..set.clone() };
         let dataset = place.open_without_hint(None, &set)?;
         let images = counted(dataset.frames().count(), "image");
@@ -83,7 +83,7 @@ impl Photographs {
             frames::insert_image(&mut sources, parts.join("/"), path)?;
         }
         if sources.is_empty() && has_parquet && !is_lerobot_set(folder) {
-            return Self::open_set(&DataPlace::Path(folder.to_owned()), set);
+            return Self::open_set(&DataSource::Path(folder.to_owned()), set);
         }
         if sources.is_empty() {
             let unread = found.unsupported_note().map_or(String::new(), |unread| format!("; {unread}"));
@@ -143,7 +143,7 @@ mod tests {
     use super::*;
 
     fn found(path: &Path) -> Result<(Vec<String>, Vec<String>)> {
-        let found = Photographs::open(&DataPlace::Path(path.to_owned()), &SetArgs::default())?;
+        let found = Photographs::open(&DataSource::Path(path.to_owned()), &SetArgs::default())?;
         let names = found.dataset.frames().map(|id| id.0.clone());
         Ok((names.collect(), found.notes))
     }

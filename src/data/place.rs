@@ -1,4 +1,4 @@
-//! Where data are ([`DataPlace`]), and how they are opened: a folder of frames, a ready-made set, or the built-in rooms.
+//! Where data are ([`DataSource`]), and how they are opened: a folder of frames, a ready-made set, or the built-in rooms.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::types::{Labels, shell_word};
 
 /// Where the data are, as given by `--data`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum DataPlace {
+pub enum DataSource {
     /// The built-in rooms with these settings.
     Rooms(Rooms),
     /// A folder or file.
@@ -31,7 +31,7 @@ pub enum DataPlace {
     },
 }
 
-impl DataPlace {
+impl DataSource {
     /// The folder or file (the first of several files); `None` for the built-in rooms.
     #[must_use]
     pub fn path(&self) -> Option<&Path> {

@@ -13,7 +13,7 @@ use super::dataset::{Dataset, stem};
 use super::frames::{self, ImagePaths};
 use super::openeqa::ImageSource;
 use super::pairs::{self, Pairs};
-use super::place::{DataPlace, refuse_questions};
+use super::place::{DataSource, refuse_questions};
 use super::ready_made::{self, SetArgs};
 use super::root::Root;
 use crate::error::{Error, Result};
@@ -89,9 +89,9 @@ impl PairFolders {
 
 impl SceneArgs {
     /// Place of the data: the folder of the pairs if `--pairs` is given, else `data`.
-    pub(crate) fn place(&self, data: DataPlace) -> DataPlace {
+    pub(crate) fn place(&self, data: DataSource) -> DataSource {
         match &self.pairs {
-            Some(pairs) => DataPlace::Path(pairs.folder().to_owned()),
+            Some(pairs) => DataSource::Path(pairs.folder().to_owned()),
             None => data,
         }
     }
@@ -100,11 +100,11 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If `dataset.json` cannot be read.
-    pub(crate) fn set_light(&self, place: &DataPlace, further: &[PathBuf]) -> Result<SetLight> {
+    pub(crate) fn set_light(&self, place: &DataSource, further: &[PathBuf]) -> Result<SetLight> {
         match (self.light, place) {
             (Some(light), _) => Ok(light),
-            (None, DataPlace::Path(path)) if path.is_dir() => frames::light(path, further),
-            (None, DataPlace::Path(path)) if ready_made::is_zip_file(path) => ready_made::light_of_archive(path),
+            (None, DataSource::Path(path)) if path.is_dir() => frames::light(path, further),
+            (None, DataSource::Path(path)) if ready_made::is_zip_file(path) => ready_made::light_of_archive(path),
             (None, _) => Ok(SetLight::Lit),
         }
     }
@@ -113,7 +113,7 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn open(&self, place: &DataPlace, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
+    pub(crate) fn open(&self, place: &DataSource, questions: Option<&Path>, set: &SetArgs) -> Result<Dataset> {
         match self.pairs_or_classes(place, &set.root.data_root)? {
             None => place.open(questions, set),
             Some(dataset) if self.pairs.is_some() => {
@@ -136,14 +136,14 @@ impl SceneArgs {
     ///
     /// # Errors
     /// If the data cannot be read; the error names the file.
-    pub(crate) fn pairs_or_classes(&self, place: &DataPlace, further: &[PathBuf]) -> Result<Option<Dataset>> {
+    pub(crate) fn pairs_or_classes(&self, place: &DataSource, further: &[PathBuf]) -> Result<Option<Dataset>> {
         if let Some(pairs) = &self.pairs {
             return pairs::open(pairs.folder(), pairs.open(further)?).map(Some);
         }
         let Some(question) = &self.label_folders else {
             return Ok(None);
         };
-        let DataPlace::Path(folder) = place else {
+        let DataSource::Path(folder) = place else {
             let problem = "--data must name the folder with a folder for each class";
             return Err(Error::usage("--label-folders", problem));
         };

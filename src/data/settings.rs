@@ -7,9 +7,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::bank::BankPlace;
+use super::bank::BankSource;
 use super::ready_made::{is_known_set, known_sets};
-use super::{DataPlace, RootArgs, SetArgs};
+use super::{DataSource, RootArgs, SetArgs};
 use crate::pictures::decode_rule::{ColourRule, DecodeRule, MAX_PIXELS, Transfer};
 use crate::rooms::Rooms;
 use crate::types::{Decides, Family, shell_word};
@@ -21,8 +21,8 @@ pub(crate) struct DataArgs {
     /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by
     /// its name, as mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable
     /// for the files of one set
-    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = parse_data_place, default_values_t = [DataPlace::default()], add = Decides::Reply)]
-    pub data: Vec<DataPlace>,
+    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = parse_data_place, default_values_t = [DataSource::default()], add = Decides::Reply)]
+    pub data: Vec<DataSource>,
     /// Options for reading a ready-made set.
     #[command(flatten)]
     pub set: SetArgs,
@@ -30,15 +30,15 @@ pub(crate) struct DataArgs {
 
 impl DataArgs {
     /// Place of the data, from all `--data` flags together.
-    pub(crate) fn place(&self) -> DataPlace {
+    pub(crate) fn place(&self) -> DataSource {
         match &*self.data {
-            [] => DataPlace::default(),
+            [] => DataSource::default(),
             [place] => place.clone(),
-            places => DataPlace::Files(
+            places => DataSource::Files(
                 places
                     .iter()
                     .map(|place| match place {
-                        DataPlace::Path(path) => path.clone(),
+                        DataSource::Path(path) => path.clone(),
                         other => PathBuf::from(other.to_string()),
                     })
                     .collect(),
@@ -74,7 +74,7 @@ pub(crate) struct BankArgs {
     /// its own answer in the light; home or home:uncertain (built in), or a JSONL file of id, question, choices;
     /// default: none
     #[arg(long, value_name = "home|home:uncertain|FILE", conflicts_with_all = ["questions", "rules"], add = Decides::Reply)]
-    pub ask: Option<BankPlace>,
+    pub ask: Option<BankSource>,
     /// Ask only N of the questions about each image, drawn by its name; default: all
     #[arg(long, value_name = "N", add = Decides::Trials)]
     pub ask_per_image: Option<NonZeroUsize>,
@@ -142,15 +142,15 @@ impl DecodeArgs {
 
 /// Parses the value of `--data`: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its
 /// path, such as `mmvp:FILE`. An existing file or folder with the same name takes precedence, except for `rooms:…`.
-pub(crate) fn parse_data_place(text: &str) -> Result<DataPlace, String> {
+pub(crate) fn parse_data_place(text: &str) -> Result<DataSource, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
-        Some(rooms) => rooms.parse().map(DataPlace::Rooms),
-        None if text == "rooms" && !path.exists() => Ok(DataPlace::Rooms(Rooms::default())),
-        None if path.exists() => Ok(DataPlace::Path(path)),
+        Some(rooms) => rooms.parse().map(DataSource::Rooms),
+        None if text == "rooms" && !path.exists() => Ok(DataSource::Rooms(Rooms::default())),
+        None if path.exists() => Ok(DataSource::Path(path)),
         None => match text.split_once(':') {
             Some((name, place)) if is_known_set(name) => {
-                Ok(DataPlace::Known { name: name.to_owned(), path: PathBuf::from(place) })
+                Ok(DataSource::Known { name: name.to_owned(), path: PathBuf::from(place) })
             }
             // A single letter before the colon is a drive on Windows.
             Some((name, place)) if name.len() > 1 && PathBuf::from(place).exists() => Err(format!(
@@ -158,7 +158,7 @@ pub(crate) fn parse_data_place(text: &str) -> Result<DataPlace, String> {
                 known_sets().join(", "),
                 shell_word(place)
             )),
-            _ => Ok(DataPlace::Path(path)),
+            _ => Ok(DataSource::Path(path)),
         },
     }
 }
@@ -168,13 +168,13 @@ fn parse_family(name: &str) -> Result<Family, Infallible> {
     Ok(Family::from(name.trim()))
 }
 
-impl Default for DataPlace {
+impl Default for DataSource {
     fn default() -> Self {
         Self::Rooms(Rooms::default())
     }
 }
 
-impl fmt::Display for DataPlace {
+impl fmt::Display for DataSource {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Rooms(rooms) => write!(f, "rooms:{rooms}"),

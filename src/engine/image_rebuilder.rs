@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::data::{DataArgs, DataPlace, Dataset, Photographs, open_frames, parse_data_place};
+use crate::data::{DataArgs, DataSource, Dataset, Photographs, open_frames, parse_data_place};
 use crate::engine::images::enhancement::enhancers;
 use crate::engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
 use crate::engine::images::frames::{Frames, Source, WalkArgs, WalkFolder, photographs};
@@ -168,8 +168,8 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
 /// The frames of a data set. Its questions are ignored.
 fn frames(data: &DataArgs) -> Result<Dataset> {
     match &data.place() {
-        DataPlace::Path(path) if path.join("frames.jsonl").is_file() => open_frames(path, &data.set.root.data_root),
-        place @ (DataPlace::Path(_) | DataPlace::Files(_) | DataPlace::Known { .. }) => place.open(None, &data.set),
-        place @ DataPlace::Rooms(_) => place.open_without_questions(&[]),
+        DataSource::Path(path) if path.join("frames.jsonl").is_file() => open_frames(path, &data.set.root.data_root),
+        place @ (DataSource::Path(_) | DataSource::Files(_) | DataSource::Known { .. }) => place.open(None, &data.set),
+        place @ DataSource::Rooms(_) => place.open_without_questions(&[]),
     }
 }

@@ -10,7 +10,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::ask::{Call, Local, LocalAnswer, Random};
-use crate::data::{DataPlace, Dataset};
+use crate::data::{DataSource, Dataset};
 use crate::error::{Error, Result};
 use crate::types::replies::OBSERVER;
 use crate::types::values::Recent;
@@ -49,7 +49,7 @@ impl Observer {
     /// If the frames have no maps, or a question does not follow from the rules.
     pub(crate) fn open(
         dataset: &Arc<Dataset>,
-        place: &DataPlace,
+        place: &DataSource,
         further: &[PathBuf],
         questions: &[Question],
         rules: Rules,

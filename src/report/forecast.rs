@@ -71,7 +71,7 @@ pub(crate) fn render(forecast: &Forecast) -> String {
         }
     }
     text += &by_endpoint(&forecast.lines);
-    text += &by_reading(&forecast.lines);
+    text += &by_profile(&forecast.lines);
     let _ = writeln!(
         text,
         "dollars: from {} a reply to every reply as long as --max-tokens allows; {prices}; by a Batch API, if there is one, {:.0} % of it",
@@ -138,7 +138,7 @@ fn by_endpoint(lines: &[CostLine]) -> String {
 }
 
 /// Line with the requests of all models by noise profile; empty with fewer than two profiles.
-fn by_reading(lines: &[CostLine]) -> String {
+fn by_profile(lines: &[CostLine]) -> String {
     let mut sums = BTreeMap::<Option<&ProfileName>, (usize, Option<f64>)>::new();
     for cost in lines.iter().flat_map(|line| &line.readings) {
         let (requests, dollars) = sums.entry(cost.reading.as_ref()).or_insert((0, Some(0.0)));
@@ -213,10 +213,10 @@ mod tests {
     fn requests_are_counted_by_noise_profile() {
         let shared = cost(None, 6, Some(0.5));
         let one = line(vec![shared.clone(), cost(Some("paper"), 5, Some(0.25))]);
-        assert_eq!(by_reading(std::slice::from_ref(&one)), "");
+        assert_eq!(by_profile(std::slice::from_ref(&one)), "");
         let two = line(vec![shared, cost(Some("paper"), 5, Some(0.25)), cost(Some("physical"), 1005, None)]);
         assert_eq!(
-            by_reading(&[one, two]),
+            by_profile(&[one, two]),
             "requests by reading: shared by all (L0, exposure drop, blind) 12 ($1.00), paper 10 ($0.5000), \
              physical 1,005 (price unknown)\n"
         );

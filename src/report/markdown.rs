@@ -161,7 +161,7 @@ fn markdown_table(table: &Table) -> String {
     let columns: Vec<&Column> = table.columns.iter().filter(|column| is_on_page(column)).collect();
     let heads = columns.iter().filter_map(|column| column.heads.page.as_deref()).map(inline);
     let alignments = columns.iter().map(|column| {
-        let is_text = matches!(column.kind, ColumnKind::Text | ColumnKind::Significance);
+        let is_text = matches!(column.kind, ColumnKind::Text | ColumnKind::Verdict);
         if is_text { "---" } else { "---:" }.to_owned()
     });
     let mut text = format!("{}\n\n", block(&table.caption));

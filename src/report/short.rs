@@ -1,3 +1,5 @@
+//! The short report on multiple-choice questions in the terminal.
+//!
 //! Terminal text of a report on multiple-choice questions: [`text()`].
 //!
 //! Start of a report in the terminal, with its findings: [`findings`].

@@ -173,7 +173,7 @@ pub(crate) struct PowerForecast {
     pub unit: String,
     /// Number of models whose mean is tested.
     pub models: usize,
-    /// Significance level of the test, after the report's correction.
+    /// Verdict level of the test, after the report's correction.
     pub level: f64,
     #[serde(flatten)]
     pub detectable: Detectable,

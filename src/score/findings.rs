@@ -18,7 +18,7 @@ use super::grid::Grid;
 use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use super::observed::ObserverSummary;
 use super::photographs::{self, FidelityFindings, PairDarkness, PhotographedSet};
-use super::significance::Significance;
+use super::significance::Verdict;
 use darkqa_base::types::{ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant};
 
 /// All results that are computed from the trials of a run.
@@ -268,7 +268,7 @@ impl<'a> Findings<'a> {
                 comparison.kind == ComparisonKind::Blind
                     && comparison.family.as_ref() == family
                     && comparison.first == *subject
-                    && comparison.claim() == Claim::Detected(Significance::Worse)
+                    && comparison.claim() == Claim::Detected(Verdict::Worse)
             })
             .map(|comparison| &*comparison.second.model)
             .collect()

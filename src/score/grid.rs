@@ -45,7 +45,7 @@ impl TrialResult {
 
     /// Parsed choice in a mode: `None` without a reply, `Some(None)` for an unreadable reply.
     #[must_use]
-    pub fn reading(self, mode: ParsingMode) -> Option<Option<u8>> {
+    pub fn parsed(self, mode: ParsingMode) -> Option<Option<u8>> {
         match (self, mode) {
             (Self::Absent | Self::Failed, _) => None,
             (Self::Read { strict, .. }, ParsingMode::Strict) => Some(strict),
@@ -261,7 +261,7 @@ impl<'a> Grid<'a> {
     pub fn counts(&self, subject: usize, family: Option<&Family>, mode: ParsingMode) -> Vec<ClusterCount> {
         let mut counts = vec![ClusterCount::default(); self.clusters];
         for (item, result) in self.family_items(subject, family) {
-            if let Some(chosen) = result.reading(mode) {
+            if let Some(chosen) = result.parsed(mode) {
                 let count = &mut counts[item.cluster as usize];
                 count.replies += 1;
                 count.right += u32::from(item.is_right(chosen));

@@ -35,7 +35,7 @@ pub struct PlannedSample {
     /// Number of questions of each cluster.
     pub questions: Vec<usize>,
     pub models: usize,
-    /// Significance level of the test.
+    /// Verdict level of the test.
     pub level: f64,
 }
 
@@ -77,7 +77,7 @@ struct Design {
     pairs: f64,
     /// Design effect of the clusters.
     effect: f64,
-    /// Significance level of the test.
+    /// Verdict level of the test.
     level: f64,
 }
 

@@ -82,7 +82,7 @@ pub struct RunContents {
 }
 
 impl RunContents {
-    /// Significance level of the first test of an enhancer at the darker levels of one variant; without enhancers, of
+    /// Verdict level of the first test of an enhancer at the darker levels of one variant; without enhancers, of
     /// the first test of the cost of darkness. Later tests of the same question have this level or a larger one.
     #[must_use]
     pub fn first_significance_level(self) -> f64 {
@@ -289,7 +289,7 @@ fn below_blind(findings: &Findings<'_>) -> Tests {
         let (first, second) = (&comparison.first, &comparison.second);
         if findings.is_tested_against_blind(comparison)
             && is_main(&findings.grid, &first.variant)
-            && comparison.strict.significance.is_possible()
+            && comparison.strict.verdict.is_possible()
         {
             let key = (&first.model, &second.model, &comparison.family, &first.variant);
             chains.entry(key).or_default().push(Test::Comparison(index));
@@ -316,7 +316,7 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
                             && first.variant.photograph().is_some()
                             && (first.enhancer.is_none() || kind == ComparisonKind::RealEnhanced)
                             && models.contains(&*first.model)
-                            && comparison.strict.significance.is_possible()
+                            && comparison.strict.verdict.is_possible()
                     })
                     .map(|(index, _)| TestTree::leaf(Test::Comparison(index))),
             )

@@ -8,7 +8,7 @@ use super::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, 
 use super::findings::Findings;
 use super::grid::Grid;
 use super::model_in_condition::ModelInCondition;
-use super::significance::Significance;
+use super::significance::Verdict;
 use darkqa_base::types::{
     ChoiceDetail, Condition, Digest, Family, FrameId, ParsedAnswer, QuestionId, Record, TrialOutcome,
 };
@@ -92,7 +92,7 @@ fn one_model_pooled_is_its_own_comparison() {
         // Two levels: the smaller p counts twice.
         let darkest = find(&findings, PooledKind::Darkness, "L5-noise")[0];
         assert!((darkest.strict.holm - 2.0 * darkest.strict.p).abs() < 1e-15 && darkest.levels == 2);
-        assert_eq!(darkest.strict.verdict, Significance::Worse);
+        assert_eq!(darkest.strict.verdict, Verdict::Worse);
         // By family the clusters are the same, and the sets are corrected apart.
         let by_family = findings.iter().filter(|finding| finding.family.is_some()).count();
         assert_eq!(by_family, 4);
@@ -137,7 +137,7 @@ fn models_are_compared_with_their_own_words_if_some_were_asked() {
         let (findings, _) = pooled(grid);
         let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
         assert_eq!((&*blind.models, &*blind.blind_models), (&["a".to_owned()][..], &["a".to_owned()][..]));
-        assert_eq!(blind.strict.verdict, Significance::Worse);
+        assert_eq!(blind.strict.verdict, Verdict::Worse);
     });
     let other = [base, records("c", "", right), records("random", "", right)].concat();
     with_grid(&other, |grid| {
@@ -157,7 +157,7 @@ fn few_clusters_give_no_verdict() {
     with_grid(&all, |grid| {
         let (findings, _) = pooled(grid);
         let dark = find(&findings, PooledKind::Darkness, "L3-noise")[0];
-        assert_eq!(dark.strict.verdict, Significance::TooFewClusters);
+        assert_eq!(dark.strict.verdict, Verdict::TooFewClusters);
         assert!((dark.strict.p - 0.0625).abs() < 1e-12 && (dark.least_p - 0.0625).abs() < 1e-15);
     });
 }
@@ -195,7 +195,7 @@ fn the_best_is_shown_better_than_every_other() {
         assert_eq!(best.not_shown_better_than, ["same"]);
         assert!(!best.is_shown() && best.pairs.len() == 3);
         assert_eq!(best.leader().model, "good");
-        assert_eq!(best.pairs[1].significance, Significance::Better);
+        assert_eq!(best.pairs[1].verdict, Verdict::Better);
     });
     all.retain(|record| record.model != "same");
     with_grid(&all, |grid| {
@@ -288,7 +288,7 @@ fn rows_of_one_model_have_the_verdict_of_the_sentences() {
         let pooled = &find(&findings.pooled, PooledKind::Darkness, "L5-noise")[0];
         (level.unwrap().verdict(), pooled.verdict())
     };
-    let worse = Some(Significance::Worse);
+    let worse = Some(Verdict::Worse);
     assert_eq!(verdicts(&one), (worse, worse));
     // With two models, the sentences are about their mean.
     assert_eq!(verdicts(&two), (None, worse));
@@ -389,14 +389,14 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
         // Ten frames change, all in one direction, and frame 0 does not; two levels.
         let (dark, darkest) = (&dark.strict, &darkest.strict);
         assert!((dark.p - 2.0 / 1024.0).abs() < 1e-12 && (dark.holm - 2.0 * dark.p).abs() < 1e-12);
-        assert_eq!(dark.verdict, Significance::Worse);
-        assert!((darkest.first - 0.0).abs() < 1e-12 && darkest.verdict == Significance::NotShown);
+        assert_eq!(dark.verdict, Verdict::Worse);
+        assert!((darkest.first - 0.0).abs() < 1e-12 && darkest.verdict == Verdict::NotShown);
         let said_yes = &said_yes[0].strict;
         assert!((said_yes.first - 1.0 / 12.0).abs() < 1e-12 && said_yes.second < 1e-12);
-        assert_eq!(said_yes.verdict, Significance::NotShown);
+        assert_eq!(said_yes.verdict, Verdict::NotShown);
         // Accuracy counts what cannot be read as wrong.
         let accuracy = find(&findings, PooledKind::Darkness, "L5-noise")[0];
-        assert_eq!(accuracy.strict.verdict, Significance::Worse);
+        assert_eq!(accuracy.strict.verdict, Verdict::Worse);
     });
     with_grid(&all[6 * FRAMES..], |grid| {
         let (findings, _) = pooled(grid);

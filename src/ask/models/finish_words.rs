@@ -16,17 +16,17 @@ use crate::types::{FailureKind, Finish, Reply};
 
 /// What the second try of a reply showed about its finish reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Verdict {
+enum SecondTry {
     /// The second try ended by the same word.
     Deliberate,
     /// The second try ended in another way.
     BrokenOff,
 }
 
-/// Verdict about one word; locked while its first reply is asked again. `None` before.
-type Word = Arc<tokio::sync::Mutex<Option<Verdict>>>;
+/// SecondTry about one word; locked while its first reply is asked again. `None` before.
+type Word = Arc<tokio::sync::Mutex<Option<SecondTry>>>;
 
-/// Verdicts about the unknown finish reasons of one model.
+/// What second tries showed about the unknown finish reasons of one model.
 #[derive(Debug, Default)]
 pub(super) struct FinishWords(Mutex<HashMap<String, Word>>);
 
@@ -56,21 +56,21 @@ impl FinishWords {
         let known = self.word(&word);
         let mut verdict = known.lock().await;
         match *verdict {
-            Some(Verdict::BrokenOff) if may_pay => {
+            Some(SecondTry::BrokenOff) if may_pay => {
                 drop(verdict);
                 join(first, ask_again().await)
             }
-            Some(Verdict::BrokenOff) => Err(broken_off(&first, word)),
+            Some(SecondTry::BrokenOff) => Err(broken_off(&first, word)),
             None if may_pay => {
                 let second = ask_again().await;
                 *verdict = second.as_ref().ok().map(|second| match &second.finish {
-                    Finish::Other(again) if *again == word => Verdict::Deliberate,
-                    _ => Verdict::BrokenOff,
+                    Finish::Other(again) if *again == word => SecondTry::Deliberate,
+                    _ => SecondTry::BrokenOff,
                 });
                 join(first, second)
             }
             // The model's own end, or nothing shows that another try would have an answer.
-            Some(Verdict::Deliberate) | None => Ok(first),
+            Some(SecondTry::Deliberate) | None => Ok(first),
         }
     }
 

@@ -1,3 +1,5 @@
+//! Models without an endpoint: built-in ones, guesses, and replies from a file.
+//!
 //! Model that a function in this process answers for: [`Local`].
 //!
 //! Model that guesses: [`Random`].

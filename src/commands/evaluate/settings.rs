@@ -11,7 +11,7 @@ use clap::Args;
 use serde_json::{Value, json};
 
 use crate::ask::{Constrain, Prompts};
-use crate::data::{BankArgs, DataArgs, DataPlace, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
+use crate::data::{BankArgs, DataArgs, DataSource, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
 use crate::engine::images::recipes::Recipe;
 use crate::engine::images::trials::{ASK, QuestionBank, rules};
 use crate::engine::manifest;
@@ -97,7 +97,7 @@ pub(crate) struct ShrinkArgs {
 /// Validated settings of an evaluation.
 #[derive(Debug)]
 pub(super) struct Evaluation {
-    pub(super) place: DataPlace,
+    pub(super) place: DataSource,
     /// Settings for reading a ready-made set.
     pub(super) set: SetArgs,
     pub(super) scene: SceneArgs,
@@ -330,7 +330,7 @@ pub(super) fn shown_questions(
 pub(super) fn plan_identity(config: &Evaluation, dataset: &Dataset) -> Result<Identity> {
     let (selection, rule) = (&config.selection, config.rule);
     let data = match &config.place {
-        rooms @ DataPlace::Rooms(_) => rooms.to_string(),
+        rooms @ DataSource::Rooms(_) => rooms.to_string(),
         _ => dataset.name().to_owned(),
     };
     let rules = config.rules.digest();

@@ -34,7 +34,7 @@ use tokio::runtime;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::ask::{Call, Message, Model, Query, Random};
-use crate::data::{self, DataPlace, RootArgs};
+use crate::data::{self, DataSource, RootArgs};
 use crate::engine::images::progress::Progress;
 use crate::engine::interrupt::Interrupt;
 use crate::engine::observer::Observer;
@@ -62,7 +62,7 @@ const COMPLETIONS: &str = "/v1/chat/completions";
 pub(crate) struct ServeArgs {
     /// The frames that the observer knows: rooms:frames=N,seed=N,size=WIDTHxHEIGHT, or a folder of frames with maps
     #[arg(long, value_name = "DIR|rooms:…", value_parser = data::parse_data_place, default_value_t, add = Decides::Reply)]
-    pub data: DataPlace,
+    pub data: DataSource,
     /// The port on 127.0.0.1, 0 for any that is free
     #[arg(long, value_name = "N", default_value_t = 8089, add = Decides::Nothing)]
     pub port: u16,

@@ -23,7 +23,7 @@ use super::notes::ImageNotes;
 use super::progress::Progress;
 use crate::ask::{ImagePlaces, Message, Query};
 use crate::data::{
-    Bank, BankArgs, BankPlace, DataPlace, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs, SkipBad,
+    Bank, BankArgs, BankSource, DataSource, Dataset, Photographs, SceneArgs, SelectionArgs, SetArgs, SkipBad,
 };
 use crate::error::{Error, Result};
 use crate::files;
@@ -264,7 +264,7 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
 
 /// Opens the data at a place. If they have no questions, generates them by rule.
 pub(crate) fn open_data(
-    place: &DataPlace,
+    place: &DataSource,
     scene: &SceneArgs,
     set: &SetArgs,
     selection: &SelectionArgs,
@@ -307,7 +307,7 @@ fn skip_unusable(dataset: Dataset, skip: Option<SkipBad>, progress: &Progress) -
 
 /// Opens the data at a place with their own questions. No image is read.
 pub(crate) fn open_without_generating(
-    place: &DataPlace,
+    place: &DataSource,
     scene: &SceneArgs,
     set: &SetArgs,
     selection: &SelectionArgs,
@@ -323,7 +323,7 @@ pub(crate) const ASK: &str = "--ask";
 /// Questions that are asked about every image and have no known answers (`--ask`).
 #[derive(Debug)]
 pub(crate) struct QuestionBank {
-    place: BankPlace,
+    place: BankSource,
     bank: Bank,
     /// Number of questions to ask about each image; `None` for all.
     per_image: Option<NonZeroUsize>,
@@ -367,7 +367,7 @@ impl QuestionBank {
     /// If the place has no image.
     pub(crate) fn open_images(
         &self,
-        place: &DataPlace,
+        place: &DataSource,
         set: &SetArgs,
         rule: DecodeRule,
         progress: &Progress,

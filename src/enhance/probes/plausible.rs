@@ -45,14 +45,14 @@ pub(super) enum Gravity {
 
 /// Flaw of one output, with the measured figure.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Verdict {
+pub(super) struct MeasuredFlaw {
     pub(super) flaw: Flaw,
     pub(super) gravity: Gravity,
     /// Figure that the rule compares with its threshold.
     pub(super) figure: f64,
 }
 
-impl fmt::Display for Verdict {
+impl fmt::Display for MeasuredFlaw {
     /// The finding as it follows "the images": `are flat (their brightness varies by 0.2 of 255)`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let figure = self.figure;
@@ -239,7 +239,7 @@ pub fn shows_nothing(image: &Rgb) -> bool {
 }
 
 /// First flaw found in an output for a dark image of the same size; `None` if the output is plausible.
-pub(super) fn judge(dark: &UnclampedImage, output: &UnclampedImage) -> Option<Verdict> {
+pub(super) fn judge(dark: &UnclampedImage, output: &UnclampedImage) -> Option<MeasuredFlaw> {
     let not_finite = share(&output.samples, |value| !value.is_finite());
     if not_finite > 0.0 {
         return impossible(Flaw::Nan, not_finite);
@@ -288,14 +288,14 @@ pub(super) fn judge(dark: &UnclampedImage, output: &UnclampedImage) -> Option<Ve
 
 /// The verdict on an impossible output, always `Some`.
 #[expect(clippy::unnecessary_wraps, reason = "returned by rules that may find nothing")]
-fn impossible(flaw: Flaw, figure: f64) -> Option<Verdict> {
-    Some(Verdict { flaw, gravity: Gravity::Impossible, figure })
+fn impossible(flaw: Flaw, figure: f64) -> Option<MeasuredFlaw> {
+    Some(MeasuredFlaw { flaw, gravity: Gravity::Impossible, figure })
 }
 
 /// The verdict on a doubtful output, always `Some`.
 #[expect(clippy::unnecessary_wraps, reason = "returned by rules that may find nothing")]
-fn doubtful(flaw: Flaw, figure: f64) -> Option<Verdict> {
-    Some(Verdict { flaw, gravity: Gravity::Doubtful, figure })
+fn doubtful(flaw: Flaw, figure: f64) -> Option<MeasuredFlaw> {
+    Some(MeasuredFlaw { flaw, gravity: Gravity::Doubtful, figure })
 }
 
 /// Share of the values that satisfy a condition.
@@ -308,7 +308,7 @@ fn dot_product(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Flaw of an output whose blocks do not follow those of its input in brightness.
-fn structure(before: &Plane, after: &Plane) -> Option<Verdict> {
+fn structure(before: &Plane, after: &Plane) -> Option<MeasuredFlaw> {
     let order = correlation(&ranks(&before.samples), &ranks(&after.samples));
     if order < -0.3 {
         return impossible(Flaw::Inverted, order);

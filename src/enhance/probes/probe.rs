@@ -10,7 +10,7 @@
 use std::fmt;
 use std::ops::Range;
 
-use super::plausible::{Gravity, UnclampedImage, Verdict, judge};
+use super::plausible::{Gravity, MeasuredFlaw, UnclampedImage, judge};
 use crate::conventions::sidecar::ADD;
 use crate::conventions::{ValueRange, ValueScale};
 use crate::outputs::light_map_line;
@@ -36,7 +36,7 @@ pub(super) struct PairTrial {
     /// Output of the model for each frame.
     pub(super) made: Vec<UnclampedImage>,
     /// Flaw of each output.
-    pub(super) verdicts: Vec<Option<Verdict>>,
+    pub(super) verdicts: Vec<Option<MeasuredFlaw>>,
     /// Output for black and white; `None` if it was not measured.
     pub(super) endpoints: Option<Endpoints>,
 }
@@ -74,14 +74,14 @@ impl PairTrial {
         }
     }
 
-    /// Verdict on the pair: the most frequent flaw, if at least half of the frames have one.
+    /// MeasuredFlaw on the pair: the most frequent flaw, if at least half of the frames have one.
     pub(super) fn verdict(&self) -> Option<FlawedFrames> {
         self.most_frequent_flaw().filter(|seen| 2 * seen.flawed >= seen.frames)
     }
 
     /// The most frequent flaw; `None` if no frame has one.
     fn most_frequent_flaw(&self) -> Option<FlawedFrames> {
-        let flawed: Vec<Verdict> = self.verdicts.iter().flatten().copied().collect();
+        let flawed: Vec<MeasuredFlaw> = self.verdicts.iter().flatten().copied().collect();
         // Reversed, because `max_by_key` returns the last of equally frequent flaws and the first is wanted.
         let example = flawed
             .iter()
@@ -102,7 +102,7 @@ impl PairTrial {
 pub(super) struct FlawedFrames {
     pub(super) gravity: Gravity,
     /// The first image with the most frequent flaw.
-    pub(super) example: Verdict,
+    pub(super) example: MeasuredFlaw,
     pub(super) flawed: usize,
     pub(super) frames: usize,
 }
@@ -472,7 +472,7 @@ mod tests {
         RangePair { input: ValueScale::Range(ValueRange::Bytes), output: ValueScale::Range(ValueRange::Bytes) };
 
     /// A pair with these verdicts on the frames.
-    fn pair(ranges: RangePair, verdicts: &[Option<Verdict>]) -> PairTrial {
+    fn pair(ranges: RangePair, verdicts: &[Option<MeasuredFlaw>]) -> PairTrial {
         PairTrial { ranges, made: Vec::new(), verdicts: verdicts.to_vec(), endpoints: None }
     }
 
@@ -493,11 +493,14 @@ mod tests {
         probe.conclusion()
     }
 
-    const FLAT: Option<Verdict> = Some(Verdict { flaw: Flaw::Flat, gravity: Gravity::Impossible, figure: 0.0 });
+    const FLAT: Option<MeasuredFlaw> =
+        Some(MeasuredFlaw { flaw: Flaw::Flat, gravity: Gravity::Impossible, figure: 0.0 });
 
-    const WHITE: Option<Verdict> = Some(Verdict { flaw: Flaw::White, gravity: Gravity::Doubtful, figure: 0.0 });
+    const WHITE: Option<MeasuredFlaw> =
+        Some(MeasuredFlaw { flaw: Flaw::White, gravity: Gravity::Doubtful, figure: 0.0 });
 
-    const UNLIT: Option<Verdict> = Some(Verdict { flaw: Flaw::Unlit, gravity: Gravity::Doubtful, figure: 0.0 });
+    const UNLIT: Option<MeasuredFlaw> =
+        Some(MeasuredFlaw { flaw: Flaw::Unlit, gravity: Gravity::Doubtful, figure: 0.0 });
 
     #[test]
     fn usual_ranges_are_assumed_if_they_are_plausible() {

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use super::plausible::{DARK, Gravity, UnclampedImage, Verdict, brightness, judge, shows_nothing};
+use super::plausible::{DARK, Gravity, MeasuredFlaw, UnclampedImage, brightness, judge, shows_nothing};
 use crate::conventions::LUMA;
 use darkqa_base::error::{Error, Result};
 use darkqa_base::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
@@ -40,7 +40,7 @@ pub(super) enum Judgement {
     #[default]
     Bright,
     /// Flaw of the enhanced image, if any; the degraded image is dark.
-    Dark(Option<Verdict>),
+    Dark(Option<MeasuredFlaw>),
 }
 
 impl Judgement {

@@ -1,3 +1,5 @@
+//! JPEG files: facts of their markers, standard Huffman tables, and CMYK.
+//!
 //! Facts of a JPEG file from its markers: [`JpegProperties`], and the check for its end marker: [`has_end`].
 //!
 //! The decoder converts CMYK to RGB without the ICC profile, and fills the missing part of a truncated file with grey.

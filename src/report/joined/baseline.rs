@@ -19,7 +19,7 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{BaselineRow, baseline_rows};
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::{ModelInCondition, is_control, is_observer};
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// The flag that makes the command fail if a model got worse.
 pub(super) const FAIL_IF_WORSE: &str = "--fail-if-worse";
@@ -199,7 +199,7 @@ impl Baseline {
     pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
         let models: Vec<&BaselineRow> = self.rows.iter().filter(|row| !row.subject.is_reference()).collect();
         let old = &self.old;
-        if models.iter().any(|row| row.significance == Significance::Worse) {
+        if models.iter().any(|row| row.verdict == Verdict::Worse) {
             return Ok(true);
         }
         if let Some(missing) = self.missing_sentence() {
@@ -211,7 +211,7 @@ impl Baseline {
                  observer do not count)"
             ));
         }
-        let undecided: Vec<&BaselineRow> = models.into_iter().filter(|row| !row.significance.is_decided()).collect();
+        let undecided: Vec<&BaselineRow> = models.into_iter().filter(|row| !row.verdict.is_decided()).collect();
         if !undecided.is_empty() {
             let conditions: Vec<String> = undecided.iter().map(|row| name(&row.subject)).collect();
             return refuse(&format!(

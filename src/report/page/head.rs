@@ -350,7 +350,7 @@ impl StripTrial<'_> {
     /// counts even in a row with an enhancer.
     fn is_right(self) -> Option<bool> {
         let enhancer = self.row.enhancer.filter(|_| self.level != AxisLevel::L0);
-        let reading = self.result(enhancer)?.reading(ParsingMode::Strict)?;
+        let reading = self.result(enhancer)?.parsed(ParsingMode::Strict)?;
         let item = &self.grid.items[self.item];
         item.asked.truth?;
         Some(item.is_right(reading))
@@ -363,7 +363,7 @@ impl StripTrial<'_> {
             return None;
         }
         let item = &self.grid.items[self.item];
-        let (class, sign, text) = match result.reading(ParsingMode::Strict) {
+        let (class, sign, text) = match result.parsed(ParsingMode::Strict) {
             None => ("none", '–', "no reply"),
             Some(None) => ("none", '?', "not readable"),
             Some(Some(chosen)) => {

@@ -120,7 +120,7 @@ fn code(result: TrialResult, mode: ParsingMode) -> u8 {
     match result {
         TrialResult::Absent => ABSENT,
         TrialResult::Failed => FAILED,
-        TrialResult::Read { .. } => result.reading(mode).flatten().unwrap_or(UNREAD),
+        TrialResult::Read { .. } => result.parsed(mode).flatten().unwrap_or(UNREAD),
     }
 }
 
@@ -339,6 +339,6 @@ fn answer_changes(grid: &Grid<'_>) -> Vec<AnswerChange> {
 
 /// True if a reply is right by strict parsing; `None` without a reply.
 fn is_right(grid: &Grid<'_>, subject: usize, item: usize) -> Option<bool> {
-    let answer = grid.result(subject, item).reading(ParsingMode::Strict)?;
+    let answer = grid.result(subject, item).parsed(ParsingMode::Strict)?;
     Some(grid.items[item].is_right(answer))
 }

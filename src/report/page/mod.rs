@@ -36,7 +36,7 @@ use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::models_under_test;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 pub(crate) use data::fitting_thumbnails;
 pub(crate) use head::PageHead;
@@ -464,7 +464,7 @@ fn page_tables<'a>(tables: &'a [Table], section: &str) -> Vec<PageTable<'a>> {
 /// True for the row of a test that detected no effect.
 fn is_undetected(row: &TableRow) -> bool {
     row.cells.iter().any(|cell| match cell {
-        TableCell::Significance(significance) => !significance.is_shown(),
+        TableCell::Verdict(verdict) => !verdict.is_shown(),
         _ => false,
     })
 }
@@ -526,9 +526,9 @@ fn summary(table: &Table, rows: &[&TableRow]) -> String {
 fn page_cell(kind: ColumnKind, cell: &TableCell) -> PageCell {
     let class = match (kind, cell) {
         (_, TableCell::Below(_)) => "below",
-        (_, TableCell::Significance(Significance::Better)) => "better",
-        (_, TableCell::Significance(Significance::Worse)) | (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
-        (_, TableCell::Significance(_)) => "unshown",
+        (_, TableCell::Verdict(Verdict::Better)) => "better",
+        (_, TableCell::Verdict(Verdict::Worse)) | (ColumnKind::Failures, TableCell::Count(1..)) => "worse",
+        (_, TableCell::Verdict(_)) => "unshown",
         (ColumnKind::Text, _) => "text",
         _ => "",
     };

@@ -6,7 +6,7 @@ use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::comparisons::{BaselineRow, MIN_PAIRS};
 use darkqa_score::estimate::largest;
 use darkqa_score::model_in_condition::models_under_test;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Maximum number of conditions that a sentence names.
 const MAX_NAMED: usize = 3;
@@ -18,9 +18,8 @@ pub(crate) fn against_baseline(rows: &[BaselineRow], old: &str, unit: ClusterUni
     let rows: Vec<&BaselineRow> = rows.iter().filter(|row| judged.contains(&*row.subject.model)).collect();
     let mut sentences = Vec::new();
     for model_rows in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
-        for verdict in [Significance::Worse, Significance::Better] {
-            let detected: Vec<&BaselineRow> =
-                model_rows.iter().copied().filter(|row| row.significance == verdict).collect();
+        for verdict in [Verdict::Worse, Verdict::Better] {
+            let detected: Vec<&BaselineRow> = model_rows.iter().copied().filter(|row| row.verdict == verdict).collect();
             sentences.extend(detected_difference(&detected, old, unit));
         }
     }
@@ -41,7 +40,7 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
     let shared = rows.iter().map(|row| row.paired.difference.n).max().unwrap_or(0);
     let most_missing = rows
         .iter()
-        .filter(|row| row.significance == Significance::Missing || row.paired.missing > row.paired.difference.n)
+        .filter(|row| row.verdict == Verdict::Missing || row.paired.missing > row.paired.difference.n)
         .max_by_key(|row| row.paired.missing);
     if let Some(row) = most_missing {
         format!(
@@ -69,8 +68,8 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
 fn detected_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
     let largest = largest(rows, |row| row.paired.difference)?;
     let mut numbers = Numbers::new(unit);
-    let verdict = largest.significance;
-    let word = if verdict == Significance::Worse { "worse" } else { "better" };
+    let verdict = largest.verdict;
+    let word = if verdict == Verdict::Worse { "worse" } else { "better" };
     let up_to = if rows.len() > 1 { "up to " } else { "" };
     let text = format!(
         "{} is {word} than in {old} at {}, by {up_to}{} points.",
@@ -91,7 +90,7 @@ fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
         let detail = "no model answered the same question about the same image in both".to_owned();
         return numbers.sentence("baseline", Tone::Note, text, detail);
     }
-    let possible: Vec<&BaselineRow> = rows.iter().copied().filter(|row| row.significance.is_decided()).collect();
+    let possible: Vec<&BaselineRow> = rows.iter().copied().filter(|row| row.verdict.is_decided()).collect();
     let Some(largest) = largest(&possible, |row| row.paired.difference) else {
         let text = format!("No verdict against {old} is possible.");
         let detail = too_few(rows, &mut numbers);

@@ -13,7 +13,7 @@ use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
 use darkqa_score::comparisons::{Claim, Comparison, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Second side of a comparison if the same models answered with images and without.
 const WITHOUT: &str = "without images";
@@ -21,13 +21,10 @@ const WITHOUT: &str = "without images";
 /// Reports the levels at which the models are right less often with images than without. If none has a verdict,
 /// [`format_alone`] reports a loss that only the strict parsing detects.
 pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
-    let detected = with_verdict(findings, Significance::Worse);
+    let detected = with_verdict(findings, Verdict::Worse);
     let Some(largest) = PooledFinding::largest(&detected) else {
-        let strict_only: Vec<&PooledFinding> = findings
-            .iter()
-            .copied()
-            .filter(|finding| finding.claim() == Claim::StrictOnly(Significance::Worse))
-            .collect();
+        let strict_only: Vec<&PooledFinding> =
+            findings.iter().copied().filter(|finding| finding.claim() == Claim::StrictOnly(Verdict::Worse)).collect();
         return format_alone(&strict_only, unit);
     };
     let mut numbers = Numbers::new(unit);
@@ -78,7 +75,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     let (with, without) =
         (numbers.percent("with", finding.strict.first), numbers.percent("without", finding.strict.second));
     let text = match finding.claim() {
-        Claim::Detected(Significance::Better) => format!(
+        Claim::Detected(Verdict::Better) => format!(
             "At L0 images add {} points{}: {with} % with them, {without} % without.",
             numbers.size("gain", finding.strict.difference.value),
             against(finding)
@@ -127,7 +124,7 @@ pub(super) fn in_a_family(all: &[&Comparison], pooled: &[&PooledFinding], unit: 
         a.total_cmp(&b)
     })?;
     let model = &worst.first.model;
-    if with_verdict(pooled, Significance::Worse).iter().any(|finding| finding.models == [&**model]) {
+    if with_verdict(pooled, Verdict::Worse).iter().any(|finding| finding.models == [&**model]) {
         return None;
     }
     let in_family: Vec<&Comparison> =
@@ -158,7 +155,7 @@ fn model_count(comparisons: &[&Comparison]) -> usize {
 
 /// True if images are detected to make a model worse than the second side.
 fn is_below(comparison: &Comparison) -> bool {
-    comparison.claim() == Claim::Detected(Significance::Worse)
+    comparison.claim() == Claim::Detected(Verdict::Worse)
 }
 
 /// True if a model is compared with its own replies.

@@ -11,7 +11,7 @@ use crate::types::{AxisLevel, RunGroup, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// The cost of darkness, or of another cause, in each topic.
 pub(super) fn darkness(findings: &Findings<'_>) -> Vec<Sentence> {
@@ -43,7 +43,7 @@ fn topic_sentences(findings: &Findings<'_>, topic: &Topic<'_>) -> Vec<Sentence> 
             .iter()
             .filter(|variant| overlap(other, variant))
             .any(|variant| CostOfDarkness::new(findings, variant).verdict() == verdict);
-        if !is_reported && verdict.is_some_and(Significance::is_shown) {
+        if !is_reported && verdict.is_some_and(Verdict::is_shown) {
             let name = name(other);
             sentences.extend(cost.sentence(Some(&name), unit));
         }
@@ -75,7 +75,7 @@ impl<'f> CostOfDarkness<'f> {
     }
 
     /// The verdict of the levels; if none is detected, the verdict of their mean.
-    fn verdict(&self) -> Option<Significance> {
+    fn verdict(&self) -> Option<Verdict> {
         let verdict = verdict(&self.levels)?;
         match self.mean.and_then(mean_verdict) {
             Some(mean) if !verdict.is_shown() => Some(mean),
@@ -91,14 +91,14 @@ fn overlap(one: &Variant, other: &Variant) -> bool {
 
 /// The verdict over all levels: a loss if any level has one, otherwise a gain, otherwise not detected; `None` if no
 /// level can have a verdict.
-fn verdict(levels: &[&PooledFinding]) -> Option<Significance> {
-    [Significance::Worse, Significance::Better, Significance::NotShown]
+fn verdict(levels: &[&PooledFinding]) -> Option<Verdict> {
+    [Verdict::Worse, Verdict::Better, Verdict::NotShown]
         .into_iter()
         .find(|verdict| !with_verdict(levels, *verdict).is_empty())
 }
 
 /// The detected verdict of a mean over levels; `None` if nothing is detected.
-fn mean_verdict(mean: &PooledFinding) -> Option<Significance> {
+fn mean_verdict(mean: &PooledFinding) -> Option<Verdict> {
     match mean.claim() {
         Claim::Detected(verdict) => Some(verdict),
         _ => None,
@@ -126,7 +126,7 @@ pub(super) fn with_variant(
     let mut numbers = Numbers::new(unit);
     let undecided = Undecided::new(levels, silent);
     let verdict = verdict(levels);
-    let is_shown = verdict.is_some_and(Significance::is_shown);
+    let is_shown = verdict.is_some_and(Verdict::is_shown);
     if let Some(mean) = mean
         && let Some(mean_verdict) = mean_verdict(mean)
         && !is_shown
@@ -146,7 +146,7 @@ pub(super) fn with_variant(
     let darkest = found.last()?;
     let size = darkest.strict.difference.value;
     let (text, more) = match verdict {
-        Significance::Worse => (
+        Verdict::Worse => (
             format!(
                 "{cause} costs {} points at {}, from {} % at L0.",
                 numbers.size("cost", size),
@@ -155,7 +155,7 @@ pub(super) fn with_variant(
             ),
             format!("; a loss is shown at {}{}", runs(&found, levels), curve(levels, &mut numbers)),
         ),
-        Significance::Better => (
+        Verdict::Better => (
             format!("at {} accuracy is {} points higher than at L0.", darkest.level, numbers.size("gain", size)),
             format!("; at {}{}", darkest.level, curve(levels, &mut numbers)),
         ),
@@ -199,14 +199,14 @@ fn begin_with(name: Option<&str>, text: &str) -> String {
 fn over_levels(
     mean: &PooledFinding,
     levels: &[&PooledFinding],
-    verdict: Significance,
+    verdict: Verdict,
     name: Option<&str>,
     mut numbers: Numbers,
 ) -> Sentence {
     let size = mean.strict.difference.value;
     let cause = mean.level.axis().unwrap_or(Axis::LIGHT).cause;
     let at = mean_levels(mean, levels);
-    let text = if verdict == Significance::Worse {
+    let text = if verdict == Verdict::Worse {
         format!(
             "{cause} costs {} points on average over {at}, from {} % at L0.",
             numbers.size("cost", size),

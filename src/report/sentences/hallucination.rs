@@ -11,11 +11,11 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// The rate of a false answer at the darkest level with a detected increase.
 pub(super) fn false_answers(levels: &[&PooledFinding], answer: FalseAnswer, unit: ClusterUnit) -> Option<Sentence> {
-    let detected = with_verdict(levels, Significance::Worse);
+    let detected = with_verdict(levels, Verdict::Worse);
     let worst = detected.last()?;
     let mut numbers = Numbers::new(unit);
     let objects = match answer {

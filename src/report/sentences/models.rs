@@ -17,7 +17,7 @@ use darkqa_score::estimate::{Estimate, largest};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::{ModelInCondition, is_reference};
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// The model with the highest mean accuracy in the dark, and the models that it was not detected to be better than; or
 /// all models that share that accuracy. If another model is detected to be better at some level and the leader at
@@ -193,7 +193,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
     let whole = at_darkest(None)?;
     let (most, least) = (at_darkest(Some(&contrast.most))?, at_darkest(Some(&contrast.least))?);
     let (of_most, of_least) = (most.strict.difference, least.strict.difference);
-    if whole.claim() != Claim::Detected(Significance::Worse) || of_most.value >= 0.0 {
+    if whole.claim() != Claim::Detected(Verdict::Worse) || of_most.value >= 0.0 {
         return None;
     }
     let mut numbers = Numbers::new(findings.unit);
@@ -310,7 +310,7 @@ fn accuracy(grid: &Grid<'_>, subject: usize, items: &[usize]) -> Option<f64> {
     let asked: BTreeSet<_> = items.iter().map(|item| &grid.items[*item].asked.question).collect();
     let (mut right, mut replies) = (0, 0);
     for (index, item) in grid.items.iter().enumerate() {
-        let reading = grid.result(subject, index).reading(ParsingMode::Strict);
+        let reading = grid.result(subject, index).parsed(ParsingMode::Strict);
         if let (Some(chosen), true) = (reading, asked.contains(&item.asked.question)) {
             replies += 1;
             right += usize::from(item.is_right(chosen));

@@ -7,7 +7,7 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Maximum number of sentences about one enhancer.
 const MAX_PER_ENHANCER: usize = 3;
@@ -25,7 +25,7 @@ struct DetectedEffect<'f> {
 
 impl<'f> DetectedEffect<'f> {
     /// The effect at all levels with a verdict; `None` if no level has it.
-    fn levels(levels: &[&'f PooledFinding], verdict: Significance) -> Option<Self> {
+    fn levels(levels: &[&'f PooledFinding], verdict: Verdict) -> Option<Self> {
         let detected = with_verdict(levels, verdict);
         Some(Self {
             largest: PooledFinding::largest(&detected)?,
@@ -35,7 +35,7 @@ impl<'f> DetectedEffect<'f> {
     }
 
     /// The effect at all levels with a verdict, and each mean with that verdict if none of its levels has it.
-    fn all(levels: &[&'f PooledFinding], means: &[&'f PooledFinding], verdict: Significance) -> Vec<Self> {
+    fn all(levels: &[&'f PooledFinding], means: &[&'f PooledFinding], verdict: Verdict) -> Vec<Self> {
         let detected = with_verdict(levels, verdict);
         let means = with_verdict(means, verdict)
             .into_iter()
@@ -74,7 +74,7 @@ pub(super) fn mean_levels(mean: &PooledFinding, levels: &[&PooledFinding]) -> St
 
 /// The levels at which nothing is detected, neither alone nor as a part of a mean.
 fn undetected<'f>(levels: &[&'f PooledFinding], means: &[&PooledFinding]) -> Vec<&'f PooledFinding> {
-    with_verdict(levels, Significance::NotShown)
+    with_verdict(levels, Verdict::NotShown)
         .into_iter()
         .filter(|finding| {
             !means
@@ -89,7 +89,7 @@ fn undetected<'f>(levels: &[&'f PooledFinding], means: &[&PooledFinding]) -> Vec
 /// of noise alone.
 pub(super) fn noise(levels: &[&PooledFinding], means: &[&PooledFinding], unit: ClusterUnit) -> Vec<Sentence> {
     let mut sentences = Vec::new();
-    for (verdict, word) in [(Significance::Worse, "lower"), (Significance::Better, "higher")] {
+    for (verdict, word) in [(Verdict::Worse, "lower"), (Verdict::Better, "higher")] {
         for effect in DetectedEffect::all(levels, means, verdict) {
             let mut numbers = Numbers::new(unit);
             let size = effect.size(&mut numbers).replace(" points", &format!(" points {word}"));
@@ -142,7 +142,7 @@ pub(super) fn enhancers(all: &[&PooledFinding], means: &[&PooledFinding], unit: 
     for levels in all.chunk_by(|a, b| a.enhancer == b.enhancer) {
         let own: Vec<&PooledFinding> =
             means.iter().copied().filter(|mean| mean.enhancer == levels[0].enhancer).collect();
-        let detected = [Significance::Worse, Significance::Better].into_iter().flat_map(|verdict| {
+        let detected = [Verdict::Worse, Verdict::Better].into_iter().flat_map(|verdict| {
             DetectedEffect::all(levels, &own, verdict)
                 .into_iter()
                 .filter_map(move |effect| enhancer(&effect, levels, verdict, unit))
@@ -161,7 +161,7 @@ pub(super) fn enhancers(all: &[&PooledFinding], means: &[&PooledFinding], unit: 
 fn enhancer(
     effect: &DetectedEffect<'_>,
     levels: &[&PooledFinding],
-    verdict: Significance,
+    verdict: Verdict,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
     let name = effect.largest.enhancer.as_ref()?;
@@ -169,7 +169,7 @@ fn enhancer(
     let mut numbers = Numbers::new(unit);
     numbers.about(name);
     let size = effect.size(&mut numbers);
-    let is_better = verdict == Significance::Better;
+    let is_better = verdict == Verdict::Better;
     let (text, note) = if is_observer(effect.largest) {
         let more = if is_better { "more" } else { "less" };
         (
@@ -254,15 +254,15 @@ pub(super) fn reservation(finding: &PooledFinding, numbers: &mut Numbers) -> Str
 }
 
 /// The findings with a verdict in both parsings and after the correction over all sentences. A finding that could have
-/// a verdict but has none counts as [`Significance::NotShown`], unless the missing replies decide it.
-pub(super) fn with_verdict<'f>(levels: &[&'f PooledFinding], verdict: Significance) -> Vec<&'f PooledFinding> {
+/// a verdict but has none counts as [`Verdict::NotShown`], unless the missing replies decide it.
+pub(super) fn with_verdict<'f>(levels: &[&'f PooledFinding], verdict: Verdict) -> Vec<&'f PooledFinding> {
     levels
         .iter()
         .copied()
         .filter(|finding| match finding.claim() {
             Claim::Detected(found) => found == verdict,
             Claim::Impossible | Claim::Missing => false,
-            _ => verdict == Significance::NotShown,
+            _ => verdict == Verdict::NotShown,
         })
         .collect()
 }

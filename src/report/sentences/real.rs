@@ -9,7 +9,7 @@ use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::models_under_test;
 use darkqa_score::photographs::PairDarkness;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Sentences about each model and each photograph: compared with the lit frame, with synthetic images of the same
 /// darkness, and with the enhanced photograph.
@@ -50,8 +50,8 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
     let place = format!("Photographed in the dark ({}, {least}{ev} EV)", pair.name);
     let model = &row.first.model;
     let text = match verdict(row) {
-        Significance::Worse | Significance::Better => {
-            let does = if verdict(row) == Significance::Worse { "loses" } else { "gains" };
+        Verdict::Worse | Verdict::Better => {
+            let does = if verdict(row) == Verdict::Worse { "loses" } else { "gains" };
             let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{place}, {model} {does} {size} points against the light.")
         }
@@ -72,8 +72,8 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let level = row.second.condition();
     let (name, size) = (row.first.condition(), row.strict.paired.difference.value);
     let text = match verdict(row) {
-        Significance::Worse | Significance::Better => {
-            let harder = if verdict(row) == Significance::Worse { "harder" } else { "easier" };
+        Verdict::Worse | Verdict::Better => {
+            let harder = if verdict(row) == Verdict::Worse { "harder" } else { "easier" };
             let size = numbers.size("effect", size);
             format!("{name} is {harder} for {model} than {synthetic} ({level}), by {size} points.")
         }
@@ -94,8 +94,8 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     }
     let (model, raw) = (&row.first.model, row.second.condition());
     let text = match verdict(row) {
-        Significance::Worse | Significance::Better => {
-            let does = if verdict(row) == Significance::Worse { "harms" } else { "helps" };
+        Verdict::Worse | Verdict::Better => {
+            let does = if verdict(row) == Verdict::Worse { "harms" } else { "helps" };
             let size = numbers.size("effect", row.strict.paired.difference.value);
             format!("{name} {does} {model} with {raw}, by {size} points.")
         }
@@ -119,10 +119,10 @@ fn unconfirmed_size(row: &Comparison, numbers: &mut Numbers) -> Option<(String, 
 }
 
 /// The verdict in both parsings and after the correction over all sentences.
-fn verdict(row: &Comparison) -> Significance {
+fn verdict(row: &Comparison) -> Verdict {
     match row.claim() {
         Claim::Detected(verdict) => verdict,
-        _ => Significance::NotShown,
+        _ => Verdict::NotShown,
     }
 }
 

@@ -10,7 +10,7 @@ use crate::types::{AxisLevel, EnhancerName, Variant, View};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, ModelsLeftOut, PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Half-width of an interval above which the sample is called small, as a share (0.05 is 5 points); chosen.
 pub(super) const WIDE: f64 = 0.05;
@@ -90,7 +90,7 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
     let whole = all.iter().filter(|finding| {
         finding.family.is_none()
             && finding.kind != PooledKind::EnhancerPair
-            && finding.strict.verdict != Significance::Missing
+            && finding.strict.verdict != Verdict::Missing
     });
     let which = if whole.clone().all(|finding| finding.strict.verdict.is_possible()) {
         "the findings"

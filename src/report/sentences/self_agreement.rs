@@ -10,7 +10,7 @@ use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::light::LightReplies;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
 use darkqa_score::model_in_condition::models_under_test;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// All sentences of a run without true answers: models against each other at L0 first, then each model.
 #[must_use]
@@ -228,9 +228,9 @@ fn enhanced(found: &SelfAgreement<'_>, model: &str, variant: &Variant, enhancer:
         })
         .collect();
     let levels: Vec<AxisLevel> = own.iter().filter_map(|c| c.first.level).collect();
-    let [better, worse] = [Significance::Better, Significance::Worse].map(|significance| {
+    let [better, worse] = [Verdict::Better, Verdict::Worse].map(|verdict| {
         let detected: Vec<AxisLevel> =
-            own.iter().filter(|c| c.claim() == Claim::Detected(significance)).filter_map(|c| c.first.level).collect();
+            own.iter().filter(|c| c.claim() == Claim::Detected(verdict)).filter_map(|c| c.first.level).collect();
         (!detected.is_empty()).then(|| level_runs(&detected, &levels))
     });
     let strongest = own.iter().max_by(|one, other| {
@@ -287,7 +287,7 @@ fn level_effects(
 /// an answer is neither help nor harm.
 fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
     match change {
-        Claim::Detected(Significance::Worse) => (
+        Claim::Detected(Verdict::Worse) => (
             Tone::Note,
             format!("{enhancer} changes answers of {model} to these photographs: whether for the better is not known."),
         ),

@@ -12,7 +12,7 @@ use crate::types::{EnhancerName, ModelListing};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::significance::{Significance, SwapMethod};
+use darkqa_score::significance::{SwapMethod, Verdict};
 
 /// A finding in words.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -116,11 +116,11 @@ impl From<Claim> for Tone {
     }
 }
 
-impl From<Significance> for Tone {
-    fn from(significance: Significance) -> Self {
-        match significance {
-            Significance::Better => Self::Better,
-            Significance::Worse => Self::Worse,
+impl From<Verdict> for Tone {
+    fn from(verdict: Verdict) -> Self {
+        match verdict {
+            Verdict::Better => Self::Better,
+            Verdict::Worse => Self::Worse,
             _ => Self::NotShown,
         }
     }
@@ -297,7 +297,7 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
         })
         .collect();
     let largest = PooledFinding::largest(&strict_only)?;
-    let is_loss = largest.claim() == Claim::StrictOnly(Significance::Worse);
+    let is_loss = largest.claim() == Claim::StrictOnly(Verdict::Worse);
     let (more, effect) = if is_loss { ("fewer", "loss") } else { ("more", "gain") };
     let level = largest.level;
     let place = match (largest.kind, &largest.enhancer) {

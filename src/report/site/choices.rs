@@ -13,7 +13,7 @@ use darkqa_score::comparisons::{Comparison, ComparisonKind, RankRange};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{ModelInCondition, is_reference};
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 use darkqa_score::threshold::{NoThreshold, Threshold as EvThreshold};
 
 /// Results of one model in one run.
@@ -30,10 +30,10 @@ pub(crate) struct ChoiceRow {
     /// Darkest level; `None` if no degraded level was asked.
     darkest: Option<AxisLevel>,
     /// Accuracy at the darkest level minus accuracy at L0, with its test.
-    change: Option<(Estimate, Option<Significance>)>,
+    change: Option<(Estimate, Option<Verdict>)>,
     threshold: Option<Result<EvThreshold, NoThreshold>>,
     /// Largest gain by an enhancer over raw images: enhancer, level and difference, with its test.
-    gain: Option<(String, AxisLevel, Estimate, Option<Significance>)>,
+    gain: Option<(String, AxisLevel, Estimate, Option<Verdict>)>,
     /// Levels at which the model is detected to be worse than a model without images.
     below: Vec<AxisLevel>,
     /// Number of unreadable replies, and of all replies.
@@ -142,7 +142,7 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -
         .column(Text, "csv darkest", |row| row.darkest.map(|level| level.to_string()))
         .column(Points, "csv change change_low change_high change_n", |row| row.change.map(|(change, _)| change))
         .column(Text, "csv change_shown", |row| {
-            row.change.map(|(_, verdict)| verdict.is_some_and(Significance::is_shown).to_string())
+            row.change.map(|(_, verdict)| verdict.is_some_and(Verdict::is_shown).to_string())
         })
         .column(Threshold, "csv threshold_ev threshold_low threshold_high", |row| threshold(row))
         .column(Text, "csv best_enhancer", |row| row.gain.as_ref().map(|(enhancer, ..)| enhancer.clone()))
@@ -150,7 +150,7 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -
         .column(Points, "csv gain gain_low gain_high gain_n", |row| row.gain.as_ref().map(|(.., gain, _)| *gain))
         .column(Text, "csv gain_shown", |row| {
             let gain = row.gain.as_ref();
-            gain.map(|(.., verdict)| verdict.is_some_and(Significance::is_shown).to_string())
+            gain.map(|(.., verdict)| verdict.is_some_and(Verdict::is_shown).to_string())
         })
         .column(Text, "csv below_blind", |row| row.below_text(";"))
         .column(Count, "csv unread", |row| row.unread[0])
@@ -238,12 +238,12 @@ fn board_row(row: &ChoiceRow) -> BoardRow {
 }
 
 /// Cell with a difference in points, its interval, and its condition. A difference that was not detected is marked.
-fn difference(difference: Estimate, verdict: Option<Significance>, condition: &str) -> BoardCell {
+fn difference(difference: Estimate, verdict: Option<Verdict>, condition: &str) -> BoardCell {
     let ends = format!("[{}, {}]", points(difference.low), points(difference.high));
     let cell = BoardCell::text(&points(difference.value)).with_key(difference.value.to_string()).with_line(&ends);
     match verdict {
-        Some(Significance::Better) => cell.with_line(condition).with_class("better"),
-        Some(Significance::Worse) => cell.with_line(condition).with_class("worse"),
+        Some(Verdict::Better) => cell.with_line(condition).with_class("better"),
+        Some(Verdict::Worse) => cell.with_line(condition).with_class("worse"),
         None => cell.with_line(condition).with_class("unshown"),
         _ => cell.with_line(&format!("{condition}, not shown")).with_class("unshown"),
     }

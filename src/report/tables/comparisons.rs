@@ -21,7 +21,7 @@ use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Comparison, ComparisonKind, MIN_PAIRS};
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Maximum number of rows that the terminal shows of one kind of comparison. The CSV file has all rows.
 const MAX_ROWS: usize = 40;
@@ -51,8 +51,8 @@ pub(crate) fn agreement_comparisons(
             for cell in &mut row.cells {
                 // An answer that differs from the one at L0 is not necessarily worse.
                 let verdict = match cell {
-                    TableCell::Significance(Significance::Better) => "agrees more",
-                    TableCell::Significance(Significance::Worse) => "agrees less",
+                    TableCell::Verdict(Verdict::Better) => "agrees more",
+                    TableCell::Verdict(Verdict::Worse) => "agrees less",
                     _ => continue,
                 };
                 *cell = TableCell::Text(verdict.to_owned());
@@ -188,7 +188,7 @@ fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &
     if kind == ComparisonKind::Blind {
         // The terminal compares blind models with raw images only. The file also has the enhanced images.
         shown.retain(|index| comparisons[*index].first.enhancer.is_none());
-        let all_are_better = shown.iter().all(|index| comparisons[*index].verdict() == Some(Significance::Better));
+        let all_are_better = shown.iter().all(|index| comparisons[*index].verdict() == Some(Verdict::Better));
         if !shown.is_empty() && all_are_better {
             let line = format!("better in all {} conditions", shown.len());
             table.notes.push(line);
@@ -218,12 +218,12 @@ fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison], mode:
     let has_models_under_test = comparisons.iter().any(|one| !one.first.is_reference());
     let builder = number_columns(subject_columns(builder, kind, has_models_under_test), mode);
     builder
-        .column(ColumnKind::Significance, "csv verdict | terminal | page | latex", |comparison| {
+        .column(ColumnKind::Verdict, "csv verdict | terminal | page | latex", |comparison| {
             TableCell::verdict(comparison.verdict())
         })
         .column(Text, "csv shown", |comparison| {
             let verdict = comparison.verdict();
-            verdict.is_some_and(Significance::is_shown).to_string()
+            verdict.is_some_and(Verdict::is_shown).to_string()
         })
         .column(Text, "csv mode", move |_| mode.name())
         .build()

@@ -9,7 +9,7 @@
 //! Tables on photographs in the dark: how dark they are, and how often answers agree between two lights.
 
 mod answers;
-mod by_reading;
+mod by_profile;
 mod calibration;
 mod comparisons;
 mod levels;
@@ -62,7 +62,7 @@ fn all_tables(findings: &Findings<'_>) -> Vec<Table> {
         observer::observer(findings),
         vec![sections::subjects(&findings.summary)],
         thresholds::thresholds(findings),
-        by_reading::by_reading(findings),
+        by_profile::by_profile(findings),
         vec![pooled::best(findings)],
         vec![levels::families(findings)],
         thresholds::fails_first(findings).into(),

@@ -19,7 +19,7 @@ use darkqa_score::comparisons::{
     BaselineRow, BaselineSide, BestInTheDark, DarkAccuracy, DarkPair, MIN_PAIRS, PooledFinding, PooledKind,
 };
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::{Significance, SwapMethod};
+use darkqa_score::significance::{SwapMethod, Verdict};
 
 /// Three tables: all families together, by family, and both with lenient parsing (in files only).
 pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
@@ -63,11 +63,11 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: Parsing
         .family(|finding| finding.family.as_ref())
         .column(Count, models, |finding| finding.models.len());
     number_columns(builder, mode)
-        .column(ColumnKind::Significance, "terminal | page", |finding| TableCell::verdict(finding.verdict()))
-        .column(Text, "csv verdict", |finding| finding.verdict().map_or("", Significance::word))
+        .column(ColumnKind::Verdict, "terminal | page", |finding| TableCell::verdict(finding.verdict()))
+        .column(Text, "csv verdict", |finding| finding.verdict().map_or("", Verdict::word))
         .column(Text, "csv shown", |finding| {
             let verdict = finding.verdict();
-            verdict.is_some_and(Significance::is_shown).to_string()
+            verdict.is_some_and(Verdict::is_shown).to_string()
         })
         .column(Text, "csv names", |finding| finding.models.join(";"))
         .column(Text, "csv mode", |_| mode.name())
@@ -232,14 +232,14 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         .column(P, "csv p | page p", |row| row.pair.p)
         .column(Text, "csv p_by", |row| row.pair.p_by.to_string())
         .column(P, "csv p_holm | page p (Holm)", |row| row.pair.holm)
-        .column(ColumnKind::Significance, "page", |row| TableCell::verdict(row.best.verdict(row.pair, is_detected)))
+        .column(ColumnKind::Verdict, "page", |row| TableCell::verdict(row.best.verdict(row.pair, is_detected)))
         .column(Text, "csv verdict", |row| {
             let verdict = row.best.verdict(row.pair, is_detected);
             verdict.map_or("", |verdict| verdict.word())
         })
         .column(Text, "csv shown", |row| {
             let verdict = row.best.verdict(row.pair, is_detected);
-            verdict.is_some_and(darkqa_score::significance::Significance::is_shown).to_string()
+            verdict.is_some_and(darkqa_score::significance::Verdict::is_shown).to_string()
         })
         .column(Text, "csv levels", |row| row.best.levels.iter().map(ToString::to_string).collect::<Vec<_>>().join(";"))
         .build();
@@ -271,11 +271,11 @@ pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
         .column(P, "csv p", |row| row.paired.p)
         .column(P, "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)", |row| row.holm);
     let mut table = reply_columns(builder)
-        .column(ColumnKind::Significance, "csv verdict | terminal | page | latex", |row| row.significance)
+        .column(ColumnKind::Verdict, "csv verdict | terminal | page | latex", |row| row.verdict)
         .build();
     table.heading = Some(format!("New less {old}, paired by question and image"));
     table.latex = Some(format!("New less {}, paired by question, in percentage points.", escape(old)));
-    let too_few = rows.iter().filter(|row| row.significance == Significance::TooFew).count();
+    let too_few = rows.iter().filter(|row| row.verdict == Verdict::TooFew).count();
     if too_few > 0 {
         let line = format!("too few: fewer than {MIN_PAIRS} items are shared, so no verdict is given");
         table.notes.push(line);

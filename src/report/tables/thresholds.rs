@@ -16,7 +16,7 @@ use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::{ALPHA, Significance, holm};
+use darkqa_score::significance::{ALPHA, Verdict, holm};
 use darkqa_score::threshold::{CurveSummary, NoThreshold, SparseLevel};
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
@@ -275,7 +275,7 @@ fn first_losses<'f>(findings: &'f Findings<'_>, variant: &Variant) -> BTreeMap<&
     let p_values: Vec<f64> = tested.iter().map(|(_, finding)| finding.strict.p).collect();
     let mut losses = BTreeMap::new();
     for ((family, finding), p_holm) in tested.into_iter().zip(holm(&p_values)) {
-        if p_holm < ALPHA && finding.strict.verdict == Significance::Worse {
+        if p_holm < ALPHA && finding.strict.verdict == Verdict::Worse {
             let first = losses.entry(family).or_insert(finding);
             if finding.level < first.level {
                 *first = finding;
@@ -365,7 +365,7 @@ fn answers<'f>(findings: &'f Findings<'_>, variant: &Variant) -> BTreeMap<&'f Fr
         }
         for (index, item) in grid.items.iter().enumerate() {
             let is_right = |subject: usize| {
-                let answer = grid.result(subject, index).reading(ParsingMode::Strict);
+                let answer = grid.result(subject, index).parsed(ParsingMode::Strict);
                 answer.is_some_and(|choice| item.is_right(choice))
             };
             if is_right(*clean) {

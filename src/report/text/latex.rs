@@ -6,7 +6,7 @@ use crate::report::text::table::{ColumnKind, Table, TableCell, TableFormat};
 use crate::report::text::words::{interval, percent, points, words};
 use crate::types::text::escape_hidden;
 use darkqa_score::estimate::Estimate;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// The findings as a list, then all tables that have a LaTeX caption. The first comment line begins with `head`.
 #[must_use]
@@ -69,7 +69,7 @@ fn table(caption: &str, table: &Table) -> String {
     let alignments: String = columns
         .clone()
         .map(|column| match column.kind {
-            ColumnKind::Text | ColumnKind::Significance => 'l',
+            ColumnKind::Text | ColumnKind::Verdict => 'l',
             _ => 'r',
         })
         .collect();
@@ -147,8 +147,8 @@ fn cell_text(kind: ColumnKind, cell: &TableCell) -> String {
             let number = format!("{} {{\\scriptsize({change})}}", percent(share.value));
             stacked(&number, *share)
         }
-        (_, TableCell::Significance(Significance::Better)) => "helps".to_owned(),
-        (_, TableCell::Significance(Significance::Worse)) => "harms".to_owned(),
+        (_, TableCell::Verdict(Verdict::Better)) => "helps".to_owned(),
+        (_, TableCell::Verdict(Verdict::Worse)) => "harms".to_owned(),
         _ => {
             let text = escape(&words(kind, cell));
             interval(kind, cell).map_or(text.clone(), |share| stacked(&text, share))

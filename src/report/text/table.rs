@@ -14,7 +14,7 @@ use crate::types::PairDark;
 use crate::types::text::{escape_where, is_hidden};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 use darkqa_score::threshold::Threshold;
 
 /// Implements `From` for values that have a cell type.
@@ -130,7 +130,7 @@ pub enum ColumnKind {
     /// A p-value with three decimals.
     P,
     /// Result of a significance test.
-    Significance,
+    Verdict,
 }
 
 /// Content of a cell.
@@ -161,11 +161,11 @@ pub enum TableCell {
     /// A score, and its difference from the score on the clean frames, if that is known.
     Changed(Estimate, Option<f64>),
     /// A difference of shares, and the result of its test.
-    Effect(Estimate, Significance),
+    Effect(Estimate, Verdict),
     /// A threshold, and the exposure drop of the darkest level, in EV.
     Threshold(Threshold, f64),
     /// Result of a significance test.
-    Significance(Significance),
+    Verdict(Verdict),
 }
 
 cell_from! {
@@ -174,7 +174,7 @@ cell_from! {
     usize => Count,
     f64 => Number,
     Estimate => Estimate,
-    Significance => Significance,
+    Verdict => Verdict,
 }
 
 impl TableCell {
@@ -187,8 +187,8 @@ impl TableCell {
     }
 
     /// The verdict of a comparison; blank if no sentence is about it.
-    pub(crate) fn verdict(verdict: Option<Significance>) -> Self {
-        verdict.map_or(Self::Blank, Self::Significance)
+    pub(crate) fn verdict(verdict: Option<Verdict>) -> Self {
+        verdict.map_or(Self::Blank, Self::Verdict)
     }
 }
 
@@ -352,9 +352,9 @@ pub(crate) fn fields(cell: &TableCell, names: usize) -> impl Iterator<Item = Csv
         TableCell::Text(text) => fields[0] = CsvField::Text(text),
         TableCell::Count(count) => fields[0] = CsvField::Count(*count),
         TableCell::Number(number) => fields[0] = CsvField::Number(*number),
-        TableCell::Significance(verdict) => {
+        TableCell::Verdict(verdict) => {
             // `tied` is kept for one release; the column `shown` states its meaning.
-            let word = if verdict.is_shown() || *verdict == Significance::Missing { verdict.word() } else { "tied" };
+            let word = if verdict.is_shown() || *verdict == Verdict::Missing { verdict.word() } else { "tied" };
             fields[0] = CsvField::Text(word);
             fields[1] = CsvField::Text(if verdict.is_shown() { "true" } else { "false" });
         }

@@ -218,7 +218,7 @@ pub(crate) fn words(kind: ColumnKind, cell: &TableCell) -> String {
             let range = reach(threshold.low, threshold.high, *darkest);
             format!("{} [{range}]", stops(threshold.value, *darkest))
         }
-        TableCell::Significance(significance) => significance.word().to_owned(),
+        TableCell::Verdict(verdict) => verdict.word().to_owned(),
     }
 }
 

@@ -1,3 +1,5 @@
+//! Columns of `records.parquet`: those of both experiments, and those of each.
+//!
 //! Columns in the tables of both experiments: [`leading_columns`], [`reply_columns`], [`image_columns`] and
 //! [`trailing_columns`].
 //!

@@ -140,7 +140,7 @@ fn cell(
     let mut unparsed = 0;
     for (index, _) in grid.items.iter().enumerate().filter(|(_, item)| item.is_in_family(family)) {
         let result = grid.result(subject, index);
-        unparsed += usize::from(result.reading(mode) == Some(None) && !cannot_tell(grid, subject, index));
+        unparsed += usize::from(result.parsed(mode) == Some(None) && !cannot_tell(grid, subject, index));
     }
     let counts = grid.counts(subject, family, mode);
     let failed = grid.failed(subject, family);
@@ -181,7 +181,7 @@ fn always(grid: &Grid<'_>, subject: usize, family: Option<&Family>, mode: Parsin
     let mut last: Option<&GridItem<'_>> = None;
     let mut count = ClusterCount::default();
     for (item, result) in grid.family_items(subject, family) {
-        let Some(chosen) = result.reading(mode) else {
+        let Some(chosen) = result.parsed(mode) else {
             continue;
         };
         if let Some(last) = last.filter(|last| last.asked.question != item.asked.question) {

@@ -84,7 +84,7 @@ pub(super) fn balanced_accuracy(
 ) -> Option<f64> {
     let mut families = BTreeMap::<&Family, BTreeMap<String, [usize; 2]>>::new();
     for (item, result) in grid.family_items(subject, family) {
-        if let (Some(chosen), Some(answer)) = (result.reading(mode), true_answer(item)) {
+        if let (Some(chosen), Some(answer)) = (result.parsed(mode), true_answer(item)) {
             let answers = families.entry(&*item.asked.family).or_default();
             let [right, replies] = answers.entry(answer).or_default();
             *right += usize::from(item.is_right(chosen));

@@ -244,7 +244,7 @@ impl FirstFailure {
     #[must_use]
     pub fn first(&self, grid: &Grid<'_>, item: usize) -> Option<AxisLevel> {
         for &(level, subject) in &self.curve.subjects {
-            let chosen = grid.result(subject, item).reading(ParsingMode::Strict)?;
+            let chosen = grid.result(subject, item).parsed(ParsingMode::Strict)?;
             if !grid.items[item].is_right(chosen) {
                 return Some(level);
             }

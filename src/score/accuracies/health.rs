@@ -27,7 +27,7 @@ pub struct Health {
 
 impl Health {
     fn count(&mut self, result: TrialResult, trial: TrialRef<'_>) {
-        let Some(strict) = result.reading(ParsingMode::Strict) else {
+        let Some(strict) = result.parsed(ParsingMode::Strict) else {
             if let Some((kind, _)) = trial.failure() {
                 *self.failed.entry(kind).or_default() += 1;
             }
@@ -35,7 +35,7 @@ impl Health {
         };
         self.replies += 1;
         self.read += usize::from(strict.is_some());
-        let lenient = result.reading(ParsingMode::Lenient).flatten();
+        let lenient = result.parsed(ParsingMode::Lenient).flatten();
         self.lenient_only += usize::from(strict.is_none() && lenient.is_some());
         if let Some(reason) = trial.strict().and_then(|reading| reading.why) {
             *self.unread.entry(reason).or_default() += 1;

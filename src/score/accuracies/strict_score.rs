@@ -205,7 +205,7 @@ impl Group<'_> {
             let result = grid.result(subject, item);
             is_asked |= result.is_asked();
             has_failed |= result == TrialResult::Failed;
-            if let Some(chosen) = result.reading(mode) {
+            if let Some(chosen) = result.parsed(mode) {
                 let item = &grid.items[item];
                 replied.insert(&*item.asked.question);
                 is_right &= item.is_right(chosen);

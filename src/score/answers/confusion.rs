@@ -63,7 +63,7 @@ pub fn confusions(grid: &Grid<'_>) -> Vec<Confusion> {
 fn counts(grid: &Grid<'_>, subject: usize, family: &Family, labels: &[String]) -> Vec<Vec<usize>> {
     let mut counts = vec![vec![0; labels.len() + 1]; labels.len()];
     for (item, result) in grid.family_items(subject, Some(family)) {
-        let Some(chosen) = result.reading(ParsingMode::Strict) else {
+        let Some(chosen) = result.parsed(ParsingMode::Strict) else {
             continue;
         };
         let [truth, predicted] = [item.asked.truth, chosen.map(usize::from)]
@@ -143,7 +143,7 @@ impl AgainstClean {
             if !item.is_in_family(Some(family)) {
                 continue;
             }
-            let [a, b] = [subject, clean].map(|side| grid.result(side, index).reading(ParsingMode::Strict));
+            let [a, b] = [subject, clean].map(|side| grid.result(side, index).parsed(ParsingMode::Strict));
             let (Some(a), Some(b)) = (a, b) else { continue };
             for given in [a, b].into_iter().flatten() {
                 if let Some(text) = item.asked.choices.get(usize::from(given)) {
@@ -207,7 +207,7 @@ impl Collapse {
         let mut clusters = BTreeMap::<u32, ClusterCount>::new();
         let mut guess = 0.0;
         for (item, result) in grid.family_items(subject, Some(&confusion.family)) {
-            let Some(chosen) = result.reading(ParsingMode::Strict) else {
+            let Some(chosen) = result.parsed(ParsingMode::Strict) else {
                 continue;
             };
             let choices = &*item.asked.choices;
@@ -333,7 +333,7 @@ pub fn hallucinations(grid: &Grid<'_>) -> Vec<Hallucination> {
 fn rate(grid: &Grid<'_>, subject: usize, answer: FalseAnswer) -> Option<Estimate> {
     let mut clusters = BTreeMap::<u32, ClusterCount>::new();
     for (item, result) in grid.family_items(subject, Some(&Family::Presence)) {
-        if let Some(chosen) = result.reading(ParsingMode::Strict)
+        if let Some(chosen) = result.parsed(ParsingMode::Strict)
             && answer.is_false_for(item)
         {
             let count = clusters.entry(item.cluster).or_default();

@@ -91,7 +91,7 @@ pub struct Independence {
     pub p: Option<f64>,
 }
 
-/// Significance level of a test. It is repeated whenever the number of replies has grown by half, from 24 to 100,000:
+/// Verdict level of a test. It is repeated whenever the number of replies has grown by half, from 24 to 100,000:
 /// at most 20 times, so that at most 1 % of the models that answer by the image or guess are reported in a run.
 const LEVEL: f64 = 0.0005;
 

@@ -6,7 +6,7 @@ use crate::accuracies::Health;
 use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
-use crate::significance::{ALPHA, PValues, Significance};
+use crate::significance::{ALPHA, PValues, Verdict};
 
 /// Comparison of a model in a condition between the new runs and the old one.
 #[derive(Debug, Clone, PartialEq)]
@@ -18,7 +18,7 @@ pub struct BaselineRow {
     /// p-value after Holm's correction over all conditions of all models under test. Reference models (`random`, the
     /// observer) are corrected among themselves.
     pub holm: f64,
-    pub significance: Significance,
+    pub verdict: Verdict,
     /// Smallest difference that the test would detect in 80 % of runs like these, at the level after Bonferroni's
     /// correction.
     pub detectable: f64,
@@ -64,7 +64,7 @@ pub fn baseline_rows(
                 subject: grid.subjects[new].clone(),
                 paired: PairedComparison::on_items(grid, new, old, mode, |item, _| !has_other_image[item])?,
                 holm: 1.0,
-                significance: Significance::TooFew,
+                verdict: Verdict::TooFew,
                 detectable: f64::INFINITY,
                 other_images: has_other_image.iter().filter(|is_other| **is_other).count(),
                 sides: [new, old].map(|subject| BaselineSide {
@@ -90,7 +90,7 @@ fn correct(mut rows: Vec<&mut BaselineRow>) {
         row.holm = corrected.p;
         row.detectable = row.paired.spread.detectable(level);
         if row.paired.difference.n >= MIN_PAIRS {
-            row.significance = Significance::new(row.paired.difference.value, corrected);
+            row.verdict = Verdict::new(row.paired.difference.value, corrected);
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
-use crate::significance::{ALPHA, PValues, Significance, SwapMethod, least_p};
+use crate::significance::{ALPHA, PValues, SwapMethod, Verdict, least_p};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{AxisLevel, Variant};
 
@@ -68,7 +68,7 @@ impl BestInTheDark {
     /// True if there are enough clusters for at least one pair to be significant.
     #[must_use]
     pub fn is_possible(&self) -> bool {
-        self.pairs.iter().any(|pair| pair.significance.is_possible())
+        self.pairs.iter().any(|pair| pair.verdict.is_possible())
     }
 
     /// True if the leader is significantly better than every other model. Only the correction over all pairs is
@@ -81,12 +81,12 @@ impl BestInTheDark {
     /// Verdict of a pair in tables, which is that of the sentence; `None` for pairs without the leader, which no
     /// sentence is about. `is_detected` is true if the leader is detected to be the best.
     #[must_use]
-    pub fn verdict(&self, pair: &DarkPair, is_detected: bool) -> Option<Significance> {
-        match pair.significance {
+    pub fn verdict(&self, pair: &DarkPair, is_detected: bool) -> Option<Verdict> {
+        match pair.verdict {
             own if !own.is_possible() => Some(own),
             _ if pair.first != self.leader().model => None,
-            _ if is_detected => Some(Significance::Better),
-            _ => Some(Significance::NotShown),
+            _ if is_detected => Some(Verdict::Better),
+            _ => Some(Verdict::NotShown),
         }
     }
 
@@ -165,7 +165,7 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
     Some(BestInTheDark {
         not_shown_better_than: pairs
             .iter()
-            .filter(|pair| pair.first == *leader && pair.significance != Significance::Better)
+            .filter(|pair| pair.first == *leader && pair.verdict != Verdict::Better)
             .map(|pair| pair.second.clone())
             .collect(),
         gain: scores.gain(*leader_index, split)?,
@@ -261,7 +261,7 @@ pub struct DarkPair {
     pub p_by: SwapMethod,
     /// p-value after Holm's correction over all pairs of models.
     pub holm: f64,
-    pub significance: Significance,
+    pub verdict: Verdict,
 }
 
 /// Mean accuracy of the leader over the dark levels minus what it reaches without seeing.
@@ -387,7 +387,7 @@ impl Scores {
                 levels
                     .iter()
                     .map(|subject| {
-                        let reading = grid.result(*subject, index).reading(mode);
+                        let reading = grid.result(*subject, index).parsed(mode);
                         reading.map(|chosen| item.is_right(chosen))
                     })
                     .collect()
@@ -398,7 +398,7 @@ impl Scores {
                 blind: blind
                     .iter()
                     .map(|subject| {
-                        let reading = grid.result((*subject)?, index).reading(mode)?;
+                        let reading = grid.result((*subject)?, index).parsed(mode)?;
                         Some(item.is_right(reading))
                     })
                     .collect(),
@@ -555,7 +555,7 @@ impl Scores {
                     p_if_answered: tested.p_if_answered,
                     p_by: tested.by,
                     holm: 1.0,
-                    significance: Significance::NotShown,
+                    verdict: Verdict::NotShown,
                 });
             }
         }
@@ -564,7 +564,7 @@ impl Scores {
         let corrected = PValues::corrected(&tests.collect::<Vec<PValues>>());
         for (pair, corrected) in pairs.iter_mut().zip(corrected) {
             pair.holm = corrected.p;
-            pair.significance = Significance::new(pair.difference.value, corrected);
+            pair.verdict = Verdict::new(pair.difference.value, corrected);
         }
         pairs
     }
@@ -619,11 +619,11 @@ pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
             let (mut better, mut worse) = (0, 0);
             for pair in &best.pairs {
                 let (is_first, is_second) = (pair.first == model.model, pair.second == model.model);
-                match pair.significance {
-                    Significance::Better if is_second => better += 1,
-                    Significance::Worse if is_first => better += 1,
-                    Significance::Better if is_first => worse += 1,
-                    Significance::Worse if is_second => worse += 1,
+                match pair.verdict {
+                    Verdict::Better if is_second => better += 1,
+                    Verdict::Worse if is_first => better += 1,
+                    Verdict::Better if is_first => worse += 1,
+                    Verdict::Worse if is_second => worse += 1,
                     _ => {}
                 }
             }
@@ -639,7 +639,7 @@ mod tests {
     use crate::significance::SwapMethod;
     use darkqa_base::types::Variant;
 
-    fn best(names: &[&str], shown: &[(&str, &str, Significance)]) -> BestInTheDark {
+    fn best(names: &[&str], shown: &[(&str, &str, Verdict)]) -> BestInTheDark {
         let share = Estimate { value: 0.5, low: 0.4, high: 0.6, n: 10 };
         let models = names.iter().map(|name| DarkAccuracy {
             model: (*name).to_owned(),
@@ -649,7 +649,7 @@ mod tests {
             clean: share,
             loss: None,
         });
-        let pairs = shown.iter().map(|(first, second, significance)| DarkPair {
+        let pairs = shown.iter().map(|(first, second, verdict)| DarkPair {
             first: (*first).to_owned(),
             second: (*second).to_owned(),
             difference: share,
@@ -657,7 +657,7 @@ mod tests {
             p_if_answered: 0.01,
             p_by: SwapMethod::Counted,
             holm: 0.01,
-            significance: *significance,
+            verdict: *verdict,
         });
         BestInTheDark {
             variant: Variant::NONE,
@@ -679,13 +679,13 @@ mod tests {
     }
 
     /// Ranges of ranks of four models.
-    fn ranges(shown: &[(&str, &str, Significance)]) -> Vec<(usize, usize)> {
+    fn ranges(shown: &[(&str, &str, Verdict)]) -> Vec<(usize, usize)> {
         rank_ranges(&best(&["a", "b", "c", "d"], shown)).into_iter().map(|rank| (rank.first, rank.last)).collect()
     }
 
     #[test]
     fn ties_share_their_places() {
-        use Significance::{Better, NotShown, TooFewClusters, Worse};
+        use Verdict::{Better, NotShown, TooFewClusters, Worse};
         // No difference is detected, whether or not the clusters allow it.
         let unshown = [("a", "b", NotShown), ("a", "c", TooFewClusters)];
         assert_eq!(ranges(&unshown), [(1, 4); 4]);

@@ -90,7 +90,7 @@ fn paper_levels() -> Vec<AxisLevel> {
 
 /// Test result of a claim, after Holm's correction over all claims and profiles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Support {
+pub enum ClaimVerdict {
     /// An effect in the direction of the claim is detected.
     Holds,
     /// An effect in the opposite direction is detected.
@@ -99,7 +99,7 @@ pub enum Support {
     Open,
 }
 
-impl Support {
+impl ClaimVerdict {
     /// Word in tables and files.
     #[must_use]
     pub fn word(self) -> &'static str {
@@ -156,7 +156,7 @@ pub struct TestedEffect {
     /// Difference in accuracy with its clustered 95 % interval.
     pub difference: Estimate,
     /// Test result of the claim.
-    pub support: Support,
+    pub verdict: ClaimVerdict,
     /// p-value of no difference.
     pub p: f64,
     /// p-value after Holm's correction over all claims and profiles.
@@ -376,7 +376,7 @@ impl SharedItems {
             let item = &grid.items[index];
             net_bounds(pairs.iter().map(|(first, second)| {
                 [*first, *second].map(|subject| {
-                    let reading = grid.result(subject, index).reading(ParsingMode::Strict);
+                    let reading = grid.result(subject, index).parsed(ParsingMode::Strict);
                     reading.map(|chosen| item.is_right(chosen))
                 })
             }))
@@ -390,7 +390,7 @@ impl SharedItems {
             sums.add_missing(grid.items[index].cluster, lowest, highest);
         }
         let tested = sums.test(pairs.len() as f64)?;
-        Some(TestedEffect { support: Support::Open, difference: tested.difference, p: tested.p, holm: tested.p })
+        Some(TestedEffect { verdict: ClaimVerdict::Open, difference: tested.difference, p: tested.p, holm: tested.p })
     }
 }
 
@@ -409,7 +409,7 @@ fn with_holm_correction(mut findings: Vec<FindingByProfile>) -> Vec<FindingByPro
             finding.effects.iter_mut().filter_map(|in_profile| in_profile.effect.as_mut()).zip(&mut corrected)
         {
             effect.holm = holm;
-            effect.support = support(effect, expects_gain);
+            effect.verdict = claim_verdict(effect, expects_gain);
         }
         finding.robustness = robustness(&finding.effects);
     }
@@ -417,21 +417,21 @@ fn with_holm_correction(mut findings: Vec<FindingByProfile>) -> Vec<FindingByPro
 }
 
 /// Test result of a claim with this effect, by its corrected p-value and the sign of the difference.
-fn support(effect: &TestedEffect, expects_gain: bool) -> Support {
+fn claim_verdict(effect: &TestedEffect, expects_gain: bool) -> ClaimVerdict {
     if effect.holm >= ALPHA {
-        Support::Open
+        ClaimVerdict::Open
     } else if (effect.difference.value > 0.0) == expects_gain {
-        Support::Holds
+        ClaimVerdict::Holds
     } else {
-        Support::Opposite
+        ClaimVerdict::Opposite
     }
 }
 
 /// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold
 /// under all.
 fn robustness(effects: &[EffectInProfile]) -> Robustness {
-    let [holding, opposite] = [Support::Holds, Support::Opposite].map(|support| {
-        effects.iter().filter_map(|effect| effect.effect).filter(|effect| effect.support == support).count()
+    let [holding, opposite] = [ClaimVerdict::Holds, ClaimVerdict::Opposite].map(|verdict| {
+        effects.iter().filter_map(|effect| effect.effect).filter(|effect| effect.verdict == verdict).count()
     });
     match (holding, opposite) {
         (0, 0) => Robustness::Open,

@@ -1,14 +1,14 @@
 //! Statement that a finding supports: [`Claim`].
 
-use crate::significance::{ALPHA, Significance};
+use crate::significance::{ALPHA, Verdict};
 
 /// Statement that the sentences of a report may make about a finding that was tested in both parsings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Claim {
     /// Detected after the correction over all sentences, in both parsings and in the same direction.
-    Detected(Significance),
+    Detected(Verdict),
     /// Detected after that correction in the strict parsing only, with this direction.
-    StrictOnly(Significance),
+    StrictOnly(Verdict),
     /// Detected only by the correction within its own set of tests.
     InOwnSet,
     /// The missing replies decide whether a difference is detected.
@@ -25,7 +25,7 @@ pub(super) struct ParsedFinding {
     /// Gain of the first side over the second.
     pub(super) gain: f64,
     /// Verdict within its own set of tests.
-    pub(super) verdict: Significance,
+    pub(super) verdict: Verdict,
     /// p-value after the correction over all sentences; `None` if no sentence is about the finding.
     pub(super) p_report: Option<f64>,
 }
@@ -35,8 +35,8 @@ impl ParsedFinding {
         self.p_report.is_some_and(|value| value < ALPHA)
     }
 
-    fn direction(&self) -> Significance {
-        if self.gain > 0.0 { Significance::Better } else { Significance::Worse }
+    fn direction(&self) -> Verdict {
+        if self.gain > 0.0 { Verdict::Better } else { Verdict::Worse }
     }
 }
 
@@ -44,13 +44,13 @@ impl Claim {
     /// Verdict of a finding in tables, which is that of the sentences. `own` is its verdict within its own set of
     /// tests, and `p_report` its p-value after the correction over all sentences. `None` if no sentence is about the
     /// finding.
-    pub(super) fn verdict(self, own: Significance, p_report: Option<f64>) -> Option<Significance> {
+    pub(super) fn verdict(self, own: Verdict, p_report: Option<f64>) -> Option<Verdict> {
         match self {
             _ if !own.is_possible() => Some(own),
             _ if p_report.is_none() => None,
             Self::Detected(verdict) => Some(verdict),
-            Self::Missing => Some(Significance::Missing),
-            _ => Some(Significance::NotShown),
+            Self::Missing => Some(Verdict::Missing),
+            _ => Some(Verdict::NotShown),
         }
     }
 
@@ -65,7 +65,7 @@ impl Claim {
             Self::StrictOnly(strict.direction())
         } else if strict.verdict.is_shown() {
             Self::InOwnSet
-        } else if strict.verdict == Significance::Missing {
+        } else if strict.verdict == Verdict::Missing {
             Self::Missing
         } else {
             Self::Open
@@ -78,23 +78,23 @@ mod tests {
     use super::*;
 
     fn finding(gain: f64, p: f64) -> ParsedFinding {
-        ParsedFinding { gain, verdict: Significance::Worse, p_report: Some(p) }
+        ParsedFinding { gain, verdict: Verdict::Worse, p_report: Some(p) }
     }
 
     #[test]
     fn detection_needs_both_parsings_in_one_direction() {
         for (strict, lenient, expected) in [
-            ((-0.2, 0.01), (-0.1, 0.01), Claim::Detected(Significance::Worse)),
-            ((-0.2, 0.01), (-0.1, 0.2), Claim::StrictOnly(Significance::Worse)),
-            ((0.2, 0.01), (-0.1, 0.01), Claim::StrictOnly(Significance::Better)),
+            ((-0.2, 0.01), (-0.1, 0.01), Claim::Detected(Verdict::Worse)),
+            ((-0.2, 0.01), (-0.1, 0.2), Claim::StrictOnly(Verdict::Worse)),
+            ((0.2, 0.01), (-0.1, 0.01), Claim::StrictOnly(Verdict::Better)),
             ((-0.2, 0.05), (-0.1, 0.01), Claim::InOwnSet),
         ] {
             let claim = Claim::new(finding(strict.0, strict.1), finding(lenient.0, lenient.1));
             assert_eq!(claim, expected);
         }
-        let unshown = ParsedFinding { verdict: Significance::NotShown, p_report: None, ..finding(-0.2, 0.5) };
+        let unshown = ParsedFinding { verdict: Verdict::NotShown, p_report: None, ..finding(-0.2, 0.5) };
         assert_eq!(Claim::new(unshown, unshown), Claim::Open);
-        let few = ParsedFinding { verdict: Significance::TooFewClusters, ..finding(-0.2, 0.001) };
+        let few = ParsedFinding { verdict: Verdict::TooFewClusters, ..finding(-0.2, 0.001) };
         assert_eq!(Claim::new(few, few), Claim::Impossible);
     }
 }

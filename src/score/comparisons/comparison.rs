@@ -12,7 +12,7 @@ use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, models_under_test};
 use crate::photographs::{PairDarkness, pair_facts};
-use crate::significance::{PValues, Significance};
+use crate::significance::{PValues, Verdict};
 use darkqa_base::types::degradations::Axis;
 use darkqa_base::types::{AxisLevel, EnhancerName, Family, PairDark, Variant, View};
 
@@ -99,14 +99,14 @@ pub struct TestedComparison {
     /// p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the
     /// report changes no result. Comparisons by family are corrected separately.
     pub holm: f64,
-    pub significance: Significance,
+    pub verdict: Verdict,
     /// p-value after the correction over all tests behind sentences; `None` if no sentence is about the comparison.
     pub p_report: Option<f64>,
 }
 
 impl TestedComparison {
     fn new(paired: PairedComparison) -> Self {
-        Self { paired, holm: 1.0, significance: Significance::NotShown, p_report: None }
+        Self { paired, holm: 1.0, verdict: Verdict::NotShown, p_report: None }
     }
 }
 
@@ -123,7 +123,7 @@ impl Comparison {
     pub fn claim(&self) -> Claim {
         let [strict, lenient] = [&self.strict, &self.lenient].map(|tested| ParsedFinding {
             gain: tested.paired.difference.value,
-            verdict: tested.significance,
+            verdict: tested.verdict,
             p_report: tested.p_report,
         });
         Claim::new(strict, lenient)
@@ -131,8 +131,8 @@ impl Comparison {
 
     /// Verdict in tables, the same as in sentences; `None` if no sentence is about the comparison.
     #[must_use]
-    pub fn verdict(&self) -> Option<Significance> {
-        self.claim().verdict(self.strict.significance, self.strict.p_report)
+    pub fn verdict(&self) -> Option<Verdict> {
+        self.claim().verdict(self.strict.verdict, self.strict.p_report)
     }
 
     /// Comparison in a parsing.
@@ -254,8 +254,7 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
             {
                 let difference = tested.paired.difference.value;
                 tested.holm = corrected.p;
-                tested.significance =
-                    if is_too_small { Significance::TooFew } else { Significance::new(difference, corrected) };
+                tested.verdict = if is_too_small { Verdict::TooFew } else { Verdict::new(difference, corrected) };
             }
         }
     }

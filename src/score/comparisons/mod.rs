@@ -16,7 +16,7 @@ pub use baseline::{BaselineRow, BaselineSide, baseline_rows};
 pub use best::{
     BestInTheDark, Crossing, DarkAccuracy, DarkGain, DarkPair, LevelLead, RankRange, best_in_the_dark, rank_ranges,
 };
-pub use by_profile::{EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect};
+pub use by_profile::{ClaimVerdict, EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness, TestedEffect};
 pub use claim::Claim;
 pub use comparison::{Comparison, ComparisonKind, MIN_PAIRS, TestedComparison, compares_enhancers, compares_models};
 pub use pooled::{ContrastTest, FamilyContrast, ModelsLeftOut, PooledDifference, PooledFinding, pool, pooled};

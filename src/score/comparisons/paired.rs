@@ -83,7 +83,7 @@ impl PairedComparison {
             }
             let results = [first, second].map(|subject| grid.result(subject, index));
             let counts = results.map(|result| {
-                let chosen = result.reading(mode)?;
+                let chosen = result.parsed(mode)?;
                 Some(counts(item, chosen))
             });
             match counts {

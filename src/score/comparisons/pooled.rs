@@ -20,7 +20,7 @@ use crate::accuracies::{Coverage, Lacking, shared};
 use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::{ModelInCondition, pooled_models};
-use crate::significance::{PValues, Significance, least_p};
+use crate::significance::{PValues, Verdict, least_p};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use finding::is_severe;
@@ -429,7 +429,7 @@ fn difference(
         p_if_answered: tested.p_if_answered,
         p_by: tested.by,
         holm: 1.0,
-        verdict: Significance::NotShown,
+        verdict: Verdict::NotShown,
         p_report: None,
     })
 }
@@ -452,7 +452,7 @@ fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
         for (parsed, corrected) in [(&mut finding.strict, strict[index]), (&mut finding.lenient, lenient[index])] {
             parsed.holm = corrected.p;
             let gain = kind.gain(parsed.difference.value);
-            parsed.verdict = Significance::new(gain, corrected);
+            parsed.verdict = Verdict::new(gain, corrected);
         }
     }
     set

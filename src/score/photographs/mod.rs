@@ -158,7 +158,7 @@ impl<'a> ConditionSums<'a> {
         for &subject in subjects {
             let mut strata = BTreeMap::<&Family, [Vec<RankedReply>; 2]>::new();
             for (index, item) in grid.items.iter().enumerate() {
-                let reading = grid.result(subject, index).reading(ParsingMode::Strict);
+                let reading = grid.result(subject, index).parsed(ParsingMode::Strict);
                 let image = grid.trial(subject, index).and_then(|trial| {
                     let image = trial.images()?;
                     Some((trial.frame(), image.first))

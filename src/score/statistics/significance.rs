@@ -1,16 +1,16 @@
 //! Tests of paired differences ([`mcnemar`], [`sign_flip`] and [`swap_test`]), the correction for several tests
-//! ([`holm`]), and the result ([`Significance`]).
+//! ([`holm`]), and the result ([`Verdict`]).
 
 use std::fmt;
 
 use super::bootstrap::SplitMix;
 
-/// Significance level of the tests (conventional).
+/// Verdict level of the tests (conventional).
 pub const ALPHA: f64 = 0.05;
 
 /// Result of a comparison at the 5 % level, after Holm's correction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Significance {
+pub enum Verdict {
     /// The first side is better.
     Better,
     /// The first side is worse.
@@ -51,7 +51,7 @@ impl PValues {
     }
 }
 
-impl Significance {
+impl Verdict {
     /// The result for a difference with these corrected p-values.
     #[must_use]
     pub fn new(difference: f64, corrected: PValues) -> Self {
@@ -418,13 +418,13 @@ mod tests {
     fn no_verdict_is_possible_with_few_clusters() {
         assert!((least_p(8) - 2.0 / 256.0).abs() < 1e-15);
         assert!((least_p(0) - 1.0).abs() < 1e-15);
-        for (clusters, expected) in [(8, Significance::Worse), (7, Significance::TooFewClusters)] {
+        for (clusters, expected) in [(8, Verdict::Worse), (7, Verdict::TooFewClusters)] {
             let least = 5.0 * least_p(clusters);
-            assert_eq!(Significance::new(-0.3, complete(least, least)), expected);
+            assert_eq!(Verdict::new(-0.3, complete(least, least)), expected);
         }
-        assert_eq!(Significance::new(0.3, complete(0.05, 0.01)), Significance::NotShown);
+        assert_eq!(Verdict::new(0.3, complete(0.05, 0.01)), Verdict::NotShown);
         let undecided = PValues { p: 0.2, if_answered: 0.04, least: 0.01 };
-        assert_eq!(Significance::new(0.3, undecided), Significance::Missing);
+        assert_eq!(Verdict::new(0.3, undecided), Verdict::Missing);
     }
 
     #[test]

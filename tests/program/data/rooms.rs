@@ -6,7 +6,7 @@ use std::sync::LazyLock;
 use crate::support::run::{Bench, records, words};
 use crate::support::snapshot::each;
 use darkqa_base::types::{Digest, Family, Frame, FrameId};
-use darkqa_eval::internals::dataset::{DataPlace, open_frames};
+use darkqa_eval::internals::dataset::{DataSource, open_frames};
 use darkqa_questions::balance::BalanceMode;
 use darkqa_questions::colors::Palette;
 use darkqa_questions::room::RoomSource;
@@ -271,7 +271,7 @@ fn stored_rooms_match_built_in() {
     bench.complete(&[&["rooms", "--out", "frames"][..], &size].concat());
     let folder = open_frames(&bench.path("frames"), &[]).unwrap();
     let rooms = Rooms { frames: 4, size: [160, 120], ..Rooms::default() };
-    let built_in = DataPlace::Rooms(rooms).open_without_questions(&[]).unwrap();
+    let built_in = DataSource::Rooms(rooms).open_without_questions(&[]).unwrap();
     assert_eq!(folder.labels(), built_in.labels());
     assert_eq!(folder.title(), built_in.title());
     let mut count = 0;

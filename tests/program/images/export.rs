@@ -8,7 +8,7 @@ use crate::support::run::{Called, PROGRAM, called};
 use crate::support::snapshot::redacted;
 use crate::support::table::check_rows;
 use darkqa_base::types::{Question, Rgb, Severity};
-use darkqa_eval::internals::dataset::{DataPlace, Dataset, SetArgs};
+use darkqa_eval::internals::dataset::{DataSource, Dataset, SetArgs};
 use darkqa_light::exposure::expose;
 use image::{Rgb as Pixel, RgbImage};
 use tempfile::TempDir;
@@ -53,7 +53,7 @@ fn pixels(set: &Dataset, text: &str) -> Rgb {
 #[test]
 fn every_form_is_read_back() {
     let data = data();
-    let original = DataPlace::Path(data.path().to_owned()).open(None, &SetArgs::default()).unwrap();
+    let original = DataSource::Path(data.path().to_owned()).open(None, &SetArgs::default()).unwrap();
     let name = original.name().to_owned();
     let rows = [
         ("vlmevalkit", format!("{name}_CONDITION.tsv")),
@@ -66,7 +66,7 @@ fn every_form_is_read_back() {
         run(data.path(), kind, out.path(), &["--levels", "L0,L2", "--variant", "ev"]).ended(0);
         for (condition, degraded) in [("L0", false), ("L2-ev", true)] {
             let path = out.path().join(file.replace("CONDITION", condition));
-            let set = DataPlace::Path(path.clone()).open(None, &SetArgs::default()).unwrap();
+            let set = DataSource::Path(path.clone()).open(None, &SetArgs::default()).unwrap();
             assert_eq!(words(&set), words(&original), "{}", path.display());
             for question in original.questions() {
                 let clean = original.picture(&question.frame).unwrap().decode().unwrap();

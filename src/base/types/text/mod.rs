@@ -156,16 +156,16 @@ const COMMON: [&str; 14] = [
 /// so that other differences mean nothing; and names without a digit, such as `default`, are not judged.
 #[must_use]
 pub fn is_other_model(asked: &str, served: &str) -> bool {
-    let (asked, served) = (words(asked), words(served));
+    let (asked, served) = (name_words(asked), name_words(served));
     let has_version = |words: &BTreeSet<String>| words.iter().any(|word| has_digit(word));
     if !has_version(&asked) || !has_version(&served) {
         return false;
     }
-    let (asked_families, served_families) = (families(&asked), families(&served));
+    let (asked_families, served_families) = (model_families(&asked), model_families(&served));
     if asked_families.is_empty() || served_families.is_empty() {
         return false;
     }
-    let (asked_sizes, served_sizes) = (sizes(&asked), sizes(&served));
+    let (asked_sizes, served_sizes) = (model_sizes(&asked), model_sizes(&served));
     let is_other_size = !asked_sizes.is_empty() && !served_sizes.is_empty() && asked_sizes.is_disjoint(&served_sizes);
     asked_families.is_disjoint(&served_families) || is_other_size || is_small(&asked) != is_small(&served)
 }
@@ -182,7 +182,7 @@ fn last_segment(name: &str) -> &str {
 }
 
 /// The words of a name in lower case, without its path.
-fn words(name: &str) -> BTreeSet<String> {
+fn name_words(name: &str) -> BTreeSet<String> {
     last_segment(name)
         .to_lowercase()
         .split(|c: char| !c.is_alphanumeric() && c != '.')
@@ -196,7 +196,7 @@ fn has_digit(word: &str) -> bool {
 }
 
 /// The letters of each word, without common words and single letters: `qwen` of `qwen2.5-vl-7b`.
-fn families(words: &BTreeSet<String>) -> BTreeSet<&str> {
+fn model_families(words: &BTreeSet<String>) -> BTreeSet<&str> {
     words
         .iter()
         .flat_map(|word| word.split(|c: char| !c.is_alphabetic()))
@@ -205,7 +205,7 @@ fn families(words: &BTreeSet<String>) -> BTreeSet<&str> {
 }
 
 /// The sizes in a name, such as `7b`.
-fn sizes(words: &BTreeSet<String>) -> BTreeSet<&str> {
+fn model_sizes(words: &BTreeSet<String>) -> BTreeSet<&str> {
     words
         .iter()
         .filter(|word| word.strip_suffix(['b', 'm']).is_some_and(|number| number.parse::<f64>().is_ok()))

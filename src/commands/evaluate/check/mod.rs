@@ -21,7 +21,7 @@ use super::settings::EvaluateArgs;
 use super::setup::unnamed_scenes;
 use super::write_plan::power_forecast;
 use crate::ask::Prompts;
-use crate::data::{DataPlace, Dataset, Picture};
+use crate::data::{DataSource, Dataset, Picture};
 use crate::engine::dark_already::DarkImages;
 use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
 use crate::engine::images::progress::Progress;
@@ -44,7 +44,7 @@ use images::{Depth, Finding, Findings, Mark, lines};
 pub(crate) struct CheckArgs {
     /// The data, in place of --data; default: --data
     #[arg(value_name = "DATA", value_parser = crate::data::parse_data_place, add = Decides::Nothing)]
-    pub place: Option<DataPlace>,
+    pub place: Option<DataSource>,
     /// Decode every image, so that damage inside a file is found; one that ends early is found without
     #[arg(long, help_heading = "Check", add = Decides::Nothing)]
     pub deep: bool,

@@ -11,7 +11,7 @@ use super::super::settings::LeaveOut;
 use super::fixture::{base64, png, row, set};
 use super::{open, read, refusal};
 use crate::data::ready_made::SetArgs;
-use crate::data::{DataPlace, Dataset};
+use crate::data::{DataSource, Dataset};
 use crate::error::Result;
 
 fn question(fields: Value) -> Value {
@@ -248,7 +248,7 @@ fn numbered_row(id: i64) -> [Map<String, Value>; 1] {
 
 fn open_joined(paths: &[&PathBuf]) -> Result<Dataset> {
     let paths = paths.iter().map(|path| (*path).clone()).collect();
-    let place = DataPlace::Files(paths);
+    let place = DataSource::Files(paths);
     place.open(None, &SetArgs::default())
 }
 

@@ -17,12 +17,12 @@ mod user_shapes;
 use std::path::Path;
 
 use super::SetArgs;
-use crate::data::{DataPlace, Dataset, Picture};
+use crate::data::{DataSource, Dataset, Picture};
 use crate::error::Result;
 
 /// Opens the set at a path with these flags.
 fn open(path: &Path, args: &SetArgs) -> Result<Dataset> {
-    DataPlace::Path(path.to_owned()).open(None, args)
+    DataSource::Path(path.to_owned()).open(None, args)
 }
 
 /// Flags with this map.

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 
 use super::fixture::{png, row, set};
 use super::{map, open, refusal};
-use crate::data::{DataPlace, Dataset, SetArgs};
+use crate::data::{DataSource, Dataset, SetArgs};
 
 /// Six rows about three images, with a column of scenes.
 fn rows(column: &str, scenes: [Value; 6]) -> Vec<Map<String, Value>> {
@@ -60,7 +60,7 @@ fn questions_assign_scenes_to_frames() {
         })
         .collect();
     let (folder, _path) = made("questions.jsonl", &rows);
-    let place = DataPlace::Path(folder.path().to_owned());
+    let place = DataSource::Path(folder.path().to_owned());
     let read = place.open(None, &SetArgs::default()).unwrap();
     assert_eq!(scenes(&read), ["a", "a", "b"]);
     // The set is still in this program's own format.

@@ -1,3 +1,5 @@
+//! Pieces that are fixed to a wall.
+//!
 //! Pieces for bathrooms.
 //!
 //! Pieces for kitchens.

@@ -1,3 +1,5 @@
+//! Bedrooms and bathrooms.
+//!
 //! Furnishing of bedrooms.
 //!
 //! Furnishing of bathrooms.

@@ -1,3 +1,5 @@
+//! Kitchens and dining rooms.
+//!
 //! Furnishing of kitchens.
 //!
 //! Furnishing of dining rooms.

@@ -1,3 +1,5 @@
+//! Living rooms and offices.
+//!
 //! Furnishing of living rooms.
 //!
 //! Furnishing of offices.

@@ -17,7 +17,7 @@ use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Caption sentence about the mark ↓.
 const BELOW: &str = "↓: detected to be below the answers without images.";
@@ -232,7 +232,7 @@ impl FigureBuilder<'_> {
         let effects = levels.iter().map(|level| {
             let finding = pooled.iter().find(|finding| finding.level == *level);
             finding.map_or(TableCell::Blank, |finding| {
-                let verdict = finding.verdict().unwrap_or(Significance::NotShown);
+                let verdict = finding.verdict().unwrap_or(Verdict::NotShown);
                 TableCell::Effect(finding.strict.difference, verdict)
             })
         });

@@ -1,3 +1,5 @@
+//! Figures of reports as SVG, and the drawing of each kind of panel.
+//!
 //! SVG figures of reports, at the width of a page: [`figure`], [`point_figure`] and [`count_figure`].
 //!
 //! Drawing of bar charts: [`bars`].

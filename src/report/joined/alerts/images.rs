@@ -1,3 +1,5 @@
+//! Alerts about images and requests: replies that do not depend on the image, changed requests, and noise.
+//!
 //! Alerts about models whose replies do not depend on the image ([`image_alerts`]), and about servers that shrink
 //! images ([`shrunk_alerts`]).
 //!

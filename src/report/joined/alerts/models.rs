@@ -1,3 +1,5 @@
+//! Alerts about models: their names, servers, providers, settings, constraints and limits.
+//!
 //! Alerts about models that a report lists under several names, with the reason: [`model_alerts`].
 //!
 //! Alerts about the model names in replies: [`served_alerts`].

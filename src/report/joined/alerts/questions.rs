@@ -1,3 +1,5 @@
+//! Alerts about questions and the sample.
+//!
 //! Alerts about questions that differ between runs or models: [`question_alerts`], [`repeat_alert`],
 //! [`item_alerts`]; and about their true answers: [`balance_alert`].
 //!
@@ -17,7 +19,7 @@ use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
 use darkqa_score::comparisons::PooledKind;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::is_control;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 use darkqa_score::suggested_scenes::SuggestedScenes;
 
 /// Alerts about differences between the questions of the runs, and between their image files.
@@ -263,8 +265,8 @@ pub(super) fn rare_loss_alert(findings: &Findings<'_>) -> Option<Alert> {
     let is_better = findings.pooled.iter().any(|finding| {
         let verdict = finding.verdict();
         match finding.kind {
-            PooledKind::Enhancer => verdict == Some(Significance::Better),
-            PooledKind::EnhancerPair => verdict.is_some_and(Significance::is_shown),
+            PooledKind::Enhancer => verdict == Some(Verdict::Better),
+            PooledKind::EnhancerPair => verdict.is_some_and(Verdict::is_shown),
             _ => false,
         }
     });

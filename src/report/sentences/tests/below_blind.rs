@@ -9,7 +9,7 @@ use darkqa_score::comparisons::paired::{PairedComparison, Spread};
 use darkqa_score::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, TestedComparison};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
-use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
+use darkqa_score::significance::Verdict::{self, Better, NotShown, Worse};
 
 /// A comparison of `model` with images and `other` without, in a family.
 fn against_blind(
@@ -18,7 +18,7 @@ fn against_blind(
     family: &Family,
     level: usize,
     difference: f64,
-    significance: Significance,
+    verdict: Verdict,
 ) -> Comparison {
     let level = AxisLevel::new(Kind::Sensor, Severity::LADDER[level - 1]);
     let variant = Variant { kind: Some(Kind::Sensor), ..Variant::NONE };
@@ -27,13 +27,13 @@ fn against_blind(
         first: ModelInCondition::with_images(model, level, &variant, None),
         second: ModelInCondition::new(other, None),
         family: Some(family.clone()),
-        strict: tested(difference, significance),
-        lenient: tested(difference, significance),
+        strict: tested(difference, verdict),
+        lenient: tested(difference, verdict),
         least_holm: 1e-6,
     }
 }
 
-fn tested(difference: f64, significance: Significance) -> TestedComparison {
+fn tested(difference: f64, verdict: Verdict) -> TestedComparison {
     TestedComparison {
         paired: PairedComparison {
             first: 0.3,
@@ -49,8 +49,8 @@ fn tested(difference: f64, significance: Significance) -> TestedComparison {
             spread: Spread { error: 0.05, degrees: 23.0 },
         },
         holm: 0.0123,
-        significance,
-        p_report: Some(if significance.is_shown() { 0.0123 } else { 0.3 }),
+        verdict,
+        p_report: Some(if verdict.is_shown() { 0.0123 } else { 0.3 }),
     }
 }
 

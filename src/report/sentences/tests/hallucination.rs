@@ -9,7 +9,7 @@ use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::paired::{PairedComparison, Spread};
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
-use darkqa_score::significance::Significance::{self, Better, NotShown, Worse};
+use darkqa_score::significance::Verdict::{self, Better, NotShown, Worse};
 
 #[test]
 fn detected_increases_of_false_answers_are_reported() {
@@ -30,7 +30,7 @@ fn detected_increases_of_false_answers_are_reported() {
     assert_eq!(false_answer_sentence(FalseAnswer::No, &[]), None);
 }
 
-fn false_answer_sentence(answer: FalseAnswer, levels: &[(f64, Significance)]) -> Option<String> {
+fn false_answer_sentence(answer: FalseAnswer, levels: &[(f64, Verdict)]) -> Option<String> {
     let mut all = findings(PooledKind::Hallucination(answer), levels);
     for finding in &mut all {
         let strict = &mut finding.strict;

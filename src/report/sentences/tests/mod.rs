@@ -21,11 +21,11 @@ use darkqa_score::comparisons::{PooledDifference, PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::FidelityFindings;
-use darkqa_score::significance::Significance::{self, Better, NotShown, TooFewClusters, Worse};
 use darkqa_score::significance::SwapMethod;
+use darkqa_score::significance::Verdict::{self, Better, NotShown, TooFewClusters, Worse};
 
 /// A finding at one of the named levels, with an interval of ± 4 points.
-fn finding(kind: PooledKind, level: usize, difference: f64, verdict: Significance) -> PooledFinding {
+fn finding(kind: PooledKind, level: usize, difference: f64, verdict: Verdict) -> PooledFinding {
     let enhancer = (kind == PooledKind::Enhancer).then(|| EnhancerName::new("lift").unwrap());
     PooledFinding {
         kind,
@@ -51,7 +51,7 @@ fn finding(kind: PooledKind, level: usize, difference: f64, verdict: Significanc
 }
 
 /// The difference of a finding in a parsing.
-fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDifference {
+fn parsed(kind: PooledKind, difference: f64, verdict: Verdict) -> PooledDifference {
     let holm = if verdict == NotShown { 0.062 } else { 0.0004 };
     // A loss has a negative difference, except for rates of false answers, which are worse if they grow.
     let is_loss = matches!(kind, PooledKind::Hallucination(_)) == (difference > 0.0);
@@ -69,7 +69,7 @@ fn parsed(kind: PooledKind, difference: f64, verdict: Significance) -> PooledDif
     }
 }
 
-fn findings(kind: PooledKind, all: &[(f64, Significance)]) -> Vec<PooledFinding> {
+fn findings(kind: PooledKind, all: &[(f64, Verdict)]) -> Vec<PooledFinding> {
     all.iter().enumerate().map(|(i, (difference, verdict))| finding(kind, i + 1, *difference, *verdict)).collect()
 }
 
@@ -159,7 +159,7 @@ fn each_kind_and_verdict_has_a_sentence() {
     assert!(said[0].starts_with("− In the dark the models are less often right than without images at L2. ("));
 }
 
-fn level_sentences(kind: PooledKind, levels: &[(f64, Significance)]) -> Vec<String> {
+fn level_sentences(kind: PooledKind, levels: &[(f64, Verdict)]) -> Vec<String> {
     let all = findings(kind, levels);
     let all: Vec<&PooledFinding> = all.iter().collect();
     let unit = ClusterUnit::Scene;
@@ -234,7 +234,7 @@ fn fidelity_sentence([value, low, high]: [f64; 3]) -> String {
 }
 
 /// Findings about L1–L5 without a verdict, and the mean of L4–L5 with one.
-fn detected_by_mean(kind: PooledKind, difference: f64, verdict: Significance) -> [Vec<PooledFinding>; 2] {
+fn detected_by_mean(kind: PooledKind, difference: f64, verdict: Verdict) -> [Vec<PooledFinding>; 2] {
     let levels = findings(kind, &[(difference / 5.0, NotShown); 5]);
     let mean = PooledFinding {
         mean_over: levels[3..].iter().map(|finding| finding.level).collect(),
@@ -270,7 +270,7 @@ fn means_are_reported_without_a_detected_level() {
     assert!(none.len() == 1 && none[0].starts_with("· lift at L1–L5: no effect detected. ("), "{none:?}");
 }
 
-fn mean_sentences(kind: PooledKind, difference: f64, verdict: Significance) -> Vec<String> {
+fn mean_sentences(kind: PooledKind, difference: f64, verdict: Verdict) -> Vec<String> {
     let [levels, means] = detected_by_mean(kind, difference, verdict);
     let [levels, means] = [&levels, &means].map(|all| all.iter().collect::<Vec<&PooledFinding>>());
     let unit = ClusterUnit::Scene;
@@ -291,7 +291,7 @@ fn the_observer_confirms_less() {
     assert!(said[0].starts_with("+ With lift the observer confirms more at L1, by 3.0 points. ("), "{said:?}");
 }
 
-fn enhancer_sentences(model: &str, levels: &[(f64, Significance)]) -> Vec<String> {
+fn enhancer_sentences(model: &str, levels: &[(f64, Verdict)]) -> Vec<String> {
     let mut all = findings(PooledKind::Enhancer, levels);
     for finding in &mut all {
         finding.models = vec![model.to_owned()];

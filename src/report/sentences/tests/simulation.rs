@@ -15,7 +15,7 @@ use darkqa_score::comparisons::{PooledKind, baseline_rows};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::ModelInCondition;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// The design of a simulated run, and its true effects.
 #[derive(Debug, Clone, Copy)]
@@ -184,8 +184,8 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
         let is_decided = findings.by_profile.iter().any(|finding| finding.robustness.word() != "open");
         counts.decided += usize::from(is_decided);
         for (kind, verdict, name, found) in [
-            (PooledKind::Enhancer, Significance::Better, "enhancer", &mut counts.helped),
-            (PooledKind::Darkness, Significance::Worse, "darkness", &mut counts.lost),
+            (PooledKind::Enhancer, Verdict::Better, "enhancer", &mut counts.helped),
+            (PooledKind::Darkness, Verdict::Worse, "darkness", &mut counts.lost),
         ] {
             let sign = Tone::from(verdict);
             found[0] += usize::from(claims.iter().any(|claim| claim.kind == name && claim.tone == sign));
@@ -288,7 +288,7 @@ fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
                 Some((index, grid.find(&old)?))
             });
             let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), |_| None);
-            rows.iter().any(|row| row.significance == Significance::Worse)
+            rows.iter().any(|row| row.verdict == Verdict::Worse)
         })
         .count()
 }

@@ -1,3 +1,5 @@
+//! Single steps of the lenient parsing.
+//!
 //! [`contradiction`]: a letter with the text of another choice, anywhere in a reply.
 //!
 //! [`first_line`]: a first line that is an answer on its own.

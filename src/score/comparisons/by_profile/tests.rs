@@ -8,8 +8,8 @@ fn find<'f>(found: &'f [FindingByProfile], claim: &NoiseHypothesis) -> &'f Findi
     found.iter().find(|finding| finding.claim == *claim).unwrap()
 }
 
-fn standings(finding: &FindingByProfile) -> Vec<Option<Support>> {
-    finding.effects.iter().map(|one| one.effect.map(|effect| effect.support)).collect()
+fn standings(finding: &FindingByProfile) -> Vec<Option<ClaimVerdict>> {
+    finding.effects.iter().map(|one| one.effect.map(|effect| effect.verdict)).collect()
 }
 
 /// Replies that are right by exposure drop and at L0, and follow the two functions with noise.
@@ -30,7 +30,7 @@ fn a_claim_holds_where_its_interval_is_on_its_side() {
         let found = by_profile(grid);
         let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
         assert_eq!(noise.levels.len(), 5);
-        assert_eq!(standings(noise), [Some(Support::Holds), Some(Support::Open)]);
+        assert_eq!(standings(noise), [Some(ClaimVerdict::Holds), Some(ClaimVerdict::Open)]);
         assert_eq!(noise.robustness, Robustness::Some);
         let effect = noise.effects[0].effect.unwrap();
         assert!((effect.difference.value - 0.75).abs() < 1e-12);
@@ -46,7 +46,7 @@ fn a_claim_holds_where_its_interval_is_on_its_side() {
             .fold(1.0, f64::min);
         assert!(effect.holm >= 14.0 * smallest, "{effect:?}");
         let costs = find(&found, &NoiseHypothesis::DarknessCosts);
-        assert_eq!(standings(costs), [Some(Support::Holds), Some(Support::Open)]);
+        assert_eq!(standings(costs), [Some(ClaimVerdict::Holds), Some(ClaimVerdict::Open)]);
         assert!(costs.effects[0].effect.unwrap().difference.value < 0.0);
         // Nothing was enhanced or asked without images.
         assert!(found.iter().all(|finding| finding.claim.enhancer().is_none()));
@@ -69,7 +69,7 @@ fn the_same_everywhere_is_open_and_the_opposite_is_reversed() {
     with_grid(&opposite, |grid| {
         let found = by_profile(grid);
         let noise = find(&found, &NoiseHypothesis::NoiseCompounds(None));
-        assert_eq!(standings(noise), [Some(Support::Opposite); 2]);
+        assert_eq!(standings(noise), [Some(ClaimVerdict::Opposite); 2]);
         assert_eq!(noise.robustness, Robustness::None);
     });
 }
@@ -90,7 +90,7 @@ fn items_without_a_reply_leave_every_column_and_unasked_levels_are_named() {
         let second = grid.subjects.iter().find(|subject| subject.level.is_some_and(|level| level.to_string() == "L2"));
         let claim = NoiseHypothesis::NoiseCompounds(second.and_then(|subject| subject.level));
         let of_second = find(&found, &claim);
-        assert_eq!(standings(of_second), [Some(Support::Holds), None]);
+        assert_eq!(standings(of_second), [Some(ClaimVerdict::Holds), None]);
         // A claim that was not asked under one profile does not hold under all.
         assert_eq!(of_second.robustness, Robustness::Some);
     });
@@ -113,14 +113,14 @@ fn enhancers_and_families_have_claims_of_their_own() {
         let harms = find(&found, &NoiseHypothesis::EnhancerHarms(name.clone()));
         assert_eq!((harms.levels.len(), harms.robustness), (3, Robustness::All));
         let helps = find(&found, &NoiseHypothesis::EnhancerHelps(name));
-        assert_eq!(standings(helps), [Some(Support::Holds), Some(Support::Open)]);
+        assert_eq!(standings(helps), [Some(ClaimVerdict::Holds), Some(ClaimVerdict::Open)]);
         // Items of one family are all even, those of the other all odd.
         let level = *harms.levels.last().unwrap();
         let darkest = helps.levels[1];
         assert!(level < darkest);
         let below = find(&found, &NoiseHypothesis::BelowBlind(Family::RoomType, darkest));
         assert_eq!(below.blind.as_deref(), Some("other"));
-        assert_eq!(standings(below), [Some(Support::Holds), Some(Support::Open)]);
+        assert_eq!(standings(below), [Some(ClaimVerdict::Holds), Some(ClaimVerdict::Open)]);
         assert_eq!(below.effects[0].effect.unwrap().difference.n, 12);
     });
 }

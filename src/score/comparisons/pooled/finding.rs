@@ -4,7 +4,7 @@ use crate::choice::ParsingMode;
 use crate::comparisons::claim::{Claim, ParsedFinding};
 use crate::comparisons::pooled_kind::PooledKind;
 use crate::estimate::{Estimate, largest};
-use crate::significance::{Significance, SwapMethod};
+use crate::significance::{SwapMethod, Verdict};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant};
 
@@ -73,7 +73,7 @@ pub struct PooledDifference {
     /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
     pub holm: f64,
     /// Result of the test after Holm's correction. A detected increase of false answers is `Worse`.
-    pub verdict: Significance,
+    pub verdict: Verdict,
     /// p-value after the correction over all tests behind sentences; `None` if no sentence is about the finding.
     pub p_report: Option<f64>,
 }
@@ -99,7 +99,7 @@ impl PooledFinding {
 
     /// Verdict in tables and figures, which is that of the sentences; `None` if no sentence is about the finding.
     #[must_use]
-    pub fn verdict(&self) -> Option<Significance> {
+    pub fn verdict(&self) -> Option<Verdict> {
         self.claim().verdict(self.strict.verdict, self.strict.p_report)
     }
 

@@ -149,7 +149,7 @@ impl CellItems<'_, '_> {
     fn share(&self, counts_reply: impl Fn(Option<&str>, &[String]) -> bool) -> Option<Estimate> {
         let mut counts = vec![ClusterCount::default(); self.grid.clusters];
         for (item, result) in self.grid.family_items(self.subject, self.family) {
-            let Some(reading) = result.reading(self.mode) else {
+            let Some(reading) = result.parsed(self.mode) else {
                 continue;
             };
             let choices = &*item.asked.choices;
@@ -213,7 +213,7 @@ impl<'g> BankCounts<'g> {
         let mut counts = Self { whole: BTreeMap::new(), by_cluster: BTreeMap::new() };
         for (index, item) in grid.items.iter().enumerate() {
             let result = grid.result(subject, index);
-            let (Some(question), Some(reading)) = (bank.position(&item.asked.question), result.reading(mode)) else {
+            let (Some(question), Some(reading)) = (bank.position(&item.asked.question), result.parsed(mode)) else {
                 continue;
             };
             if !item.is_in_family(family) {

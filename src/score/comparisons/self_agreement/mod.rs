@@ -175,7 +175,7 @@ fn adjust_comparisons(comparisons: &mut [Comparison]) {
     let mut enhanced = BTreeMap::<_, Vec<usize>>::new();
     for (index, comparison) in comparisons.iter().enumerate() {
         let first = &comparison.first;
-        if comparison.family.is_some() || !comparison.strict.significance.is_possible() {
+        if comparison.family.is_some() || !comparison.strict.verdict.is_possible() {
             continue;
         }
         match comparison.kind {

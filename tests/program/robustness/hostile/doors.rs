@@ -5,7 +5,7 @@ use std::panic::catch_unwind;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
-use darkqa_eval::internals::dataset::{DataPlace, SetArgs};
+use darkqa_eval::internals::dataset::{DataSource, SetArgs};
 use darkqa_questions::rules::Rules;
 
 use crate::robustness::hostile::mutators::{Form, step};
@@ -34,7 +34,7 @@ fn open(path: &Path) -> bool {
         let text = fs::read(path).unwrap();
         return Rules::parse(&String::from_utf8_lossy(&text)).is_ok();
     }
-    let place = DataPlace::Path(path.to_owned());
+    let place = DataSource::Path(path.to_owned());
     let set = if path.is_dir() && !path.join("questions.jsonl").exists() {
         place.open_without_questions(&[])
     } else {

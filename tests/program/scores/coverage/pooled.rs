@@ -10,7 +10,7 @@ use darkqa_score::cluster::FrameTies;
 use darkqa_score::comparisons::paired::PairedComparison;
 use darkqa_score::comparisons::{PooledKind, pooled};
 use darkqa_score::grid::Grid;
-use darkqa_score::significance::Significance;
+use darkqa_score::significance::Verdict;
 
 /// Clusters, the standard deviation of a scene's effect in logits, and the share of right replies that is lost in the
 /// dark.
@@ -87,7 +87,7 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
         rates.rejected_by_one += f64::from(u8::from(one.p < 0.05));
         rates.held += f64::from(u8::from(holds(finding.strict.difference, -design.effect)));
         assert_eq!(finding.strict.verdict.is_shown(), finding.strict.p < 0.05);
-        assert_ne!(finding.strict.verdict, Significance::TooFewClusters);
+        assert_ne!(finding.strict.verdict, Verdict::TooFewClusters);
     }
     let percent = 100.0 / runs as f64;
     for rate in [&mut rates.rejected, &mut rates.rejected_by_one, &mut rates.held] {

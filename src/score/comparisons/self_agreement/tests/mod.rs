@@ -9,7 +9,7 @@ use super::evidence::NoEvidence;
 use crate::choice::ParsingMode;
 use crate::cluster::FrameTies;
 use crate::comparisons::comparison::ComparisonKind;
-use crate::significance::Significance;
+use crate::significance::Verdict;
 use darkqa_base::types::{ParsedAnswer, Record};
 
 #[test]
@@ -103,11 +103,11 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
                 .find(|c| c.kind == kind && c.family.is_none() && c.first.condition() == condition)
                 .unwrap()
         });
-        assert_eq!((dark.second.condition(), dark.strict.significance), ("L0".into(), Significance::Worse));
+        assert_eq!((dark.second.condition(), dark.strict.verdict), ("L0".into(), Verdict::Worse));
         assert_eq!((dark.strict.paired.second, dark.strict.paired.gained), (1.0, 0));
-        assert_eq!((lifted.strict.significance, lifted.strict.paired.lost), (Significance::Better, 0));
+        assert_eq!((lifted.strict.verdict, lifted.strict.paired.lost), (Verdict::Better, 0));
         assert!(lifted.strict.holm < 0.001 && lifted.strict.paired.mcnemar < 0.001);
-        assert_eq!(harmed.strict.significance, Significance::Worse);
+        assert_eq!(harmed.strict.verdict, Verdict::Worse);
         assert!(found.comparisons.iter().all(|c| c.kind != ComparisonKind::Model));
     });
 }

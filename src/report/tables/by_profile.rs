@@ -9,18 +9,18 @@ use crate::types::degradations::Kind;
 use crate::types::text::counted;
 use crate::types::{AxisLevel, ProfileName};
 use darkqa_score::accuracies::Curve;
-use darkqa_score::comparisons::{FindingByProfile, NoiseHypothesis, Robustness, Support, TestedEffect};
+use darkqa_score::comparisons::{ClaimVerdict, FindingByProfile, NoiseHypothesis, Robustness, TestedEffect};
 use darkqa_score::findings::Findings;
 
 /// Two tables: the file has a row for each finding and profile; the report has a row for each finding and a column for
 /// each profile. Empty unless several noise profiles were tested.
-pub(super) fn by_reading(findings: &Findings<'_>) -> Vec<Table> {
+pub(super) fn by_profile(findings: &Findings<'_>) -> Vec<Table> {
     let found = &findings.by_profile;
     let Some(first) = found.first() else {
         return Vec::new();
     };
-    let readings: Vec<&ProfileName> = first.effects.iter().map(|effect| &effect.profile).collect();
-    vec![file_table(found), report_table(findings, &readings)]
+    let profiles: Vec<&ProfileName> = first.effects.iter().map(|effect| &effect.profile).collect();
+    vec![file_table(found), report_table(findings, &profiles)]
 }
 
 /// Table for the file.
@@ -34,10 +34,10 @@ fn file_table(found: &[FindingByProfile]) -> Table {
         .column(Text, "csv levels", |(finding, _)| level_names(&finding.levels, ";"))
         .column(Text, "csv blind", |(finding, _)| finding.blind.clone())
         .column(Text, "csv reading", |(_, effect)| effect.profile.to_string())
-        .column(Number, "csv effect low high n", |(_, reading)| reading.effect.map(|effect| effect.difference))
-        .column(P, "csv p", |(_, reading)| reading.effect.map(|effect| effect.p))
-        .column(P, "csv p_holm", |(_, reading)| reading.effect.map(|effect| effect.holm))
-        .column(Text, "csv verdict", |(_, reading)| reading.effect.map_or("not asked", |effect| effect.support.word()))
+        .column(Number, "csv effect low high n", |(_, effect)| effect.effect.map(|effect| effect.difference))
+        .column(P, "csv p", |(_, effect)| effect.effect.map(|effect| effect.p))
+        .column(P, "csv p_holm", |(_, effect)| effect.effect.map(|effect| effect.holm))
+        .column(Text, "csv verdict", |(_, effect)| effect.effect.map_or("not asked", |effect| effect.verdict.word()))
         .column(Text, "csv holds", |(finding, _)| finding.robustness.word())
         .column(Count, "csv dropped", |(finding, _)| finding.dropped)
         .build()
@@ -58,7 +58,7 @@ impl Row<'_> {
 }
 
 /// Table for the terminal and the page: the findings of each model, then its thresholds.
-fn report_table(findings: &Findings<'_>, readings: &[&ProfileName]) -> Table {
+fn report_table(findings: &Findings<'_>, profiles: &[&ProfileName]) -> Table {
     let mut rows = Vec::new();
     let found = &findings.by_profile;
     for same_model in found.chunk_by(|a, b| (&a.model, &a.group) == (&b.model, &b.group)) {
@@ -73,15 +73,15 @@ fn report_table(findings: &Findings<'_>, readings: &[&ProfileName]) -> Table {
             Row::Finding(finding) => title(finding),
             Row::Thresholds(..) => "the break (threshold EV)".to_owned(),
         });
-    for (index, reading) in readings.iter().enumerate() {
+    for (index, profile) in profiles.iter().enumerate() {
         let heads = ColumnHeads {
-            terminal: vec![reading.to_string()],
-            page: Some(reading.to_string()),
+            terminal: vec![profile.to_string()],
+            page: Some(profile.to_string()),
             ..ColumnHeads::default()
         };
         table = table.column(Text, heads, |row| match row {
             Row::Finding(finding) => effect(finding.effects[index].effect.as_ref()),
-            Row::Thresholds(_, curves) => threshold(curves, reading),
+            Row::Thresholds(_, curves) => threshold(curves, profile),
         });
     }
     let mut table = table
@@ -124,8 +124,8 @@ fn noise_curves<'f>(findings: &'f Findings<'_>, finding: &FindingByProfile) -> V
 }
 
 /// Threshold with its interval under one noise profile, in words.
-fn threshold(curves: &[&Curve], reading: &ProfileName) -> String {
-    let Some(curve) = curves.iter().find(|curve| curve.variant.reading.as_ref() == Some(reading)) else {
+fn threshold(curves: &[&Curve], profile: &ProfileName) -> String {
+    let Some(curve) = curves.iter().find(|curve| curve.variant.reading.as_ref() == Some(profile)) else {
         return "not asked".to_owned();
     };
     let darkest = curve.summary.darkest.value();
@@ -144,14 +144,14 @@ fn subject(finding: &FindingByProfile) -> String {
     finding.model.clone() + &group.unwrap_or_default()
 }
 
-/// Effect with its interval and its support for the finding, as in `+12.3 [8.1, 16.2] holds`.
+/// Effect with its interval and its verdict for the finding, as in `+12.3 [8.1, 16.2] holds`.
 fn effect(effect: Option<&TestedEffect>) -> String {
     effect.map_or_else(
         || "not asked".to_owned(),
         |effect| {
             let value = points(effect.difference.value);
             let ends = ends_in_points(effect.difference);
-            format!("{value} [{ends}] {}", effect.support.word())
+            format!("{value} [{ends}] {}", effect.verdict.word())
         },
     )
 }
@@ -218,16 +218,16 @@ fn clause(finding: &FindingByProfile) -> String {
     }
 }
 
-/// Noise profiles under which a finding has some support. Each but [`Support::Holds`] has its interval.
-fn profiles_with_support(finding: &FindingByProfile, support: Support) -> Vec<String> {
+/// Noise profiles under which a finding has a verdict. Each but [`ClaimVerdict::Holds`] has its interval.
+fn profiles_with_verdict(finding: &FindingByProfile, verdict: ClaimVerdict) -> Vec<String> {
     finding
         .effects
         .iter()
         .filter_map(|in_profile| Some((&in_profile.profile, in_profile.effect.as_ref()?)))
-        .filter(|(_, effect)| effect.support == support)
-        .map(|(profile, effect)| match support {
-            Support::Holds => profile.to_string(),
-            Support::Opposite | Support::Open => {
+        .filter(|(_, effect)| effect.verdict == verdict)
+        .map(|(profile, effect)| match verdict {
+            ClaimVerdict::Holds => profile.to_string(),
+            ClaimVerdict::Opposite | ClaimVerdict::Open => {
                 format!("{profile} ({} points)", ends_in_points(effect.difference).replace(", ", " to "))
             }
         })
@@ -244,14 +244,14 @@ fn sentence(finding: &FindingByProfile) -> String {
         .map(|in_profile| in_profile.profile.to_string())
         .collect();
     let parts: Vec<String> = [
-        ("holds under", profiles_with_support(finding, Support::Holds)),
-        ("the opposite under", profiles_with_support(finding, Support::Opposite)),
-        ("open under", profiles_with_support(finding, Support::Open)),
+        ("holds under", profiles_with_verdict(finding, ClaimVerdict::Holds)),
+        ("the opposite under", profiles_with_verdict(finding, ClaimVerdict::Opposite)),
+        ("open under", profiles_with_verdict(finding, ClaimVerdict::Open)),
         ("not asked under", not_asked),
     ]
     .iter()
-    .filter(|(_, readings)| !readings.is_empty())
-    .map(|(words, readings)| format!("{words} {}", readings.join(", ")))
+    .filter(|(_, profiles)| !profiles.is_empty())
+    .map(|(words, profiles)| format!("{words} {}", profiles.join(", ")))
     .collect();
     format!("{}: {}.", clause(finding), parts.join("; "))
 }
@@ -288,12 +288,12 @@ mod tests {
     use darkqa_score::comparisons::EffectInProfile;
     use darkqa_score::estimate::Estimate;
 
-    fn effect_in(reading: &str, low: f64, high: f64, support: Support) -> EffectInProfile {
+    fn effect_in(profile: &str, low: f64, high: f64, verdict: ClaimVerdict) -> EffectInProfile {
         EffectInProfile {
-            profile: ProfileName::new(reading).unwrap(),
+            profile: ProfileName::new(profile).unwrap(),
             effect: Some(TestedEffect {
                 difference: Estimate { value: f64::midpoint(low, high), low, high, n: 9 },
-                support,
+                verdict,
                 p: 0.01,
                 holm: 0.02,
             }),
@@ -310,9 +310,9 @@ mod tests {
             levels: vec![level],
             blind: None,
             effects: vec![
-                effect_in("paper", 0.1, 0.3, Support::Holds),
-                effect_in("eld", 0.2, 0.4, Support::Holds),
-                effect_in("physical", -0.012, 0.05, Support::Open),
+                effect_in("paper", 0.1, 0.3, ClaimVerdict::Holds),
+                effect_in("eld", 0.2, 0.4, ClaimVerdict::Holds),
+                effect_in("physical", -0.012, 0.05, ClaimVerdict::Open),
             ],
             robustness: Robustness::Some,
             dropped: 0,
@@ -322,7 +322,7 @@ mod tests {
             "Noise compounds the drop: holds under paper, eld; open under physical (−1.2 to +5.0 points)."
         );
         assert_eq!(effect(finding.effects[2].effect.as_ref()), "+1.9 [−1.2, +5.0] open");
-        finding.effects[1] = effect_in("eld", -0.4, -0.2, Support::Opposite);
+        finding.effects[1] = effect_in("eld", -0.4, -0.2, ClaimVerdict::Opposite);
         finding.effects[2].effect = None;
         finding.claim = NoiseHypothesis::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());
         assert_eq!(
