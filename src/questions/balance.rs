@@ -71,14 +71,17 @@ pub(super) fn balance(asked: Vec<GeneratedQuestion>, mode: BalanceMode, rule: &B
 /// Family and text of a yes-no question; `None` for other questions.
 fn binary_key(asked: &GeneratedQuestion) -> Option<(Family, String)> {
     let family = &asked.question.family;
-    matches!(family, Family::Affordance | Family::Presence).then(|| (family.clone(), asked.question.text.clone()))
+    family.is_yes_no().then(|| (family.clone(), asked.question.text.clone()))
 }
 
 /// Drops questions whose room type or colour exceeds its share of the answers. Returns a warning for each family that
 /// cannot be balanced.
 fn cap_shares(asked: &[GeneratedQuestion], dropped: &mut BTreeSet<usize>, rule: &BalanceRule) -> Vec<String> {
     let mut uneven = Vec::new();
-    for (family, share) in [(Family::RoomType, rule.room_type_share_ppm), (Family::Color, rule.color_share_ppm)] {
+    for family in Family::by_rule() {
+        let Some(share) = rule.share_ppm(&family) else {
+            continue;
+        };
         let lists =
             groups(asked, dropped, |asked| (asked.question.family == family).then(|| asked.answer().to_owned()));
         match max_per_answer(&lists, share) {

@@ -13,7 +13,6 @@ use super::rule_context::{Candidate, GeneratedQuestion, Picker, RuleContext, Rul
 use super::rules::{RuleBook, Rules};
 use super::statistics::FrameStatistics;
 use super::vocabulary::Vocabulary;
-use super::{affordance, closest, color, presence, room_type};
 use darkqa_base::error::Result;
 use darkqa_base::types::{Choices, Digest, Family, FrameId, Labels, Question, QuestionId};
 
@@ -145,8 +144,8 @@ pub fn generate(
             frequency: &frequency,
             picker: Picker { seed: book.seed, dataset: request.dataset, frame: &frame.frame },
         };
-        for family in request.families.iter().filter(|family| Family::PAPER.contains(family)) {
-            let results = apply_rules(family, &context, request.palette);
+        for family in &request.families {
+            let results = super::candidates(family, &context, request.palette);
             let counts = generated.counts.entry(family.clone()).or_default();
             for result in &results {
                 explain(&frame.frame, result);
@@ -207,17 +206,6 @@ pub fn stated_room(frame: &FrameStatistics, book: &RuleBook) -> Option<String> {
     book.room.order.iter().find(|room| **room == stated).cloned()
 }
 
-fn apply_rules(family: &Family, context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
-    match family {
-        Family::RoomType => room_type::candidates(context),
-        Family::Affordance => affordance::candidates(context),
-        Family::Presence => presence::candidates(context),
-        Family::Color => color::candidates(context, palette),
-        Family::Closest => closest::candidates(context),
-        Family::Other(_) => Vec::new(),
-    }
-}
-
 /// Numbers of yes and no answers chosen so far, by family and text.
 #[derive(Default)]
 struct AnswerCounts(BTreeMap<(Family, String), [u64; 2]>);
@@ -229,7 +217,7 @@ impl AnswerCounts {
     /// the question whose answers it balances best is preferred, then the question asked least. Hashes break ties.
     fn choose(&mut self, candidates: Vec<Candidate>, context: &RuleContext<'_>) -> Option<Candidate> {
         let family = candidates.first()?.family.clone();
-        let binary = matches!(family, Family::Affordance | Family::Presence);
+        let binary = family.is_yes_no();
         if !binary {
             let chosen = context.picker.pick(family.name(), "candidate", candidates.len());
             return candidates.into_iter().nth(chosen);

@@ -32,5 +32,21 @@ pub mod summary;
 mod tests;
 mod vocabulary;
 
+use colors::Palette;
+use darkqa_base::types::Family;
+use rule_context::{RuleContext, RuleResult};
+
 pub use generate::{Generated, QuestionRequest, generate};
 pub use rule_context::GeneratedQuestion;
+
+/// The candidates of a family in a frame; none for a category of a ready-made set.
+fn candidates(family: &Family, context: &RuleContext<'_>, palette: &Palette) -> Vec<RuleResult> {
+    match family {
+        Family::RoomType => room_type::candidates(context),
+        Family::Affordance => affordance::candidates(context),
+        Family::Presence => presence::candidates(context),
+        Family::Color => color::candidates(context, palette),
+        Family::Closest => closest::candidates(context),
+        Family::Other(_) => Vec::new(),
+    }
+}

@@ -176,7 +176,7 @@ impl QuestionSummary {
         let question = &asked.question;
         let answers = self.answers.entry(question.family.clone()).or_default();
         *answers.entry(asked.answer().to_owned()).or_insert(0) += 1;
-        if matches!(question.family, Family::Affordance | Family::Presence) {
+        if question.family.is_yes_no() {
             let subjects = self.polarity.entry(question.family.clone()).or_default();
             let counts = subjects.entry(asked.about.clone()).or_default();
             if let Some(truth) = question.choices.truth() {
@@ -239,7 +239,7 @@ fn coverage(frames: &[FrameStatistics], asked: &[GeneratedQuestion]) -> BTreeMap
         }
     }
     for asked in asked {
-        if matches!(asked.question.family, Family::Presence | Family::Color | Family::Closest) {
+        if asked.question.family.row().is_some_and(|row| row.has_outline) {
             classes.entry(asked.about.clone()).or_default().questions += 1;
         }
     }

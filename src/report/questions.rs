@@ -23,6 +23,7 @@ use crate::report::text::table::ColumnKind::{Count, Text};
 use crate::report::text::table::TableBuilder;
 use crate::report::text::terminal::{self, to_script_json};
 use crate::report::text::words::with_interval;
+use crate::types::questions::FAMILIES;
 use crate::types::text::counted;
 use crate::types::{Digest, Family};
 use darkqa_questions::GeneratedQuestion;
@@ -39,10 +40,7 @@ const MAX_REASONS: usize = 3;
 /// candidates.
 #[must_use]
 pub(crate) fn table(summary: &QuestionSummary) -> String {
-    let families = Family::PAPER.iter().filter_map(|family| {
-        let candidates = summary.candidates.get(family)?;
-        Some((family.name(), Some(candidates)))
-    });
+    let families = FAMILIES.iter().filter_map(|row| Some((row.name, Some(summary.candidates.get(&row.family)?))));
     let total = summary.baselines.get(Family::TOTAL);
     let rows = families.chain(total.map(|_| (Family::TOTAL, None)));
     let table = TableBuilder::new("questions", rows)
@@ -412,7 +410,7 @@ pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
         CountPanel::from_counts("Questions by family", questions),
         CountPanel::from_counts("Frames by room", rooms),
     ];
-    for family in Family::PAPER {
+    for family in Family::by_rule() {
         if let Some(answers) = summary.answers.get(&family) {
             panels.push(CountPanel::from_counts(
                 &format!("Answers: {family}"),

@@ -12,7 +12,8 @@ use std::collections::HashMap;
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use darkqa_base::types::{ChoiceDetail, Condition, Degradation, Digest, Family, Record, Severity, Trials};
+use darkqa_base::types::questions::FAMILIES;
+use darkqa_base::types::{ChoiceDetail, Condition, Degradation, Digest, Record, Severity, Trials};
 use darkqa_eval::Kind;
 use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
 use darkqa_score::cluster::FrameTies;
@@ -35,7 +36,7 @@ fn records() -> Vec<Record> {
                 let level = Severity::LADDER.iter().filter(|s| Some(**s) <= severity).count() as u32;
                 let right = u32::from(drawn.as_bytes()[0]) > 30 * level;
                 let mut record = record(&name, condition, (question, question / 4), right);
-                record.detail.family = Family::PAPER[question % 4].clone();
+                record.detail.family = FAMILIES[question % 4].family.clone();
                 records.push(record);
             }
         }

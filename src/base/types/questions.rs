@@ -29,7 +29,7 @@ impl fmt::Display for QuestionId {
     }
 }
 
-/// The kind of a question: one of the paper's five families, or a category of a ready-made set.
+/// The kind of a question: a family that is made by rule, or a category of a ready-made set.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Family {
     /// "What type of room is this?"
@@ -46,31 +46,113 @@ pub enum Family {
     Other(String),
 }
 
+/// Facts about a family that is made by rule.
+#[derive(Debug)]
+pub struct FamilyRow {
+    /// The family.
+    pub family: Family,
+    /// Its name in files and tables, and the name of its table in a rulebook.
+    pub name: &'static str,
+    /// Its name in reports; the paper's name for the families of the paper.
+    pub title: &'static str,
+    /// The choices of its questions.
+    pub answers: FamilyAnswers,
+    /// True if its questions are about objects with an outline, which their evidence has.
+    pub has_outline: bool,
+}
+
+/// The choices of the questions of a family.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FamilyAnswers {
+    /// Yes and no, balanced for each text.
+    YesNo,
+    /// Words of one list for all questions. Each word's share can be capped, and a model that answers with one word
+    /// only is reported.
+    List,
+    /// Objects of the frame.
+    Objects,
+}
+
+/// The families that are made by rule, in the order of tables: the five of the paper (arXiv 2512.24985).
+pub static FAMILIES: [FamilyRow; 5] = [
+    FamilyRow {
+        family: Family::RoomType,
+        name: "room_type",
+        title: "room type",
+        answers: FamilyAnswers::List,
+        has_outline: false,
+    },
+    FamilyRow {
+        family: Family::Affordance,
+        name: "affordance",
+        title: "room affordance",
+        answers: FamilyAnswers::YesNo,
+        has_outline: false,
+    },
+    FamilyRow {
+        family: Family::Presence,
+        name: "presence",
+        title: "object recognition",
+        answers: FamilyAnswers::YesNo,
+        has_outline: true,
+    },
+    FamilyRow {
+        family: Family::Color,
+        name: "color",
+        title: "object colour",
+        answers: FamilyAnswers::List,
+        has_outline: true,
+    },
+    FamilyRow {
+        family: Family::Closest,
+        name: "closest",
+        title: "closest object",
+        answers: FamilyAnswers::Objects,
+        has_outline: true,
+    },
+];
+
 impl Family {
     /// The name of all families together in tables and files; no family may have this name.
     pub const TOTAL: &str = "all";
 
-    /// The paper's five families.
-    pub const PAPER: [Self; 5] = [Self::RoomType, Self::Affordance, Self::Presence, Self::Color, Self::Closest];
+    /// The families that are made by rule, in the order of tables.
+    pub fn by_rule() -> impl Iterator<Item = Self> {
+        FAMILIES.iter().map(|row| row.family.clone())
+    }
 
-    /// The name in files and tables: `room_type`, `affordance`, `presence`, `color`, `closest`, or a ready-made set's
-    /// name.
+    /// Facts about the family; `None` for a category of a ready-made set.
+    #[must_use]
+    pub fn row(&self) -> Option<&'static FamilyRow> {
+        FAMILIES.iter().find(|row| row.family == *self)
+    }
+
+    /// The name in files and tables: that of [`FAMILIES`], or a ready-made set's name.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {
-            Self::RoomType => "room_type",
-            Self::Affordance => "affordance",
-            Self::Presence => "presence",
-            Self::Color => "color",
-            Self::Closest => "closest",
             Self::Other(name) => name,
+            family => family.row().map_or("", |row| row.name),
         }
+    }
+
+    /// The name in reports.
+    #[must_use]
+    pub fn title(&self) -> &str {
+        self.row().map_or(self.name(), |row| row.title)
+    }
+
+    /// True for families made by rule whose answers are yes and no.
+    #[must_use]
+    pub fn is_yes_no(&self) -> bool {
+        self.row().is_some_and(|row| row.answers == FamilyAnswers::YesNo)
     }
 }
 
 impl From<&str> for Family {
     fn from(name: &str) -> Self {
-        Self::PAPER.into_iter().find(|family| family.name() == name).unwrap_or_else(|| Self::Other(name.to_owned()))
+        let row = FAMILIES.iter().find(|row| row.name == name);
+        row.map_or_else(|| Self::Other(name.to_owned()), |row| row.family.clone())
     }
 }
 
@@ -526,7 +608,7 @@ mod tests {
 
     #[test]
     fn families_read_back() {
-        for family in Family::PAPER.into_iter().chain([Family::Other("OCR".into())]) {
+        for family in Family::by_rule().chain([Family::Other("OCR".into())]) {
             assert_eq!(Family::from(family.name()), family);
         }
     }

@@ -18,7 +18,7 @@ use serde_json::{Value, json};
 use crate::data::{Dataset, FolderArgs, open_frames, open_images};
 use crate::engine::images::frames::InputTally;
 use crate::engine::images::progress::Progress;
-use crate::engine::images::trials::rules;
+use crate::engine::images::trials::{note_built_in_families, rules};
 use crate::engine::images::workers::{ThreadArgs, pool};
 use crate::error::{Error, Result};
 use crate::files::{self, write};
@@ -27,6 +27,7 @@ use crate::report::questions::AppearanceComparison;
 use crate::runs::Outcome;
 use crate::runs::resolved_shard::{keep_shard, shard_from_flag};
 use crate::runs::shard::Shard;
+use crate::types::questions::FAMILIES;
 use crate::types::text::{counted, plural};
 use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId, shell_word};
 use checked::StatisticsCache;
@@ -56,8 +57,15 @@ pub(crate) struct QuestionsArgs {
     /// The names of colours, a table like src/questions/colors.txt; default: the one built in
     #[arg(long, value_name = "FILE", help_heading = "Rules", add = Decides::Trials)]
     pub colors: Option<PathBuf>,
-    /// Only these families: room_type, affordance, presence, color, closest; default: all
-    #[arg(long, value_name = "LIST", help_heading = "Rules", value_delimiter = ',', value_parser = family, add = Decides::Trials)]
+    #[arg(
+        long,
+        value_name = "LIST",
+        help_heading = "Rules",
+        help = format!("Only these families: {}; default: all", family_names()),
+        value_delimiter = ',',
+        value_parser = family,
+        add = Decides::Trials
+    )]
     pub families: Vec<Family>,
     /// How the answers are evened out
     #[arg(long, value_enum, default_value_t, help_heading = "Rules", add = Decides::Trials)]
@@ -112,9 +120,14 @@ fn file(text: &str) -> Result<PathBuf, String> {
 /// The family of questions in a text; only families that are made by rule.
 fn family(name: &str) -> Result<Family, String> {
     match Family::from(name.trim()) {
-        Family::Other(_) => Err("one of room_type, affordance, presence, color, closest expected".to_owned()),
+        Family::Other(_) => Err(format!("one of {} expected", family_names())),
         family => Ok(family),
     }
+}
+
+/// The names of the families that are made by rule, with commas.
+fn family_names() -> String {
+    FAMILIES.iter().map(|row| row.name).collect::<Vec<_>>().join(", ")
 }
 
 /// The folder of frames.
@@ -149,10 +162,10 @@ impl<'a> QuestionSettings<'a> {
         Ok(Self { args, rules: rules(args.rules.as_deref())?, palette: palette.map_or_else(Palette::built_in, Ok)? })
     }
 
-    /// The families to make; all families of the paper if no flag names any.
+    /// The families to make; all if no flag names any.
     fn families(&self) -> BTreeSet<Family> {
         if self.args.families.is_empty() {
-            Family::PAPER.into_iter().collect()
+            Family::by_rule().collect()
         } else {
             self.args.families.iter().cloned().collect()
         }
@@ -193,6 +206,7 @@ pub(crate) fn questions(args: &QuestionsArgs, progress: &Progress) -> Result<Out
         Error::data(folder.display(), problem)
     })?;
     let shard = shard_from_flag(args.shard.as_deref())?;
+    note_built_in_families(&settings.rules, progress);
     let (frames, failed) = measure_frames(settings, &dataset, labels, shard, progress)?;
     if shard.is_part() {
         return Ok(shard_outcome(args, shard, frames.len(), failed));

@@ -262,6 +262,13 @@ pub(crate) fn rules(path: Option<&Path>) -> Result<Rules> {
     Rules::parse(&files::settings(path)?).map_err(|e| e.at(path.display().to_string()))
 }
 
+/// Notes of the families whose rules are the built-in ones, because the user's rulebook does not have them.
+pub(crate) fn note_built_in_families(rules: &Rules, progress: &Progress) {
+    for family in rules.built_in_families() {
+        progress.note(&format!("--rules: no table [{family}] in this file; the built-in one is used"));
+    }
+}
+
 /// Opens the data at a place. If they have no questions, generates them by rule.
 pub(crate) fn open_data(
     place: &DataSource,
@@ -417,6 +424,7 @@ pub(crate) fn select(mut questions: Vec<Question>, selection: &SelectionArgs) ->
 fn generate_by_rule(dataset: &Dataset, rules: &Rules, progress: &Progress) -> Result<Vec<Question>> {
     let labels =
         dataset.labels().ok_or_else(|| Error::data(dataset.name(), "no questions, and no classes to make them of"))?;
+    note_built_in_families(rules, progress);
     let palette = Palette::built_in()?;
     let names: Vec<&FrameId> = dataset.frames().collect();
     let bar = progress.bar("making questions", names.len());
@@ -436,7 +444,7 @@ fn generate_by_rule(dataset: &Dataset, rules: &Rules, progress: &Progress) -> Re
         labels,
         rules,
         palette: &palette,
-        families: Family::PAPER.into_iter().collect(),
+        families: Family::by_rule().collect(),
         room_source: RoomSource::default(),
         balance: BalanceMode::default(),
         rejected: BTreeSet::new(),

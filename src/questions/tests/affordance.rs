@@ -136,7 +136,7 @@ fn classes_that_cannot_be_labelled_are_not_called_absent() {
         labels: &labels,
         rules: &rules,
         palette: &palette,
-        families: Family::PAPER.into_iter().collect(),
+        families: Family::by_rule().collect(),
         room_source: RoomSource::Signature,
         balance: BalanceMode::None,
         rejected: BTreeSet::new(),

@@ -133,7 +133,7 @@ fn run_rules_of(
         labels,
         rules,
         palette: &palette,
-        families: Family::PAPER.into_iter().collect(),
+        families: Family::by_rule().collect(),
         room_source: RoomSource::Signature,
         balance: BalanceMode::None,
         rejected: BTreeSet::new(),

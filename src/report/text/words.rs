@@ -36,18 +36,9 @@ pub(crate) fn light_with(variant: &Variant, enhancer: Option<&str>) -> String {
     }
 }
 
-/// Display name of a question family: the paper's name for its five families, the family's own name for others. `None`
-/// is all families.
+/// Display name of a question family; `None` is all families.
 pub(crate) fn family(family: Option<&Family>) -> &str {
-    match family {
-        None => "all families",
-        Some(Family::RoomType) => "room type",
-        Some(Family::Affordance) => "room affordance",
-        Some(Family::Presence) => "object recognition",
-        Some(Family::Color) => "object colour",
-        Some(Family::Closest) => "closest object",
-        Some(Family::Other(name)) => name,
-    }
+    family.map_or("all families", Family::title)
 }
 
 /// Display name of a subject: its model and condition.

@@ -68,7 +68,7 @@ fn asked(rooms: Rooms) -> (Generated, BTreeMap<FrameId, Seen>, (usize, Vec<Strin
         labels: &labels,
         rules: &rules,
         palette: &palette,
-        families: Family::PAPER.into_iter().collect(),
+        families: Family::by_rule().collect(),
         room_source: RoomSource::Signature,
         balance: BalanceMode::default(),
         rejected: BTreeSet::new(),
@@ -183,7 +183,7 @@ fn the_questions_are_right_and_even() {
         let of_family = answers.entry(&asked.question.family).or_default();
         *of_family.entry(asked.answer()).or_insert(0) += 1;
     }
-    for family in Family::PAPER {
+    for family in Family::by_rule() {
         let counts = &answers[&family];
         let total: usize = counts.values().sum();
         let most = counts.values().max().unwrap();
@@ -215,7 +215,7 @@ fn the_questions_are_right_and_even() {
     for seen in seen.values_mut() {
         spoil(&mut seen.truth);
     }
-    for family in Family::PAPER {
+    for family in Family::by_rule() {
         let of_family = made.asked.iter().filter(|asked| asked.question.family == family);
         let found = of_family.clone().filter(|asked| wrong(asked, &seen[&asked.question.frame]).is_some());
         let (found, all) = (found.count(), of_family.count());

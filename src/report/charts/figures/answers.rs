@@ -1,3 +1,5 @@
+//! Figures of what models answer: wrong answers, confidence, enhancers, and photographs in the dark.
+//!
 //! Figures of wrong answers in the dark: hallucinated objects, and collapse to one answer.
 //!
 //! Figure of mean confidence and accuracy by level.
@@ -11,6 +13,7 @@ use crate::report::charts::chart::{
     Bar, BarChart, BarPanel, Chart, FigureChart, LineContent, LineItems, LineStyle, Panel, PlotLine,
 };
 use crate::report::text::words::family as family_name;
+use crate::types::questions::{FAMILIES, FamilyAnswers};
 use crate::types::{AxisLevel, Family, SetLight, Variant, View};
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::calibration::Calibration;
@@ -55,9 +58,10 @@ impl FigureBuilder<'_> {
     /// Share of the most frequent answer by level, against the share of the most frequent true answer.
     pub(super) fn collapse(&self) -> Option<(String, Chart)> {
         let variant = self.main_variant()?;
-        let panels: Vec<Panel> = [Family::RoomType, Family::Color]
-            .into_iter()
-            .filter_map(|family| self.collapse_panel(&variant, &family))
+        let panels: Vec<Panel> = FAMILIES
+            .iter()
+            .filter(|row| row.answers == FamilyAnswers::List)
+            .filter_map(|row| self.collapse_panel(&variant, &row.family))
             .collect();
         let caption = format!(
             "Answer collapse, {}: how often the answer given most often is given, by level.",

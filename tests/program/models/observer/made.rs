@@ -75,7 +75,7 @@ impl Set {
             labels,
             rules: &rules,
             palette: &palette,
-            families: Family::PAPER.into_iter().collect(),
+            families: Family::by_rule().collect(),
             room_source: RoomSource::Signature,
             balance: BalanceMode::default(),
             rejected: BTreeSet::new(),
