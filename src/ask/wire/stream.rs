@@ -302,6 +302,8 @@ mod tests {
         assert_eq!(cut, broken(Some(json!({"prompt_tokens": 3})), true));
         let counts = "data: {\"choices\":[],\"usage\":{\"completion_tokens\":3}}\n\n";
         assert!(assemble(&format!("{counts}{piece}")).is_err(), "counts so far");
+        let total = "data: {\"choices\":[],\"usage\":{\"prompt_tokens\":3,\"total_tokens\":5}}\n\n";
+        assert!(assemble(&format!("{piece}{total}")).is_err(), "a total may be one so far");
         assert_eq!(assemble(&format!("{piece}data: {{\"choi")), broken(None, true));
         let role = "data: {\"choices\":[{\"index\":0,\"delta\":{\"content\":\"\"}}]}\n\n";
         for empty in ["", ": keep-alive\n\n", "data: [DONE]\n\n", role] {

@@ -36,7 +36,7 @@ pub(super) fn raw(body: &Value) -> Option<&Value> {
 
 /// True if an event states a number of reply tokens other than 0.
 pub(super) fn states_reply_tokens(event: &Value) -> bool {
-    read(raw(event)).is_some_and(|usage| usage.completion_tokens > Some(0))
+    raw(event).is_some_and(|usage| REPLY_TOKENS.iter().any(|name| number_in(usage, name) > Some(0)))
 }
 
 /// Parses the `usage` in a body, with the charge and the service tier that the body states. `None` if it states none of
@@ -71,7 +71,7 @@ pub(super) fn alone(usage: Option<Value>) -> Option<Usage> {
 fn read(usage: Option<&Value>) -> Option<Usage> {
     let usage = usage?;
     let prompt = first_of(usage, ["prompt_tokens", "input_tokens"]);
-    let completion = first_of(usage, ["completion_tokens", "output_tokens"]);
+    let completion = first_of(usage, REPLY_TOKENS);
     let total = number_in(usage, "total_tokens");
     // OpenAI reports cached tokens in the details, Anthropic in two top-level fields.
     let cached = detail(usage, PROMPT_DETAILS, "cached_tokens");
@@ -101,6 +101,9 @@ fn read(usage: Option<&Value>) -> Option<Usage> {
 fn first_of(usage: &Value, names: [&str; 2]) -> Option<u64> {
     names.iter().find_map(|name| number(usage.get(*name)?))
 }
+
+/// Names of the number of reply tokens.
+const REPLY_TOKENS: [&str; 2] = ["completion_tokens", "output_tokens"];
 
 /// Names of the object with details about the prompt.
 const PROMPT_DETAILS: [&str; 2] = ["prompt_tokens_details", "input_tokens_details"];
