@@ -144,7 +144,7 @@ pub fn generate(
             frequency: &frequency,
             picker: Picker { seed: book.seed, dataset: request.dataset, frame: &frame.frame },
         };
-        for family in &request.families {
+        for family in request.families.iter().filter(|family| family.row().is_some()) {
             let results = super::candidates(family, &context, request.palette);
             let counts = generated.counts.entry(family.clone()).or_default();
             for result in &results {

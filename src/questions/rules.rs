@@ -90,12 +90,18 @@ impl Rules {
             let TomlFault { line, problem } = TomlFault::new(text, &e);
             Error::data("rules", format!("line {line}: {problem}"))
         };
-        let given: toml::Table = toml::from_str(text).map_err(with_line)?;
-        let is_missing = |name: &&str| !given.contains_key(*name);
-        let built_in_families: Vec<&str> = FAMILIES.iter().map(|row| row.name).filter(is_missing).collect();
-        let missing = built_in_tables(&built_in_families)?;
-        // The missing tables stand last, so that the lines of faults are those of the text.
-        let book: RuleBook = toml::from_str(&format!("{text}\n{missing}")).map_err(with_line)?;
+        let (book, built_in_families): (RuleBook, _) = match toml::from_str(text) {
+            Ok(book) => (book, Vec::new()),
+            Err(e) => {
+                let missing = missing_families(text).map_err(with_line)?;
+                if missing.is_empty() {
+                    return Err(with_line(e));
+                }
+                // The missing tables stand last, so that the lines of faults are those of the text.
+                let whole = format!("{text}\n{}", built_in_tables(&missing)?);
+                (toml::from_str(&whole).map_err(with_line)?, missing)
+            }
+        };
         book.check().map_err(|problem| Error::data("rules", problem))?;
         let digest = digest_values(&book).map_err(|e| Error::data("rules", e))?;
         let measure_digest = digest_values(&(&book.measure, &book.coarse)).map_err(|e| Error::data("rules", e))?;
@@ -125,6 +131,12 @@ impl Rules {
     pub fn measure_digest(&self) -> Digest {
         self.measure_digest
     }
+}
+
+/// The families whose table a rulebook does not have.
+fn missing_families(text: &str) -> std::result::Result<Vec<&'static str>, toml::de::Error> {
+    let given: toml::Table = toml::from_str(text)?;
+    Ok(FAMILIES.iter().map(|row| row.name).filter(|name| !given.contains_key(*name)).collect())
 }
 
 /// The built-in tables of some families, as the text of a rulebook.

@@ -57,7 +57,7 @@ pub struct FamilyRow {
     pub title: &'static str,
     /// The choices of its questions.
     pub answers: FamilyAnswers,
-    /// True if its questions are about objects with an outline, which their evidence has.
+    /// True if its questions are about objects, whose bounding boxes are in their evidence.
     pub has_outline: bool,
 }
 
@@ -66,8 +66,7 @@ pub struct FamilyRow {
 pub enum FamilyAnswers {
     /// Yes and no, balanced for each text.
     YesNo,
-    /// Words of one list for all questions. Each word's share can be capped, and a model that answers with one word
-    /// only is reported.
+    /// Words of one list for all questions; a figure shows models that answer with one word only.
     List,
     /// Objects of the frame.
     Objects,
