@@ -340,11 +340,11 @@ fn usable_probabilities(trial: Option<TrialRef<'_>>) -> Option<&OptionProbabilit
     (fits && !options.reasoned).then_some(options)
 }
 
-/// Maximum number of bins.
+/// Maximum number of bins of the expected calibration error.
 const MAX_ERROR_BINS: usize = 15;
 
-/// Minimum number of replies per bin. An arbitrary choice.
-const MIN_REPLIES_PER_ERROR_BIN: usize = 20;
+/// Minimum number of replies in a bin, of the error and of the diagram; chosen.
+const MIN_REPLIES_PER_BIN: usize = 20;
 
 /// Estimates the error of replies sorted by confidence, with its interval by the cluster bootstrap.
 ///
@@ -393,7 +393,7 @@ impl Bin {
 /// equal confidence share a bin.
 fn squared_error(replies: &[ConfidentReply], times: impl Fn(u32) -> usize) -> f64 {
     let n: usize = replies.iter().map(|reply| times(reply.cluster)).sum();
-    let bins = (n / MIN_REPLIES_PER_ERROR_BIN).clamp(1, MAX_ERROR_BINS);
+    let bins = (n / MIN_REPLIES_PER_BIN).clamp(1, MAX_ERROR_BINS);
     let (mut sum, mut bin, mut bin_index) = (0.0, Bin::default(), 0);
     let mut replies_before = 0;
     let mut last_confidence = f64::NAN;
@@ -455,11 +455,8 @@ fn shares(grid: &Grid<'_>, subject: usize) -> Vec<PositionShare> {
     shares
 }
 
-/// Maximum number of bins.
-const MAX_BINS: usize = 10;
-
-/// Minimum number of replies in a bin (chosen, the same as for the expected calibration error).
-const MIN_REPLIES_PER_BIN: usize = 20;
+/// Maximum number of bins of a reliability diagram.
+const MAX_DIAGRAM_BINS: usize = 10;
 
 /// A bin of the reliability diagram.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -475,7 +472,7 @@ pub struct ReliabilityBin {
 ///
 /// `replies` must be sorted by confidence.
 fn bins(clusters: usize, replies: &[ConfidentReply]) -> Vec<ReliabilityBin> {
-    let number = (replies.len() / MIN_REPLIES_PER_BIN).min(MAX_BINS);
+    let number = (replies.len() / MIN_REPLIES_PER_BIN).min(MAX_DIAGRAM_BINS);
     let mut bins = Vec::new();
     let mut start = 0;
     for bin in 1..=number {

@@ -11,7 +11,7 @@ use darkqa_base::types::questions::QuestionPart;
 use darkqa_base::types::text::excerpt;
 use darkqa_base::types::{QuestionId, RunQuestion, TrialKey};
 
-/// Maximum number of characters of a text in the message.
+/// Maximum number of characters of a text or name in a message.
 const MAX_CHARS: usize = 60;
 
 /// The first question that differs from the stored one, and the number of questions that differ in the same part.
@@ -77,9 +77,6 @@ fn part_text(part: QuestionPart, question: &RunQuestion) -> Option<String> {
     }
 }
 
-/// Maximum number of characters of a question's name in the message.
-const MAX_NAME_CHARS: usize = 60;
-
 /// The keys of the records about questions that are not stored, by question.
 #[derive(Debug, Default)]
 pub(super) struct LostQuestions(BTreeMap<QuestionId, Vec<TrialKey>>);
@@ -135,7 +132,7 @@ impl LostQuestions {
              the same data",
             others.count() + 1,
             self.len(),
-            excerpt(&first.0, MAX_NAME_CHARS)
+            excerpt(&first.0, MAX_CHARS)
         );
         Err(Error::Run { path: path.to_owned(), problem })
     }
