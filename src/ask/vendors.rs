@@ -1,10 +1,5 @@
-//! Vendors that host models: the built-in table and the user's own.
-//!
-//! Vendors that host models, and the limits of their endpoints: [`Vendor`]. The built-in table is `vendors.toml`.
-//!
-//! Vendors from the user's file, in the form of `vendors.toml`: [`VendorTable`].
-//!
-//! The Batch API of a vendor, from the table of vendors: [`VendorBatch`].
+//! Vendors that host models ([`Vendor`]), with the limits of their endpoints and their Batch API ([`VendorBatch`]): the
+//! built-in table, `vendors.toml`, and the user's file of the same form ([`VendorTable`]).
 
 use std::collections::BTreeMap;
 use std::num::{NonZeroU64, NonZeroUsize};

@@ -1,8 +1,6 @@
-//! Files that are written completely or not at all, by [`write()`] and [`write_synced`]; and helpers to read files, in
-//! `reading`.
-//!
-//! Readers of folders ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object
-//! a line ([`json_lines`]).
+//! Files that are written completely or not at all, by [`write()`] and [`write_synced`], and readers of folders
+//! ([`entries`]), files ([`open`]), text files ([`text`], [`settings`]) and files of one JSON object a line
+//! ([`json_lines`]).
 //!
 //! Each reader has a size limit and refuses pipes and devices: a downloaded data set may contain a link to `/dev/zero`,
 //! which would fill the memory, or a pipe, which would block for ever.

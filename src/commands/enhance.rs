@@ -496,7 +496,7 @@ fn picture(examination: &Examination) -> Rgb {
 }
 
 /// Template of the page.
-const GUIDE: &str = include_str!("../report/doctor.html");
+const TEMPLATE: &str = include_str!("enhance.html");
 
 /// Values of the page.
 #[derive(Debug, Serialize)]
@@ -544,7 +544,7 @@ pub(crate) struct DoctorCell {
 /// # Errors
 /// If the template cannot be rendered.
 pub(crate) fn page(page: &DoctorPage) -> Result<String> {
-    render(GUIDE, page)
+    render(TEMPLATE, page)
 }
 
 #[cfg(test)]

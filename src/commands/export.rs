@@ -42,7 +42,7 @@ pub(crate) struct ExportArgs {
     #[arg(value_name = "KIND", value_enum, add = Decides::Nothing)]
     pub kind: SetForm,
     /// A folder of frames, or a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them)
-    #[arg(value_name = "DATA", value_parser = data::parse_data_place, add = Decides::Reply)]
+    #[arg(value_name = "DATA", value_parser = data::parse_data_source, add = Decides::Reply)]
     pub data: DataSource,
     /// Where the sets go, one for each condition
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]

@@ -14,11 +14,11 @@ pub(crate) mod maps;
 pub(crate) mod openeqa;
 pub(crate) mod pairs;
 mod photographs;
-mod place;
 pub(crate) mod ready_made;
 mod root;
 mod scene_args;
 mod settings;
+mod source;
 
 pub(crate) use bank::{Bank, BankSource};
 pub(crate) use frames::open_images;
@@ -28,9 +28,9 @@ pub(crate) use photographs::Photographs;
 pub(crate) use ready_made::{ParquetColumns, SkipBad, cached_snapshot, refuse_lfs_pointer};
 pub(crate) use root::{Root, RootArgs};
 pub(crate) use scene_args::SceneArgs;
-pub(crate) use settings::{BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, parse_data_place};
+pub(crate) use settings::{BankArgs, DataArgs, DecodeArgs, FolderArgs, PixelLimit, SelectionArgs, parse_data_source};
 
 pub use dataset::Dataset;
 pub use frames::open_frames;
-pub use place::DataSource;
 pub use ready_made::SetArgs;
+pub use source::DataSource;

@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 
 use super::dataset::{Dataset, stem};
 use super::frames::{self, ImagePaths, MissingFiles, is_image, open_images};
-use super::place::{DataSource, is_lerobot_set, with_import_hint};
 use super::ready_made::SetArgs;
 use super::root::Root;
+use super::source::{DataSource, is_lerobot_set, with_import_hint};
 use crate::error::{Error, Result};
 use crate::pictures::image_file::format::SUPPORTED_FORMATS;
 use crate::types::text::counted;

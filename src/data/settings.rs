@@ -21,7 +21,7 @@ pub(crate) struct DataArgs {
     /// A folder of frames, a ready-made set (.parquet, .tsv, .csv, .json, .jsonl, a folder of them; a well-known one by
     /// its name, as mmbench:FILE), or built-in rooms, rooms:frames=N,seed=N,size=WIDTHxHEIGHT,light=linear; repeatable
     /// for the files of one set
-    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = parse_data_place, default_values_t = [DataSource::default()], add = Decides::Reply)]
+    #[arg(long, value_name = "DIR|FILE|rooms:…", value_parser = parse_data_source, default_values_t = [DataSource::default()], add = Decides::Reply)]
     pub data: Vec<DataSource>,
     /// Options for reading a ready-made set.
     #[command(flatten)]
@@ -142,7 +142,7 @@ impl DecodeArgs {
 
 /// Parses the value of `--data`: a path, `rooms`, `rooms:frames=48,seed=7,size=1280x720`, or a well-known set with its
 /// path, such as `mmvp:FILE`. An existing file or folder with the same name takes precedence, except for `rooms:…`.
-pub(crate) fn parse_data_place(text: &str) -> Result<DataSource, String> {
+pub(crate) fn parse_data_source(text: &str) -> Result<DataSource, String> {
     let path = PathBuf::from(text);
     match text.strip_prefix("rooms:") {
         Some(rooms) => rooms.parse().map(DataSource::Rooms),

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use clap::Args;
 
-use crate::data::{DataArgs, DataSource, Dataset, Photographs, open_frames, parse_data_place};
+use crate::data::{DataArgs, DataSource, Dataset, Photographs, open_frames, parse_data_source};
 use crate::engine::images::enhancement::enhancers;
 use crate::engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
 use crate::engine::images::frames::{Frames, Source, WalkArgs, WalkFolder, photographs};
@@ -153,7 +153,7 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
     if let Some(data) = &args.data {
         match &mut flags.walk {
             Some(walk) => walk.folder.clone_from(data),
-            None => flags.data.data = vec![parse_data_place(&data.to_string_lossy())?],
+            None => flags.data.data = vec![parse_data_source(&data.to_string_lossy())?],
         }
     }
     if !args.llie.is_empty() {

@@ -23,7 +23,7 @@ enum SecondTry {
     BrokenOff,
 }
 
-/// SecondTry about one word; locked while its first reply is asked again. `None` before.
+/// What the second try of a reply with one word showed; locked while its first reply is asked again. `None` before.
 type Word = Arc<tokio::sync::Mutex<Option<SecondTry>>>;
 
 /// What second tries showed about the unknown finish reasons of one model.

@@ -1,10 +1,5 @@
-//! Models without an endpoint: built-in ones, guesses, and replies from a file.
-//!
-//! Model that a function in this process answers for: [`Local`].
-//!
-//! Model that guesses: [`Random`].
-//!
-//! Model whose replies come from a file: [`Script`].
+//! Models without an endpoint: a function in this process ([`Local`]), guesses ([`Random`]), and replies from a file
+//! ([`Script`]).
 
 use std::collections::HashMap;
 use std::fmt;

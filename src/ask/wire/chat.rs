@@ -1,14 +1,5 @@
-//! Chat completions: requests ([`body`]), and the lenient parsing of replies ([`read`]).
-//!
-//! Requests for chat completions: [`body`].
-//!
-//! Lenient parsing of chat completions, because servers differ: [`read`].
-//!
-//! Fields of chat completion requests that servers may refuse: [`fields`].
-//!
-//! Insertion of images into the JSON of a request: [`with_images`].
-//!
-//! Parsing of the JSON in a response body: [`parse_body`].
+//! Chat completions: the JSON of a request ([`body`]), with its images ([`with_images`]) and the [`fields`] that
+//! servers may refuse; and the lenient parsing of replies ([`read`], [`parse_body`]), because servers differ.
 
 use std::borrow::Cow;
 use std::sync::Arc;

@@ -1,10 +1,7 @@
-//! OpenAI's Responses API: requests ([`body`]) and replies ([`read`]).
-//!
-//! Requests to OpenAI's Responses API: the JSON [`body`], and the [`fields`] that servers may refuse.
+//! OpenAI's Responses API: the JSON of a request ([`body`]), with the [`fields`] that servers may refuse, and the
+//! lenient parsing of replies ([`read`]).
 //!
 //! The form follows OpenAI's reference, `POST /responses`; `store` is false, so that the vendor does not store images.
-//!
-//! Lenient parsing of replies of OpenAI's Responses API: [`read`].
 
 use serde::Serialize;
 use serde_json::{Map, Value, json};

@@ -61,7 +61,7 @@ const COMPLETIONS: &str = "/v1/chat/completions";
 #[derive(Debug, Args)]
 pub(crate) struct ServeArgs {
     /// The frames that the observer knows: rooms:frames=N,seed=N,size=WIDTHxHEIGHT, or a folder of frames with maps
-    #[arg(long, value_name = "DIR|rooms:…", value_parser = data::parse_data_place, default_value_t, add = Decides::Reply)]
+    #[arg(long, value_name = "DIR|rooms:…", value_parser = data::parse_data_source, default_value_t, add = Decides::Reply)]
     pub data: DataSource,
     /// The port on 127.0.0.1, 0 for any that is free
     #[arg(long, value_name = "N", default_value_t = 8089, add = Decides::Nothing)]

@@ -1,11 +1,6 @@
-//! Columns of `records.parquet`: those of both experiments, and those of each.
-//!
-//! Columns in the tables of both experiments: [`leading_columns`], [`reply_columns`], [`image_columns`] and
-//! [`trailing_columns`].
-//!
-//! Table of the records of questions with choices.
-//!
-//! Table of the records of open questions, with one row for each answer and its mark.
+//! Columns of the table of records: those of both experiments ([`leading_columns`], [`reply_columns`],
+//! [`image_columns`], [`trailing_columns`]), of questions with choices, and of open questions, which have a row for
+//! each answer and its mark.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -43,7 +43,7 @@ use images::{Depth, Finding, Findings, Mark, lines};
 #[derive(Debug, Clone, Args)]
 pub(crate) struct CheckArgs {
     /// The data, in place of --data; default: --data
-    #[arg(value_name = "DATA", value_parser = crate::data::parse_data_place, add = Decides::Nothing)]
+    #[arg(value_name = "DATA", value_parser = crate::data::parse_data_source, add = Decides::Nothing)]
     pub place: Option<DataSource>,
     /// Decode every image, so that damage inside a file is found; one that ends early is found without
     #[arg(long, help_heading = "Check", add = Decides::Nothing)]

@@ -101,7 +101,7 @@ fn preset_config_is_ignored_for_a_single_file() {
     let (_folder, path) = with(vec![
         json!({"question": "?", "options": "['x', 'y']", "answer": "A", "image_1": base64(1), "image_2": null}),
     ]);
-    let place = crate::data::parse_data_place(&format!("mmmu:{}", path.display())).unwrap();
+    let place = crate::data::parse_data_source(&format!("mmmu:{}", path.display())).unwrap();
     let dataset = place.open(None, &SetArgs::default()).unwrap();
     assert_eq!(dataset.questions().len(), 1);
 }

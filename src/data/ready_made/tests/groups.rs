@@ -125,7 +125,7 @@ fn stored_questions_keep_their_groups() {
 }
 
 fn open_preset(name: &str, path: &std::path::Path, args: &SetArgs) -> Dataset {
-    let place = crate::data::parse_data_place(&format!("{name}:{}", path.display())).unwrap();
+    let place = crate::data::parse_data_source(&format!("{name}:{}", path.display())).unwrap();
     place.open(None, args).unwrap()
 }
 

@@ -1,8 +1,4 @@
-//! Pieces that are fixed to a wall.
-//!
-//! Pieces for bathrooms.
-//!
-//! Pieces for kitchens.
+//! Pieces for bathrooms and kitchens.
 
 use glam::{Vec3, vec3};
 

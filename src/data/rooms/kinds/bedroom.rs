@@ -1,8 +1,4 @@
-//! Bedrooms and bathrooms.
-//!
-//! Furnishing of bedrooms.
-//!
-//! Furnishing of bathrooms.
+//! Furnishing of bedrooms and bathrooms.
 
 use glam::vec3;
 

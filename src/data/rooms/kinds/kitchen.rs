@@ -1,8 +1,4 @@
-//! Kitchens and dining rooms.
-//!
-//! Furnishing of kitchens.
-//!
-//! Furnishing of dining rooms.
+//! Furnishing of kitchens and dining rooms.
 
 use glam::{Vec3, vec3};
 

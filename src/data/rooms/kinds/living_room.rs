@@ -1,8 +1,4 @@
-//! Living rooms and offices.
-//!
-//! Furnishing of living rooms.
-//!
-//! Furnishing of offices.
+//! Furnishing of living rooms and offices.
 
 use glam::vec3;
 

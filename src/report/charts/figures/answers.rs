@@ -1,12 +1,5 @@
-//! Figures of what models answer: wrong answers, confidence, enhancers, and photographs in the dark.
-//!
-//! Figures of wrong answers in the dark: hallucinated objects, and collapse to one answer.
-//!
-//! Figure of mean confidence and accuracy by level.
-//!
-//! Figure of accuracy raw and with each enhancer.
-//!
-//! Bar chart for a data set that was photographed in the dark: accuracy raw and with each enhancer.
+//! Figures of what models answer: hallucinated objects and collapse to one answer in the dark; mean confidence and
+//! accuracy by level; accuracy raw and with each enhancer, also of a data set that was photographed in the dark.
 
 use super::{ACCURACY, FigureBuilder, FigureSpec};
 use crate::report::charts::chart::{

@@ -1,18 +1,6 @@
-//! Figures of reports as SVG, and the drawing of each kind of panel.
-//!
-//! SVG figures of reports, at the width of a page: [`figure`], [`point_figure`] and [`count_figure`].
-//!
-//! Drawing of bar charts: [`bars`].
-//!
-//! Drawing of count panels as horizontal bars with counts and shares: [`counts`].
-//!
-//! Drawing of panels of points and lines over two numeric axes: [`points`].
-//!
-//! Arrangement of several sheets in rows and columns on one sheet: [`arrange_in_rows`].
-//!
-//! Drawing of reliability diagrams: [`reliability`].
-//!
-//! Drawing of threshold charts: [`thresholds`].
+//! Figures of reports as SVG, at the width of a page ([`figure`], [`point_figure`], [`count_figure`]), and the drawing
+//! of their panels: [`bars`], [`counts`], [`points`], [`reliability`] and [`thresholds`], arranged by
+//! [`arrange_in_rows`].
 
 use super::font::Font;
 use super::legend::{Legend, LegendEntry, LegendSample};
