@@ -231,7 +231,7 @@ pub(super) struct VendorTable(&'static [Vendor]);
 /// Content of a file.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-struct Rows {
+struct VendorFile {
     /// Date of the table.
     #[expect(dead_code, reason = "for readers of the table")]
     as_of: Option<String>,
@@ -246,7 +246,7 @@ impl VendorTable {
     /// not show the key.
     pub(crate) fn read(path: &Path) -> Result<Self> {
         let text = files::settings(path)?;
-        let Rows { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
+        let VendorFile { vendor: rows, .. } = toml::from_str(&text).map_err(|e: toml::de::Error| {
             let TomlFault { line, problem } = TomlFault::new(&text, &e);
             invalid_file(path, &format!("line {line}: {problem}"))
         })?;

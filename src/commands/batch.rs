@@ -13,7 +13,7 @@ use crate::engine::images::progress::Progress;
 use crate::error::Result;
 use crate::report::joined::{open, whole};
 use crate::runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
-use crate::runs::{Outcome, ShowArgs, StdoutFormat, record_table};
+use crate::runs::{Outcome, PrintArgs, StdoutFormat, record_table};
 use crate::store::{AddressChange, Store};
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{ChoiceDetail, Decides, OpenDetail, TrialRef};
@@ -30,7 +30,7 @@ pub(crate) struct BatchImportArgs {
     pub files: Vec<PathBuf>,
     /// How the report is printed.
     #[command(flatten)]
-    pub show: ShowArgs,
+    pub show: PrintArgs,
 }
 
 /// Imports the replies of output and error files. Each reply is imported once, even if a file is imported again.
@@ -59,7 +59,7 @@ fn import_into<D: Detail>(
 fn report<D: Detail>(
     store: &Store<D>,
     manifest: RunManifest,
-    show: &ShowArgs,
+    show: &PrintArgs,
     text: &str,
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
@@ -97,7 +97,7 @@ pub(crate) struct BatchFolderArgs {
     pub collect: CollectArgs,
     /// How the report is printed.
     #[command(flatten)]
-    pub show: ShowArgs,
+    pub show: PrintArgs,
 }
 
 /// Prints the progress of the batches of a run. Changes nothing, and works while another process is waiting for them.

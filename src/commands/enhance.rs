@@ -18,7 +18,7 @@ use crate::engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunA
 use crate::engine::images::enhancement::{dark_or_darkened, evenly_spaced_indices};
 use crate::engine::images::frames::InputTally;
 use crate::engine::images::progress::Progress;
-use crate::engine::images::stored::{ImageCounts, ImageOrigin, OutputImage, Refusals};
+use crate::engine::images::stored::{ImageCounts, ImageOrigin, ImageRefusals, OutputImage};
 use crate::engine::manifest;
 use crate::error::{Error, Result};
 use crate::files::write;
@@ -66,7 +66,7 @@ enum EnhanceForm {
 
 /// The enhancer, and how it is run.
 #[derive(Debug, Args)]
-struct ModelArgs {
+struct OneEnhancerArgs {
     /// The enhancer: lift or gray-gain, which are built in; FILE.onnx; or PRESET:FILE.onnx (zero-dce, zero-dce++,
     /// ruas-lol, ruas-upe, ruas-dark, sci, iat, pairlie, pairlie-lol, enlightengan, uretinex, retinexformer, darkir,
     /// cidnet, llformer, restormer, mirnet, kind, agllnet, zero-dce-tf)
@@ -93,7 +93,7 @@ struct InputArgs {
 struct DescribeArgs {
     /// The enhancer.
     #[command(flatten)]
-    enhancer: ModelArgs,
+    enhancer: OneEnhancerArgs,
 }
 
 /// The flags of `enhance doctor`.
@@ -101,7 +101,7 @@ struct DescribeArgs {
 struct DoctorArgs {
     /// The enhancer.
     #[command(flatten)]
-    enhancer: ModelArgs,
+    enhancer: OneEnhancerArgs,
     /// The images.
     #[command(flatten)]
     images: InputArgs,
@@ -116,7 +116,7 @@ struct DoctorArgs {
 struct EnhanceArgs {
     /// The enhancer.
     #[command(flatten)]
-    enhancer: ModelArgs,
+    enhancer: OneEnhancerArgs,
     /// The images.
     #[command(flatten)]
     images: InputArgs,
@@ -131,7 +131,7 @@ struct EnhanceArgs {
     force: bool,
 }
 
-impl ModelArgs {
+impl OneEnhancerArgs {
     fn file(&self) -> Result<ModelFile> {
         ModelFile::read(&self.model).map_err(|e| e.usage_at("MODEL"))
     }
@@ -210,7 +210,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let settings = pixel_settings(&digest, &loading.size);
     let overruled_problem = enhancer.overruled_problem();
     let mut counts = ImageCounts::default();
-    let refusals = Refusals::default();
+    let refusals = ImageRefusals::default();
     let mut burnt = Vec::new();
     for entry in &images.entries {
         let picture = images.picture(entry);
@@ -318,7 +318,7 @@ impl EnhancedOrigin {
 
 /// Opens an enhancer, and returns whether it is known which of its outputs is the image. If unknown, the first usable
 /// output is opened.
-fn open_for_examination(args: &ModelArgs) -> Result<(Enhancer, ImageOutput)> {
+fn open_for_examination(args: &OneEnhancerArgs) -> Result<(Enhancer, ImageOutput)> {
     let problem = match args.open(args.file()?) {
         Ok(enhancer) => return Ok((enhancer, ImageOutput::Known)),
         Err(problem) => problem,

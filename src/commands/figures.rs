@@ -13,9 +13,11 @@ use crate::files;
 use crate::pictures::{decode_data_url, png};
 use crate::report::charts::chart::FigureChart;
 use crate::report::charts::figures::{
-    FIGURES, FigureSpec, KnownNames, Names, figure_specs, missing_threshold_message, overview, paper_tables,
+    DisplayNames, FIGURES, FigureSpec, KnownNames, figure_specs, missing_threshold_message, overview, paper_tables,
 };
-use crate::report::charts::paper::{Look, OverviewSheet, Palette, Sheet, overview_sheet, pdf, sheet, svg, tables, tex};
+use crate::report::charts::paper::{
+    FigureColours, Look, OverviewSheet, Sheet, overview_sheet, pdf, sheet, svg, tables, tex,
+};
 use crate::report::joined::FigureRuns;
 use crate::report::text::table::Table;
 use crate::runs::Outcome;
@@ -66,7 +68,7 @@ pub(crate) struct FiguresArgs {
     pub order: Vec<String>,
     /// The colours of lines; grey is for papers that are printed without colour
     #[arg(long, value_enum, default_value = "colour", add = Decides::Nothing)]
-    pub palette: Palette,
+    pub palette: FigureColours,
     /// Height of the letters in points, from 4 to 24; default: that of the captions of the venue
     #[arg(long, value_name = "PT", value_parser = font_size, add = Decides::Nothing)]
     pub font_size: Option<f64>,
@@ -117,7 +119,8 @@ pub(crate) fn figures(args: &FiguresArgs) -> Result<Outcome> {
     let runs = FigureRuns::open(&args.runs)?;
     let all = runs.findings();
     let findings = all.shown();
-    let names = Names::new(&args.label, &args.order, args.reference.as_ref(), &KnownNames::from_findings(findings))?;
+    let names =
+        DisplayNames::new(&args.label, &args.order, args.reference.as_ref(), &KnownNames::from_findings(findings))?;
     let mut output = String::new();
     for alert in runs.alerts(&all) {
         let _ = writeln!(output, "note: {}", alert.text);

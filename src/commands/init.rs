@@ -107,9 +107,9 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
 }
 
 /// A row of the question table.
-type Row = Vec<String>;
+type QuestionRow = Vec<String>;
 
-fn row(image: &str, question: &str, choices: &[String], truth: usize, category: &str) -> Row {
+fn row(image: &str, question: &str, choices: &[String], truth: usize, category: &str) -> QuestionRow {
     let mut row = vec![image.to_owned(), question.to_owned()];
     row.extend(choices.iter().cloned());
     row.resize(2 + CHOICE_COLUMNS, String::new());
@@ -118,7 +118,7 @@ fn row(image: &str, question: &str, choices: &[String], truth: usize, category: 
 }
 
 /// Writes images of built-in rooms, and returns rows with questions by rule about them.
-fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
+fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<QuestionRow>> {
     let rooms = ROOMS.parse().map_err(|e: String| Error::data("rooms", e))?;
     let (place, rules) = (DataSource::Rooms(rooms), Rules::built_in()?);
     let (set, selection) = (SetArgs::default(), SelectionArgs::default());
@@ -151,7 +151,7 @@ fn room_rows(folder: &Path, progress: &Progress) -> Result<Vec<Row>> {
 
 /// Copies images of a folder, and returns rows with questions about their colours and shape, which can be asked about
 /// any image.
-fn image_rows(frames: &Path, folder: &Path) -> Result<Vec<Row>> {
+fn image_rows(frames: &Path, folder: &Path) -> Result<Vec<QuestionRow>> {
     let dataset = open_images(frames, &[])?;
     let copies: Vec<(&FrameId, &Path, PathBuf)> = dataset
         .frames()

@@ -11,7 +11,7 @@ use crate::runs::missing_thumbnails::MissingThumbnails;
 use crate::runs::shard_records::append_records;
 use crate::runs::sharded_run::{MissingShards, ShardedRun, common_kind, run_folders_in};
 use crate::runs::stored::{ExperimentKind, StoredRun};
-use crate::runs::{Outcome, ShowArgs, StdoutFormat, record_table};
+use crate::runs::{Outcome, PrintArgs, StdoutFormat, record_table};
 use crate::store::{self, AddressChange, Store};
 use crate::types::{ChoiceDetail, Decides, OpenDetail};
 use darkqa_score::answers::record::Detail;
@@ -33,7 +33,7 @@ pub(crate) struct MergeArgs {
     pub partial: bool,
     /// How the report is printed.
     #[command(flatten)]
-    pub show: ShowArgs,
+    pub show: PrintArgs,
 }
 
 /// Merges shards into one run, with all records in the order of the questions and the report that a single run would

@@ -52,8 +52,8 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     };
     let conditions = conditions(&item.answers, &args)?;
     let target = match &args.out {
-        Some(out) => Target { trusted: out.clone(), out: out.clone() },
-        None => Target { trusted: folder.clone(), out: folder.join("shown") },
+        Some(out) => ImageFolder { trusted: out.clone(), out: out.clone() },
+        None => ImageFolder { trusted: folder.clone(), out: folder.join("shown") },
     };
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
     let mut text = item.text.clone();
@@ -96,14 +96,14 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
 }
 
 /// Output folder of the images.
-struct Target {
+struct ImageFolder {
     /// Folder named by the user: the run or `--out`. It may be a symbolic link.
     trusted: PathBuf,
     /// Folder of the images: `trusted` or a folder in it.
     out: PathBuf,
 }
 
-impl Target {
+impl ImageFolder {
     /// Path of an image. Frame names can contain folders, and a run may come from a stranger.
     ///
     /// # Errors
@@ -130,7 +130,12 @@ fn shown_frames(item: &ShownItem) -> Vec<FrameId> {
 }
 
 /// Writes the images of a frame in a condition. Returns their paths, one per line.
-fn write_images(target: &Target, source: &FrameId, condition: &Condition, images: &[Arc<Payload>]) -> Result<String> {
+fn write_images(
+    target: &ImageFolder,
+    source: &FrameId,
+    condition: &Condition,
+    images: &[Arc<Payload>],
+) -> Result<String> {
     let mut text = String::new();
     for (index, image) in images.iter().enumerate() {
         let suffix = if images.len() > 1 { format!("_{index:03}") } else { String::new() };

@@ -22,7 +22,7 @@ use crate::pictures::Payload;
 use crate::report::joined::whole;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::stored::StoredRun;
-use crate::runs::{Outcome, ShowArgs, record_table};
+use crate::runs::{Outcome, PrintArgs, record_table};
 use crate::store::{AddressChange, Store, now, read_questions};
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::text::{counted, plural};
@@ -190,7 +190,7 @@ pub(crate) struct ReadArgs {
     pub name: String,
     /// How the report is printed.
     #[command(flatten)]
-    pub show: ShowArgs,
+    pub show: PrintArgs,
 }
 
 /// A line of a file of answers.
@@ -206,7 +206,7 @@ struct AnswerLine {
 
 /// Counts of the imported and rejected lines.
 #[derive(Debug, Default)]
-struct AnswerCounts {
+struct ImportCounts {
     answers: usize,
     /// Items that the run did not ask.
     unknown: BTreeSet<String>,
@@ -234,7 +234,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let instead = "openeqa --answers NAME=FILE reads what people answered";
     let asked_run = StoredRun::open_choices(&args.run, instead)?.with_truths("what people answer is scored by them")?;
     let asked = trials_by_item(&asked_run.trials);
-    let mut counts = AnswerCounts::default();
+    let mut counts = ImportCounts::default();
     let mut lines = Vec::new();
     for path in &args.files {
         lines.extend(read_answers(path)?);
@@ -411,7 +411,7 @@ impl People {
     }
 }
 
-fn summary(counts: &AnswerCounts) -> String {
+fn summary(counts: &ImportCounts) -> String {
     let mut text = format!("answers imported: {}\n", counts.answers);
     if let Some(first) = counts.unknown.first() {
         let count = counts.unknown.len();

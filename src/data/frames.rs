@@ -70,7 +70,7 @@ type SegmentNames = BTreeMap<String, Arc<BTreeMap<u32, SegmentName>>>;
 
 /// Fields of a line of `frames.jsonl` that are used.
 #[derive(Debug, Deserialize)]
-struct FrameLine {
+struct FrameFields {
     scene: String,
     frame: String,
     rgb: PathBuf,
@@ -112,7 +112,7 @@ impl MissingFiles {
     }
 }
 
-impl FrameLine {
+impl FrameFields {
     /// Converts the line to the files of its frame and the facts about it.
     fn into_source(
         self,
@@ -306,7 +306,7 @@ pub(super) fn image(path: &Path) -> Result<BTreeMap<FrameId, ImageSource>> {
 fn listed_frames(root: &Root, list: &Path, missing: MissingFiles) -> Result<BTreeMap<FrameId, ImageSource>> {
     let (info, mut names) = (data_set_info(root)?, SegmentNames::new());
     let mut sources = BTreeMap::new();
-    for (number, line) in json_lines::<FrameLine>(list)? {
+    for (number, line) in json_lines::<FrameFields>(list)? {
         let id = FrameId(format!("{}/{}", line.scene, line.frame));
         if !names.contains_key(&line.scene) {
             let scene_names = segment_names(root, &line.scene).map_err(|problem| Error::line(list, number, problem))?;

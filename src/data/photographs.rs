@@ -71,7 +71,7 @@ impl Photographs {
             return Ok(Self { dataset, notes });
         }
         let root = Root::new(folder, further)?;
-        let mut scan = Scan::default();
+        let mut scan = PhotographScan::default();
         scan.add_folder(&root, folder)?;
         let has_parquet =
             scan.files.iter().any(|path| path.extension().is_some_and(|name| name.eq_ignore_ascii_case("parquet")));
@@ -105,7 +105,7 @@ impl Photographs {
 
 /// Files in a folder and its subfolders.
 #[derive(Debug, Default)]
-struct Scan {
+struct PhotographScan {
     files: Vec<PathBuf>,
     /// Canonical paths of the scanned folders, so that a link to one of them is not followed again.
     seen: BTreeSet<PathBuf>,
@@ -113,7 +113,7 @@ struct Scan {
     links_out: Vec<PathBuf>,
 }
 
-impl Scan {
+impl PhotographScan {
     fn add_folder(&mut self, root: &Root, folder: &Path) -> Result<()> {
         let real = folder.canonicalize().map_err(|e| Error::file(folder, "read", e))?;
         if !self.seen.insert(real) {

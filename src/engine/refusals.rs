@@ -18,16 +18,16 @@ use crate::engine::lanes::PreparedTrial;
 use crate::types::{Failure, FailureKind, TrialKey};
 
 /// Status and cause of a refusal.
-type Cause = (u16, String);
+type RefusalCause = (u16, String);
 
 /// A trial that was refused, and waits for another answer of its model.
-struct Waiting<I> {
+struct WaitingTrial<I> {
     ready: PreparedTrial<I>,
     error: AskError,
-    cause: Cause,
+    cause: RefusalCause,
 }
 
-impl<I> Waiting<I> {
+impl<I> WaitingTrial<I> {
     fn is_by_status(&self) -> bool {
         self.error.reach == Reach::ByStatus
     }
@@ -40,11 +40,11 @@ const STATUS_REFUSALS_AT_END: usize = 3;
 /// Refused trials of one model.
 struct OfModel<I> {
     has_answered: bool,
-    waiting: Vec<Waiting<I>>,
+    waiting: Vec<WaitingTrial<I>>,
     /// The first refusal of each trial that was asked again.
-    again: BTreeMap<TrialKey, (Cause, AskError)>,
+    again: BTreeMap<TrialKey, (RefusalCause, AskError)>,
     /// Causes for which a trial was refused twice, with an answer to another trial in between.
-    confirmed: BTreeSet<Cause>,
+    confirmed: BTreeSet<RefusalCause>,
 }
 
 /// Refused trials of all models.
@@ -80,7 +80,7 @@ impl<I> Refusals<I> {
     /// Adds a trial that waits.
     pub(super) fn add(&mut self, ready: PreparedTrial<I>, error: AskError) {
         if let Some(cause) = unknown_cause(&error) {
-            self.models[ready.trial.model].waiting.push(Waiting { ready, error, cause });
+            self.models[ready.trial.model].waiting.push(WaitingTrial { ready, error, cause });
         }
     }
 
@@ -154,7 +154,7 @@ impl<I> Refusals<I> {
         self.models
             .iter_mut()
             .flat_map(|model| std::mem::take(&mut model.waiting))
-            .map(|Waiting { ready, error, .. }| {
+            .map(|WaitingTrial { ready, error, .. }| {
                 let reach = match error.reach {
                     Reach::ByStatus if is_over => Reach::Endpoint,
                     reach => reach,
@@ -169,12 +169,12 @@ impl<I> OfModel<I> {
     /// Takes one waiting trial of each cause that no trial is asked again for; those refused by a status only if
     /// `by_status`.
     fn release(&mut self, by_status: bool) -> Vec<PreparedTrial<I>> {
-        let mut causes: BTreeSet<Cause> = self.again.values().map(|(cause, _)| cause.clone()).collect();
+        let mut causes: BTreeSet<RefusalCause> = self.again.values().map(|(cause, _)| cause.clone()).collect();
         let mut released = Vec::new();
         for waiting in std::mem::take(&mut self.waiting) {
             let is_open = by_status || !waiting.is_by_status();
             if is_open && causes.insert(waiting.cause.clone()) {
-                let Waiting { ready, error, cause } = waiting;
+                let WaitingTrial { ready, error, cause } = waiting;
                 self.again.insert(ready.trial.key, (cause, error));
                 released.push(ready);
             } else {
@@ -188,16 +188,16 @@ impl<I> OfModel<I> {
     /// if `by_status`.
     fn filtered(&mut self, by_status: bool) -> Vec<Finished<I>> {
         let confirmed = &self.confirmed;
-        let (known, rest) = std::mem::take(&mut self.waiting).into_iter().partition(|waiting: &Waiting<I>| {
+        let (known, rest) = std::mem::take(&mut self.waiting).into_iter().partition(|waiting: &WaitingTrial<I>| {
             confirmed.contains(&waiting.cause) && (by_status || !waiting.is_by_status())
         });
         self.waiting = rest;
-        known.into_iter().map(|Waiting { ready, error, .. }| (ready, error.into_filtered())).collect()
+        known.into_iter().map(|WaitingTrial { ready, error, .. }| (ready, error.into_filtered())).collect()
     }
 }
 
 /// The cause of a refusal that may concern the content, if it is not known to be moderation; `None` for other errors.
-fn unknown_cause(error: &AskError) -> Option<Cause> {
+fn unknown_cause(error: &AskError) -> Option<RefusalCause> {
     let is_open = error.failure.kind == FailureKind::Request && matches!(error.reach, Reach::Trial | Reach::ByStatus);
     let refusal = error.refusal.as_ref().filter(|_| is_open)?;
     Some((refusal.status, refusal.cause.clone()))
@@ -205,11 +205,11 @@ fn unknown_cause(error: &AskError) -> Option<Cause> {
 
 /// First failure of each model and kind. Images that cannot be made are the same for all models.
 #[derive(Debug, Default)]
-pub(super) struct FirstFailures(BTreeMap<(usize, FailureKind), FirstFailure>);
+pub(super) struct FirstFailures(BTreeMap<(usize, FailureKind), TrialFailure>);
 
 /// Frame or walk of a failed trial, and the message of its failure.
 #[derive(Debug)]
-struct FirstFailure {
+struct TrialFailure {
     source: String,
     message: String,
 }
@@ -223,13 +223,13 @@ impl FirstFailures {
         };
         self.0
             .entry((model, failure.kind))
-            .or_insert_with(|| FirstFailure { source: source.to_owned(), message: failure.message.clone() });
+            .or_insert_with(|| TrialFailure { source: source.to_owned(), message: failure.message.clone() });
     }
 
     /// Warns about each kind of failure, except of stopped models, whose error describes it.
     pub(super) fn warn(&self, models: &[ModelUnderTest], is_stopped: impl Fn(usize) -> bool) {
         for ((model, kind), failure) in &self.0 {
-            let FirstFailure { source, message } = failure;
+            let TrialFailure { source, message } = failure;
             if *kind == FailureKind::Image {
                 // The message names the frame.
                 tracing::warn!("a trial failed: {message}");

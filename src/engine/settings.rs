@@ -22,7 +22,7 @@ use crate::error::{Error, Result};
 use crate::files::FolderAccess;
 use crate::pictures::{ImageArgs, PayloadFormat};
 use crate::runs::batch_system::TaskRange;
-use crate::runs::outcome::{RecordTable, ShowArgs, StdoutFormat};
+use crate::runs::outcome::{PrintArgs, RecordTable, StdoutFormat};
 use crate::runs::resolved_shard::ResolvedShard;
 use crate::runs::run_plan::RunPlan;
 use crate::runs::shard::Shard;
@@ -126,7 +126,7 @@ pub(crate) struct OutputArgs {
     pub shared: bool,
     /// How the report is printed.
     #[command(flatten)]
-    pub show: ShowArgs,
+    pub show: PrintArgs,
 }
 
 /// Validated settings that all experiments share. Files, environment variables and API keys are read to resolve them,

@@ -13,7 +13,7 @@ use super::conventions::sidecar::{self, ADD};
 use super::failure::{RunFailure, describe_invalid_values, format_size};
 use super::files::{ModelFile, RandomOperators, computed_products, traced_sizes};
 use super::graphs::{Graph, GraphSource, LoadLimits, RunResult, Stopper};
-use super::inputs::DarkImage;
+use super::inputs::DegradedImage;
 use super::libraries::Runtime;
 use super::limits::{self, MAX_CONSECUTIVE_OVERRUNS, MemoryCheck, MemoryLimit, TimeLimit, out_of_memory};
 use super::outputs::InvalidValues;
@@ -396,7 +396,7 @@ impl Enhancer {
     fn attempt_planned(&mut self, image: &Rgb, rule: SizeRule, plan: &SizePlan) -> Result<Attempt> {
         let size = [image.height(), image.width()];
         let mut canvas = TiledImage::new(plan.geometry.area);
-        let dark = DarkImage::new(image);
+        let dark = DegradedImage::new(image);
         for (row, column) in plan.tiles.tiles() {
             let input = TileWindow::for_input(row, column);
             let output = TileWindow::for_output(row, column);

@@ -62,8 +62,8 @@ pub use graphs::{LoadLimits, Network, Stopper};
 pub use libraries::{Install, Runtime, RuntimeSearch, disable_telemetry};
 pub use limits::{MemoryLimit, TimeLimit};
 pub use probes::{
-    DARK, Examination, FRAMES, Findings, ImageOutput, ImageUse, Implausible, ProposedLine, Settled, Usage, brightness,
-    burnt_out, shows_nothing,
+    DARK, Examination, FRAMES, ImageOutput, ImageUse, Implausible, ProbeFindings, ProposedLine, Settled, Usage,
+    brightness, burnt_out, shows_nothing,
 };
 pub use settings::{EnhancedFolder, EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 pub use sizing::Tiling;

@@ -4,7 +4,7 @@ use image::imageops::{FilterType, resize};
 use image::{ImageBuffer, Luma};
 
 use super::conventions::{Channels, Rounding};
-use super::expressions::Sample;
+use super::expressions::PixelValue;
 use darkqa_base::types::Rgb;
 
 /// Planar image with samples in 0..1: red, green and blue planes, or a single plane.
@@ -42,11 +42,11 @@ impl Planes {
     }
 
     /// Value of the pixel with this index, counted row by row.
-    pub(super) fn sample(&self, pixel: usize) -> Sample {
+    pub(super) fn sample(&self, pixel: usize) -> PixelValue {
         let plane = self.height * self.width;
         match self.samples.get(2 * plane + pixel) {
-            Some(blue) => Sample::Three([self.samples[pixel], self.samples[plane + pixel], *blue]),
-            None => Sample::One(self.samples[pixel]),
+            Some(blue) => PixelValue::Three([self.samples[pixel], self.samples[plane + pixel], *blue]),
+            None => PixelValue::One(self.samples[pixel]),
         }
     }
 

@@ -108,12 +108,12 @@ const OCTAVES: usize = 21;
 const DARKEST: f32 = 1.0 / 1_048_576.0;
 
 /// Codes by light, for pieces of equal width within each octave.
-static TABLE: LazyLock<Box<[Piece]>> = LazyLock::new(|| {
+static TABLE: LazyLock<Box<[TablePiece]>> = LazyLock::new(|| {
     (0..(OCTAVES * PIECES_PER_OCTAVE) as u32)
         .map(|index| {
             let start = f32::from_bits(DARKEST.to_bits() + (index << OFFSET_BITS));
             let code = (255.0 * libm::pow(f64::from(start), 1.0 / GAMMA) + 0.5).floor();
-            Piece { next: round_up(libm::pow((code + 0.5) / 255.0, GAMMA)), code: code as u32 }
+            TablePiece { next: round_up(libm::pow((code + 0.5) / 255.0, GAMMA)), code: code as u32 }
         })
         .collect()
 });
@@ -126,7 +126,7 @@ fn round_up(x: f64) -> f32 {
 
 /// Codes of the light in one piece of the table.
 #[derive(Debug, Clone, Copy)]
-struct Piece {
+struct TablePiece {
     /// Smallest light with the next code.
     next: f32,
     /// Code at the start of the piece.

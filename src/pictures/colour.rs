@@ -1,4 +1,4 @@
-//! Colour space of an image: the colour information in its file ([`ColourTag`]) and its interpretation ([`Meaning`]).
+//! Colour space of an image: the colour information in its file ([`ColourTag`]) and its interpretation ([`CodeMeaning`]).
 //!
 //! A PNG file may have several kinds of colour information. In order of priority (PNG specification, third edition,
 //! section 4.3): code points (`cICP`), an ICC profile, the chunk `sRGB`, gamma and primaries (`gAMA`, `cHRM`). Without
@@ -16,7 +16,7 @@ mod tests;
 use std::io::Read as _;
 use std::sync::{Arc, LazyLock};
 
-use self::icc::Profile;
+use self::icc::IccProfile;
 use self::space::{REMEDY, rgb_space};
 use conversion::{Primaries, ToneCurve};
 use darkqa_base::types::values::Recent;
@@ -24,7 +24,7 @@ use darkqa_base::types::{ColourHandling, Digest};
 use space::primaries_number;
 
 pub(super) use self::inks::Inks;
-pub(super) use self::space::{CodeDepth, ColourSpace, Meaning};
+pub(super) use self::space::{CodeDepth, CodeMeaning, ColourSpace};
 pub(super) use space::CodePoints;
 
 /// Maximum size of an ICC profile, in bytes; chosen. Matrix profiles have a few thousand bytes, printer profiles up to
@@ -67,9 +67,9 @@ impl ColourTag {
     ///
     /// # Errors
     /// If the colour space is unknown or cannot be converted. The error names the colour space and the remedy.
-    pub(super) fn meaning(&self, depth: CodeDepth) -> Result<Meaning, String> {
+    pub(super) fn meaning(&self, depth: CodeDepth) -> Result<CodeMeaning, String> {
         match self {
-            Self::None | Self::Srgb => Ok(Meaning::Srgb),
+            Self::None | Self::Srgb => Ok(CodeMeaning::Srgb),
             Self::CodePoints(points) => meaning_from_code_points(*points, depth),
             Self::Profile(profile) => meaning_from_profile(profile, depth),
             Self::DeflatedProfile(chunk) => meaning_from_profile(&decompress_profile(chunk)?, depth),
@@ -92,15 +92,15 @@ impl ColourTag {
 }
 
 /// The colour space of linear light with these primaries.
-fn meaning_from_primaries(primaries: &Primaries) -> Meaning {
+fn meaning_from_primaries(primaries: &Primaries) -> CodeMeaning {
     let Primaries { red, green, blue, white } = primaries;
     let [red, green, blue, white] = [red, green, blue, white].map(|[x, y]| format!("{x:.4} {y:.4}"));
     let name = format!("primaries {red}, {green}, {blue}, white {white}");
-    Meaning::Other(Arc::new(rgb_space(name, ToneCurve::Gamma(1.0), primaries, ColourHandling::Converted)))
+    CodeMeaning::Other(Arc::new(rgb_space(name, ToneCurve::Gamma(1.0), primaries, ColourHandling::Converted)))
 }
 
 /// Interprets code points of H.273: primaries, transfer, matrix, and 1 for the full range.
-fn meaning_from_code_points(points: [u8; 4], depth: CodeDepth) -> Result<Meaning, String> {
+fn meaning_from_code_points(points: [u8; 4], depth: CodeDepth) -> Result<CodeMeaning, String> {
     let [primaries, transfer, matrix, range] = points;
     if range == 0 {
         return Err(format!("the codes have the narrow range of video; {REMEDY}"));
@@ -117,8 +117,8 @@ fn meaning_from_code_points(points: [u8; 4], depth: CodeDepth) -> Result<Meaning
 /// Interprets an ICC profile. The most recent profiles are cached by their digests.
 ///
 /// Of HDR profiles, which convert by tables, the code points are used.
-fn meaning_from_profile(profile: &[u8], depth: CodeDepth) -> Result<Meaning, String> {
-    static CACHE: LazyLock<Recent<Digest, Meaning>> = LazyLock::new(|| Recent::new(CACHED_PROFILES));
+fn meaning_from_profile(profile: &[u8], depth: CodeDepth) -> Result<CodeMeaning, String> {
+    static CACHE: LazyLock<Recent<Digest, CodeMeaning>> = LazyLock::new(|| Recent::new(CACHED_PROFILES));
     if profile.len() > MAX_PROFILE_BYTES {
         return Err(profile_too_large());
     }
@@ -127,12 +127,12 @@ fn meaning_from_profile(profile: &[u8], depth: CodeDepth) -> Result<Meaning, Str
     }
     let digest = Digest::from_bytes(profile);
     CACHE.get(&digest, || {
-        let Profile { name, conversion, is_grey, is_video } =
-            Profile::read(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
+        let IccProfile { name, conversion, is_grey, is_video } =
+            IccProfile::read(profile).map_err(|problem| format!("{problem}; {REMEDY}"))?;
         if conversion.is_identity() {
-            return Ok(Meaning::Srgb);
+            return Ok(CodeMeaning::Srgb);
         }
-        Ok(Meaning::Other(Arc::new(ColourSpace {
+        Ok(CodeMeaning::Other(Arc::new(ColourSpace {
             conversion,
             name,
             profile: Some(digest),
@@ -173,7 +173,7 @@ impl Gamma {
     /// Tolerance for exponents, because encoders round them differently (chosen).
     const TOLERANCE: u32 = 50;
 
-    fn meaning(self, depth: CodeDepth) -> Result<Meaning, String> {
+    fn meaning(self, depth: CodeDepth) -> Result<CodeMeaning, String> {
         let primaries = match self.primaries {
             None => 1,
             Some(stated) => primaries_number(stated).ok_or_else(|| unknown_primaries(stated))?,
@@ -238,8 +238,8 @@ impl StatedColours {
         let points = CodePoints { primaries: self.primaries, transfer: self.transfer };
         // Frames have 8 bits at the end, in which linear light has too few codes.
         match points.meaning(CodeDepth::Eight)? {
-            Meaning::Srgb | Meaning::Linear => Ok(None),
-            Meaning::Other(space) => {
+            CodeMeaning::Srgb | CodeMeaning::Linear => Ok(None),
+            CodeMeaning::Other(space) => {
                 Ok(Some(FrameConversion { tables: space.conversion.tables(u16::MAX.into()), space }))
             }
         }

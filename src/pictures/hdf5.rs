@@ -68,7 +68,7 @@ struct Object {
 }
 
 /// A message of an object header.
-struct Message<'a> {
+struct HeaderMessage<'a> {
     kind: u64,
     data: Bytes<'a>,
 }
@@ -133,7 +133,7 @@ impl<'a> Bytes<'a> {
     }
 
     /// The messages of an object header.
-    fn messages(self, header: u64) -> Result<Vec<Message<'a>>, String> {
+    fn messages(self, header: u64) -> Result<Vec<HeaderMessage<'a>>, String> {
         if self.number(header, 1)? != 1 {
             return Err(
                 "the HDF5 file has object headers of libver=\"latest\", which are not read; write it with h5py's default, or as .npy"
@@ -152,7 +152,7 @@ impl<'a> Bytes<'a> {
                 if kind == CONTINUATION {
                     blocks.push((data.number(0, 8)?, data.number(8, 8)?));
                 }
-                messages.push(Message { kind, data });
+                messages.push(HeaderMessage { kind, data });
                 at += 8 + size;
             }
         }
@@ -230,7 +230,7 @@ const SYMBOL_TABLE: u64 = 17;
 
 /// A filter of the chunk pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Filter {
+enum ChunkFilter {
     Deflate,
     Shuffle,
     /// A checksum of four bytes at the end, which is not verified.
@@ -254,7 +254,7 @@ struct ArrayLayout {
     /// Size of a number, in bytes.
     number_size: usize,
     storage: Storage,
-    filters: Vec<Filter>,
+    filters: Vec<ChunkFilter>,
 }
 
 impl ArrayLayout {
@@ -341,12 +341,12 @@ impl ArrayLayout {
         let mut bytes = stored.to_vec();
         for (_, filter) in self.filters.iter().enumerate().rev().filter(|(index, _)| skipped >> index & 1 == 0) {
             bytes = match filter {
-                Filter::Checksum => {
+                ChunkFilter::Checksum => {
                     bytes.truncate(bytes.len().saturating_sub(4));
                     bytes
                 }
-                Filter::Deflate => inflate(&bytes, chunk_size + 4)?,
-                Filter::Shuffle => unshuffle(&bytes, self.number_size),
+                ChunkFilter::Deflate => inflate(&bytes, chunk_size + 4)?,
+                ChunkFilter::Shuffle => unshuffle(&bytes, self.number_size),
             };
         }
         if bytes.len() == chunk_size {
@@ -393,16 +393,16 @@ fn number_type(message: Bytes<'_>) -> Result<(String, usize), String> {
 }
 
 /// The filters in a filter message, in the order in which the writer applied them.
-fn filters(message: Bytes<'_>) -> Result<Vec<Filter>, String> {
+fn filters(message: Bytes<'_>) -> Result<Vec<ChunkFilter>, String> {
     let (version, count) = (message.number(0, 1)?, message.number(1, 1)?);
     let mut at = if version == 1 { 8 } else { 2 };
     let mut filters = Vec::new();
     for _ in 0..count {
         let id = message.number(at, 2)?;
         filters.push(match id {
-            1 => Filter::Deflate,
-            2 => Filter::Shuffle,
-            3 => Filter::Checksum,
+            1 => ChunkFilter::Deflate,
+            2 => ChunkFilter::Shuffle,
+            3 => ChunkFilter::Checksum,
             _ => {
                 return Err(format!(
                     "the HDF5 file is compressed by filter {id}, which is not read; write it with compression=\"gzip\""

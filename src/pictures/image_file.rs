@@ -18,9 +18,9 @@ use image::metadata::Orientation;
 use image::{ColorType, DynamicImage, ImageDecoder, ImageReader, Limits, RgbImage};
 
 use self::exr_layers::ExrFile;
-use self::facts::{Depth, FileFacts, InkForm, fault};
+use self::facts::{FileFacts, InkForm, SampleType, fault};
 use self::format::FileFormat;
-use super::colour::{CodeDepth, ColourSpace, ColourTag, Inks, Meaning};
+use super::colour::{CodeDepth, CodeMeaning, ColourSpace, ColourTag, Inks};
 use super::decode_rule::{ColourRule, DecodeRule, Transfer};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files::{self, guarded};
@@ -132,7 +132,7 @@ impl ImageFile {
         let interpretation = self.interpretation(facts);
         let depth = match (&interpretation, facts.depth) {
             (Ok(Interpretation::Light(_)), _) => Some(DepthNote::Light),
-            (Ok(Interpretation::Codes(_)), Depth::Sixteen) => Some(DepthNote::Rgb16Image),
+            (Ok(Interpretation::Codes(_)), SampleType::Sixteen) => Some(DepthNote::Rgb16Image),
             _ => None,
         };
         let is_light = depth == Some(DepthNote::Light);
@@ -153,12 +153,12 @@ impl ImageFile {
             return self.ink_colours().ok().map(|inks| inks.note());
         }
         match (self.rule.colour, colour.meaning(depth.code_depth())) {
-            (ColourRule::Ignore, Ok(Meaning::Other(space))) => Some(space.note(ColourHandling::Ignored)),
-            (ColourRule::Ignore, Ok(Meaning::Linear) | Err(_)) => {
+            (ColourRule::Ignore, Ok(CodeMeaning::Other(space))) => Some(space.note(ColourHandling::Ignored)),
+            (ColourRule::Ignore, Ok(CodeMeaning::Linear) | Err(_)) => {
                 Some(ColourNote { from: colour.kind().to_owned(), profile: None, handling: ColourHandling::Ignored })
             }
-            (_, Err(_) | Ok(Meaning::Linear | Meaning::Srgb)) => None,
-            (rule, Ok(Meaning::Other(space))) => {
+            (_, Err(_) | Ok(CodeMeaning::Linear | CodeMeaning::Srgb)) => None,
+            (rule, Ok(CodeMeaning::Other(space))) => {
                 let is_refused = rule == ColourRule::Convert && space.handling == ColourHandling::Clipped;
                 (!is_refused).then(|| space.note(space.handling))
             }
@@ -175,28 +175,28 @@ impl ImageFile {
             return Ok(Interpretation::Codes(None));
         }
         let meaning = match colour {
-            ColourRule::Ignore => Meaning::Srgb,
+            ColourRule::Ignore => CodeMeaning::Srgb,
             ColourRule::Convert | ColourRule::Clip => facts.colour.meaning(facts.depth.code_depth())?,
         };
-        if let Meaning::Other(space) = &meaning
+        if let CodeMeaning::Other(space) = &meaning
             && space.handling == ColourHandling::Clipped
             && colour == ColourRule::Convert
         {
             return Err(space.hdr_refusal());
         }
-        let is_linear = transfer == Transfer::Linear && facts.depth == Depth::Sixteen;
+        let is_linear = transfer == Transfer::Linear && facts.depth == SampleType::Sixteen;
         Ok(match (meaning, facts.depth) {
-            (Meaning::Linear, _) | (Meaning::Srgb, Depth::Float) => Interpretation::Light(None),
-            (Meaning::Other(space), Depth::Float) => Interpretation::Light(Some(space)),
-            (Meaning::Srgb, _) if is_linear => {
+            (CodeMeaning::Linear, _) | (CodeMeaning::Srgb, SampleType::Float) => Interpretation::Light(None),
+            (CodeMeaning::Other(space), SampleType::Float) => Interpretation::Light(Some(space)),
+            (CodeMeaning::Srgb, _) if is_linear => {
                 if colour != ColourRule::Ignore && facts.colour != ColourTag::None {
                     return Err(contradiction(&facts.colour));
                 }
                 Interpretation::Light(None)
             }
-            (Meaning::Other(_), _) if is_linear => return Err(contradiction(&facts.colour)),
-            (Meaning::Srgb, _) => Interpretation::Codes(None),
-            (Meaning::Other(space), _) => Interpretation::Codes(Some(space)),
+            (CodeMeaning::Other(_), _) if is_linear => return Err(contradiction(&facts.colour)),
+            (CodeMeaning::Srgb, _) => Interpretation::Codes(None),
+            (CodeMeaning::Other(space), _) => Interpretation::Codes(Some(space)),
         })
     }
 
@@ -272,7 +272,7 @@ impl ImageFile {
         let interpretation = self.checked_interpretation(!image.color().has_color())?;
         image.apply_orientation(self.orientation());
         let (width, height) = (image.width() as usize, image.height() as usize);
-        let is_16_bit = self.facts().depth == Depth::Sixteen;
+        let is_16_bit = self.facts().depth == SampleType::Sixteen;
         let pixels = match interpretation {
             Interpretation::Codes(space) if is_16_bit => {
                 let mut codes = image.into_rgb16().into_raw();
@@ -410,7 +410,7 @@ enum Interpretation {
     Light(Option<Arc<ColourSpace>>),
 }
 
-impl Depth {
+impl SampleType {
     /// The bit depth of the codes; arbitrary for floats, which have none.
     fn code_depth(self) -> CodeDepth {
         match self {

@@ -1,6 +1,6 @@
 //! Uncompressed image of a camera driver, without a file format: [`RawImage`].
 //!
-//! Arrangement of the samples in a raw image: [`Layout`].
+//! Arrangement of the samples in a raw image: [`SampleLayout`].
 //!
 //! Demosaicing of integer codes, for all four Bayer patterns: [`demosaic`].
 //!
@@ -93,7 +93,7 @@ pub fn is_yuv(encoding: &str) -> bool {
 impl RawImage<'_> {
     /// True if images of this encoding can be decoded.
     pub fn has_known_encoding(&self) -> bool {
-        self.is_yuv() || Layout::from_encoding(&self.encoding).is_ok()
+        self.is_yuv() || SampleLayout::from_encoding(&self.encoding).is_ok()
     }
 
     /// True for an image in YUV.
@@ -115,14 +115,14 @@ impl RawImage<'_> {
             let image = Image::new(self.height, self.width, samples);
             return image.map(RawPixels::Codes8).map_err(|e| e.to_string());
         }
-        let layout = Layout::from_encoding(&self.encoding)?;
+        let layout = SampleLayout::from_encoding(&self.encoding)?;
         self.check_size()?;
         let rows = self.rows_of(self.width * layout.channels * layout.depth.bytes())?;
         let pixels = match layout.depth {
-            Depth::Eight => RawPixels::Codes8(self.image(layout, rows, |row, samples| {
+            BitDepth::Eight => RawPixels::Codes8(self.image(layout, rows, |row, samples| {
                 samples.extend_from_slice(row);
             })?),
-            Depth::Sixteen => RawPixels::Rgb16Image(self.image(layout, rows, |row, samples| {
+            BitDepth::Sixteen => RawPixels::Rgb16Image(self.image(layout, rows, |row, samples| {
                 let pairs = row.as_chunks::<2>().0.iter();
                 if self.is_big_endian {
                     samples.extend(pairs.map(|pair| u16::from_be_bytes(*pair)));
@@ -160,7 +160,7 @@ impl RawImage<'_> {
     /// Builds the image. `read` appends the samples of one row to a buffer.
     fn image<'a, T: RawSample>(
         &self,
-        layout: Layout,
+        layout: SampleLayout,
         rows: impl Iterator<Item = &'a [u8]>,
         read: impl Fn(&[u8], &mut Vec<T>),
     ) -> Result<Image<T>, String> {
@@ -192,15 +192,15 @@ impl RawImage<'_> {
 
 /// Arrangement of the samples of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Layout {
+pub(super) struct SampleLayout {
     channels: usize,
-    depth: Depth,
+    depth: BitDepth,
     order: Order,
 }
 
 /// Bit depth of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Depth {
+pub(super) enum BitDepth {
     Eight,
     Sixteen,
 }
@@ -214,7 +214,7 @@ pub(super) enum Order {
     Mosaic([usize; 2]),
 }
 
-impl Depth {
+impl BitDepth {
     /// Size of a sample, in bytes.
     fn bytes(self) -> usize {
         match self {
@@ -224,7 +224,7 @@ impl Depth {
     }
 }
 
-impl Layout {
+impl SampleLayout {
     /// The layout of an encoding, by its name in ROS or Foxglove. `8UC3` and `8UC4` have the channel order of OpenCV
     /// (BGR).
     ///
@@ -233,13 +233,13 @@ impl Layout {
     fn from_encoding(encoding: &str) -> Result<Self, String> {
         let (rgb, bgr) = (Order::Channels([0, 1, 2]), Order::Channels([2, 1, 0]));
         let (name, depth) = match encoding {
-            "8UC1" => ("mono", Depth::Eight),
-            "8UC3" => ("bgr", Depth::Eight),
-            "8UC4" => ("bgra", Depth::Eight),
+            "8UC1" => ("mono", BitDepth::Eight),
+            "8UC3" => ("bgr", BitDepth::Eight),
+            "8UC4" => ("bgra", BitDepth::Eight),
             _ => match (encoding.strip_suffix("16"), encoding.strip_suffix('8')) {
-                (Some(name), _) => (name, Depth::Sixteen),
-                (None, Some(name)) => (name, Depth::Eight),
-                (None, None) => (encoding, Depth::Eight),
+                (Some(name), _) => (name, BitDepth::Sixteen),
+                (None, Some(name)) => (name, BitDepth::Eight),
+                (None, None) => (encoding, BitDepth::Eight),
             },
         };
         let (channels, order) = match name {

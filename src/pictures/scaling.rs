@@ -63,7 +63,7 @@ const ONE: f32 = 2048.0;
 
 /// The two source pixels (indices) of an output pixel along one axis, and their weights.
 #[derive(Debug, Clone, Copy)]
-struct Tap {
+struct ScalingTap {
     indices: [usize; 2],
     weights: [i32; 2],
 }
@@ -124,7 +124,7 @@ fn scale_length(length: usize, factor: f64) -> usize {
 }
 
 /// The taps of all output pixels along a side of `length` source pixels.
-fn taps(length: usize, factor: f64) -> Vec<Tap> {
+fn taps(length: usize, factor: f64) -> Vec<ScalingTap> {
     let count = scale_length(length, factor);
     let last = length - 1;
     (0..count)
@@ -136,7 +136,7 @@ fn taps(length: usize, factor: f64) -> Vec<Tap> {
                 floor if floor as usize >= last => (last, 0.0),
                 floor => (floor as usize, position - floor),
             };
-            Tap {
+            ScalingTap {
                 indices: [first, (first + 1).min(last)],
                 weights: [1.0 - fraction, fraction].map(|weight| (weight * ONE).round_ties_even() as i32),
             }
@@ -145,7 +145,7 @@ fn taps(length: usize, factor: f64) -> Vec<Tap> {
 }
 
 /// Interpolates one source row at the output columns, into `out`.
-fn interpolate_row(image: &Rgb, row: usize, columns: &[Tap], out: &mut Vec<i32>) {
+fn interpolate_row(image: &Rgb, row: usize, columns: &[ScalingTap], out: &mut Vec<i32>) {
     let width = 3 * image.width();
     let line = &image.samples()[row * width..][..width];
     out.clear();

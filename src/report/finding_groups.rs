@@ -63,13 +63,13 @@ pub(crate) struct FindingGroups<'a>(Vec<FindingGroup<'a>>);
 /// Findings of one group, the most important kind first.
 pub(crate) struct FindingGroup<'a> {
     pub(super) title: &'static str,
-    findings: Vec<Finding<'a>>,
+    findings: Vec<GroupedFinding<'a>>,
     /// Index of the main finding; `None` if no finding is of a leading kind.
     first: Option<usize>,
 }
 
 /// Sentences about the same subject, such as one enhancer, or one effect under several noise profiles.
-pub(super) struct Finding<'a> {
+pub(super) struct GroupedFinding<'a> {
     sentences: Vec<&'a Sentence>,
 }
 
@@ -111,7 +111,7 @@ impl<'a> FindingGroups<'a> {
     }
 
     /// Main findings at the start of a report, each with the title of its group.
-    pub(super) fn main_findings(&self) -> Vec<(&'static str, &Finding<'a>)> {
+    pub(super) fn main_findings(&self) -> Vec<(&'static str, &GroupedFinding<'a>)> {
         self.0.iter().filter_map(|group| Some((group.title, group.main_finding()?))).take(MAX_FIRST).collect()
     }
 
@@ -123,7 +123,7 @@ impl<'a> FindingGroups<'a> {
     /// either, it is the first main finding; without any finding, it is empty. A sentence about the training data of
     /// each enhancer with an effect follows.
     pub(super) fn summary(&self) -> String {
-        let darkness = self.group("Darkness").and_then(FindingGroup::main_finding).map(Finding::claims);
+        let darkness = self.group("Darkness").and_then(FindingGroup::main_finding).map(GroupedFinding::claims);
         let enhancers = self.group("Enhancers");
         let clauses: Vec<String> = darkness
             .into_iter()
@@ -161,11 +161,11 @@ impl<'a> FindingGroup<'a> {
         let is_last = GROUPS.last().is_some_and(|last| last.title == kinds.title);
         let listed = kinds.kinds().flat_map(|kind| sentences.iter().filter(move |sentence| sentence.kind == kind));
         let unlisted = sentences.iter().filter(|sentence| is_last && !is_listed(sentence.kind));
-        let mut findings: Vec<Finding<'a>> = Vec::new();
+        let mut findings: Vec<GroupedFinding<'a>> = Vec::new();
         for sentence in listed.chain(unlisted) {
             match findings.iter_mut().find(|finding| finding.is_about(sentence)) {
                 Some(finding) => finding.sentences.push(sentence),
-                None => findings.push(Finding { sentences: vec![sentence] }),
+                None => findings.push(GroupedFinding { sentences: vec![sentence] }),
             }
         }
         let leading: Vec<usize> = findings
@@ -181,7 +181,7 @@ impl<'a> FindingGroup<'a> {
 
     /// The first detected finding of a leading kind, else the first one; of several enhancers the one with the largest
     /// effect. `None` without a finding of a leading kind.
-    fn main_finding(&self) -> Option<&Finding<'a>> {
+    fn main_finding(&self) -> Option<&GroupedFinding<'a>> {
         Some(&self.findings[self.first?])
     }
 
@@ -191,13 +191,13 @@ impl<'a> FindingGroup<'a> {
     }
 
     /// Findings about the enhancers, of the kind of the main finding.
-    fn of_main_kind(&self) -> Vec<&Finding<'a>> {
-        let kind = self.main_finding().map(Finding::kind);
+    fn of_main_kind(&self) -> Vec<&GroupedFinding<'a>> {
+        let kind = self.main_finding().map(GroupedFinding::kind);
         self.findings.iter().filter(|finding| Some(finding.kind()) == kind).collect()
     }
 
     /// Findings in the summary: the largest detected effects, or the effect of the only enhancer.
-    fn in_summary(&self) -> Vec<&Finding<'a>> {
+    fn in_summary(&self) -> Vec<&GroupedFinding<'a>> {
         let mut findings = self.of_main_kind();
         if findings.len() > 1 {
             findings.retain(|finding| finding.is_detected());
@@ -209,7 +209,7 @@ impl<'a> FindingGroup<'a> {
 
     /// Detected effects of the enhancers, or the statement that none was detected.
     fn enhancer_effects(&self) -> String {
-        let claims: Vec<String> = self.in_summary().into_iter().map(Finding::claims).collect();
+        let claims: Vec<String> = self.in_summary().into_iter().map(GroupedFinding::claims).collect();
         match self.of_main_kind().len() {
             count if count > 0 && claims.is_empty() => {
                 format!("no effect of the {count} enhancers was detected")
@@ -230,8 +230,8 @@ impl<'a> FindingGroup<'a> {
 
 /// Index of the finding with the largest effect among those that are about the same kind of effect as the finding
 /// `first` and as detected as it, but about other enhancers; `first` if it is not about an enhancer.
-fn strongest(findings: &[Finding<'_>], first: usize) -> usize {
-    let is_alike = |finding: &Finding<'_>| {
+fn strongest(findings: &[GroupedFinding<'_>], first: usize) -> usize {
+    let is_alike = |finding: &GroupedFinding<'_>| {
         let sentence = finding.main_sentence();
         sentence.scope.subject.is_some()
             && finding.kind() == findings[first].kind()
@@ -256,7 +256,7 @@ impl GroupKinds {
     }
 }
 
-impl<'a> Finding<'a> {
+impl<'a> GroupedFinding<'a> {
     /// Kind of the finding's sentences.
     fn kind(&self) -> &'static str {
         self.sentences[0].kind

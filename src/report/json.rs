@@ -11,7 +11,7 @@ use crate::report::sentences::Sentence;
 use crate::report::tables::{BASELINE, strict_groups, summary_rows};
 use crate::report::text::alert::Alert;
 use crate::report::text::table::{Table, TableRow, fields};
-use crate::report::text::words::NoiseProfiles;
+use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
 use crate::types::UnreadReason;
 use crate::types::manifests::RunManifest;
@@ -23,24 +23,24 @@ struct Document<'a, H> {
     head: H,
     /// Rows of the summary; omitted if the report contains only findings.
     #[serde(skip_serializing_if = "Option::is_none")]
-    rows: Option<Rows<'a>>,
+    rows: Option<JsonRows<'a>>,
     /// All tables by file name; only in a full report.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
-    tables: BTreeMap<&'a str, Rows<'a>>,
+    tables: BTreeMap<&'a str, JsonRows<'a>>,
 }
 
 /// Rows of tables that have the same columns in their file; each row becomes an object. Tables without a file have no
 /// rows.
-pub(super) struct Rows<'a>(&'a [Table]);
+pub(super) struct JsonRows<'a>(&'a [Table]);
 
-impl<'a> Rows<'a> {
+impl<'a> JsonRows<'a> {
     /// Rows of one table.
     pub(super) fn new(table: &'a Table) -> Self {
         Self(std::slice::from_ref(table))
     }
 }
 
-impl Serialize for Rows<'_> {
+impl Serialize for JsonRows<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(
             self.0
@@ -74,11 +74,11 @@ impl Serialize for RowObject<'_> {
 pub(super) fn document(head: impl Serialize, rows: &Table, tables: &[Table], length: ReportLength) -> Result<String> {
     let document = Document {
         head,
-        rows: (length != ReportLength::Findings).then(|| Rows::new(rows)),
+        rows: (length != ReportLength::Findings).then(|| JsonRows::new(rows)),
         tables: tables
             .chunk_by(|one, other| one.name == other.name)
             .filter(|parts| length == ReportLength::Full && parts.iter().any(Table::has_file))
-            .map(|parts| (parts[0].name, Rows(parts)))
+            .map(|parts| (parts[0].name, JsonRows(parts)))
             .collect(),
     };
     serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|e| Error::data("summary.json", e))
@@ -86,20 +86,20 @@ pub(super) fn document(head: impl Serialize, rows: &Table, tables: &[Table], len
 
 /// Head of the summary of an evaluation.
 #[derive(Serialize)]
-struct Head<'a> {
+struct SummaryHead<'a> {
     #[serde(flatten)]
     runs: RunsHead<'a>,
     /// Noise profiles of the noisy images.
-    readings: NoiseProfiles,
+    readings: ProfileNames,
     unread: &'a BTreeMap<UnreadReason, usize>,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
     /// Rows of `groups.csv`, without the observer if the report hides it; omitted if empty.
     #[serde(skip_serializing_if = "Option::is_none")]
-    groups: Option<Rows<'a>>,
+    groups: Option<JsonRows<'a>>,
     /// Rows of `baseline.csv`; omitted if the report has no such table.
     #[serde(skip_serializing_if = "Option::is_none")]
-    baseline: Option<Rows<'a>>,
+    baseline: Option<JsonRows<'a>>,
 }
 
 /// Runs in the head of a summary: `run` and `folder` for a single run, `runs` for several; unused fields are omitted.
@@ -147,14 +147,14 @@ impl<'a> SummaryRuns<'a> {
 /// If the document cannot be serialised.
 pub(crate) fn summary(report: &ChoiceReport<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String> {
     let groups = strict_groups(report.findings);
-    let head = Head {
+    let head = SummaryHead {
         runs: runs.head("darkqa.summary/1"),
-        readings: NoiseProfiles::new(&report.findings.grid.subjects),
+        readings: ProfileNames::new(&report.findings.grid.subjects),
         unread: &report.findings.summary.unread,
         alerts: &report.alerts,
         findings: &report.sentences,
-        groups: (!groups.is_empty()).then_some(Rows(&groups)),
-        baseline: report.tables.iter().find(|table| table.name == BASELINE).map(Rows::new),
+        groups: (!groups.is_empty()).then_some(JsonRows(&groups)),
+        baseline: report.tables.iter().find(|table| table.name == BASELINE).map(JsonRows::new),
     };
     document(head, &summary_rows(&report.findings.summary, &report.findings.grid.listing), &report.tables, length)
 }

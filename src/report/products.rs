@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::report::charts::chart::{self, Figure};
-use crate::report::charts::figures::{Names, figure_specs};
+use crate::report::charts::figures::{DisplayNames, figure_specs};
 use crate::report::charts::paper::figure;
 use crate::report::charts::samples::{self, samples_of};
 use crate::report::charts::views;
@@ -17,7 +17,7 @@ use crate::report::text::table::{self, Table};
 /// # Errors
 /// If a file cannot be made.
 pub fn products<'a>(report: &'a ChoiceReport<'a>, inputs: &PageInputs<'a>) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures: Vec<Figure> = figure_specs(report.findings, &Names::default())
+    let figures: Vec<Figure> = figure_specs(report.findings, &DisplayNames::default())
         .into_iter()
         .chain(views::figure_specs(report.findings))
         .map(|spec| figure(spec.name, &spec.caption, &spec.chart))

@@ -20,8 +20,8 @@ use std::path::Path;
 
 use clap::builder::styling::{AnsiColor, Style};
 
-use super::finding_groups::Finding;
-use super::sentences::{Sentence, Tone};
+use super::finding_groups::GroupedFinding;
+use super::sentences::{EffectDirection, Sentence};
 use super::tables::{control_text, unread_note};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::FindingGroups;
@@ -29,7 +29,7 @@ use crate::report::sentences::how_to_read;
 use crate::report::text::alert::{Alert, lines};
 use crate::report::text::ladder::{Ladder, SeriesByLevel};
 use crate::report::text::terminal::{WIDTH, line, render, wrapped};
-use crate::report::text::words::{NoiseProfiles, frames, percent, shorten_middle, widest_reach_of, with_interval};
+use crate::report::text::words::{ProfileNames, frames, percent, shorten_middle, widest_reach_of, with_interval};
 use crate::runs::outcome::ReportLength;
 use crate::types::manifests::RunManifest;
 use crate::types::replies::OBSERVER;
@@ -71,7 +71,7 @@ pub(crate) fn text(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)], le
 
 /// Note on the question that a single noise profile leaves open; empty without noise or with several noise profiles.
 fn open_question(report: &ChoiceReport<'_>) -> String {
-    NoiseProfiles::new(&report.findings.grid.subjects)
+    ProfileNames::new(&report.findings.grid.subjects)
         .open_question()
         .map_or_else(String::new, |question| wrapped(" ", &question, " "))
 }
@@ -296,7 +296,7 @@ pub(crate) fn findings(
 }
 
 /// Title of a group and its main finding, with the intervals below.
-fn row(title: &str, finding: &Finding<'_>) -> String {
+fn row(title: &str, finding: &GroupedFinding<'_>) -> String {
     let tone = finding.main_sentence().tone;
     let first = format!(" {title:<GROUP_WIDTH$}{}  ", tone.sign());
     let rest = " ".repeat(first.chars().count());
@@ -464,11 +464,11 @@ fn sentence_line(sentence: &Sentence) -> String {
 }
 
 /// Applies the colour of a tone to the first `end` characters, at the end of which the sign is.
-fn colour_sign(lines: &str, end: usize, tone: Tone) -> String {
+fn colour_sign(lines: &str, end: usize, tone: EffectDirection) -> String {
     let style = match tone {
-        Tone::Better => colour(AnsiColor::Green),
-        Tone::Worse => colour(AnsiColor::Red),
-        Tone::NotShown | Tone::Note => Style::new().bold(),
+        EffectDirection::Better => colour(AnsiColor::Green),
+        EffectDirection::Worse => colour(AnsiColor::Red),
+        EffectDirection::NotShown | EffectDirection::Note => Style::new().bold(),
     };
     style_start(lines, end, style)
 }

@@ -1,4 +1,4 @@
-//! The result of a command ([`Outcome`]), and the format of its results ([`ShowArgs`], [`StdoutFormat`]).
+//! The result of a command ([`Outcome`]), and the format of its results ([`PrintArgs`], [`StdoutFormat`]).
 //!
 //! Length of a report: [`ReportLength`].
 //!
@@ -56,7 +56,7 @@ impl Outcome {
 /// Flags that say how a report is printed, and what is written with it.
 #[derive(Debug, Clone, Default, Args)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct ShowArgs {
+pub(crate) struct PrintArgs {
     /// Print all findings and every table
     #[arg(long, conflicts_with = "findings", add = Decides::Nothing)]
     pub full: bool,
@@ -80,7 +80,7 @@ pub(crate) struct WrittenArgs {
     pub no_parquet: bool,
 }
 
-impl ShowArgs {
+impl PrintArgs {
     /// Whether to write the table of records.
     pub(crate) fn record_table(&self) -> RecordTable {
         if self.written.no_parquet { RecordTable::Skip } else { RecordTable::Write }

@@ -26,7 +26,7 @@ pub(crate) enum AnswerState {
 
 /// One answer to one question.
 #[derive(Debug, Clone)]
-pub(crate) struct Prediction {
+pub(crate) struct QuestionAnswer {
     pub(crate) subject: ModelInCondition,
     /// Index of the question among those of the run.
     pub(crate) question: usize,
@@ -41,7 +41,7 @@ pub(crate) fn predictions(
     records: &[Record<OpenDetail>],
     questions: &[&QuestionId],
     protocol: Protocol,
-) -> Vec<Prediction> {
+) -> Vec<QuestionAnswer> {
     let places: HashMap<&QuestionId, usize> = questions.iter().copied().zip(0..).collect();
     let mut answers = BTreeMap::<(usize, ModelInCondition), Vec<&Record<OpenDetail>>>::new();
     let mut asked_subjects = BTreeSet::new();
@@ -65,7 +65,7 @@ pub(crate) fn predictions(
         let missing = records.is_empty().then_some(None);
         for record in records.into_iter().map(Some).chain(missing) {
             let (full_answer, state) = state(record, protocol);
-            predictions.push(Prediction { subject: subject.clone(), question, full_answer, state });
+            predictions.push(QuestionAnswer { subject: subject.clone(), question, full_answer, state });
         }
     }
     predictions

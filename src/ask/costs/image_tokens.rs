@@ -17,7 +17,7 @@ use crate::ask::requests::ImageDetail;
 use crate::types::text::plural;
 
 /// The built-in table.
-static TABLE: LazyLock<Table> = LazyLock::new(|| {
+static TABLE: LazyLock<TokenTable> = LazyLock::new(|| {
     let text = include_str!("../image_tokens.toml");
     toml::from_str(text).unwrap_or_else(|e| unreachable!("a test reads image_tokens.toml: {e}"))
 });
@@ -25,15 +25,15 @@ static TABLE: LazyLock<Table> = LazyLock::new(|| {
 /// Table of model families, with its date.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-struct Table {
+struct TokenTable {
     #[expect(dead_code, reason = "for readers of the table")]
     as_of: String,
-    family: Vec<Family>,
+    family: Vec<ModelFamily>,
 }
 
 /// Models with the same rule.
 #[derive(Debug, Deserialize)]
-struct Family {
+struct ModelFamily {
     /// Prefixes of their names.
     begins: Vec<String>,
     #[serde(flatten)]
@@ -112,7 +112,7 @@ pub(crate) fn scaling_image_tokens(model: &str, detail: Option<ImageDetail>, wid
 }
 
 /// The family of a model, by the beginning of its name.
-fn family(model: &str) -> Option<&'static Family> {
+fn family(model: &str) -> Option<&'static ModelFamily> {
     let name = model.rsplit('/').next().unwrap_or(model).to_lowercase();
     TABLE.family.iter().find(|family| family.begins.iter().any(|begin| name.starts_with(begin)))
 }

@@ -198,11 +198,11 @@ pub(super) fn with_causes(error: &reqwest::Error) -> String {
 #[derive(Debug)]
 pub(crate) struct AccountKey {
     access: Access,
-    state: Mutex<State>,
+    state: Mutex<AccessState>,
 }
 
 #[derive(Debug)]
-struct State {
+struct AccessState {
     /// Key from a later reading of the file; `None` before it.
     renewed: Option<Secret>,
     /// Number of keys read so far, besides the first.
@@ -221,7 +221,7 @@ pub(crate) struct KeyedHeaders {
 
 impl AccountKey {
     pub(super) fn new(access: Access, scrub: Scrub) -> Self {
-        Self { access, state: Mutex::new(State { renewed: None, renewals: 0, scrub: Arc::new(scrub) }) }
+        Self { access, state: Mutex::new(AccessState { renewed: None, renewals: 0, scrub: Arc::new(scrub) }) }
     }
 
     /// Filter that removes the keys and passwords of the endpoint from text of the server.
@@ -267,7 +267,7 @@ impl AccountKey {
         true
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, AccessState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

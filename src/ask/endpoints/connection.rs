@@ -3,7 +3,7 @@
 //! Causes of failed connections: [`permanent_cause`] and [`is_unknown_host`] search the error text of the HTTP client,
 //! [`lacks_open_files`] inspects the error itself.
 //!
-//! Time limit that excludes suspensions of the process: [`TimeLimit`].
+//! Time limit that excludes suspensions of the process: [`RunningLimit`].
 //!
 //! A suspended process (Ctrl-Z, `scontrol suspend`, a closed laptop) reads nothing, but the clock runs on. Replies that
 //! arrive during the suspension are paid for, so they must be read before a timeout is declared.
@@ -71,12 +71,12 @@ impl Deadline {
 #[derive(Debug)]
 struct AttemptTimer {
     deadline: Deadline,
-    total: TimeLimit,
+    total: RunningLimit,
 }
 
 impl AttemptTimer {
     fn new(deadline: Deadline) -> Self {
-        Self { deadline, total: TimeLimit::new(deadline.total) }
+        Self { deadline, total: RunningLimit::new(deadline.total) }
     }
 
     /// Runs one step of the attempt.
@@ -88,7 +88,7 @@ impl AttemptTimer {
         let step = async {
             match idle {
                 None => Some(step.await),
-                Some(idle) => TimeLimit::new(idle).run(step).await,
+                Some(idle) => RunningLimit::new(idle).run(step).await,
             }
         };
         match self.total.run(step).await {
@@ -509,7 +509,7 @@ const MIN_SUSPENSION: Duration = Duration::from_millis(100);
 /// Limit on the running time of one future, or of several futures one after another. Suspensions of the process do not
 /// count.
 #[derive(Debug)]
-pub(super) struct TimeLimit {
+pub(super) struct RunningLimit {
     step: Duration,
     /// Running time left.
     left: Duration,
@@ -517,7 +517,7 @@ pub(super) struct TimeLimit {
     suspended: Duration,
 }
 
-impl TimeLimit {
+impl RunningLimit {
     pub(super) fn new(limit: Duration) -> Self {
         Self { step: (limit / STEPS).clamp(MIN_STEP, MAX_STEP), left: limit, suspended: Duration::ZERO }
     }
@@ -554,7 +554,7 @@ impl TimeLimit {
 
 /// Sleeps for a running time; suspensions of the process do not count.
 pub(crate) async fn sleep_running(time: Duration) {
-    let _ = TimeLimit::new(time).run(std::future::pending::<()>()).await;
+    let _ = RunningLimit::new(time).run(std::future::pending::<()>()).await;
 }
 
 #[cfg(test)]
@@ -617,7 +617,7 @@ mod tests {
     async fn limit_is_exact_without_suspension() {
         for limit in [1, 7, 400, 120_000].map(Duration::from_millis) {
             let started = Instant::now();
-            assert!(TimeLimit::new(limit).run(pending::<()>()).await.is_none());
+            assert!(RunningLimit::new(limit).run(pending::<()>()).await.is_none());
             let took = started.elapsed();
             assert!(took >= limit && took < limit + MIN_STEP, "{took:?}");
         }
@@ -625,7 +625,7 @@ mod tests {
 
     #[tokio::test(start_paused = true)]
     async fn futures_share_the_limit() {
-        let mut limit = TimeLimit::new(LIMIT);
+        let mut limit = RunningLimit::new(LIMIT);
         assert!(limit.run(sleep(LIMIT * 3 / 4)).await.is_some());
         assert!(limit.run(sleep(LIMIT / 2)).await.is_none());
         assert_eq!(limit.suspended(), Duration::ZERO);
@@ -634,7 +634,7 @@ mod tests {
     /// Each future represents one chunk of a streamed reply.
     #[tokio::test(start_paused = true)]
     async fn short_futures_do_not_outlast_the_limit() {
-        let mut limit = TimeLimit::new(LIMIT);
+        let mut limit = RunningLimit::new(LIMIT);
         let interval = Duration::from_millis(5);
         let mut chunks = 0;
         while limit.run(sleep(interval)).await.is_some() {
@@ -646,7 +646,7 @@ mod tests {
 
     #[tokio::test]
     async fn suspension_does_not_count() {
-        let mut limit = TimeLimit::new(LIMIT);
+        let mut limit = RunningLimit::new(LIMIT);
         let done = limit.run(async {
             sleep(LIMIT / 4).await;
             thread::sleep(SUSPENSION);
@@ -660,7 +660,7 @@ mod tests {
     async fn late_output_is_read_after_suspension() {
         // The suspension is in the last step. The future is ready some polls later, like a socket that another task
         // reads.
-        let mut limit = TimeLimit::new(LIMIT);
+        let mut limit = RunningLimit::new(LIMIT);
         limit.left = MIN_STEP;
         let suspension = tokio::spawn(async { thread::sleep(SUSPENSION) });
         let ready = async {

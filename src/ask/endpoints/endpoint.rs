@@ -1,6 +1,6 @@
 //! A server at one or several addresses, with retries and load balancing: [`Endpoint`].
 //!
-//! The requests of one question: [`Attempts`].
+//! The requests of one question: [`QuestionAttempts`].
 
 use std::collections::HashMap;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -228,7 +228,7 @@ impl Endpoint {
             .with_max_delay(MAX_DELAY)
             .with_max_times(self.sending.retries as usize)
             .build();
-        let mut attempts = Attempts::with_charged(request.timeouts.charged);
+        let mut attempts = QuestionAttempts::with_charged(request.timeouts.charged);
         // Replicas that failed since the last delay, and the last of these failures.
         let (mut avoided, mut failed_over) = (Vec::new(), None::<AskError>);
         let mut retried = None;
@@ -509,7 +509,7 @@ struct Turn {
 
 /// The requests of one question so far, and their charges.
 #[derive(Debug, Default)]
-pub(super) struct Attempts {
+pub(super) struct QuestionAttempts {
     /// Number of requests that were sent.
     pub(super) sent: u32,
     /// Requests that were charged and gave no reply.
@@ -520,7 +520,7 @@ pub(super) struct Attempts {
     replies_at_timeout: Option<u64>,
 }
 
-impl Attempts {
+impl QuestionAttempts {
     /// The attempts of a question of which this many requests count as charged from the start.
     pub(super) fn with_charged(charged: u32) -> Self {
         Self { unfinished: charged, ..Self::default() }
@@ -586,13 +586,13 @@ mod tests {
 
     #[test]
     fn quick_timeouts_count_if_others_are_answered() {
-        let mut down = Attempts::default();
+        let mut down = QuestionAttempts::default();
         for _ in 0..5 {
             let failed = down.add(timeout(), 3);
             assert_eq!(failed.unfinished, Unfinished::QuickTimeout);
         }
         assert_eq!(down.charged(), 0);
-        let mut slow = Attempts::default();
+        let mut slow = QuestionAttempts::default();
         slow.add(timeout(), 3);
         let failed = slow.add(timeout(), 4);
         assert!(failed.unfinished.is_timeout());

@@ -44,7 +44,7 @@ pub struct Remote {
     forced: Mutex<BTreeSet<&'static str>>,
     /// Outcome of the first question. The other questions wait for it, so that a refusal that concerns all requests
     /// costs a single one.
-    first_question: tokio::sync::Mutex<FirstQuestion>,
+    first_question: tokio::sync::Mutex<FirstReply>,
     streams: StreamFallback,
     /// True after the first reply.
     has_answered: AtomicBool,
@@ -61,7 +61,7 @@ const REFUSALS_AT_START: usize = 3;
 
 /// Outcome of the first question to a model.
 #[derive(Debug)]
-enum FirstQuestion {
+enum FirstReply {
     /// No question has ended yet, except this number that were refused by the status alone.
     Pending(usize),
     /// The question has a reply, or a failure that does not concern other questions.
@@ -90,7 +90,7 @@ impl Remote {
             index: endpoint.add_model(&parameters.model),
             endpoint,
             parameters,
-            first_question: tokio::sync::Mutex::new(FirstQuestion::Pending(0)),
+            first_question: tokio::sync::Mutex::new(FirstReply::Pending(0)),
             has_answered: AtomicBool::new(false),
             finish_words: FinishWords::default(),
             streams: StreamFallback::default(),
@@ -186,15 +186,15 @@ impl Remote {
             if has_timed_out { AskedBefore::timed_out(self.endpoint.paid_retries()) } else { AskedBefore::default() };
         let mut first_question = self.first_question.lock().await;
         let refused = match &*first_question {
-            FirstQuestion::Pending(refused) => *refused,
-            FirstQuestion::Ended => {
+            FirstReply::Pending(refused) => *refused,
+            FirstReply::Ended => {
                 drop(first_question);
                 return self
                     .ask_settled(message, choices, reservation, before)
                     .await
                     .map_err(|error| self.resolve_reach(error, Reach::Trial, 0));
             }
-            FirstQuestion::Refused(error) => {
+            FirstReply::Refused(error) => {
                 return Err(AskError { attempts: 0, lost: Box::default(), ..error.clone() });
             }
         };
@@ -203,10 +203,10 @@ impl Remote {
             .await
             .map_err(|error| self.resolve_reach(error, Reach::Endpoint, refused));
         *first_question = match &outcome {
-            Err(error) if error.reach == Reach::Endpoint => FirstQuestion::Refused(error.clone()),
-            Err(error) if error.reach == Reach::ByStatus => FirstQuestion::Pending(refused + 1),
-            Err(error) if error.reach == Reach::Interrupted => FirstQuestion::Pending(refused),
-            _ => FirstQuestion::Ended,
+            Err(error) if error.reach == Reach::Endpoint => FirstReply::Refused(error.clone()),
+            Err(error) if error.reach == Reach::ByStatus => FirstReply::Pending(refused + 1),
+            Err(error) if error.reach == Reach::Interrupted => FirstReply::Pending(refused),
+            _ => FirstReply::Ended,
         };
         outcome
     }

@@ -81,11 +81,11 @@ const QUEUEING_RATIO: f64 = 1.5;
 #[derive(Debug)]
 pub(crate) struct Window {
     bounds: ConcurrencyBounds,
-    state: Mutex<State>,
+    state: Mutex<WindowState>,
 }
 
 #[derive(Debug)]
-struct State {
+struct WindowState {
     width: f64,
     /// Time of the last decrease; overloads of requests that were sent before it are ignored.
     decreased_at: Option<Instant>,
@@ -103,7 +103,7 @@ impl Window {
     pub(crate) fn new(bounds: ConcurrencyBounds) -> Self {
         Self {
             bounds,
-            state: Mutex::new(State {
+            state: Mutex::new(WindowState {
                 width: bounds.initial.get() as f64,
                 decreased_at: None,
                 replies: 0,
@@ -147,7 +147,7 @@ impl Window {
         }
     }
 
-    fn state(&self) -> MutexGuard<'_, State> {
+    fn state(&self) -> MutexGuard<'_, WindowState> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }

@@ -244,7 +244,7 @@ fn merge(into: &mut Map<String, Value>, patch: &Map<String, Value>) {
 }
 
 /// The built-in table.
-static TABLE: LazyLock<Table> = LazyLock::new(|| {
+static TABLE: LazyLock<ServerTable> = LazyLock::new(|| {
     let text = include_str!("../thinking.toml");
     toml::from_str(text).unwrap_or_else(|e| unreachable!("a test reads thinking.toml: {e}"))
 });
@@ -264,7 +264,7 @@ flag_words!(Thinking);
 /// Table of servers, with its date.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-struct Table {
+struct ServerTable {
     #[expect(dead_code, reason = "for readers of the table")]
     as_of: String,
     server: Vec<ServerRow>,

@@ -14,12 +14,12 @@ pub(crate) struct ImageLimit {
     /// Provider or setting that the limit comes from.
     pub origin: &'static str,
     /// Limits on requests with several images.
-    request: RequestLimit,
+    request: ImageLimits,
 }
 
 /// Limits on a request with several images; `None` for no or an unknown limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-struct RequestLimit {
+struct ImageLimits {
     /// Maximum number of images.
     images: Option<ProviderLimit<usize>>,
     /// Maximum side of an image, in pixels, in a request with more than [`MANY`] images.
@@ -39,7 +39,7 @@ struct ProviderLimit<T> {
 const MANY: usize = 20;
 
 const fn limit(bytes: usize, side: Option<u32>, origin: &'static str) -> ImageLimit {
-    ImageLimit { bytes, side, origin, request: RequestLimit { images: None, side_many: None, bytes: None } }
+    ImageLimit { bytes, side, origin, request: ImageLimits { images: None, side_many: None, bytes: None } }
 }
 
 impl ImageLimit {
@@ -147,7 +147,7 @@ impl ImageLimit {
         let (small, large) = if self.bytes <= other.bytes { (self, other) } else { (other, self) };
         let side = small.side.into_iter().chain(large.side).min();
         let (one, two) = (small.request, large.request);
-        let request = RequestLimit {
+        let request = ImageLimits {
             images: one.images.into_iter().chain(two.images).min(),
             side_many: one.side_many.into_iter().chain(two.side_many).min(),
             bytes: one.bytes.into_iter().chain(two.bytes).min(),

@@ -245,7 +245,7 @@ impl SecretParts {
         if self.0.is_empty() {
             return Vec::new();
         }
-        let letters: Vec<Letter> = letters(text).collect();
+        let letters: Vec<SecretLetter> = letters(text).collect();
         let mut runs: Vec<Range<usize>> = Vec::new();
         for (index, window) in letters.windows(PART).enumerate() {
             let part: [u8; PART] = std::array::from_fn(|i| window[i].value);
@@ -279,7 +279,7 @@ fn base64_letters(key: &str, offset: usize) -> String {
 }
 
 /// Letter or digit in a text.
-struct Letter {
+struct SecretLetter {
     /// ASCII code, in lower case.
     value: u8,
     /// Byte offset of its start.
@@ -290,14 +290,15 @@ struct Letter {
 
 /// ASCII letters and digits of a text, including escaped ones such as `\u0073` in JSON or `%73` in a URL. The letter of
 /// other escapes, such as `\n`, does not count.
-fn letters(text: &str) -> impl Iterator<Item = Letter> {
+fn letters(text: &str) -> impl Iterator<Item = SecretLetter> {
     let bytes = text.as_bytes();
     let mut start = 0;
     std::iter::from_fn(move || {
         while start < bytes.len() {
             let (value, length) = letter(&bytes[start..]);
             let end = start + length;
-            let found = value.is_ascii_alphanumeric().then(|| Letter { value: value.to_ascii_lowercase(), start, end });
+            let found =
+                value.is_ascii_alphanumeric().then(|| SecretLetter { value: value.to_ascii_lowercase(), start, end });
             start = end;
             if found.is_some() {
                 return found;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use super::finish_reason::{self, Ending};
+use super::finish_reason::{self, ReplyEnding};
 use super::message_fields::{self, refusal_field, words};
 use super::{logprobs, stream, usage};
 use crate::ask::bounded_json::parse;
@@ -56,20 +56,20 @@ struct ChatRequest<'a> {
 #[derive(Serialize)]
 struct ChatMessage<'a> {
     role: &'static str,
-    content: Content<'a>,
+    content: MessageContent<'a>,
 }
 
 /// Content of a message. Text without images is sent as a string, because text-only servers may not support parts.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Content<'a> {
+enum MessageContent<'a> {
     Text(&'a str),
-    Parts(Vec<Part<'a>>),
+    Parts(Vec<ContentPart<'a>>),
 }
 
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-enum Part<'a> {
+enum ContentPart<'a> {
     Text { text: &'a str },
     ImageUrl { image_url: ImageUrl },
 }
@@ -112,8 +112,11 @@ pub(super) fn body(
         thinking: fields.thinking_body(),
     })?;
     let head = parameters.extra.apply(head)?;
-    let system =
-        parameters.extra.system.as_deref().map(|text| ChatMessage { role: "system", content: Content::Text(text) });
+    let system = parameters
+        .extra
+        .system
+        .as_deref()
+        .map(|text| ChatMessage { role: "system", content: MessageContent::Text(text) });
     let parts = message.parts();
     let question = ChatMessage { role: "user", content: content(&parts, parameters.detail) };
     let messages: Vec<ChatMessage<'_>> = system.into_iter().chain([question]).collect();
@@ -122,16 +125,16 @@ pub(super) fn body(
 }
 
 /// Content of a message, with a placeholder for each image.
-fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Content<'a> {
+fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> MessageContent<'a> {
     match parts {
-        [] => Content::Text(""),
-        [MessagePart::Text(text)] => Content::Text(text),
-        parts => Content::Parts(
+        [] => MessageContent::Text(""),
+        [MessagePart::Text(text)] => MessageContent::Text(text),
+        parts => MessageContent::Parts(
             parts
                 .iter()
                 .map(|part| match part {
-                    MessagePart::Text(text) => Part::Text { text },
-                    MessagePart::Image(_) => Part::ImageUrl { image_url: ImageUrl { detail, url: "" } },
+                    MessagePart::Text(text) => ContentPart::Text { text },
+                    MessagePart::Image(_) => ContentPart::ImageUrl { image_url: ImageUrl { detail, url: "" } },
                 })
                 .collect(),
         ),
@@ -168,7 +171,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         return Err(ReplyError::Api(Box::new(ApiError::from_error(error))));
     }
     let reason = choice.get("finish_reason").and_then(Value::as_str);
-    let Ending { finish, may_heal } = finish_reason::read(reason.unwrap_or_default(), usage)
+    let ReplyEnding { finish, may_heal } = finish_reason::read(reason.unwrap_or_default(), usage)
         .map_err(|incomplete| error_in_text(choice).unwrap_or(ReplyError::Unreadable(incomplete)))?;
     let message = choice
         .get("message")

@@ -34,7 +34,7 @@ static REASONS: LazyLock<Reasons> =
 
 /// The end of a reply, as a server states it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Ending {
+pub(super) struct ReplyEnding {
     pub(super) finish: Finish,
     /// True if the reason is not known, so that another try may end in another way.
     pub(super) may_heal: bool,
@@ -44,7 +44,7 @@ pub(super) struct Ending {
 ///
 /// # Errors
 /// If the server gave the generation up. The error includes `usage`, the tokens charged.
-pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Ending, Box<Unreadable>> {
+pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<ReplyEnding, Box<Unreadable>> {
     let name = Finish::normalized(reason);
     let reasons = &*REASONS;
     let other = Finish::Other(reason.trim().to_owned());
@@ -65,9 +65,9 @@ pub(super) fn read(reason: &str, usage: Option<Usage>) -> Result<Ending, Box<Unr
             ..Unreadable::new(format!("a reply that broke off: its finish_reason is {reason:?}"))
         }));
     } else {
-        return Ok(Ending { finish: other, may_heal: true });
+        return Ok(ReplyEnding { finish: other, may_heal: true });
     };
-    Ok(Ending { finish, may_heal: false })
+    Ok(ReplyEnding { finish, may_heal: false })
 }
 
 /// True if a finish reason means that prompt and reply are as long as the model's context.
@@ -126,8 +126,8 @@ mod tests {
         assert!(all.iter().all(|word| !Finish::Other(word.clone()).is_whole()));
     }
 
-    fn certain(finish: Finish) -> Ending {
-        Ending { finish, may_heal: false }
+    fn certain(finish: Finish) -> ReplyEnding {
+        ReplyEnding { finish, may_heal: false }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 use super::chat::{self, OMIT_PROBABILITIES, is_end, with_images};
-use super::finish_reason::{self, Ending};
+use super::finish_reason::{self, ReplyEnding};
 use super::message_fields::{text_of, tool_call, words};
 use super::{logprobs, stream, usage};
 use crate::ask::failures::{ApiError, ReplyError, Unreadable};
@@ -50,12 +50,12 @@ struct ResponsesRequest<'a> {
 #[derive(Serialize)]
 struct InputMessage<'a> {
     role: &'static str,
-    content: Vec<Part<'a>>,
+    content: Vec<InputPart<'a>>,
 }
 
 #[derive(Serialize)]
 #[serde(tag = "type", rename_all = "snake_case")]
-enum Part<'a> {
+enum InputPart<'a> {
     InputText {
         text: &'a str,
     },
@@ -106,15 +106,15 @@ fn limit(parameters: &Parameters, fields: RequestFields) -> Option<u32> {
 }
 
 /// Content of a message, with a placeholder for each image.
-fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<Part<'a>> {
+fn content<'a>(parts: &[MessagePart<'a>], detail: Option<ImageDetail>) -> Vec<InputPart<'a>> {
     if parts.is_empty() {
-        return vec![Part::InputText { text: "" }];
+        return vec![InputPart::InputText { text: "" }];
     }
     parts
         .iter()
         .map(|part| match part {
-            MessagePart::Text(text) => Part::InputText { text },
-            MessagePart::Image(_) => Part::InputImage { detail, image_url: "" },
+            MessagePart::Text(text) => InputPart::InputText { text },
+            MessagePart::Image(_) => InputPart::InputImage { detail, image_url: "" },
         })
         .collect()
 }
@@ -220,7 +220,7 @@ pub(super) fn read(body: &[u8], content_type: &str) -> Result<Reply, ReplyError>
         return Err(ReplyError::Api(Box::new(api_error)));
     }
     let usage = usage::in_body(&response);
-    let Ending { finish, may_heal } = finish(&response, usage)?;
+    let ReplyEnding { finish, may_heal } = finish(&response, usage)?;
     let items = response
         .get("output")
         .and_then(Value::as_array)
@@ -267,11 +267,11 @@ fn last_response(stream: &str) -> Option<Value> {
 ///
 /// # Errors
 /// If the response has not ended.
-fn finish(response: &Value, usage: Option<Usage>) -> Result<Ending, ReplyError> {
+fn finish(response: &Value, usage: Option<Usage>) -> Result<ReplyEnding, ReplyError> {
     let status = owned_text(response.get("status")).unwrap_or_default();
     match &*status {
         "" | "completed" => {
-            Ok(Ending { finish: if status.is_empty() { Finish::Unknown } else { Finish::Stop }, may_heal: false })
+            Ok(ReplyEnding { finish: if status.is_empty() { Finish::Unknown } else { Finish::Stop }, may_heal: false })
         }
         "incomplete" => {
             let details = response.get("incomplete_details");

@@ -63,7 +63,7 @@ fn fenced(lines: &str) -> String {
 
 /// Levels and models in the trials of a run.
 #[derive(Default)]
-struct RunModels {
+struct BundledRuns {
     levels: BTreeSet<AxisLevel>,
     /// Models asked with images.
     seeing: BTreeSet<String>,
@@ -71,7 +71,7 @@ struct RunModels {
     blind: BTreeSet<String>,
 }
 
-impl RunModels {
+impl BundledRuns {
     fn from_trials<D: Detail>(trials: &Trials<D>) -> Self {
         let mut asked = Self::default();
         for (model, condition) in trials.asked().into_iter().flatten() {
@@ -91,12 +91,12 @@ impl RunModels {
 pub(super) fn command(manifest: &RunManifest, run: &AnyRun) -> String {
     let mut words = vec!["darkqa-eval".to_owned()];
     let asked = match run {
-        AnyRun::Choice(run) => RunModels::from_trials(&run.trials),
+        AnyRun::Choice(run) => BundledRuns::from_trials(&run.trials),
         AnyRun::Open(run) => {
             // The manifest has the digest of the questions, not their path.
             let questions = ["openeqa", "--questions", "DIR/questions.json"];
             words.extend(questions.map(str::to_owned));
-            RunModels::from_trials(&run.trials)
+            BundledRuns::from_trials(&run.trials)
         }
     };
     let judge = text_setting(manifest, "--judge");
@@ -175,7 +175,7 @@ fn remote_models(manifest: &RunManifest) -> BTreeMap<&String, &Value> {
 ///
 /// Flags do not suffice if models differ in their settings, or if a model has another name in the run than at its
 /// endpoint.
-fn models_file(remote: &BTreeMap<&String, &Value>, asked: &RunModels, judge: Option<&str>) -> Option<String> {
+fn models_file(remote: &BTreeMap<&String, &Value>, asked: &BundledRuns, judge: Option<&str>) -> Option<String> {
     // Flags define a model that is only a judge.
     let models: Vec<(&String, &Value)> = remote
         .iter()

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::frames::{Frame, FrameReader, HotPixels, Inputs, Layout, TILES, in_batches};
 use super::read_noise::{PlotFit, ReadNoise, plot_fit};
 use super::recording::SettingFiles;
-use super::sums::{Centres, PairNoise, PairSums, PlaneSums, Residuals};
+use super::sums::{Centres, PairNoise, PairSums, PlaneSums, ResidualHistogram};
 use crate::error::{Error, Result};
 
 /// Results of the bias frames of a setting.
@@ -25,7 +25,7 @@ pub(super) struct BiasFit {
     pub(super) frames: usize,
     pub(super) hot: HotPixels,
     /// Residuals of all frames, for the probability plot.
-    pub(super) residuals: Residuals,
+    pub(super) residuals: ResidualHistogram,
     /// Read noise by maximum likelihood, not yet multiplied by `widened`.
     pub(super) read: ReadNoise,
     /// Read noise by the probability plot, already multiplied by `widened`.
@@ -33,12 +33,12 @@ pub(super) struct BiasFit {
     /// Factor of σ_TL that compensates for the noise removed with the mean frame.
     pub(super) widened: f64,
     /// Sums of pairs of frames; the last group may have a single frame.
-    groups: Vec<Group>,
+    groups: Vec<FramePair>,
 }
 
 /// Two successive frames, or the last frame of an odd number.
 #[derive(Debug)]
-struct Group {
+struct FramePair {
     /// Number and sum of the samples of each plane, over all frames of the group.
     planes: Vec<[u64; 2]>,
     /// `None` for a single frame.
@@ -47,8 +47,8 @@ struct Group {
 
 /// Sums of a group, and the residuals of its frames.
 struct GroupWork {
-    group: Group,
-    residuals: Residuals,
+    group: FramePair,
+    residuals: ResidualHistogram,
     correlation: f64,
 }
 
@@ -84,10 +84,10 @@ impl BiasFit {
         } else {
             1.0
         };
-        let (groups, residuals): (Vec<Group>, Vec<Residuals>) =
+        let (groups, residuals): (Vec<FramePair>, Vec<ResidualHistogram>) =
             works.into_iter().map(|work| (work.group, work.residuals)).unzip();
         let read = ReadNoise::fit(&residuals).map_err(refused)?;
-        let mut all = Residuals::default();
+        let mut all = ResidualHistogram::default();
         for group in &residuals {
             all.add(group);
         }
@@ -226,14 +226,14 @@ fn read_group(reader: &FrameReader, group: &[PathBuf]) -> Result<Vec<Frame>> {
 fn group_work(reader: &FrameReader, frames: &[Frame], hot: &HotPixels, centres: Centres<'_>) -> GroupWork {
     let layout = reader.layout;
     let mut planes = vec![[0; 2]; layout.cfa.planes()];
-    let mut residuals = Residuals::default();
+    let mut residuals = ResidualHistogram::default();
     for frame in frames {
         let sums = PlaneSums::new(layout, &frame.samples, hot);
         for (plane, more) in planes.iter_mut().zip(sums.planes()) {
             plane[0] += more[0];
             plane[1] += more[1];
         }
-        residuals.add(&Residuals::new(layout, &frame.samples, &sums, hot, centres));
+        residuals.add(&ResidualHistogram::new(layout, &frame.samples, &sums, hot, centres));
     }
     let pair = match frames {
         [a, b] => Some(PairSums::new(layout, [&a.samples, &b.samples], hot)),
@@ -244,7 +244,7 @@ fn group_work(reader: &FrameReader, frames: &[Frame], hot: &HotPixels, centres: 
             let equal = vec![1.0; layout.cfa.planes()];
             pair.neighbours().correlation(&equal)
         }),
-        group: Group { planes, noise: pair.as_ref().map(PairSums::noise) },
+        group: FramePair { planes, noise: pair.as_ref().map(PairSums::noise) },
         residuals,
     }
 }
@@ -408,7 +408,7 @@ pub(super) struct Unevenness {
 
 /// A site of the mean frame.
 #[derive(Debug, Clone, Copy)]
-struct Site {
+struct FrameSite {
     plane_row: usize,
     /// Column within the plane.
     column: usize,
@@ -502,7 +502,11 @@ impl MeanFrame {
     }
 
     /// Sums for each part of a row, in order. `add` adds one site to the sums; hot pixels are skipped.
-    fn sums_by_part<const N: usize>(&self, hot: &HotPixels, add: impl Fn(&mut [f64; N], Site) + Sync) -> Vec<[f64; N]> {
+    fn sums_by_part<const N: usize>(
+        &self,
+        hot: &HotPixels,
+        add: impl Fn(&mut [f64; N], FrameSite) + Sync,
+    ) -> Vec<[f64; N]> {
         (0..self.layout.plane_rows())
             .into_par_iter()
             .with_min_len(64)
@@ -511,7 +515,7 @@ impl MeanFrame {
                 let mut sums = [0.0; N];
                 for (column, sum) in self.part(&self.sums, plane_row).enumerate() {
                     if hot.next_if_eq(&column).is_none() {
-                        let site = Site { plane_row, column, mean: f64::from(*sum) / self.frames() };
+                        let site = FrameSite { plane_row, column, mean: f64::from(*sum) / self.frames() };
                         add(&mut sums, site);
                     }
                 }

@@ -3,7 +3,7 @@
 //!
 //! Checks of pairs of flats.
 //!
-//! System gain K by photon transfer: [`Transfer`].
+//! System gain K by photon transfer: [`TransferLine`].
 //!
 //! A signal of S ADU is S / K electrons. Their number has the variance S / K, which is K · S in ADU² (Janesick, *Photon
 //! Transfer*, 2007; EMVA 1288 release 4 Linear, section 6).
@@ -26,12 +26,12 @@ const RANGE: [f64; 2] = [0.015, 0.7];
 /// Usable exposures of a setting.
 #[derive(Debug)]
 pub(super) struct Flats {
-    exposures: Vec<Exposure>,
+    exposures: Vec<FlatPairs>,
 }
 
 /// Pairs of flats of one exposure.
 #[derive(Debug)]
-struct Exposure {
+struct FlatPairs {
     /// Tiles of each pair in the range of light.
     pairs: Vec<Vec<Tile>>,
     dark: Option<Dark>,
@@ -103,7 +103,7 @@ impl Flats {
                 notes.extend(clipped.doubt);
                 continue;
             }
-            for (name, digest) in facts.iter().flat_map(PairFacts::files) {
+            for (name, digest) in facts.iter().flat_map(FlatPairFacts::files) {
                 inputs.check_unique(name, digest)?;
             }
             notes.extend(check.check_pairs()?);
@@ -113,7 +113,7 @@ impl Flats {
                 left_out.push(reason);
                 continue;
             }
-            exposures.push(Exposure { pairs, dark });
+            exposures.push(FlatPairs { pairs, dark });
         }
         if exposures.len() < MIN_EXPOSURES {
             return Err(too_few(files, exposures.len(), &left_out));
@@ -138,7 +138,7 @@ impl Flats {
     }
 
     /// Points of photon transfer, with one weight for each pair.
-    pub(super) fn points(&self, base: Base<'_>, weights: &[f64]) -> Vec<Point> {
+    pub(super) fn points(&self, base: Base<'_>, weights: &[f64]) -> Vec<TransferPoint> {
         let mut points = Vec::new();
         let mut weights = weights.iter();
         for (index, exposure) in self.exposures.iter().enumerate() {
@@ -149,7 +149,7 @@ impl Flats {
                 if *weight <= 0.0 {
                     continue;
                 }
-                points.extend(pair.iter().map(|tile| Point {
+                points.extend(pair.iter().map(|tile| TransferPoint {
                     exposure: index,
                     plane: tile.plane,
                     weight: weight * tile.free,
@@ -175,7 +175,7 @@ fn too_few(files: &SettingFiles, usable: usize, reasons: &[String]) -> Error {
 }
 
 /// Tiles of a pair whose light is in the range.
-fn in_range(pair: &PairFacts, offsets: &[f64], white: u16) -> Vec<Tile> {
+fn in_range(pair: &FlatPairFacts, offsets: &[f64], white: u16) -> Vec<Tile> {
     let ratios = pair.light_ratios(offsets);
     pair.tiles
         .iter()
@@ -199,14 +199,14 @@ fn read(
     files: &SettingFiles,
     hot: &HotPixels,
     inputs: &mut Inputs,
-) -> Result<Vec<Vec<PairFacts>>> {
+) -> Result<Vec<Vec<FlatPairFacts>>> {
     let pairs: Vec<(usize, &[PathBuf])> = files
         .exposures
         .iter()
         .enumerate()
         .flat_map(|(index, exposure)| exposure.flats.chunks(2).map(move |pair| (index, pair)))
         .collect();
-    let mut read: Vec<Vec<PairFacts>> = files.exposures.iter().map(|_| Vec::new()).collect();
+    let mut read: Vec<Vec<FlatPairFacts>> = files.exposures.iter().map(|_| Vec::new()).collect();
     in_batches(
         &pairs,
         2 * reader.bytes_of_frame(),
@@ -223,13 +223,13 @@ fn read(
 }
 
 /// Reads a pair of frames and computes its facts and those of its files.
-fn pair_facts(reader: &FrameReader, pair: &[PathBuf], hot: &HotPixels) -> Result<(PairFacts, [FrameFacts; 2])> {
+fn pair_facts(reader: &FrameReader, pair: &[PathBuf], hot: &HotPixels) -> Result<(FlatPairFacts, [FrameFacts; 2])> {
     let layout = reader.layout;
     let [a, b] = read_pair(reader, pair)?;
     let sums = PairSums::new(layout, [&a.samples, &b.samples], hot);
     let top = [&a, &b].map(|frame| TopCode::new(layout, &frame.samples, hot));
     let [first, second] = [0, 1].map(|frame| top[frame].largest_share());
-    let facts = PairFacts {
+    let facts = FlatPairFacts {
         names: [&pair[0], &pair[1]].map(|path| path.display().to_string()),
         digests: [a.facts.digest, b.facts.digest],
         greatest: top[0].max().max(top[1].max()),
@@ -309,7 +309,7 @@ const MIN_IN_RANGE: f64 = 0.25;
 
 /// Results of a pair of flats.
 #[derive(Debug)]
-pub(super) struct PairFacts {
+pub(super) struct FlatPairFacts {
     /// Names of the two files.
     names: [String; 2],
     /// Digests of the two files.
@@ -328,7 +328,7 @@ pub(super) struct PairFacts {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ExposureCheck<'a> {
     name: &'a str,
-    facts: &'a [PairFacts],
+    facts: &'a [FlatPairFacts],
     /// Offsets of the planes in ADU.
     offsets: &'a [f64],
     /// Code of white.
@@ -344,7 +344,7 @@ pub(super) struct Clipped {
     doubt: Option<String>,
 }
 
-impl PairFacts {
+impl FlatPairFacts {
     /// Names and digests of both files.
     fn files(&self) -> [(&str, Digest); 2] {
         [0, 1].map(|frame| (&*self.names[frame], self.digests[frame]))
@@ -465,7 +465,7 @@ impl ExposureCheck<'_> {
 }
 
 /// Warning about the code of white, if all codes of all exposures are far below it.
-fn far_below_white(exposures: &[Vec<PairFacts>], white: u16) -> Option<String> {
+fn far_below_white(exposures: &[Vec<FlatPairFacts>], white: u16) -> Option<String> {
     let greatest = exposures.iter().flatten().map(|pair| pair.greatest).max()?;
     let share = f64::from(greatest) / f64::from(white);
     (share < MIN_REACH).then(|| {
@@ -478,7 +478,7 @@ fn far_below_white(exposures: &[Vec<PairFacts>], white: u16) -> Option<String> {
 
 /// Point of photon transfer: a tile of a pair of flats.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Point {
+pub(super) struct TransferPoint {
     pub(crate) exposure: usize,
     pub(crate) plane: usize,
     /// Degrees of freedom of the variance, times the weight of the pair.
@@ -493,7 +493,7 @@ pub(super) struct Point {
 
 /// Straight line through points of photon transfer.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Transfer {
+pub(super) struct TransferLine {
     /// K of all planes together, in ADU per electron.
     pub(crate) gain: f64,
     /// K of each plane; `None` for a plane without points.
@@ -506,13 +506,14 @@ pub(super) struct Transfer {
     pub(crate) intercept_error: f64,
 }
 
-impl Transfer {
+impl TransferLine {
     /// Fits a line through points of this number of planes.
-    pub(crate) fn fit(points: &[Point], planes: usize) -> Self {
+    pub(crate) fn fit(points: &[TransferPoint], planes: usize) -> Self {
         let gain = fitted_gain(points);
         let by_plane = (0..planes)
             .map(|plane| {
-                let plane_points: Vec<Point> = points.iter().filter(|point| point.plane == plane).copied().collect();
+                let plane_points: Vec<TransferPoint> =
+                    points.iter().filter(|point| point.plane == plane).copied().collect();
                 (!plane_points.is_empty()).then(|| fitted_gain(&plane_points))
             })
             .collect();
@@ -521,13 +522,13 @@ impl Transfer {
     }
 }
 
-fn sum(points: &[Point], term: impl Fn(&Point) -> f64) -> f64 {
+fn sum(points: &[TransferPoint], term: impl Fn(&TransferPoint) -> f64) -> f64 {
     points.iter().map(term).sum()
 }
 
 /// Gain K = Σ w S V / Σ w S² with w = n / (K S + read variance)², because a variance V has the variance 2 (K S + …)² /
 /// n. The weights depend on K; three iterations are enough for them to converge.
-pub(super) fn fitted_gain(points: &[Point]) -> f64 {
+pub(super) fn fitted_gain(points: &[TransferPoint]) -> f64 {
     let mut gain = sum(points, |p| p.weight * p.variance) / sum(points, |p| p.weight * p.signal);
     for _ in 0..3 {
         let product = sum(points, |p| weight(p, gain) * p.signal * p.variance);
@@ -537,12 +538,12 @@ pub(super) fn fitted_gain(points: &[Point]) -> f64 {
 }
 
 /// Weight of a point in the fit of the gain.
-fn weight(point: &Point, gain: f64) -> f64 {
+fn weight(point: &TransferPoint, gain: f64) -> f64 {
     point.weight / (gain * point.signal + point.within).powi(2)
 }
 
 /// Slope of V / S over S, weighted by the number of sites, times the range of S and relative to K.
-fn bend(points: &[Point], gain: f64) -> f64 {
+fn bend(points: &[TransferPoint], gain: f64) -> f64 {
     let [slope, _] = line(points.iter().map(|p| (p.weight, p.signal, p.variance / p.signal)));
     let [low, high] = points
         .iter()
@@ -552,7 +553,7 @@ fn bend(points: &[Point], gain: f64) -> f64 {
 }
 
 /// Intercept of the weighted line, and its standard error from the variance 2 (K S + …)² / n of each point.
-fn intercept(points: &[Point], gain: f64) -> [f64; 2] {
+fn intercept(points: &[TransferPoint], gain: f64) -> [f64; 2] {
     let [slope, mean] = line(points.iter().map(|p| (weight(p, gain), p.signal, p.variance)));
     let [mut sum, mut first, mut second] = [0.0; 3];
     for point in points {
@@ -584,11 +585,11 @@ mod tests {
     use super::*;
 
     /// Points of exact variances, `of` the signal, at 40 signals.
-    fn points(of: impl Fn(f64) -> f64) -> Vec<Point> {
+    fn points(of: impl Fn(f64) -> f64) -> Vec<TransferPoint> {
         (0..40)
             .map(|i: i32| {
                 let signal = 300.0 * 1.1_f64.powi(i);
-                Point {
+                TransferPoint {
                     exposure: (i / 8) as usize,
                     plane: (i % 4) as usize,
                     weight: 1000.0 + f64::from(i),
@@ -602,7 +603,7 @@ mod tests {
 
     #[test]
     fn a_straight_line_gives_its_slope() {
-        let fit = Transfer::fit(&points(|signal| 0.75 * signal), 4);
+        let fit = TransferLine::fit(&points(|signal| 0.75 * signal), 4);
         assert!((fit.gain - 0.75).abs() < 1e-12);
         assert!(fit.by_plane.iter().all(|k| (k.unwrap() - 0.75).abs() < 1e-12));
         assert!(fit.bend.abs() < 1e-10 && fit.intercept.abs() < 1e-8);
@@ -610,15 +611,15 @@ mod tests {
 
     #[test]
     fn bends_and_intercepts_are_found() {
-        let bent = Transfer::fit(&points(|s| 0.75 * s * (1.1 - 0.2 * s / 12_300.0)), 4);
+        let bent = TransferLine::fit(&points(|s| 0.75 * s * (1.1 - 0.2 * s / 12_300.0)), 4);
         // From 300 to 12 344 ADU, V / S falls from 0.821 to 0.674.
         assert!((bent.bend + 0.196).abs() < 0.01, "{}", bent.bend);
-        let lifted = Transfer::fit(&points(|signal| 0.75 * signal + 12.0), 4);
+        let lifted = TransferLine::fit(&points(|signal| 0.75 * signal + 12.0), 4);
         assert!((lifted.intercept - 12.0).abs() < 1e-6, "{}", lifted.intercept);
         assert!(lifted.intercept_error > 0.0 && lifted.intercept_error < 12.0);
         let mut apart = points(|signal| 0.75 * signal);
         apart.iter_mut().filter(|p| p.plane == 3).for_each(|p| p.variance *= 1.1);
-        let fit = Transfer::fit(&apart, 5);
+        let fit = TransferLine::fit(&apart, 5);
         assert!((fit.by_plane[3].unwrap() - 0.825).abs() < 1e-12);
         assert!((fit.by_plane[0].unwrap() - 0.75).abs() < 1e-12);
         assert_eq!(fit.by_plane[4], None);
@@ -643,7 +644,7 @@ mod tests {
                 let deviation = (point.variance + point.within) * (2.0 / point.weight).sqrt();
                 point.variance += deviation * normal();
             }
-            let fit = Transfer::fit(&noisy, 4);
+            let fit = TransferLine::fit(&noisy, 4);
             squares += fit.intercept * fit.intercept / 400.0;
             error += fit.intercept_error / 400.0;
         }

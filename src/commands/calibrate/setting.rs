@@ -6,12 +6,12 @@
 //!
 //! Results of one setting: [`SettingFit`].
 //!
-//! Standard errors by the bootstrap over frame pairs: [`Draws`].
+//! Standard errors by the bootstrap over frame pairs: [`BootstrapDraws`].
 
 use serde::Serialize;
 
 use super::bias::BiasFit;
-use super::flats::{Base, FlatSettings, Flats, Point, Transfer, fitted_gain};
+use super::flats::{Base, FlatSettings, Flats, TransferLine, TransferPoint, fitted_gain};
 use super::frames::{FrameReader, Inputs};
 use super::read_noise::PlotFit;
 use super::recording::SettingFiles;
@@ -65,7 +65,7 @@ pub(super) fn measure(files: &SettingFiles, context: &mut MeasureContext<'_>) ->
 fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit {
     let noise = bias.noise(&vec![1.0; bias.groups()]);
     let points = flats.points(base, &vec![1.0; flats.pairs()]);
-    let transfer = Transfer::fit(&points, base.offsets.len());
+    let transfer = TransferLine::fit(&points, base.offsets.len());
     let errors = Errors::estimate(bias, flats);
     let scale = bias.widened * libm::exp(bias.read.log_scale);
     SettingFit {
@@ -92,7 +92,7 @@ fn fit(name: &str, bias: &BiasFit, flats: &Flats, base: Base<'_>) -> SettingFit 
 }
 
 /// Mean signal and variance of each exposure and plane.
-fn means_by_plane(points: &[Point]) -> Vec<[f64; 2]> {
+fn means_by_plane(points: &[TransferPoint]) -> Vec<[f64; 2]> {
     points
         .chunk_by(|a, b| (a.exposure, a.plane) == (b.exposure, b.plane))
         .map(|group| {
@@ -232,7 +232,7 @@ pub(super) struct Errors {
 }
 
 /// The fit of one draw.
-struct Draw {
+struct FitDraw {
     offsets: Vec<f64>,
     row: f64,
     read: [f64; 2],
@@ -242,9 +242,9 @@ struct Draw {
 impl Errors {
     /// Estimates the errors by independent draws of bias pairs and flat pairs.
     fn estimate(bias: &BiasFit, flats: &Flats) -> Self {
-        let bias_draws = Draws::new(DrawnGroups::Bias, bias.pairs());
-        let flat_draws = Draws::new(DrawnGroups::Flats, flats.pairs());
-        let draws: Vec<Draw> = bias_draws
+        let bias_draws = BootstrapDraws::new(DrawnGroups::Bias, bias.pairs());
+        let flat_draws = BootstrapDraws::new(DrawnGroups::Flats, flats.pairs());
+        let draws: Vec<FitDraw> = bias_draws
             .weights()
             .zip(flat_draws.weights())
             .map(|(bias_weights, flat_weights)| {
@@ -254,7 +254,7 @@ impl Errors {
                 fit_draw(bias, flats, &weights, flat_weights)
             })
             .collect();
-        let bias_error = |value: &dyn Fn(&Draw) -> f64| deviation(draws.iter().map(value), bias.pairs());
+        let bias_error = |value: &dyn Fn(&FitDraw) -> f64| deviation(draws.iter().map(value), bias.pairs());
         let planes = draws.first().map_or(0, |draw| draw.offsets.len());
         Self {
             gain: deviation(draws.iter().map(|draw| draw.gain), flats.pairs()),
@@ -267,10 +267,10 @@ impl Errors {
 }
 
 /// Fits a draw of the bias groups and the flat pairs, given by their weights.
-fn fit_draw(bias: &BiasFit, flats: &Flats, bias_weights: &[f64], flat_weights: &[f64]) -> Draw {
+fn fit_draw(bias: &BiasFit, flats: &Flats, bias_weights: &[f64], flat_weights: &[f64]) -> FitDraw {
     let (offsets, noise) = (bias.offsets(bias_weights), bias.noise(bias_weights));
     let base = Base { offsets: &offsets, within: noise.within };
-    Draw {
+    FitDraw {
         gain: fitted_gain(&flats.points(base, flat_weights)),
         row: noise.row_deviation(),
         read: bias.read.resampled(bias_weights),
@@ -349,7 +349,7 @@ const DRAWS: usize = 1000;
 /// A draw has n − 1 of n groups, with replacement, so that the variance of a mean over the draws is unbiased for few
 /// groups too (Rao and Wu 1988, Journal of the American Statistical Association 83:231).
 #[derive(Debug)]
-pub(super) struct Draws {
+pub(super) struct BootstrapDraws {
     /// Weights of the groups in each draw, with mean 1.
     weights: Vec<Vec<f64>>,
 }
@@ -361,7 +361,7 @@ pub(super) enum DrawnGroups {
     Flats,
 }
 
-impl Draws {
+impl BootstrapDraws {
     /// Draws from this number of groups. A single group has weight 1 in every draw.
     pub(super) fn new(kind: DrawnGroups, groups: usize) -> Self {
         let key = NoiseKey::new(0, &FrameId("calibrate".to_owned()));
@@ -414,7 +414,7 @@ mod tests {
         let mean = values.iter().sum::<f64>() / 5.0;
         let squares: f64 = values.iter().map(|v| (v - mean) * (v - mean)).sum();
         let expected = (squares / 4.0 / 5.0_f64).sqrt();
-        let draws = Draws::new(DrawnGroups::Bias, 5);
+        let draws = BootstrapDraws::new(DrawnGroups::Bias, 5);
         let means = draws.weights().map(|weights| {
             assert!((weights.iter().sum::<f64>() - 5.0).abs() < 1e-12);
             values.iter().zip(weights).map(|(v, w)| v * w).sum::<f64>() / 5.0
@@ -422,7 +422,7 @@ mod tests {
         let error = deviation(means, 5).unwrap();
         assert!((error / expected - 1.0).abs() < 0.08, "{error}, {expected}");
         assert_eq!(deviation([1.0, 2.0].into_iter(), 1), None);
-        let other = Draws::new(DrawnGroups::Flats, 5);
+        let other = BootstrapDraws::new(DrawnGroups::Flats, 5);
         assert!(draws.weights().zip(other.weights()).any(|(a, b)| a != b));
     }
 }

@@ -114,7 +114,7 @@ pub(crate) struct Cli {
 
 /// When results have colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Colours {
+pub(crate) enum ColourChoice {
     Auto,
     Always,
     Never,
@@ -129,7 +129,7 @@ pub(crate) struct CommonArgs {
     pub quiet: bool,
     /// Colours of results; auto: on a terminal, without NO_COLOR, CLICOLOR=0 and TERM=dumb
     #[arg(long, global = true, value_name = "WHEN", value_enum, default_value = "auto", add = Decides::Nothing)]
-    pub color: Colours,
+    pub color: ColourChoice,
     /// TOML file of flags by their long names; flags of a single command are in a table of its name; default:
     /// DARKQA_CONFIG, else none
     #[arg(long, global = true, value_name = "FILE", add = Decides::Nothing)]

@@ -26,7 +26,7 @@ use tracing_subscriber::EnvFilter;
 
 use super::evaluate::{EvaluateArgs, ShrinkArgs};
 use super::openeqa::{JudgeArgs, OpenEqaArgs};
-use super::synthesize::Sheet;
+use super::synthesize::SheetKind;
 use crate::ask::{AccessArgs, Parameters, RequestArgs, Sending};
 use crate::commands::evaluate::{check, evaluate, export_batch, plan, run_batch};
 use crate::commands::merge::merge;
@@ -50,7 +50,7 @@ use crate::types::flags::flag_spelling;
 use crate::types::manifests::Status;
 use crate::types::text::{escape_hidden, escape_hidden_except_styles};
 use crate::types::{AxisLevel, SetLight};
-use command::{BatchCommand, CheckCommand, Cli, Colours, Command, NAME, ReportCommand, ReportForm, StudyCommand};
+use command::{BatchCommand, CheckCommand, Cli, ColourChoice, Command, NAME, ReportCommand, ReportForm, StudyCommand};
 use darkqa_enhance::{EnhancerArgs, ProbeArgs, RuntimeArgs, SizeArgs};
 use darkqa_light::{CameraArgs, LightArgs, SensorArgs};
 use darkqa_score::photographs::realism::residual::Bins;
@@ -113,9 +113,9 @@ pub fn main(words: impl Iterator<Item = OsString>) -> ExitCode {
         tracing::warn!("{line}");
     }
     let colours = match cli.common.color {
-        Colours::Auto => AutoStream::choice(&std::io::stdout()),
-        Colours::Always => ColorChoice::Always,
-        Colours::Never => ColorChoice::Never,
+        ColourChoice::Auto => AutoStream::choice(&std::io::stdout()),
+        ColourChoice::Always => ColorChoice::Always,
+        ColourChoice::Never => ColorChoice::Never,
     };
     match carry_out(cli, &progress) {
         Ok(outcome) => finish(&outcome, verbosity, colours),
@@ -288,7 +288,7 @@ fn without_effect(cli: &Cli, matches: &ArgMatches) -> Vec<String> {
         Some(Command::OpenEqa(args)) => idle.open_questions(args),
         Some(Command::Synthesize(command)) => {
             if let Some(args) = &command.images {
-                if args.sheet == Some(Sheet::Noise) {
+                if args.sheet == Some(SheetKind::Noise) {
                     let why = "this sheet shows the noise variant";
                     idle.because(why, &[vec!["variant".into()], camera()].concat());
                 }

@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 
 use crate::data::frame_folder::{self, FrameOutput};
 use crate::data::import::recording::{
-    Channel, ChannelContent, ForeignData, ImageMessage, MessageImage, Nanoseconds, Place, Thumbnail, seconds,
+    Channel, ChannelContent, ForeignData, GreyBlocks, ImageMessage, MessageImage, Nanoseconds, Place, seconds,
 };
 use crate::engine::images::frames::InputTally;
 use crate::error::{Error, Result};
@@ -424,7 +424,7 @@ fn has_lost_colour(format: &str) -> bool {
 ///
 /// # Errors
 /// If the message has no image that can be decoded.
-pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<Thumbnail, String> {
+pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<GreyBlocks, String> {
     match parse(channel, bytes)?.image {
         MessageImage::Raw(image) => thumbnail_of_pixels(image.decode()?.with_white(white)),
         MessageImage::File { bytes, .. } => {
@@ -433,18 +433,18 @@ pub(super) fn thumbnail(channel: &Channel, bytes: &[u8], white: u16) -> Result<T
                 let pixels = RawPixels::Rgb16Image(deep_image(&file)?);
                 return thumbnail_of_pixels(pixels.with_white(white));
             }
-            file.decode().map(|image| Thumbnail::new(&image)).map_err(|e| e.to_string())
+            file.decode().map(|image| GreyBlocks::new(&image)).map_err(|e| e.to_string())
         }
     }
 }
 
-fn thumbnail_of_pixels(pixels: RawPixels) -> Result<Thumbnail, String> {
+fn thumbnail_of_pixels(pixels: RawPixels) -> Result<GreyBlocks, String> {
     match pixels {
-        RawPixels::Codes8(image) => Ok(Thumbnail::new(&image)),
+        RawPixels::Codes8(image) => Ok(GreyBlocks::new(&image)),
         RawPixels::Rgb16Image(image) => {
             let high = image.samples().iter().map(|code| (code >> 8) as u8).collect();
             let image = Rgb::new(image.height(), image.width(), high);
-            image.map(|image| Thumbnail::new(&image)).map_err(|e| e.to_string())
+            image.map(|image| GreyBlocks::new(&image)).map_err(|e| e.to_string())
         }
     }
 }

@@ -9,9 +9,9 @@ use serde_json::{Map, Value, json};
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter};
 use super::mcap_files::slug;
 use crate::data::ParquetColumns;
-use crate::data::import::lerobot::{Camera, DataRow, Episode, FilePlace, ImageForm, LeRobotSet};
+use crate::data::import::lerobot::{Camera, CameraImages, DataRow, Episode, FilePlace, LeRobotSet};
 use crate::data::import::recording::video::Video;
-use crate::data::import::recording::{Nanoseconds, Place, Sampler, SamplingArgs, Thumbnail, seconds};
+use crate::data::import::recording::{GreyBlocks, Nanoseconds, Place, Sampler, SamplingArgs, seconds};
 use crate::engine::images::progress::{Progress, StepBar};
 use crate::engine::images::workers::pool;
 use crate::error::{Error, Result};
@@ -94,7 +94,7 @@ impl<'a> EpisodeImport<'a> {
         threads: Option<NonZeroUsize>,
     ) -> Result<Self> {
         let videos: Vec<&str> =
-            cameras.iter().filter(|camera| camera.form == ImageForm::Video).map(|camera| &*camera.name).collect();
+            cameras.iter().filter(|camera| camera.form == CameraImages::Video).map(|camera| &*camera.name).collect();
         let mut problems = Problems::default();
         let episodes = set.episodes(&videos)?;
         let tasks = set.tasks().unwrap_or_else(|e| {
@@ -130,11 +130,11 @@ impl<'a> EpisodeImport<'a> {
         for (camera, files) in self.cameras.clone().into_iter().zip(chosen) {
             for (place, mut rows) in files {
                 let result = match camera.form {
-                    ImageForm::Images => {
+                    CameraImages::Images => {
                         rows.sort_by_key(|row| (row.row.group, row.row.row));
                         self.read_images(camera, place, &rows, &bar)
                     }
-                    ImageForm::Video => {
+                    CameraImages::Video => {
                         let time = |row: &ChosenRow| self.time_in_file(videos, row);
                         rows.sort_by(|a, b| time(a).total_cmp(&time(b)));
                         self.read_video(camera, videos, place, &rows, &bar)
@@ -152,7 +152,7 @@ impl<'a> EpisodeImport<'a> {
                     }
                 }
             }
-            videos += usize::from(camera.form == ImageForm::Video);
+            videos += usize::from(camera.form == CameraImages::Video);
         }
         Ok(())
     }
@@ -236,8 +236,8 @@ impl<'a> EpisodeImport<'a> {
         let (mut video, mut is_ended) = (0, false);
         for (camera, files) in self.cameras.iter().zip(chosen) {
             let part = match camera.form {
-                ImageForm::Images => Some((episode.data, None)),
-                ImageForm::Video => {
+                CameraImages::Images => Some((episode.data, None)),
+                CameraImages::Video => {
                     let part = episode.videos.get(video).copied().flatten();
                     video += 1;
                     part.map(|part| (part.place, Some(part.from)))
@@ -283,7 +283,7 @@ impl<'a> EpisodeImport<'a> {
                 Ok(bytes) => {
                     let thumbnail = || {
                         let file = ImageFile::new(bytes.clone(), String::new(), DecodeRule::default());
-                        file.decode().ok().map(|image| Thumbnail::new(&image))
+                        file.decode().ok().map(|image| GreyBlocks::new(&image))
                     };
                     if self.is_wanted(&mut samplers, chosen, thumbnail) {
                         self.push(camera, chosen, FrameSource::File(bytes));
@@ -356,7 +356,7 @@ impl<'a> EpisodeImport<'a> {
     }
 
     fn take(&mut self, camera: &Camera, samplers: &mut Samplers, chosen: &ChosenRow, image: &Rgb) {
-        if self.is_wanted(samplers, chosen, || Some(Thumbnail::new(image))) {
+        if self.is_wanted(samplers, chosen, || Some(GreyBlocks::new(image))) {
             self.push(camera, chosen, FrameSource::Image(image.clone()));
         }
     }
@@ -367,7 +367,7 @@ impl<'a> EpisodeImport<'a> {
         &self,
         samplers: &mut Samplers,
         chosen: &ChosenRow,
-        thumbnail: impl FnOnce() -> Option<Thumbnail>,
+        thumbnail: impl FnOnce() -> Option<GreyBlocks>,
     ) -> bool {
         if self.sampling.changed.is_none() {
             return true;

@@ -2,7 +2,7 @@
 //!
 //! Times of the images of a topic: [`MessageTimes`].
 //!
-//! Intrinsics and exposures in a recording: [`Cameras`] and [`Exposures`].
+//! Intrinsics and exposures in a recording: [`Cameras`] and [`FrameExposures`].
 //!
 //! The list of the topics of a recording: [`listing`].
 
@@ -190,13 +190,13 @@ impl Cameras {
 
 /// Exposures of chosen frames. An exposure may arrive before or after its image.
 #[derive(Default)]
-pub(super) struct Exposures {
+pub(super) struct FrameExposures {
     recent: VecDeque<(String, Exposure)>,
     wanted: BTreeSet<(String, Nanoseconds)>,
     pub(super) found: HashMap<(String, Nanoseconds), Map<String, Value>>,
 }
 
-impl Exposures {
+impl FrameExposures {
     pub(super) fn add(&mut self, camera: &str, exposure: Exposure) {
         let key = (camera.to_owned(), exposure.stamp);
         if self.wanted.remove(&key) {

@@ -12,12 +12,12 @@ use serde_json::{Map, Value, json};
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, VIDEO_REMEDY, summary, thumbnail};
 use super::mcap_files::{
-    Cameras, Exposures, MAX_NAMED, MessageTimes, drive_name, files, listing, no_images, open_reader, overview, slug,
-    total_bytes, warn_of_unread,
+    Cameras, FrameExposures, MAX_NAMED, MessageTimes, drive_name, files, listing, no_images, open_reader, overview,
+    slug, total_bytes, warn_of_unread,
 };
 use crate::data::import::recording::{
-    CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader, Message, Nanoseconds,
-    Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_name, camera_of_info,
+    CameraInfo, ChannelContent, Encoding, Event, ImageMessage, MAX_MESSAGE_BYTES, McapReader, MessageHeader,
+    Nanoseconds, Overview, Sampler, SamplingArgs, Stretches, TopicClock, TopicOverview, camera_name, camera_of_info,
     is_without_image, seconds, stamp,
 };
 use crate::engine::images::progress::{Progress, StepBar};
@@ -52,12 +52,12 @@ pub(crate) struct McapArgs {
     white: Option<NonZeroU16>,
     /// How frames are written.
     #[command(flatten)]
-    written: WrittenArgs,
+    written: DriveArgs,
 }
 
 /// The flags about the frames of a drive that are written.
 #[derive(Debug, Args)]
-pub(super) struct WrittenArgs {
+pub(super) struct DriveArgs {
     /// The name the data set gives itself; default: the name of the recording
     #[arg(long, value_name = "NAME", add = Decides::Reply)]
     pub(super) name: Option<String>,
@@ -72,7 +72,7 @@ pub(super) struct WrittenArgs {
     pub(super) threads: ThreadArgs,
 }
 
-impl WrittenArgs {
+impl DriveArgs {
     /// As [`check_output`].
     pub(super) fn check(&self, out: &Path) -> Result<()> {
         check_output(out, self.force)
@@ -187,7 +187,7 @@ struct Import<'a> {
     writer: FrameWriter<'a>,
     white: u16,
     cameras: Cameras,
-    exposures: Exposures,
+    exposures: FrameExposures,
     /// Topics with images in the recording.
     with_images: BTreeSet<String>,
     /// Number of messages without a time stamp.
@@ -228,7 +228,7 @@ impl<'a> Import<'a> {
             writer: FrameWriter::new(out, drive.to_owned(), white, pool(args.written.threads.threads)?),
             white,
             cameras: Cameras::default(),
-            exposures: Exposures::default(),
+            exposures: FrameExposures::default(),
             with_images: BTreeSet::new(),
             without_stamp: 0,
             backwards: 0,
@@ -288,7 +288,7 @@ impl<'a> Import<'a> {
     }
 
     /// Processes a message: an image, intrinsics or an exposure; others are ignored.
-    fn process(&mut self, reader: &mut McapReader<File>, message: &Message) {
+    fn process(&mut self, reader: &mut McapReader<File>, message: &MessageHeader) {
         let channel = &message.channel;
         let has_images = matches!(channel.content, ChannelContent::Image(_));
         if has_images && !self.with_images.contains(&channel.topic) {
@@ -330,7 +330,7 @@ impl<'a> Import<'a> {
     }
 
     /// Counts a message that is too long to be read.
-    fn fail_oversized(&mut self, message: &Message) {
+    fn fail_oversized(&mut self, message: &MessageHeader) {
         let topic = &message.channel.topic;
         let since = self.since_start(message.log_time);
         let problem = format!(
@@ -342,7 +342,7 @@ impl<'a> Import<'a> {
     }
 
     /// Gives the image of a message to the writer, if its topic's sampler selects it.
-    fn process_image(&mut self, reader: &mut McapReader<File>, message: &Message, encoding: Encoding) {
+    fn process_image(&mut self, reader: &mut McapReader<File>, message: &MessageHeader, encoding: Encoding) {
         let topic = message.channel.topic.clone();
         let schema = &message.channel.schema;
         if message.length > MAX_MESSAGE_BYTES {

@@ -8,9 +8,9 @@ use serde_json::{Map, json};
 
 use super::frame_writer::{ChosenFrame, FrameSource, FrameWriter, summary};
 use super::mcap_files::drive_name;
-use super::recording::{WrittenArgs, warn_of_missed};
+use super::recording::{DriveArgs, warn_of_missed};
 use crate::data::import::recording::video::{Video, VideoFrames};
-use crate::data::import::recording::{SamplingArgs, Stretches, Thumbnail, TopicClock, seconds};
+use crate::data::import::recording::{GreyBlocks, SamplingArgs, Stretches, TopicClock, seconds};
 use crate::engine::images::progress::Progress;
 use crate::engine::images::workers::pool;
 use crate::error::{Error, Result};
@@ -31,7 +31,7 @@ pub(crate) struct VideoArgs {
     sampling: SamplingArgs,
     /// How frames are written.
     #[command(flatten)]
-    written: WrittenArgs,
+    written: DriveArgs,
 }
 
 /// Describes a video, or imports frames of it.
@@ -77,7 +77,7 @@ pub(crate) fn import(args: &VideoArgs, progress: &Progress) -> Result<Outcome> {
         last = last.max(seconds(frame.time));
         bar.advance(last as usize - shown_seconds);
         let is_chosen =
-            sampler.is_due(place) && (!sampler.compares_pixels() || sampler.has_changed(Thumbnail::new(&frame.image)));
+            sampler.is_due(place) && (!sampler.compares_pixels() || sampler.has_changed(GreyBlocks::new(&frame.image)));
         if is_chosen {
             let frame = ChosenFrame {
                 topic: path.clone(),

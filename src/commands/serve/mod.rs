@@ -44,7 +44,7 @@ use crate::types::manifests::Status;
 use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
 use completion::{Completion, MemoryBound, RequestFault};
 use darkqa_questions::rules::Rules;
-use request::{FrameMatcher, MAX_PIXELS, ParsedQuestion, ServedQuestion};
+use request::{AskedQuestion, FrameMatcher, MAX_PIXELS, ServedQuestion};
 
 /// Maximum number of bytes of all bodies in flight (chosen). A body takes up to three times its size until it is
 /// decoded.
@@ -188,7 +188,7 @@ impl ServerState {
             let message = format!("the model {:?} is not one of {}", request.model, names.join(", "));
             RequestFault::new(StatusCode::NOT_FOUND, message).at("model", "model_not_found")
         })?;
-        let parsed = ParsedQuestion::parse(&request.text)?;
+        let parsed = AskedQuestion::parse(&request.text)?;
         let frame = request.image.as_ref().and_then(|image| self.frame_matcher.best_match(&image.rgb));
         if request.image.is_some() && frame.is_none() && !self.has_seen_unknown.swap(true, Relaxed) {
             tracing::warn!(

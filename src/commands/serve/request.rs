@@ -1,6 +1,6 @@
 //! Parses a request: [`ServedQuestion`].
 //!
-//! Parses a multiple-choice question in free text: [`ParsedQuestion`].
+//! Parses a multiple-choice question in free text: [`AskedQuestion`].
 //!
 //! Matching of an image to the frame of a data set that it shows: [`FrameMatcher`].
 //!
@@ -34,13 +34,13 @@ pub(super) const MAX_PIXELS: usize = 32_000_000;
 #[derive(Deserialize)]
 struct ChatBody {
     model: String,
-    messages: Vec<Message>,
+    messages: Vec<AskedMessage>,
     #[serde(default)]
     stream: Option<bool>,
 }
 
 #[derive(Deserialize)]
-struct Message {
+struct AskedMessage {
     #[serde(default)]
     content: Option<Content>,
 }
@@ -191,7 +191,7 @@ fn invalid_image(message: String) -> RequestFault {
 
 /// A question with its choices, without their letters.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) struct ParsedQuestion {
+pub(super) struct AskedQuestion {
     pub(super) question: String,
     pub(super) choices: Vec<String>,
 }
@@ -199,7 +199,7 @@ pub(super) struct ParsedQuestion {
 /// A line with a choice: `A. yes`, `(B) no`, `C: perhaps`.
 static CHOICE: LazyLock<Option<Regex>> = LazyLock::new(|| Regex::new(r"^\s*[(\[]?([A-Z])[)\].:]+\s*(\S.*?)\s*$").ok());
 
-impl ParsedQuestion {
+impl AskedQuestion {
     /// Parses the last question of a text. The choices are lines with consecutive letters. The question is the last
     /// line before them that ends with a question mark, or else the line directly before them.
     ///
@@ -331,7 +331,7 @@ mod tests {
             "Is it dark?\n A: yes \n B: no\nThe best answer is:",
             "Was it?\nA. no\nB. yes\nIs it dark?\nA) yes\nB) no",
         ] {
-            let parsed = ParsedQuestion::parse(text).ok().unwrap();
+            let parsed = AskedQuestion::parse(text).ok().unwrap();
             assert_eq!(parsed.question, "Is it dark?", "{text}");
             assert_eq!(parsed.choices, ["yes", "no"], "{text}");
         }
@@ -340,7 +340,7 @@ mod tests {
     #[test]
     fn a_text_without_choices_is_refused() {
         for text in ["", "Hello", "Is it?\nA. yes", "Is it?\nB. no"] {
-            assert!(ParsedQuestion::parse(text).is_err(), "{text}");
+            assert!(AskedQuestion::parse(text).is_err(), "{text}");
         }
     }
 }

@@ -20,7 +20,7 @@ use crate::engine::images::frame_work::FrameWork;
 use crate::engine::images::frames::{Frames, InputTally};
 use crate::engine::images::progress::{Progress, StepBar};
 use crate::engine::images::recipes::{ImageRecipe, Recipe};
-use crate::engine::images::stored::{ImageCounts, ImageOutcome, OutputFile, OutputImage, Refusals, Sidecar};
+use crate::engine::images::stored::{ImageCounts, ImageOutcome, ImageRefusals, OutputFile, OutputImage, Sidecar};
 use crate::engine::images::timings::{ImageSteps, Timings};
 use crate::engine::images::workers::{ThreadArgs, pool};
 use crate::error::{Error, Result};
@@ -33,7 +33,7 @@ use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 use darkqa_light::{LightArgs, LightSettings, NoiseKey};
 use sheet::SheetRecipe;
 
-pub(crate) use sheet::Sheet;
+pub(crate) use sheet::SheetKind;
 
 /// `synthesize`, or another form of it.
 #[derive(Debug, Args)]
@@ -95,7 +95,7 @@ pub(crate) struct SynthesizeArgs {
     pub light: LightArgs,
     /// One figure per input instead; default: images
     #[arg(long, value_enum, help_heading = "Synthesis", add = Decides::Nothing)]
-    pub sheet: Option<Sheet>,
+    pub sheet: Option<SheetKind>,
     /// Overwrite any file that has the name of an image
     #[arg(long, help_heading = "Synthesis", add = Decides::Nothing)]
     pub force: bool,
@@ -115,7 +115,7 @@ struct ImageMaking<'a> {
     args: &'a SynthesizeArgs,
     light: LightSettings,
     /// Images that are not made because others are in their places.
-    refusals: Refusals,
+    refusals: ImageRefusals,
 }
 
 /// Makes images, makes one again, or checks images.
@@ -140,8 +140,11 @@ pub(crate) fn synthesize(command: &SynthesizeCommand, progress: &Progress) -> Re
 /// If an input is missing, two frames have the same name, or the folder cannot be written to.
 fn make_images(args: &SynthesizeArgs, progress: &Progress) -> Result<Outcome> {
     let out = &args.out;
-    let making =
-        ImageMaking { args, light: LightSettings::resolve(&args.light, SetLight::Lit)?, refusals: Refusals::default() };
+    let making = ImageMaking {
+        args,
+        light: LightSettings::resolve(&args.light, SetLight::Lit)?,
+        refusals: ImageRefusals::default(),
+    };
     making.light.refuse_matches("synthesize knows none")?;
     let mut frames = Inputs::open(&args.inputs, &args.folders.root.data_root, args.folders.decode.rule())?;
     keep_shard(&mut frames.entries, args.part.resolve()?)?;
@@ -181,17 +184,17 @@ fn outcome(counts: ImageCounts, out: &Path, frames: usize) -> Outcome {
 
 /// Content of an output file of a frame: an image with a degradation (`None` for the untouched frame), or a figure.
 #[derive(Debug, Clone)]
-enum FrameFile {
+enum OutputContent {
     Image(Option<Degradation>),
-    Sheet(Sheet),
+    Sheet(SheetKind),
 }
 
 /// The output files of each frame.
-fn output_files(making: &ImageMaking<'_>) -> Vec<FrameFile> {
+fn output_files(making: &ImageMaking<'_>) -> Vec<OutputContent> {
     if let Some(sheet) = making.args.sheet {
-        return vec![FrameFile::Sheet(sheet)];
+        return vec![OutputContent::Sheet(sheet)];
     }
-    making.light.degradations().into_iter().map(FrameFile::Image).collect()
+    making.light.degradations().into_iter().map(OutputContent::Image).collect()
 }
 
 /// Writes all files of one frame.
@@ -199,7 +202,7 @@ fn write_files(
     making: &ImageMaking<'_>,
     frames: &Inputs,
     entry: &InputFrame,
-    files: &[FrameFile],
+    files: &[OutputContent],
     bar: &StepBar,
     tally: &InputTally,
 ) -> ImageCounts {
@@ -221,8 +224,8 @@ fn write_files(
     let mut logged = BTreeSet::new();
     for file in files {
         let outcome = match file {
-            FrameFile::Image(degradation) => work.image(degradation.as_ref()),
-            FrameFile::Sheet(sheet) => work.sheet(*sheet),
+            OutputContent::Image(degradation) => work.image(degradation.as_ref()),
+            OutputContent::Sheet(sheet) => work.sheet(*sheet),
         };
         match outcome {
             Ok(outcome) => {
@@ -279,7 +282,7 @@ impl SynthesisWork<'_> {
         place.write_unless_present(&recipe, || Ok(Rgb::clone(self.frame.degraded(how)?)))
     }
 
-    fn sheet(&mut self, kind: Sheet) -> Result<ImageOutcome> {
+    fn sheet(&mut self, kind: SheetKind) -> Result<ImageOutcome> {
         let light = &self.making.light;
         let recipe = SheetRecipe::new(kind, &self.entry.id, self.frame.picture()?, light)?;
         let name = format!("{}_{kind}", self.entry.stem);

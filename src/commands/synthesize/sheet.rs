@@ -1,4 +1,4 @@
-//! The figures of `synthesize --sheet` ([`Sheet`]) and the facts that determine them ([`SheetRecipe`]). They are drawn
+//! The figures of `synthesize --sheet` ([`SheetKind`]) and the facts that determine them ([`SheetRecipe`]). They are drawn
 //! by [`crate::report::charts::sheet`].
 
 use std::fmt;
@@ -22,14 +22,14 @@ use darkqa_light::{Coupling, Draws, LightSettings, NoiseKey, Synthesis, version}
 /// The kind of a figure of one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Sheet {
+pub(crate) enum SheetKind {
     /// Each variant by level, with amplified crops
     Levels,
     /// Each term of the noise alone
     Noise,
 }
 
-impl fmt::Display for Sheet {
+impl fmt::Display for SheetKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Levels => "levels",
@@ -41,7 +41,7 @@ impl fmt::Display for Sheet {
 /// All facts that determine a figure.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct SheetRecipe {
-    sheet: Sheet,
+    sheet: SheetKind,
     /// Version of the drawing, [`sheet::VERSION`].
     drawing: u32,
     frame: String,
@@ -61,8 +61,8 @@ impl ImageOrigin for SheetRecipe {
 }
 
 impl SheetRecipe {
-    pub(super) fn new(kind: Sheet, frame: &FrameId, picture: &Picture, light: &LightSettings) -> Result<Self> {
-        if kind == Sheet::Noise {
+    pub(super) fn new(kind: SheetKind, frame: &FrameId, picture: &Picture, light: &LightSettings) -> Result<Self> {
+        if kind == SheetKind::Noise {
             light.kinds.sensor.readings.only()?;
         }
         let degradations = light.degradations().into_iter().flatten();
@@ -78,7 +78,7 @@ impl SheetRecipe {
     }
 }
 
-impl Sheet {
+impl SheetKind {
     /// Draws the figure of a frame.
     pub(super) fn draw(self, frame: &mut FrameWork<'_>, light: &LightSettings) -> Result<Rgb> {
         match self {

@@ -68,7 +68,7 @@ struct SceneInfo {
 }
 
 /// Names of the segments of a scene, by segment number.
-type SegmentNames = BTreeMap<u32, SegmentName>;
+type SceneSegments = BTreeMap<u32, SegmentName>;
 
 /// Line of `trajectory.jsonl`.
 #[derive(Deserialize)]
@@ -139,7 +139,7 @@ impl Habitat {
     }
 
     /// Reads the room types and the segment names from the annotation file of a scene.
-    fn read_annotations(&mut self, folder: &Path) -> Result<(SceneInfo, SegmentNames)> {
+    fn read_annotations(&mut self, folder: &Path) -> Result<(SceneInfo, SceneSegments)> {
         let annotations = files(folder, &[".semantic.txt", ".house", "info_semantic.json"])?;
         let Some(path) = annotations.into_values().next() else {
             let problem = "none of *.semantic.txt (HM3D-Sem), *.house (Matterport3D), info_semantic.json (Replica) in this folder; one of them must name the instances of the semantic maps";

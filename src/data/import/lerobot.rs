@@ -78,7 +78,7 @@ pub(super) struct Info {
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Camera {
     pub(crate) name: String,
-    pub(crate) form: ImageForm,
+    pub(crate) form: CameraImages,
     /// True if the images are depth maps, which are not read.
     pub(crate) is_depth: bool,
     /// Size and codec as stated, such as `640×480 av1`; may be empty.
@@ -89,14 +89,14 @@ pub(crate) struct Camera {
 
 /// Where the images of a camera are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum ImageForm {
+pub(crate) enum CameraImages {
     /// In video files.
     Video,
     /// In the data files, as image files in a column.
     Images,
 }
 
-impl ImageForm {
+impl CameraImages {
     /// The `dtype` in `info.json`.
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -171,8 +171,8 @@ impl Camera {
     /// Parses a feature; `None` if it has no images.
     fn parse(name: &str, feature: &Value, fps: f64) -> Option<Self> {
         let form = match feature.get("dtype").and_then(Value::as_str)? {
-            "video" => ImageForm::Video,
-            "image" => ImageForm::Images,
+            "video" => CameraImages::Video,
+            "image" => CameraImages::Images,
             _ => return None,
         };
         // Version 2.0 has `video_info` in some sets.
@@ -182,7 +182,7 @@ impl Camera {
         let is_depth = ["is_depth_map", "video.is_depth_map"]
             .iter()
             .any(|key| info.get(*key).and_then(Value::as_bool) == Some(true));
-        let codec = info.get("video.codec").and_then(Value::as_str).filter(|_| form == ImageForm::Video);
+        let codec = info.get("video.codec").and_then(Value::as_str).filter(|_| form == CameraImages::Video);
         let words: Vec<String> = size(feature).into_iter().chain(codec.map(str::to_owned)).collect();
         Some(Self {
             name: name.to_owned(),
@@ -583,13 +583,13 @@ impl LeRobotSet {
     }
 
     fn fill(&self, pattern: &str, key: &str, place: FilePlace, camera: &str) -> Result<String> {
-        let [chunk, file] = [place.chunk, place.file].map(FieldValue::Number);
+        let [chunk, file] = [place.chunk, place.file].map(PatternValue::Number);
         let fields = [
             ("chunk_index", chunk),
             ("file_index", file),
             ("episode_chunk", chunk),
             ("episode_index", file),
-            ("video_key", FieldValue::Text(camera)),
+            ("video_key", PatternValue::Text(camera)),
         ];
         fill(pattern, &fields).map_err(|problem| {
             let info = self.folder.join(INFO);
@@ -618,7 +618,7 @@ const MAX_WIDTH: usize = 20;
 
 /// Value of a field of a pattern.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum FieldValue<'a> {
+pub(super) enum PatternValue<'a> {
     Text(&'a str),
     Number(u64),
 }
@@ -628,7 +628,7 @@ pub(super) enum FieldValue<'a> {
 ///
 /// # Errors
 /// If the pattern has another field or another syntax.
-fn fill(pattern: &str, fields: &[(&str, FieldValue<'_>)]) -> Result<String, String> {
+fn fill(pattern: &str, fields: &[(&str, PatternValue<'_>)]) -> Result<String, String> {
     let mut path = String::new();
     let mut rest = pattern;
     while let Some((before, after)) = rest.split_once('{') {
@@ -644,13 +644,13 @@ fn fill(pattern: &str, fields: &[(&str, FieldValue<'_>)]) -> Result<String, Stri
             .1;
         path.push_str(before);
         match value {
-            FieldValue::Text(text) if format.is_empty() => path.push_str(text),
-            FieldValue::Number(number) => {
+            PatternValue::Text(text) if format.is_empty() => path.push_str(text),
+            PatternValue::Number(number) => {
                 let width = width(format)
                     .ok_or_else(|| format!("{pattern:?} has the format {format:?}; one such as 03d expected"))?;
                 let _ = write!(path, "{number:0width$}");
             }
-            FieldValue::Text(_) => return Err(format!("{pattern:?} has a format for {name}")),
+            PatternValue::Text(_) => return Err(format!("{pattern:?} has a format for {name}")),
         }
         rest = after;
     }
@@ -735,10 +735,10 @@ mod tests {
         assert!(Info::parse(&value).is_err());
     }
 
-    const FIELDS: [(&str, FieldValue<'_>); 3] = [
-        ("video_key", FieldValue::Text("observation.images.top")),
-        ("chunk_index", FieldValue::Number(2)),
-        ("episode_index", FieldValue::Number(1_234_567)),
+    const FIELDS: [(&str, PatternValue<'_>); 3] = [
+        ("video_key", PatternValue::Text("observation.images.top")),
+        ("chunk_index", PatternValue::Number(2)),
+        ("episode_index", PatternValue::Number(1_234_567)),
     ];
 
     #[test]

@@ -52,7 +52,7 @@ struct ScannetMaps {
 
 /// Numbering of the labels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Numbering {
+enum LabelNumbering {
     /// The label numbers of ScanNet's table.
     Scannet,
     /// The label numbers of NYU40.
@@ -69,18 +69,18 @@ impl Scannet {
         };
         let scenes: Vec<PathBuf> = folders(folder)?.into_iter().filter(|scene| scene.join("color").is_dir()).collect();
         let numbering = if scenes.iter().any(|scene| scene.join("label-filt").is_dir()) {
-            Numbering::Scannet
+            LabelNumbering::Scannet
         } else {
-            Numbering::Nyu40
+            LabelNumbering::Nyu40
         };
         set.listing.labels = match numbering {
-            Numbering::Scannet => {
+            LabelNumbering::Scannet => {
                 let path = folder.join(LABEL_TABLE);
                 let labels = read_label_table(&path)?;
                 set.scene_files.push(path);
                 labels
             }
-            Numbering::Nyu40 => space("nyu40").unwrap_or_default(),
+            LabelNumbering::Nyu40 => space("nyu40").unwrap_or_default(),
         };
         for scene in scenes {
             set.add_scene(&scene, numbering)?;
@@ -88,7 +88,7 @@ impl Scannet {
         Ok(set)
     }
 
-    fn add_scene(&mut self, folder: &Path, numbering: Numbering) -> Result<()> {
+    fn add_scene(&mut self, folder: &Path, numbering: LabelNumbering) -> Result<()> {
         let name = file_name(folder);
         check_overflow(folder, &name)?;
         let color_file = intrinsics_file(folder, "color");
@@ -100,8 +100,8 @@ impl Scannet {
         self.scene_files.extend(color_file.into_iter().chain(depth_file));
         self.scene_files.extend([room_file, folder.join(format!("{name}.aggregation.json"))]);
         let (label_folder, instance_folder) = match numbering {
-            Numbering::Scannet => ("label-filt", "instance-filt"),
-            Numbering::Nyu40 => ("label", "instance"),
+            LabelNumbering::Scannet => ("label-filt", "instance-filt"),
+            LabelNumbering::Nyu40 => ("label", "instance"),
         };
         let labels = files(&folder.join(label_folder), &[".png"])?;
         let instances = files(&folder.join(instance_folder), &[".png"])?;

@@ -59,11 +59,11 @@ struct Index {
 #[derive(Deserialize)]
 struct SunRgbdFrame {
     #[serde(default)]
-    polygon: Vec<Shape>,
+    polygon: Vec<ImageShape>,
 }
 
 #[derive(Deserialize)]
-struct Shape {
+struct ImageShape {
     x: Value,
     y: Value,
     object: usize,

@@ -2,12 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::cells::{Cell, Row, Table};
+use super::cells::{Cell, Row, SetRows};
 use super::choices::is_native_format;
 use super::columns::map::ColumnMap;
-use super::columns::{Column, find_column};
+use super::columns::{SetColumn, find_column};
 use super::summary::count;
-use crate::data::ready_made::columns::map::Role;
+use crate::data::ready_made::columns::map::ColumnRole;
 use crate::types::{Question, StrictGroup};
 
 /// Rule that makes the name of a row's group from its cells.
@@ -17,7 +17,7 @@ pub(super) struct GroupRule {
     text: String,
     parts: Vec<NamePart>,
     /// Column with the number of questions in the group, in files written by a run.
-    size: Option<Column>,
+    size: Option<SetColumn>,
 }
 
 /// Part of the name of a group.
@@ -26,10 +26,10 @@ enum NamePart {
     /// Literal text, the same in every row.
     Literal(String),
     /// Text of a cell.
-    Cell(Column),
+    Cell(SetColumn),
     /// Index of a run of `length` consecutive numbers in a column, counted from `first`: `{Index:2 from 1}` groups 1
     /// with 2, and 3 with 4.
-    Run { column: Column, length: u64, first: u64 },
+    Run { column: SetColumn, length: u64, first: u64 },
 }
 
 /// Columns for the name and the size of groups in files of this program.
@@ -40,11 +40,11 @@ impl GroupRule {
     ///
     /// # Errors
     /// If the map names a column that does not exist, or the template is invalid.
-    pub(super) fn from_map(table: &Table, map: &ColumnMap) -> Result<Option<Self>, String> {
+    pub(super) fn from_map(table: &SetRows, map: &ColumnMap) -> Result<Option<Self>, String> {
         let [name, size] = NATIVE_COLUMNS;
-        let size = table.find(size).map(|index| Column::new(index, size));
+        let size = table.find(size).map(|index| SetColumn::new(index, size));
         let is_native = table.find(name).is_some() && (size.is_some() || is_native_format(table));
-        let text = match map.entry(Role::Group).map(|entry| &*entry.columns) {
+        let text = match map.entry(ColumnRole::Group).map(|entry| &*entry.columns) {
             Some([text]) => text.clone(),
             None if is_native => name.to_owned(),
             _ => return Ok(None),
@@ -81,7 +81,7 @@ impl NamePart {
 }
 
 /// Parses a template of group names.
-fn parse_template(table: &Table, template: &str) -> Result<Vec<NamePart>, String> {
+fn parse_template(table: &SetRows, template: &str) -> Result<Vec<NamePart>, String> {
     let mut parts = Vec::new();
     let mut rest = template;
     while let Some((literal, after)) = rest.split_once('{') {
@@ -100,7 +100,7 @@ fn parse_template(table: &Table, template: &str) -> Result<Vec<NamePart>, String
 
 /// Parses a field in braces: a column, or a column with the length of a run of numbers. A column with the whole name
 /// takes precedence.
-fn parse_field(table: &Table, field: &str) -> Result<NamePart, String> {
+fn parse_field(table: &SetRows, field: &str) -> Result<NamePart, String> {
     let Some((name, run)) = split_run(field).filter(|_| table.find(field).is_none()) else {
         return find_column(table, field).map(NamePart::Cell);
     };
@@ -148,7 +148,7 @@ pub(super) struct Groups {
 impl Groups {
     /// Groups the rows. Rows that cannot be asked count as members, so that incomplete groups are detected. Rotated
     /// copies of a question do not count.
-    pub(super) fn new(table: &Table, rule: &GroupRule, is_rotation: impl Fn(usize) -> bool) -> Self {
+    pub(super) fn new(table: &SetRows, rule: &GroupRule, is_rotation: impl Fn(usize) -> bool) -> Self {
         let mut groups = Self { rule: rule.text.clone(), ..Self::default() };
         for (index, row) in table.rows.iter().enumerate() {
             let name = rule.name(row).filter(|name| !name.is_empty());

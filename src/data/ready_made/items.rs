@@ -3,14 +3,14 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::cells::{Cell, ConversationPaths, Row, Table, parse_list};
+use super::cells::{Cell, ConversationPaths, Row, SetRows, parse_list};
 use super::choices::{LetteredOptions, OptionInterner, OptionList, Options, find_in_question};
 use super::columns::map::map_flag;
-use super::columns::{Column, OptionsInQuestion, QuestionSource, Roles};
-use super::omissions::{OmissionReason, Omissions};
+use super::columns::{ColumnRoles, OptionsInQuestion, QuestionSource, SetColumn};
+use super::omissions::{Omissions, RowOmission};
 use super::pictures::{ImageForm, ImageMarks};
 use super::settings::{SetArgs, SeveralImages};
-use crate::data::ready_made::columns::map::{Role, split_instructions};
+use crate::data::ready_made::columns::map::{ColumnRole, split_instructions};
 use crate::types::text::excerpt;
 
 /// Maximum length of a question or an option, in bytes.
@@ -18,7 +18,7 @@ const MAX_TEXT_BYTES: usize = 16 << 10;
 
 /// The question of a row. Its correct answer is not known yet.
 #[derive(Debug)]
-pub(super) struct Item {
+pub(super) struct RowQuestion {
     /// Index of the row in the table.
     pub(super) row: usize,
     /// The question without its options.
@@ -29,7 +29,7 @@ pub(super) struct Item {
     pub(super) options: Option<Arc<OptionList>>,
 }
 
-impl Item {
+impl RowQuestion {
     /// The item as an open question. Options that were found in the question stay in its text.
     pub(super) fn without_options(self) -> Self {
         let text = self.whole.unwrap_or(self.text);
@@ -63,23 +63,28 @@ impl InstructionCutter<'_> {
 /// # Errors
 /// If two columns have different options. The message contains the row and the two flags to choose from.
 pub(super) fn items(
-    table: &Table,
-    roles: &Roles,
+    table: &SetRows,
+    roles: &ColumnRoles,
     form: ImageForm,
     args: &SetArgs,
     omissions: &mut Omissions,
     cut: &mut InstructionCounts,
-) -> Result<Vec<Item>, String> {
+) -> Result<Vec<RowQuestion>, String> {
     let mut cutter = InstructionCutter((!args.keep_instructions).then_some(cut));
     let (mut items, mut interner) = (Vec::new(), OptionInterner::default());
     for (index, image_count) in rows_with_images(table, roles, form, args, omissions) {
         let row = &table.rows[index];
         match question_parts(row, roles, ImageMarks::new(image_count), &mut cutter) {
             Ok(QuestionParts { text, whole, options }) => {
-                items.push(Item { row: index, text, whole, options: options.map(|options| interner.intern(options)) });
+                items.push(RowQuestion {
+                    row: index,
+                    text,
+                    whole,
+                    options: options.map(|options| interner.intern(options)),
+                });
             }
             Err(PartsError::Row(problem)) => {
-                omissions.add(OmissionReason::Bad, || format!("{}: {problem}", table.place_in_set(index)));
+                omissions.add(RowOmission::Bad, || format!("{}: {problem}", table.place_in_set(index)));
             }
             Err(PartsError::Set(problem)) => {
                 return Err(format!("{}: {problem}", table.place_in_set(index)));
@@ -92,8 +97,8 @@ pub(super) fn items(
 /// The rows with an image, or with several that may be sent, and the number of images of each. Counts the other rows in
 /// `omissions`.
 pub(super) fn rows_with_images(
-    table: &Table,
-    roles: &Roles,
+    table: &SetRows,
+    roles: &ColumnRoles,
     form: ImageForm,
     args: &SetArgs,
     omissions: &mut Omissions,
@@ -102,9 +107,9 @@ pub(super) fn rows_with_images(
     for (index, row) in table.rows.iter().enumerate() {
         let image_count = form.in_row(row, roles).len();
         let reason = match (image_count, args.multi_image) {
-            (0, _) => Some(OmissionReason::NoImage),
+            (0, _) => Some(RowOmission::NoImage),
             (1, _) | (_, Some(SeveralImages::Send)) => None,
-            (_, Some(SeveralImages::Skip) | None) => Some(OmissionReason::SeveralImages),
+            (_, Some(SeveralImages::Skip) | None) => Some(RowOmission::SeveralImages),
         };
         match reason {
             Some(reason) => omissions.add(reason, || format!("{image_count} images")),
@@ -114,7 +119,7 @@ pub(super) fn rows_with_images(
     rows
 }
 
-/// The question and the options of a row, as in [`Item`].
+/// The question and the options of a row, as in [`RowQuestion`].
 struct QuestionParts {
     text: String,
     whole: Option<String>,
@@ -132,7 +137,7 @@ enum PartsError {
 /// Reads the question and the options of a row.
 fn question_parts(
     row: &Row,
-    roles: &Roles,
+    roles: &ColumnRoles,
     mut marks: ImageMarks,
     cutter: &mut InstructionCutter<'_>,
 ) -> Result<QuestionParts, PartsError> {
@@ -162,8 +167,8 @@ fn question_parts(
         Options::Differ([one, other]) => {
             return Err(PartsError::Set(format!(
                 "the options of {one:?} and {other:?} differ; {} or {} says which are meant",
-                map_flag(Role::Options, &one, None),
-                map_flag(Role::Options, &other, None)
+                map_flag(ColumnRole::Options, &one, None),
+                map_flag(ColumnRole::Options, &other, None)
             )));
         }
         Options::Unread(problem) => return Err(PartsError::Row(problem)),
@@ -192,7 +197,7 @@ fn prepend_hint(hint: &str, text: String) -> String {
 ///
 /// # Errors
 /// If the row has no question, the question is too long, or its image marks cannot be read.
-fn hint_and_question(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result<[String; 2], String> {
+fn hint_and_question(row: &Row, roles: &ColumnRoles, marks: &mut ImageMarks) -> Result<[String; 2], String> {
     let text = match &roles.question {
         QuestionSource::Image => QuestionSource::IN_IMAGE_TEXT.to_owned(),
         QuestionSource::Column(column) => {
@@ -213,13 +218,13 @@ fn hint_and_question(row: &Row, roles: &Roles, marks: &mut ImageMarks) -> Result
 }
 
 /// Error message for a cell without the text of a question.
-fn no_question_text(column: &Column, row: &Row) -> String {
+fn no_question_text(column: &SetColumn, row: &Row) -> String {
     let (cell, name) = (column.cell(row), excerpt(&column.name, 60));
     if cell.is_absent() {
         return format!("the question is empty (column {name:?})");
     }
     let conversation_hint = ConversationPaths::from_cell(&column.name, cell).map_or_else(String::new, |paths| {
-        format!("; {} reads its text", map_flag(Role::Question, &paths.question, None))
+        format!("; {} reads its text", map_flag(ColumnRole::Question, &paths.question, None))
     });
     let kind = cell.parsed().map_or(cell.kind(), |parsed| parsed.kind());
     format!("the column {name:?} of the question holds a {kind}, not a text: {}{conversation_hint}", cell.excerpt(60))
@@ -236,7 +241,7 @@ pub(super) enum AnswerCell {
 }
 
 impl AnswerCell {
-    pub(super) fn from_row(row: &Row, column: &Column) -> Self {
+    pub(super) fn from_row(row: &Row, column: &SetColumn) -> Self {
         let cell = column.cell(row);
         let items = match cell {
             Cell::List(cells) => cells.iter().map(Cell::text).collect(),

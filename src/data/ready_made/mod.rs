@@ -37,15 +37,15 @@ use super::root::Root;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::types::{Choices, Family, FrameId, Question, SetLight};
-use cells::{Cell, Table};
-use choices::{ParsedQuestion, find_truths, is_native_format};
-use columns::map::{CellFormat, ColumnMap, Role};
-use columns::{FamilySource, ImageColumns, QuestionSource, Roles};
-use container::{FoundFiles, Joined, SetFile};
+use cells::{Cell, SetRows};
+use choices::{SetQuestion, find_truths, is_native_format};
+use columns::map::{CellFormat, ColumnMap, ColumnRole};
+use columns::{ColumnRoles, FamilySource, ImageColumns, QuestionSource};
+use container::{FileRelation, FoundFiles, SetFile};
 use groups::{GroupRule, Groups};
 use items::{InstructionCounts, items, rows_with_images};
-use omissions::{OmissionReason, Omissions, omit_contradictions};
-use pictures::{Frames, Ids, ImageForm, Scenes};
+use omissions::{Omissions, RowOmission, omit_contradictions};
+use pictures::{Ids, ImageForm, Scenes, SetFrames};
 use summary::Summary;
 
 pub(super) use choices::one_line;
@@ -99,10 +99,10 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
         "" => stem.to_owned(),
         name => name.to_owned(),
     };
-    let frames = Frames::new(&table, &root, archive.as_ref(), &files, &roles, ImageForm::Files, args.multi_image);
+    let frames = SetFrames::new(&table, &root, archive.as_ref(), &files, &roles, ImageForm::Files, args.multi_image);
     notes.extend_from_slice(&table.notes);
     notes.extend(preset.map(preset::Preset::source));
-    notes.extend(missing_group.filter(|_| map.entry(Role::Group).is_none()));
+    notes.extend(missing_group.filter(|_| map.entry(ColumnRole::Group).is_none()));
     let context = SetContext { place, name: &name, table: &table, roles: &roles, args };
     let scenes = Scenes::new(&table, &map, roles.scene.as_ref());
     let contents = assemble(&context, set, frames, scenes, notes, hint)?;
@@ -123,14 +123,14 @@ pub(super) fn open(places: &[PathBuf], stem: &str, args: &SetArgs) -> Result<Rea
 ///
 /// # Errors
 /// If a file cannot be read, or files of one table have different columns.
-fn read_files(files: &[Arc<SetFile>], joined: Joined, args: &SetArgs) -> Result<Table> {
-    let mut table = Table::default();
+fn read_files(files: &[Arc<SetFile>], joined: FileRelation, args: &SetArgs) -> Result<SetRows> {
+    let mut table = SetRows::default();
     let mut header: Option<BTreeSet<String>> = None;
     for file in files {
         file.read(args.rows.as_deref(), &mut table)?;
         let columns = table.columns_of_last_file();
         let first = header.get_or_insert_with(|| columns.clone());
-        if joined == Joined::OneTable
+        if joined == FileRelation::OneTable
             && let Some(name) = first.symmetric_difference(&columns).next()
         {
             let holder = if columns.contains(name) { file } else { &files[0] };
@@ -191,7 +191,7 @@ pub(super) struct FileQuestions {
 }
 
 /// Maps the column `frame` to the image; `None` if the table has no such column.
-fn frame_map(table: &Table) -> Option<ColumnMap> {
+fn frame_map(table: &SetRows) -> Option<ColumnMap> {
     table.find("frame").and_then(|_| "image=frame".parse().ok())
 }
 
@@ -200,7 +200,7 @@ fn frame_map(table: &Table) -> Option<ColumnMap> {
 /// # Errors
 /// As [`open`].
 pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<FileQuestions> {
-    let mut table = Table::default();
+    let mut table = SetRows::default();
     SetFile::open(file.to_owned(), String::new())?.read(args.rows.as_deref(), &mut table)?;
     let frame = frame_map(&table);
     let folder = file.parent().unwrap_or(Path::new(""));
@@ -210,7 +210,7 @@ pub(super) fn questions_about_frames(file: &Path, args: &SetArgs) -> Result<File
     let map = ColumnMap::merge(frame.iter().chain(&info.map).chain(&args.map));
     let (roles, set) = parse_rows(&table, &map, args, None, ImageForm::Frames)
         .map_err(|problem| Error::data(file.display(), problem))?;
-    let frames = Frames::new(&table, &root, None, &[], &roles, ImageForm::Frames, args.multi_image);
+    let frames = SetFrames::new(&table, &root, None, &[], &roles, ImageForm::Frames, args.multi_image);
     let name = file.display().to_string();
     let context = SetContext { place: file, name: &name, table: &table, roles: &roles, args };
     let notes = table.notes.clone();
@@ -242,8 +242,8 @@ struct SetContents {
 struct SetContext<'a> {
     place: &'a Path,
     name: &'a str,
-    table: &'a Table,
-    roles: &'a Roles,
+    table: &'a SetRows,
+    roles: &'a ColumnRoles,
     args: &'a SetArgs,
 }
 
@@ -253,7 +253,7 @@ struct SetContext<'a> {
 fn assemble(
     context: &SetContext<'_>,
     mut set: ParsedSet,
-    mut frames: Frames<'_>,
+    mut frames: SetFrames<'_>,
     mut scenes: Scenes<'_>,
     mut notes: Vec<String>,
     hint: Option<String>,
@@ -305,7 +305,7 @@ fn assemble(
 ///
 /// Without the flag, reading such an image is an error. Rows whose image cannot be decoded are left out later
 /// ([`Dataset::without_unusable`](crate::data::Dataset::without_unusable)).
-fn omit_unusable_images(context: &SetContext<'_>, set: &mut ParsedSet, frames: &Frames<'_>) -> Result<()> {
+fn omit_unusable_images(context: &SetContext<'_>, set: &mut ParsedSet, frames: &SetFrames<'_>) -> Result<()> {
     if context.args.bad.is_none() {
         return Ok(());
     }
@@ -313,7 +313,7 @@ fn omit_unusable_images(context: &SetContext<'_>, set: &mut ParsedSet, frames: &
     questions.retain(|question| match frames.problem(question.row) {
         None => true,
         Some(problem) => {
-            omissions.add(OmissionReason::Bad, || match problem {
+            omissions.add(RowOmission::Bad, || match problem {
                 Error::Data { problem, .. } => {
                     format!("{}: {problem}", context.table.place_in_set(question.row))
                 }
@@ -329,7 +329,7 @@ fn omit_unusable_images(context: &SetContext<'_>, set: &mut ParsedSet, frames: &
 
 /// Questions of a set with their correct options.
 struct ParsedSet {
-    questions: Vec<ParsedQuestion>,
+    questions: Vec<SetQuestion>,
     /// Columns and formats of the answers, for the summary.
     answer_columns: Vec<String>,
     cut_instructions: InstructionCounts,
@@ -339,31 +339,31 @@ struct ParsedSet {
 
 /// Parses the rows into questions with their correct options (steps 2 to 5).
 fn parse_rows(
-    table: &Table,
+    table: &SetRows,
     map: &ColumnMap,
     args: &SetArgs,
     preset: Option<&preset::Preset>,
     form: ImageForm,
-) -> Result<(Roles, ParsedSet), String> {
+) -> Result<(ColumnRoles, ParsedSet), String> {
     if table.rows.is_empty() {
         return Err("no questions in it".to_owned());
     }
     if args.images_alone {
         return parse_images(table, map, args, form);
     }
-    let roles = Roles::new(table, map)?;
+    let roles = ColumnRoles::new(table, map)?;
     let rule = GroupRule::from_map(table, map)?;
     let (mut omissions, mut cut_instructions) = (Omissions::default(), InstructionCounts::new());
     let mut items = items(table, &roles, form, args, &mut omissions, &mut cut_instructions)?;
     let is_rotation = |row| preset.is_some_and(|preset| preset.is_rotation(table, row));
     for item in items.extract_if(.., |item| is_rotation(item.row)) {
-        omissions.add(OmissionReason::Rotation, || table.place(item.row));
+        omissions.add(RowOmission::Rotation, || table.place(item.row));
     }
     if items.is_empty() {
         omissions.check(table.rows.len(), args).map_err(|problem| with_image_hint(table, &roles, problem))?;
         return Err("no row is left to ask".to_owned());
     }
-    let format = map.entry(Role::Answer).map_or(&CellFormat::Inferred, |entry| &entry.format);
+    let format = map.entry(ColumnRole::Answer).map_or(&CellFormat::Inferred, |entry| &entry.format);
     let truths = find_truths(table, &roles, format, items, &mut omissions)?;
     omissions.check(table.rows.len(), args).map_err(|problem| with_image_hint(table, &roles, problem))?;
     if truths.questions.is_empty() {
@@ -380,10 +380,15 @@ fn parse_rows(
 }
 
 /// Finds the images of the rows. Each row with an image has a question that is not asked.
-fn parse_images(table: &Table, map: &ColumnMap, args: &SetArgs, form: ImageForm) -> Result<(Roles, ParsedSet), String> {
-    let mut roles = Roles::with_question(table, map, QuestionSource::Image)?;
-    let is_named =
-        map.entry(Role::Image).is_some() || table.rows.iter().any(|row| !pictures::images(row, &roles).is_empty());
+fn parse_images(
+    table: &SetRows,
+    map: &ColumnMap,
+    args: &SetArgs,
+    form: ImageForm,
+) -> Result<(ColumnRoles, ParsedSet), String> {
+    let mut roles = ColumnRoles::with_question(table, map, QuestionSource::Image)?;
+    let is_named = map.entry(ColumnRole::Image).is_some()
+        || table.rows.iter().any(|row| !pictures::images(row, &roles).is_empty());
     if let Some(column) = columns::embedded_images(table).filter(|_| !is_named) {
         roles.images = ImageColumns::First(vec![column]);
     }
@@ -391,10 +396,8 @@ fn parse_images(table: &Table, map: &ColumnMap, args: &SetArgs, form: ImageForm)
     let rows = rows_with_images(table, &roles, form, args, &mut omissions);
     omissions.check(table.rows.len(), args).map_err(|problem| with_image_hint(table, &roles, problem))?;
     let choices = Choices::without_truth(vec!["yes".to_owned(), "no".to_owned()]).map_err(|e| e.to_string())?;
-    let questions = rows
-        .into_iter()
-        .map(|(row, _)| ParsedQuestion { row, text: row.to_string(), choices: choices.clone() })
-        .collect();
+    let questions =
+        rows.into_iter().map(|(row, _)| SetQuestion { row, text: row.to_string(), choices: choices.clone() }).collect();
     let set = ParsedSet {
         questions,
         answer_columns: Vec::new(),
@@ -406,7 +409,7 @@ fn parse_images(table: &Table, map: &ColumnMap, args: &SetArgs, form: ImageForm)
 }
 
 /// Adds the columns and an example of `--map image=…` to a problem, if no row has an image.
-fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
+fn with_image_hint(table: &SetRows, roles: &ColumnRoles, problem: String) -> String {
     let has_images = table.rows.iter().any(|row| !pictures::images(row, roles).is_empty());
     if has_images {
         return problem;
@@ -423,7 +426,7 @@ fn with_image_hint(table: &Table, roles: &Roles, problem: String) -> String {
     format!(
         "{problem}\n its columns:\n{}\n if files hold the images, say how they are named, e.g. {}",
         columns::describe_columns(table),
-        columns::map::map_flag(Role::Image, &format!("images/{{{key}}}.jpg"), None)
+        columns::map::map_flag(ColumnRole::Image, &format!("images/{{{key}}}.jpg"), None)
     )
 }
 
@@ -443,9 +446,9 @@ fn build_questions(
     context: &SetContext<'_>,
     families: &FamilySource,
     groups: &Groups,
-    parsed: Vec<ParsedQuestion>,
+    parsed: Vec<SetQuestion>,
     ids: &Ids,
-    frames: &mut Frames<'_>,
+    frames: &mut SetFrames<'_>,
     scenes: &mut Scenes<'_>,
 ) -> Result<Vec<Question>> {
     let (table, evidence) = (context.table, context.roles.evidence.as_ref());

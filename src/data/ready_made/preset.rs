@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::cells::Table;
+use super::cells::SetRows;
 use super::columns::map::ColumnMap;
 use super::groups::template_columns;
 use super::settings::{LeaveOut, SetArgs, SeveralImages};
@@ -103,7 +103,7 @@ impl Preset {
     }
 
     /// Map of the groups for the strict score of the set, or a note if their columns do not exist.
-    pub(super) fn group(&self, table: &Table) -> (Option<ColumnMap>, Option<String>) {
+    pub(super) fn group(&self, table: &SetRows) -> (Option<ColumnMap>, Option<String>) {
         let map: Option<ColumnMap> = self
             .group
             .iter()
@@ -121,7 +121,7 @@ impl Preset {
     }
 
     /// True if a row is a copy of a question with its options in another order.
-    pub(super) fn is_rotation(&self, table: &Table, row: usize) -> bool {
+    pub(super) fn is_rotation(&self, table: &SetRows, row: usize) -> bool {
         let Some(rotations) = &self.rotations else {
             return false;
         };

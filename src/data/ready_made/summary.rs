@@ -2,10 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::cells::Table;
-use super::columns::{FamilySource, ImageColumns, QuestionSource, Roles};
+use super::cells::SetRows;
+use super::columns::{ColumnRoles, FamilySource, ImageColumns, QuestionSource};
 use super::items::InstructionCounts;
-use super::omissions::{OmissionReason, Omissions};
+use super::omissions::{Omissions, RowOmission};
 use super::pictures::Series;
 use crate::data::openeqa::ImageSource;
 use crate::types::{FrameId, Question};
@@ -13,8 +13,8 @@ use crate::types::{FrameId, Question};
 /// Facts about a set, for messages and the manifest.
 pub(super) struct Summary<'a> {
     pub(super) name: &'a str,
-    pub(super) table: &'a Table,
-    pub(super) roles: &'a Roles,
+    pub(super) table: &'a SetRows,
+    pub(super) roles: &'a ColumnRoles,
     pub(super) families: &'a FamilySource,
     /// Columns and formats of the answers.
     pub(super) answers: &'a [String],
@@ -58,7 +58,7 @@ impl Summary<'_> {
         lines.extend(self.groups.clone());
         for (reason, number) in self.omissions.counts() {
             let first = match (reason, self.omissions.bad()) {
-                (OmissionReason::Bad, Some((_, first))) => format!("; the first: {first}"),
+                (RowOmission::Bad, Some((_, first))) => format!("; the first: {first}"),
                 _ => String::new(),
             };
             lines.push(format!("{LEFT_OUT}{number} of {} rows ({}){first}", self.table.rows.len(), reason.name()));

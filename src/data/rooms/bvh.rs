@@ -354,13 +354,13 @@ fn half_area(low: Vec3, high: Vec3) -> f32 {
 
 /// Bounds and number of items.
 #[derive(Debug, Clone, Copy)]
-struct Bin {
+struct SplitBin {
     low: Vec3,
     high: Vec3,
     count: usize,
 }
 
-impl Bin {
+impl SplitBin {
     const EMPTY: Self = Self { low: Vec3::MAX, high: Vec3::MIN, count: 0 };
 
     fn merge(self, other: Self) -> Self {
@@ -386,17 +386,17 @@ fn partition_by_cost(items: &mut [BuildItem]) -> (usize, usize) {
     };
     let mut best: Option<(f32, usize, usize)> = None;
     for axis in (0..3).filter(|axis| size[*axis] > 1e-6) {
-        let mut bins = [Bin::EMPTY; BINS];
+        let mut bins = [SplitBin::EMPTY; BINS];
         for item in items.iter() {
             let bin = &mut bins[bin(item, axis)];
-            *bin = bin.merge(Bin { low: item.low, high: item.high, count: 1 });
+            *bin = bin.merge(SplitBin { low: item.low, high: item.high, count: 1 });
         }
         // Bin i of `right` merges the bins from i on.
         let mut right = bins;
         for index in (0..BINS - 1).rev() {
             right[index] = right[index].merge(right[index + 1]);
         }
-        let mut left = Bin::EMPTY;
+        let mut left = SplitBin::EMPTY;
         for index in 1..BINS {
             left = left.merge(bins[index - 1]);
             let cost = left.cost() + right[index].cost();

@@ -1,4 +1,4 @@
-//! The camera of a frame: [`Camera`].
+//! The camera of a frame: [`Pinhole`].
 //!
 //! The rendered image and maps of a frame in a compact form: [`RenderedFrame`].
 
@@ -15,7 +15,7 @@ use darkqa_base::types::{DepthKind, Frame, FrameId, Intrinsics, Light, Rgb, Segm
 
 /// A pinhole camera, rotated about y and tilted downwards, without roll.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Camera {
+pub(super) struct Pinhole {
     pub(super) position: Vec3,
     /// Cosine and sine of the rotation about y; at an angle of 0 the camera looks along −z.
     yaw: Vec2,
@@ -36,7 +36,7 @@ pub(super) fn focal(size: [usize; 2]) -> f32 {
     longer as f32 / 2.0 / HALF_WIDTH
 }
 
-impl Camera {
+impl Pinhole {
     /// Creates a camera that is rotated about y by `angle` and tilted downwards by `tilt`, both in radians; `size` is
     /// in pixels.
     pub(super) fn new(position: Vec3, angle: f32, tilt: f32, size: [usize; 2]) -> Self {
@@ -99,7 +99,7 @@ pub(super) struct RenderedFrame {
     pub(super) id: FrameId,
     pub(super) scene: String,
     pub(super) room: &'static str,
-    pub(super) camera: Camera,
+    pub(super) camera: Pinhole,
     pub(super) rgb: Arc<Rgb>,
     /// Linear light; `None` if only 8-bit display codes are rendered.
     pub(super) light: Option<Arc<Light>>,

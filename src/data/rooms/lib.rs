@@ -28,7 +28,7 @@ use std::convert::Infallible;
 use std::sync::{Arc, LazyLock};
 
 use self::bvh::Bvh;
-use self::camera::Camera;
+use self::camera::Pinhole;
 use self::kinds::RoomKind;
 use self::plan::FloorPlan;
 use self::seeded_rng::SeededRng;
@@ -176,7 +176,7 @@ impl Room {
         self.kind().furnish(SeededRng::new(self.rooms.seed, &[&scene, "furniture"]))
     }
 
-    fn camera(&self, plan: &FloorPlan, tree: &Bvh) -> Camera {
+    fn camera(&self, plan: &FloorPlan, tree: &Bvh) -> Pinhole {
         let scene = self.scene();
         let mut rng = SeededRng::new(self.rooms.seed, &[&scene, self.view(), "camera"]);
         viewpoint::choose_camera(plan, tree, self.camera_height(), self.rooms.size, &mut rng)

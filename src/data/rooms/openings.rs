@@ -5,7 +5,7 @@ use glam::vec3;
 use super::furniture::{parts, plants, seats, storage, walls};
 use super::mesh::{LightSource, Mesh, Piece, Pose, bounds, kind};
 use super::pattern::{ALL_COLORS, Paint, Pattern, Surface};
-use super::plan::{Doorway, FloorPlan, Flooring, WALL_THICKNESS, Wall, WallPatch, floor_surface};
+use super::plan::{FloorPlan, Flooring, WALL_THICKNESS, Wall, WallDoorway, WallPatch, floor_surface};
 use crate::furniture::beds;
 
 /// Curtains or blinds of a window.
@@ -40,7 +40,7 @@ impl FloorPlan {
             let mut angle = 0.0;
             if self.rng.chance(0.6) {
                 angle = self.rng.between(1.2, 1.9);
-                self.shell.doorways.push(Doorway {
+                self.shell.doorways.push(WallDoorway {
                     wall,
                     along: [along - width / 2.0, along + width / 2.0],
                     top: height,

@@ -97,7 +97,7 @@ impl FloorPlan {
     pub(super) fn add_walls(&mut self) {
         for (i, wall) in WALLS.into_iter().enumerate() {
             let width = self.wall_length(wall);
-            let mut doorways: Vec<Doorway> =
+            let mut doorways: Vec<WallDoorway> =
                 self.shell.doorways.iter().filter(|doorway| doorway.wall == wall).copied().collect();
             doorways.sort_by(|a, b| a.along[0].total_cmp(&b.along[0]));
             let [left, right] = [-width / 2.0 - WALL_THICKNESS, width / 2.0 + WALL_THICKNESS];
@@ -370,7 +370,7 @@ pub(super) const WALL_THICKNESS: f32 = 0.1;
 
 /// A doorway in a wall.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Doorway {
+pub(super) struct WallDoorway {
     pub(super) wall: Wall,
     /// Left and right edge in metres along the wall.
     pub(super) along: [f32; 2],
@@ -385,7 +385,7 @@ pub(super) struct Shell {
     /// Covering of the lower part of all walls, with its height in metres; `None` for a uniform wall.
     pub(super) lower: Option<(Surface, f32)>,
     pub(super) skirting: Surface,
-    pub(super) doorways: Vec<Doorway>,
+    pub(super) doorways: Vec<WallDoorway>,
 }
 
 /// sRGB codes of paints for walls.

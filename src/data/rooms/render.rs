@@ -10,7 +10,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::bvh::Bvh;
-use super::camera::Camera;
+use super::camera::Pinhole;
 use super::light::{LightGrid, LightSample, Lighting, RoomLight, STRATA, SurfacePoint, luminance};
 use super::mesh::Scene;
 use darkqa_base::types::{Light, Pixels, Rgb};
@@ -36,7 +36,7 @@ const EXPOSURE: f32 = 0.98;
 const EDGE_CONTRAST: f32 = 0.06;
 
 /// Renders the image and the maps of a scene. `encoding` is the encoding of the image.
-pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, encoding: RoomLight) -> RenderedView {
+pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Pinhole, encoding: RoomLight) -> RenderedView {
     let [width, height] = camera.size;
     let points = trace_pixels(scene, tree, camera);
     let lighting = estimate_lighting(scene, tree, &points);
@@ -96,7 +96,7 @@ pub(super) fn render(scene: &Scene, tree: &Bvh, camera: &Camera, encoding: RoomL
 }
 
 /// Returns the first surface point on the ray through the center of each pixel.
-fn trace_pixels(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<SurfacePoint>> {
+fn trace_pixels(scene: &Scene, tree: &Bvh, camera: &Pinhole) -> Vec<Option<SurfacePoint>> {
     let [width, height] = camera.size;
     (0..width * height)
         .into_par_iter()
@@ -109,7 +109,7 @@ fn trace_pixels(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<Option<Surfac
 }
 
 /// Depth of each pixel in millimetres along the optical axis, at most 65,535; 0 without a thing.
-fn depth(points: &[Option<SurfacePoint>], camera: &Camera) -> Vec<u16> {
+fn depth(points: &[Option<SurfacePoint>], camera: &Pinhole) -> Vec<u16> {
     let (width, axis) = (camera.size[0], camera.axis());
     points
         .iter()
@@ -122,7 +122,7 @@ fn depth(points: &[Option<SurfacePoint>], camera: &Camera) -> Vec<u16> {
 }
 
 /// Number of the thing at each pixel of a small view, from 1; 0 without a thing.
-pub(super) fn preview(scene: &Scene, tree: &Bvh, camera: &Camera) -> Vec<u32> {
+pub(super) fn preview(scene: &Scene, tree: &Bvh, camera: &Pinhole) -> Vec<u32> {
     let [width, height] = camera.size;
     (0..width * height)
         .map(|i| {

@@ -3,7 +3,7 @@
 use glam::{Vec3, vec3};
 
 use super::bvh::Bvh;
-use super::camera::Camera;
+use super::camera::Pinhole;
 use super::plan::FloorPlan;
 use super::render::preview;
 use super::seeded_rng::SeededRng;
@@ -46,9 +46,9 @@ pub(super) fn choose_camera(
     height: CameraHeight,
     size: [usize; 2],
     rng: &mut SeededRng,
-) -> Camera {
+) -> Pinhole {
     let up = height.draw(rng);
-    let mut best: Option<(f32, Camera)> = None;
+    let mut best: Option<(f32, Pinhole)> = None;
     let mut tries = 0;
     while tries < CANDIDATES * 12 && (tries < CANDIDATES || best.is_none()) {
         tries += 1;
@@ -64,14 +64,14 @@ pub(super) fn choose_camera(
         // At angle 0 the camera looks along −z.
         let angle = libm::atan2f(-offset.x, -offset.z);
         let tilt = libm::atan2f((-offset.y).max(0.0), distance.max(1.5)) * 0.55;
-        let camera = Camera::new(position, angle, tilt, size);
+        let camera = Pinhole::new(position, angle, tilt, size);
         let score = rate_view(plan, &preview(&plan.scene, tree, &camera.with_size(PREVIEW_SIZE)));
         if best.as_ref().is_none_or(|(highest, _)| score > *highest) {
             best = Some((score, camera));
         }
     }
     let middle = vec3(plan.size.x / 2.0, up, plan.size.z / 2.0);
-    best.map_or_else(|| Camera::new(middle, 0.0, 0.1, size), |(_, camera)| camera)
+    best.map_or_else(|| Pinhole::new(middle, 0.0, 0.1, size), |(_, camera)| camera)
 }
 
 /// Position of a random thing that the camera should look at; the middle of the room without such things.

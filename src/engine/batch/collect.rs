@@ -7,8 +7,8 @@ use std::path::PathBuf;
 use jiff::Timestamp;
 use tokio::time::sleep;
 
-use super::driver::{Driver, Goal, Step};
-use super::journal::{Event, Part};
+use super::driver::{Driver, Goal, StepOutcome};
+use super::journal::{BatchPart, PartEvent};
 use super::replies::for_each_line;
 use crate::ask::batch_api::{ApiResult, BatchState, RemoteBatch};
 use crate::error::{Error, Result};
@@ -29,12 +29,12 @@ const MAX_DELETIONS: usize = 3;
 
 impl<D: Detail> Driver<'_, D> {
     /// Checks the batch of a part, at most once between two waits.
-    pub(super) async fn check_batch(&mut self, part: usize) -> Result<Step> {
+    pub(super) async fn check_batch(&mut self, part: usize) -> Result<StepOutcome> {
         let Some(id) = self.part(part).batch.clone() else {
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         };
         if !self.notes.checked.insert(part) {
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         }
         if self.until == Goal::Cancelled && !self.part(part).cancelled {
             self.cancel(part, &id).await?;
@@ -46,14 +46,14 @@ impl<D: Detail> Driver<'_, D> {
         self.notes.refused_checks.remove(&part);
         let state = batch.state.word().to_owned();
         if state != self.part(part).state {
-            self.journal.record(part, Event::Seen { state })?;
+            self.journal.record(part, PartEvent::Seen { state })?;
         }
         let (done, total) = (batch.counts.done, batch.counts.total);
         match &batch.state {
             BatchState::Working(word) => {
                 self.say(part, &format!("{word}, {done} of {total}"));
                 self.cancel_if_late(part, &id).await?;
-                Ok(Step::Waiting)
+                Ok(StepOutcome::Waiting)
             }
             BatchState::Unknown(word) => {
                 let name = self.part(part).name.clone();
@@ -61,7 +61,7 @@ impl<D: Detail> Driver<'_, D> {
                     "{name}: the server states {word:?} for its batch {id}, which is not a known state; it is checked again until it has \
                      ended"
                 ));
-                Ok(Step::Waiting)
+                Ok(StepOutcome::Waiting)
             }
             BatchState::Failed if batch.output_file.is_none() && batch.counts.answered == 0 => {
                 self.batch_failed(part, &batch)
@@ -75,7 +75,7 @@ impl<D: Detail> Driver<'_, D> {
 
     async fn cancel(&mut self, part: usize, id: &str) -> Result<()> {
         match self.server(part)?.cancel(id).await {
-            Ok(()) => self.journal.record(part, Event::Cancelled),
+            Ok(()) => self.journal.record(part, PartEvent::Cancelled),
             // The batch may have ended before; the next check finds out.
             Err(failure) => {
                 let name = self.part(part).name.clone();
@@ -106,7 +106,7 @@ impl<D: Detail> Driver<'_, D> {
     ///
     /// # Errors
     /// Always, unless the batch failed because too many tokens are waiting.
-    fn batch_failed(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+    fn batch_failed(&mut self, part: usize, batch: &RemoteBatch) -> Result<StepOutcome> {
         if let Some(quota) = &batch.quota {
             return self.quota_reached(part, quota);
         }
@@ -124,7 +124,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// Downloads the files of an ended batch. Either file may not exist.
-    async fn fetch(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+    async fn fetch(&mut self, part: usize, batch: &RemoteBatch) -> Result<StepOutcome> {
         let max_bytes = MAX_REPLY_BYTES * (self.part(part).facts.requests as u64 + 1);
         let files = [&batch.output_file, &batch.error_file];
         for (id, path) in files.into_iter().zip(self.output_paths(part)) {
@@ -198,7 +198,7 @@ impl<D: Detail> Driver<'_, D> {
     ///
     /// # Errors
     /// If the files have been incomplete in too many checks. The existing replies are then imported.
-    fn incomplete(&mut self, part: usize, batch: &RemoteBatch, problem: &str) -> Result<Step> {
+    fn incomplete(&mut self, part: usize, batch: &RemoteBatch, problem: &str) -> Result<StepOutcome> {
         let checks = self.notes.incomplete_checks.entry(part).or_default();
         *checks += 1;
         let is_cancelled = self.until == Goal::Cancelled;
@@ -224,11 +224,11 @@ impl<D: Detail> Driver<'_, D> {
             self.warn_once(format!(
                 "{text}; nothing is imported, asked again or deleted; look again later (the command of the run without --detach, or batch cancel, ends the wait)"
             ));
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         }
         if !is_last_check {
             self.warn_once(format!("{text}; looked at again"));
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         }
         self.import_lines(part)?;
         let run = self.store.folder().display();
@@ -240,15 +240,15 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// Records that all files of a batch are downloaded.
-    fn all_fetched(&mut self, part: usize, batch: &RemoteBatch) -> Result<Step> {
+    fn all_fetched(&mut self, part: usize, batch: &RemoteBatch) -> Result<StepOutcome> {
         let files = [&batch.output_file, &batch.error_file];
-        let event = Event::Fetched {
+        let event = PartEvent::Fetched {
             state: batch.state.word().to_owned(),
             files: files.into_iter().flatten().cloned().collect(),
         };
         self.journal.record(part, event)?;
         self.release(part);
-        Ok(Step::Moved)
+        Ok(StepOutcome::Moved)
     }
 
     /// The local paths of a part's output file and error file.
@@ -258,26 +258,26 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// Deletes the files of a part at the server, unless they are kept.
-    pub(super) async fn delete_files(&mut self, part: usize) -> Result<Step> {
-        let mut event = Event::Deleted;
+    pub(super) async fn delete_files(&mut self, part: usize) -> Result<StepOutcome> {
+        let mut event = PartEvent::Deleted;
         if self.args.collect.keep_files || self.notes.kept_files.contains(&part) {
-            event = Event::Kept;
+            event = PartEvent::Kept;
         } else {
             for id in self.files_at_server(part).await? {
                 if let Err(failure) = self.delete_file(part, &id).await? {
-                    event = Event::Kept;
+                    event = PartEvent::Kept;
                     tracing::warn!("the file {id} could not be deleted at the server: {failure}");
                 }
             }
         }
         self.journal.record(part, event)?;
-        Ok(Step::Moved)
+        Ok(StepOutcome::Moved)
     }
 
     /// The ids of a part's files at the server. If the input file was uploaded more than once, this includes copies
     /// whose upload seemed to fail.
     pub(super) async fn files_at_server(&self, part: usize) -> Result<Vec<String>> {
-        let Part { name: part_name, files, uploads, .. } = self.part(part);
+        let BatchPart { name: part_name, files, uploads, .. } = self.part(part);
         let mut ids = files.clone();
         if *uploads > 1 {
             let (name, purpose) = (self.remote_name(part), self.purpose(part));

@@ -13,8 +13,8 @@ use std::time::Duration;
 use tokio::time::{Instant, sleep};
 
 use super::file::{SHARE_OF_QUOTA, StoppedModels};
-use super::journal::{Event, Journal, Part, PartFacts, Stage};
-use super::servers::{BatchRunArgs, Servers};
+use super::journal::{BatchPart, Journal, PartEvent, PartFacts, Stage};
+use super::servers::{BatchRunArgs, BatchServers};
 use crate::ask::batch_api::BatchServer;
 use crate::ask::{AskError, BaseUrl, QuotaRefusal};
 use crate::engine::costs::{Budget, InFlightCost, MoneySettings, RunModels};
@@ -44,7 +44,7 @@ const MAX_REFUSED_CHECKS: u32 = 10;
 
 /// The outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Step {
+pub(super) enum StepOutcome {
     /// The part advanced, and the next step may follow at once.
     Moved,
     /// The part has to wait.
@@ -78,7 +78,7 @@ pub(super) struct Driver<'a, D> {
     pub(super) store: &'a mut Store<D>,
     pub(super) manifest: &'a RunManifest,
     pub(super) journal: &'a mut Journal,
-    pub(super) servers: &'a Servers,
+    pub(super) servers: &'a BatchServers,
     /// Models of all phases of the run, used to adapt their requests and to price their replies; empty if no model is
     /// asked again.
     pub(super) models: &'a [&'a ModelUnderTest],
@@ -139,7 +139,7 @@ impl<D: Detail> Driver<'_, D> {
             let mut part = 0;
             // The list may grow: the pieces of a divided part are appended.
             while part < self.journal.parts.len() {
-                while self.step_or_stop(part).await? == Step::Moved {
+                while self.step_or_stop(part).await? == StepOutcome::Moved {
                     moved = true;
                 }
                 part += 1;
@@ -157,27 +157,27 @@ impl<D: Detail> Driver<'_, D> {
 
     /// Runs one step of a part, unless its model is stopped. Stops the model if its server refuses the call in a way
     /// that would stop every further call.
-    async fn step_or_stop(&mut self, part: usize) -> Result<Step> {
+    async fn step_or_stop(&mut self, part: usize) -> Result<StepOutcome> {
         if self.is_stopped(part) {
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         }
         match self.step(part).await {
             Err(error @ Error::Endpoint { .. }) if !self.money.is_some_and(|money| money.fail_fast) => {
                 self.progress.print_on_terminal(&format!("stopped: {error}"));
                 let facts = &self.journal.parts[part].facts;
                 self.stopped.add_part(facts, error);
-                Ok(Step::Waiting)
+                Ok(StepOutcome::Waiting)
             }
             step => step,
         }
     }
 
-    async fn step(&mut self, part: usize) -> Result<Step> {
+    async fn step(&mut self, part: usize) -> Result<StepOutcome> {
         if self.is_left_alone(part) {
             let base = &self.part(part).facts.base;
             let line = format!("batches at {base} are left alone; name that address, with its key");
             self.warn_once(line);
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         }
         match &self.part(part).stage {
             Stage::Written | Stage::Uploading | Stage::Uploaded if self.until == Goal::Cancelled => {
@@ -190,7 +190,7 @@ impl<D: Detail> Driver<'_, D> {
             Stage::Created => self.check_batch(part).await,
             Stage::Fetched { .. } => self.import_replies(part),
             Stage::Imported => self.delete_files(part).await,
-            Stage::Ended => Ok(Step::Waiting),
+            Stage::Ended => Ok(StepOutcome::Waiting),
         }
     }
 
@@ -229,7 +229,7 @@ impl<D: Detail> Driver<'_, D> {
         self.stopped.has_part(&self.part(part).facts)
     }
 
-    pub(super) fn part(&self, part: usize) -> &Part {
+    pub(super) fn part(&self, part: usize) -> &BatchPart {
         &self.journal.parts[part]
     }
 
@@ -272,7 +272,7 @@ impl<D: Detail> Driver<'_, D> {
     /// # Errors
     /// If the last [`MAX_REFUSED_CHECKS`] checks of the part failed permanently, or one did under [`Goal::Checked`]:
     /// the key or the address is wrong.
-    pub(super) fn check_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
+    pub(super) fn check_failed(&mut self, part: usize, failure: &AskError) -> Result<StepOutcome> {
         tracing::debug!("{}: {failure}", self.part(part).name);
         if failure.is_permanent() {
             let refused = self.notes.refused_checks.entry(part).or_default();
@@ -283,7 +283,7 @@ impl<D: Detail> Driver<'_, D> {
         }
         let name = self.part(part).name.clone();
         self.warn_once(format!("{name}: {failure}; tried again"));
-        Ok(Step::Waiting)
+        Ok(StepOutcome::Waiting)
     }
 
     /// True if the file or batch of a part has been missing for long enough to conclude that it does not exist.
@@ -395,7 +395,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// True if the maximum cost of a part is within the remaining budget.
-    fn is_affordable(&self, part: &Part) -> Result<bool> {
+    fn is_affordable(&self, part: &BatchPart) -> Result<bool> {
         let remaining = self.remaining_budget()?;
         Ok(remaining.is_none_or(|remaining| part.facts.max_cost() <= remaining))
     }
@@ -436,8 +436,9 @@ impl<D: Detail> Driver<'_, D> {
 
     /// True if no batch is open, and no unsubmitted part is within the remaining budget.
     pub(super) fn is_over_budget(&self) -> Result<bool> {
-        let parts: Vec<&Part> = self.journal.parts.iter().filter(|part| !self.stopped.has_part(&part.facts)).collect();
-        let unsubmitted: Vec<&Part> = parts.iter().copied().filter(|part| part.is_unsubmitted()).collect();
+        let parts: Vec<&BatchPart> =
+            self.journal.parts.iter().filter(|part| !self.stopped.has_part(&part.facts)).collect();
+        let unsubmitted: Vec<&BatchPart> = parts.iter().copied().filter(|part| part.is_unsubmitted()).collect();
         if unsubmitted.is_empty() || parts.iter().any(|part| part.is_out()) {
             return Ok(false);
         }
@@ -451,9 +452,9 @@ impl<D: Detail> Driver<'_, D> {
 
     /// Records that a batch was refused because too many tokens are waiting. A part that must be split advances at
     /// once.
-    pub(super) fn quota_reached(&mut self, part: usize, quota: &QuotaRefusal) -> Result<Step> {
+    pub(super) fn quota_reached(&mut self, part: usize, quota: &QuotaRefusal) -> Result<StepOutcome> {
         let limit = quota.limit;
-        self.journal.record(part, Event::QuotaReached { limit })?;
+        self.journal.record(part, PartEvent::QuotaReached { limit })?;
         self.hold(part, None);
         *self.notes.refused_parts.entry(part).or_default() += 1;
         let facts = &self.part(part).facts;
@@ -469,8 +470,8 @@ impl<D: Detail> Driver<'_, D> {
         };
         self.warn_once(line);
         Ok(match self.required_pieces(part)? {
-            Some(_) => Step::Moved,
-            None => Step::Waiting,
+            Some(_) => StepOutcome::Moved,
+            None => StepOutcome::Waiting,
         })
     }
 

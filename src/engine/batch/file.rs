@@ -401,7 +401,7 @@ pub(crate) fn summary(written: &[(PathBuf, usize)], answered: usize, in_batch: u
 }
 
 /// Settings for writing input files.
-pub(super) struct Target<'a, I: Item> {
+pub(super) struct FileSettings<'a, I: Item> {
     pub(super) files: &'a BatchFileArgs,
     /// Maximum number of tokens waiting for batches of a model; `None` if unknown.
     pub(super) quota: Option<u64>,
@@ -425,7 +425,7 @@ pub(crate) fn export<E: Experiment>(mut run: OpenRun<'_, E>, files: &BatchFileAr
         let Remaining { plan, in_batch, .. } = remaining;
         let trials = plan.keys.len();
         let answered = trials - plan.remaining() - in_batch;
-        let target = Target { files, quota: None, journal: None, cost: &|_, _| RequestCost::default() };
+        let target = FileSettings { files, quota: None, journal: None, cost: &|_, _| RequestCost::default() };
         let written = write(&mut run, phase, plan, target)?;
         let mut output = summary(&written, answered, in_batch, run.store.folder());
         if !last {
@@ -442,7 +442,7 @@ pub(super) fn write<E: Experiment>(
     run: &mut OpenRun<'_, E>,
     phase: usize,
     plan: Plan<E::Item>,
-    target: Target<'_, E::Item>,
+    target: FileSettings<'_, E::Item>,
 ) -> Result<Vec<(PathBuf, usize)>> {
     let (experiment, settings) = (run.experiment, run.experiment.settings());
     let workers = pool(settings.loading.threads.threads)?;

@@ -10,9 +10,9 @@ use tokio::runtime;
 
 use super::driver::{Driver, Goal, Notes};
 use super::file::StoppedModels;
-use super::journal::{Journal, Part, Stage};
+use super::journal::{BatchPart, Journal, Stage};
 use super::recover::recover;
-use super::servers::{BatchRunArgs, CollectArgs, Servers};
+use super::servers::{BatchRunArgs, BatchServers, CollectArgs};
 use crate::ask::{AccessArgs, BaseUrl, Endpoint, Sending};
 use crate::engine::images::progress::Progress;
 use crate::engine::images::workers::thread_start_error;
@@ -35,7 +35,7 @@ pub(crate) enum FolderTask {
 pub(crate) struct FolderBatches<'a> {
     journal: Journal,
     manifest: &'a RunManifest,
-    servers: Servers,
+    servers: BatchServers,
 }
 
 impl<'a> FolderBatches<'a> {
@@ -51,12 +51,12 @@ impl<'a> FolderBatches<'a> {
                 problem: "batch run has submitted no batch of this run".to_owned(),
             });
         }
-        let mut servers = Servers::default();
+        let mut servers = BatchServers::default();
         if let Some(base) = base_url(&journal, access)? {
             let access = AccessArgs { base_url: vec![base], ..access.clone() };
             let sending = Sending::default();
             let endpoint = Endpoint::from_addresses(access.server(sending)?.replicas, sending)?;
-            servers = Servers::at(endpoint.base().to_string(), endpoint.batch_server()?);
+            servers = BatchServers::at(endpoint.base().to_string(), endpoint.batch_server()?);
         }
         Ok(Self { journal, manifest, servers })
     }
@@ -210,7 +210,7 @@ pub(super) fn lines(journal: &Journal, states: &BTreeMap<String, String>) -> Str
 }
 
 /// The state of a part, in words.
-fn state_words(part: &Part) -> String {
+fn state_words(part: &BatchPart) -> String {
     match (&part.stage, part.outcome) {
         (Stage::Written | Stage::Uploading | Stage::Uploaded, _) => "not submitted yet".to_owned(),
         (Stage::Creating, _) => "being submitted".to_owned(),

@@ -4,9 +4,9 @@
 //! everything that a killed process did is known, except for the effect of its last call, which is looked up at the
 //! server.
 //!
-//! Events of a part in the journal: [`Event`].
+//! Events of a part in the journal: [`PartEvent`].
 //!
-//! An input file and its batch: [`Part`].
+//! An input file and its batch: [`BatchPart`].
 //!
 //! Names of input files: [`file_name`].
 
@@ -28,20 +28,20 @@ const HASH_DIGITS: usize = 16;
 
 /// A line of the journal.
 #[derive(Debug, Serialize, Deserialize)]
-struct Line {
+struct JournalLine {
     /// Name of the part's file.
     file: String,
     #[serde(flatten)]
-    event: Event,
+    event: PartEvent,
     /// Time of the event, in UTC.
     at: String,
 }
 
-impl Line {
+impl JournalLine {
     /// Checks that all file names are plain names, so that nothing outside the batch folder is read or written.
     fn check_names(&self) -> std::result::Result<(), String> {
         let pieces = match &self.event {
-            Event::Split { into } => &into[..],
+            PartEvent::Split { into } => &into[..],
             _ => &[],
         };
         let names = pieces.iter().map(|piece| &piece.file);
@@ -65,7 +65,7 @@ pub(crate) struct Journal {
     folder: PathBuf,
     /// Identifies the run in names of files and in marks of batches at the server.
     pub(super) run: String,
-    pub(super) parts: Vec<Part>,
+    pub(super) parts: Vec<BatchPart>,
     /// Maximum numbers of waiting tokens stated by servers, by [`PartFacts::quota_scope`].
     pub(super) limits: BTreeMap<(String, String), u64>,
 }
@@ -95,7 +95,7 @@ impl Journal {
             if line.last() != Some(&b'\n') {
                 break;
             }
-            let line: Line = serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
+            let line: JournalLine = serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
             line.check_names().map_err(|problem| Error::line(&path, index + 1, problem))?;
             journal.apply(&line.file, &line.event, &line.at);
         }
@@ -136,7 +136,7 @@ impl Journal {
 
     /// True if a server may be working on a batch.
     pub(super) fn has_batches(&self) -> bool {
-        self.parts.iter().any(Part::is_out)
+        self.parts.iter().any(BatchPart::is_out)
     }
 
     /// Number of requests of parts whose replies are not imported.
@@ -155,19 +155,19 @@ impl Journal {
 
     /// Records the written file of a part.
     pub(super) fn add(&mut self, name: &str, facts: PartFacts) -> Result<()> {
-        self.write(name, Event::Written(facts))
+        self.write(name, PartEvent::Written(facts))
     }
 
     /// Records an event of a part.
-    pub(super) fn record(&mut self, part: usize, event: Event) -> Result<()> {
+    pub(super) fn record(&mut self, part: usize, event: PartEvent) -> Result<()> {
         let name = self.parts[part].name.clone();
         self.write(&name, event)
     }
 
     /// Appends an event, and syncs the file to disk.
-    fn write(&mut self, file: &str, event: Event) -> Result<()> {
+    fn write(&mut self, file: &str, event: PartEvent) -> Result<()> {
         let path = self.path();
-        let line = Line { file: file.to_owned(), event, at: now() };
+        let line = JournalLine { file: file.to_owned(), event, at: now() };
         let mut text = serde_json::to_vec(&line).map_err(|e| Error::file(&path, "write", e.into()))?;
         text.push(b'\n');
         append(&path, &text).map_err(|e| Error::file(&path, "write", e))?;
@@ -176,22 +176,22 @@ impl Journal {
         Ok(())
     }
 
-    fn apply(&mut self, file: &str, event: &Event, at: &str) {
+    fn apply(&mut self, file: &str, event: &PartEvent, at: &str) {
         let place = self.parts.iter().position(|part| part.name == file);
         let part = match (place, event) {
             (Some(place), _) => &mut self.parts[place],
-            (None, Event::Written(facts)) => {
-                self.parts.push(Part::new(file, facts.clone()));
+            (None, PartEvent::Written(facts)) => {
+                self.parts.push(BatchPart::new(file, facts.clone()));
                 return;
             }
             (None, _) => return,
         };
-        if let Event::QuotaReached { limit: Some(limit) } = event {
+        if let PartEvent::QuotaReached { limit: Some(limit) } = event {
             self.limits.insert(part.facts.quota_scope(), *limit);
         }
         part.apply(event, at);
-        if let Event::Split { into } = event {
-            let pieces = into.iter().map(|piece| Part::new(&piece.file, piece.facts.clone()));
+        if let PartEvent::Split { into } = event {
+            let pieces = into.iter().map(|piece| BatchPart::new(&piece.file, piece.facts.clone()));
             self.parts.extend(pieces);
         }
     }
@@ -284,7 +284,7 @@ impl PartFacts {
 /// An event that has happened to a part, or that is about to happen.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "event", rename_all = "snake_case")]
-pub(crate) enum Event {
+pub(crate) enum PartEvent {
     /// The file of the part is written.
     Written(PartFacts),
     /// The upload begins.
@@ -342,7 +342,7 @@ pub(crate) enum Event {
     /// The part is split, because it exceeds a limit.
     Split {
         /// The new parts.
-        into: Vec<Piece>,
+        into: Vec<SplitPart>,
     },
     /// The part ended without a batch; its requests may be asked again.
     GaveUp {
@@ -353,7 +353,7 @@ pub(crate) enum Event {
 
 /// A new part that was split off a larger one.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Piece {
+pub(crate) struct SplitPart {
     /// File name.
     pub(super) file: String,
     pub(super) facts: PartFacts,
@@ -385,7 +385,7 @@ pub(super) enum Stage {
 
 /// An input file and its batch.
 #[derive(Debug, Clone)]
-pub(crate) struct Part {
+pub(crate) struct BatchPart {
     /// Name of the file in the batch folder.
     pub(super) name: String,
     pub(super) facts: PartFacts,
@@ -410,7 +410,7 @@ pub(crate) struct Part {
     pub(super) outcome: Option<(usize, usize)>,
 }
 
-impl Part {
+impl BatchPart {
     pub(super) fn new(name: &str, facts: PartFacts) -> Self {
         Self {
             name: name.to_owned(),
@@ -449,65 +449,65 @@ impl Part {
     }
 
     /// Updates the part by an event at a time in UTC.
-    pub(super) fn apply(&mut self, event: &Event, at: &str) {
+    pub(super) fn apply(&mut self, event: &PartEvent, at: &str) {
         self.stage = match event {
-            Event::Written(facts) => {
+            PartEvent::Written(facts) => {
                 self.facts = facts.clone();
                 Stage::Written
             }
-            Event::Uploading => {
+            PartEvent::Uploading => {
                 self.uploads += 1;
                 Stage::Uploading
             }
-            Event::Uploaded { id } => {
+            PartEvent::Uploaded { id } => {
                 self.files = vec![id.clone()];
                 Stage::Uploaded
             }
-            Event::Creating { attempt } => {
+            PartEvent::Creating { attempt } => {
                 self.attempt = *attempt;
                 Stage::Creating
             }
-            Event::Created { id } => {
+            PartEvent::Created { id } => {
                 self.batch = Some(id.clone());
                 self.state.clear();
                 at.clone_into(&mut self.created);
                 Stage::Created
             }
-            Event::Refused { .. } if self.stage == Stage::Creating => {
+            PartEvent::Refused { .. } if self.stage == Stage::Creating => {
                 self.in_doubt = true;
                 Stage::Uploaded
             }
-            Event::Refused { .. } => Stage::Written,
-            Event::QuotaReached { .. } => {
+            PartEvent::Refused { .. } => Stage::Written,
+            PartEvent::QuotaReached { .. } => {
                 self.batch = None;
                 Stage::Uploaded
             }
-            Event::Seen { state } => {
+            PartEvent::Seen { state } => {
                 self.state.clone_from(state);
                 return;
             }
-            Event::Cancelled => {
+            PartEvent::Cancelled => {
                 self.cancelled = true;
                 return;
             }
-            Event::Fetched { state, files } => {
+            PartEvent::Fetched { state, files } => {
                 self.state.clone_from(state);
                 self.files.extend(files.iter().cloned());
                 Stage::Fetched { state: state.clone() }
             }
-            Event::TakenOver { answered, failed } => {
+            PartEvent::TakenOver { answered, failed } => {
                 self.outcome = Some((*answered, *failed));
                 Stage::Imported
             }
-            Event::Split { .. } => {
+            PartEvent::Split { .. } => {
                 "divided into smaller parts".clone_into(&mut self.state);
                 Stage::Ended
             }
-            Event::GaveUp { why } => {
+            PartEvent::GaveUp { why } => {
                 self.state.clone_from(why);
                 Stage::Ended
             }
-            Event::Deleted | Event::Kept => Stage::Ended,
+            PartEvent::Deleted | PartEvent::Kept => Stage::Ended,
         };
     }
 }

@@ -9,9 +9,9 @@ use std::path::Path;
 
 use sha2::{Digest as _, Sha256};
 
-use super::driver::{Driver, Step};
+use super::driver::{Driver, StepOutcome};
 use super::file::{PART, hexadecimal};
-use super::journal::{Event, Journal, PartFacts, Piece, Stage};
+use super::journal::{Journal, PartEvent, PartFacts, SplitPart, Stage};
 use super::replies::{for_each_line, key_of};
 use crate::error::{Error, Result};
 use crate::files::create_new;
@@ -36,7 +36,7 @@ pub(super) fn recover<D: Detail>(journal: &mut Journal, store: &Store<D>) -> Res
         let is_complete = unfinished.exists() && complete(journal, part, &unfinished, &waiting)?;
         if !is_complete {
             let why = "its file was not written to its end".to_owned();
-            journal.record(part, Event::GaveUp { why })?;
+            journal.record(part, PartEvent::GaveUp { why })?;
         }
     }
     remove_unfinished(journal.folder())?;
@@ -141,7 +141,7 @@ impl<D: Detail> Driver<'_, D> {
     ///
     /// # Errors
     /// If the part has only one request, or a file cannot be written.
-    pub(super) async fn split(&mut self, part: usize, pieces: usize) -> Result<Step> {
+    pub(super) async fn split(&mut self, part: usize, pieces: usize) -> Result<StepOutcome> {
         let whole = self.part(part).clone();
         let pieces = pieces.clamp(2, whole.facts.requests.max(2));
         if whole.facts.requests < 2 {
@@ -160,18 +160,18 @@ impl<D: Detail> Driver<'_, D> {
         let into = self.write_pieces(part, pieces)?;
         self.say(part, &format!("divided into {} parts", into.len()));
         let names: Vec<String> = into.iter().map(|piece| piece.file.clone()).collect();
-        self.journal.record(part, Event::Split { into })?;
+        self.journal.record(part, PartEvent::Split { into })?;
         for name in names {
             let path = self.journal.folder().join(name);
             fs::rename(path.with_extension(PIECE), &path).map_err(|e| Error::file(&path, "write", e))?;
         }
         let path = self.journal.file(part);
         fs::remove_file(&path).map_err(|e| Error::file(&path, "delete", e))?;
-        Ok(Step::Moved)
+        Ok(StepOutcome::Moved)
     }
 
     /// Writes the files of the pieces, with the extension [`PIECE`].
-    fn write_pieces(&self, part: usize, pieces: usize) -> Result<Vec<Piece>> {
+    fn write_pieces(&self, part: usize, pieces: usize) -> Result<Vec<SplitPart>> {
         let whole = self.part(part);
         let stem = whole.stem().rsplit_once('-').map_or(whole.stem(), |(stem, _)| stem);
         let first = self.journal.free_number(stem) as usize;
@@ -183,10 +183,10 @@ impl<D: Detail> Driver<'_, D> {
         };
         let mut writer = PieceWriter::default();
         let mut into = Vec::new();
-        let finish = |writer: PieceWriter, into: &mut Vec<Piece>| {
+        let finish = |writer: PieceWriter, into: &mut Vec<SplitPart>| {
             let index = into.len();
             let facts = writer.finish(&whole.facts).map_err(|e| Error::file(path(index), "write", e))?;
-            into.push(Piece { file: name(index), facts });
+            into.push(SplitPart { file: name(index), facts });
             Ok(())
         };
         for_each_line(&self.journal.file(part), |line| {

@@ -9,8 +9,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::driver::{Driver, Step};
-use super::journal::{Event, Stage};
+use super::driver::{Driver, StepOutcome};
+use super::journal::{PartEvent, Stage};
 use crate::ask::batch::{BatchLine, with_letter};
 use crate::ask::{Constrain, Model, TokenBound};
 use crate::error::{Error, Result};
@@ -303,16 +303,16 @@ fn summary(counts: &ReplyCounts, waiting: usize) -> String {
 impl<'a, D: Detail> Driver<'a, D> {
     /// Imports the replies of a part whose batch has ended. Requests without a line in the output fail as timeouts and
     /// may be retried.
-    pub(super) fn import_replies(&mut self, part: usize) -> Result<Step> {
+    pub(super) fn import_replies(&mut self, part: usize) -> Result<StepOutcome> {
         let Stage::Fetched { state } = self.part(part).stage.clone() else {
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         };
         let (counts, unparsed) = self.import_files(part, Some(&state))?;
         let (answered, failed) = (counts.answered, counts.failed);
         self.warn_if_incomplete(part, unparsed)?;
         self.say(part, &format!("{state}: {answered} answered, {failed} not"));
-        self.journal.record(part, Event::TakenOver { answered, failed })?;
-        Ok(Step::Moved)
+        self.journal.record(part, PartEvent::TakenOver { answered, failed })?;
+        Ok(StepOutcome::Moved)
     }
 
     /// Imports the replies that incomplete files already contain. Requests without a line keep waiting.
@@ -427,12 +427,12 @@ impl<'a, D: Detail> Driver<'a, D> {
             replies.fail(key, failure);
         }
         replies.finish()?;
-        self.journal.record(part, Event::GaveUp { why })
+        self.journal.record(part, PartEvent::GaveUp { why })
     }
 
     /// Gives up a part that the user cancels before its batch is created. Deletes its files at the server, unless the
     /// user keeps files.
-    pub(super) async fn withdraw(&mut self, part: usize) -> Result<Step> {
+    pub(super) async fn withdraw(&mut self, part: usize) -> Result<StepOutcome> {
         if !self.args.collect.keep_files {
             for id in self.files_at_server(part).await? {
                 if let Err(failure) = self.delete_file(part, &id).await? {
@@ -442,7 +442,7 @@ impl<'a, D: Detail> Driver<'a, D> {
         }
         let why = "the batch was cancelled before it was made".to_owned();
         self.give_up(part, why)?;
-        Ok(Step::Moved)
+        Ok(StepOutcome::Moved)
     }
 
     /// Trial keys of a part, read from its input file; `None` if the file is missing.

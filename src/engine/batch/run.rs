@@ -8,7 +8,7 @@ use super::file::{self, RequestCost, StoppedModels, require_files, require_remot
 use super::folder::{self, start_runtime};
 use super::journal::Journal;
 use super::recover::recover;
-use super::servers::{BatchRunArgs, Servers};
+use super::servers::{BatchRunArgs, BatchServers};
 use crate::engine::circuit_breaker::EndReason;
 use crate::engine::costs::{Budget, BudgetNotes, RunModels};
 use crate::engine::experiment::Experiment;
@@ -43,7 +43,7 @@ enum PhaseEnd {
 /// If a model is built in, or a server refuses all further calls. The batches stay, and the same command continues.
 pub(crate) fn run<E: Experiment>(run: OpenRun<'_, E>, files: &BatchFileArgs, args: &BatchRunArgs) -> Result<Outcome> {
     let journal = Journal::open(run.store.folder(), &run.manifest)?;
-    let mut batches = BatchRun {
+    let mut batches = RunBatches {
         run,
         journal,
         files,
@@ -86,7 +86,7 @@ fn reply_lengths(models: &[ModelUnderTest], stored: &[StoredTrial]) -> Vec<Optio
 }
 
 /// State of a run with its batches.
-struct BatchRun<'a, 'b, E: Experiment> {
+struct RunBatches<'a, 'b, E: Experiment> {
     run: OpenRun<'a, E>,
     journal: Journal,
     files: &'b BatchFileArgs,
@@ -99,7 +99,7 @@ struct BatchRun<'a, 'b, E: Experiment> {
     enhancers_used: bool,
 }
 
-impl<E: Experiment> BatchRun<'_, '_, E> {
+impl<E: Experiment> RunBatches<'_, '_, E> {
     fn phase(&mut self, phase: usize) -> Result<PhaseEnd> {
         for repeat in 0..=MAX_REPEATS {
             let mut remaining = self.remaining(phase)?;
@@ -256,7 +256,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
             }
         };
         let quota = self.args.enqueued_tokens.map(std::num::NonZeroU64::get);
-        let target = file::Target { files: self.files, quota, journal: Some(&mut self.journal), cost: &cost };
+        let target = file::FileSettings { files: self.files, quota, journal: Some(&mut self.journal), cost: &cost };
         file::write(&mut self.run, phase, remaining.plan, target)?;
         Ok(())
     }
@@ -276,7 +276,7 @@ impl<E: Experiment> BatchRun<'_, '_, E> {
     fn drive(&mut self) -> Result<Option<Driven>> {
         let experiment = self.run.experiment;
         let models = every_model(experiment);
-        let servers = Servers::for_models(&models)?;
+        let servers = BatchServers::for_models(&models)?;
         let mut driver = Driver {
             store: &mut self.run.store,
             manifest: &self.run.manifest,

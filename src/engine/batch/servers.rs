@@ -1,4 +1,4 @@
-//! The batch servers of a run: [`Servers`].
+//! The batch servers of a run: [`BatchServers`].
 //!
 //! The flags for batches submitted by the program: [`BatchRunArgs`], [`CollectArgs`].
 
@@ -17,7 +17,7 @@ use crate::types::flags::{positive, seconds};
 
 /// Batch servers, each with the key and headers of a model.
 #[derive(Debug, Default)]
-pub(crate) struct Servers(Vec<ModelServer>);
+pub(crate) struct BatchServers(Vec<ModelServer>);
 
 /// The server of a model.
 #[derive(Debug)]
@@ -32,7 +32,7 @@ struct ModelServer {
     server: BatchServer,
 }
 
-impl Servers {
+impl BatchServers {
     /// The servers of these models.
     ///
     /// # Errors

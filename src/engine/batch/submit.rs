@@ -1,8 +1,8 @@
 //! Steps of a part until its batch is created: upload, creation, and the search for files and batches of a killed
 //! process.
 
-use super::driver::{Driver, Goal, Step};
-use super::journal::Event;
+use super::driver::{Driver, Goal, StepOutcome};
+use super::journal::PartEvent;
 use crate::ask::batch_api::{BatchState, NewBatch, Readiness, RemoteBatch};
 use crate::ask::{AskError, BatchInterface};
 use crate::error::{Error, Result};
@@ -15,17 +15,17 @@ const MAX_FAILED_CALLS: u32 = 5;
 
 impl<D: Detail> Driver<'_, D> {
     /// Uploads the file of a part, if its batch may be created.
-    pub(super) async fn upload(&mut self, part: usize) -> Result<Step> {
+    pub(super) async fn upload(&mut self, part: usize) -> Result<StepOutcome> {
         if let Some(pieces) = self.required_pieces(part)? {
             return self.split(part, pieces).await;
         }
         if self.is_held(part)? {
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         }
         let (path, name) = (self.journal.file(part), self.remote_name(part));
         if !path.exists() {
             let why = "its file is gone".to_owned();
-            return self.give_up(part, why).map(|()| Step::Moved);
+            return self.give_up(part, why).map(|()| StepOutcome::Moved);
         }
         let expected = self.part(part).facts.bytes;
         if path.metadata().is_ok_and(|metadata| metadata.len() != expected) {
@@ -36,7 +36,7 @@ impl<D: Detail> Driver<'_, D> {
             return Err(Error::Run { path, problem });
         }
         self.say(part, "uploading");
-        self.journal.record(part, Event::Uploading)?;
+        self.journal.record(part, PartEvent::Uploading)?;
         let purpose = self.purpose(part);
         let sent = self.server(part)?.upload(&path, &name, &purpose);
         match sent.await {
@@ -44,16 +44,16 @@ impl<D: Detail> Driver<'_, D> {
                 if file.readiness == Readiness::Ready {
                     self.notes.ready.insert(file.id.clone());
                 }
-                self.journal.record(part, Event::Uploaded { id: file.id })?;
+                self.journal.record(part, PartEvent::Uploaded { id: file.id })?;
                 self.notes.failed_calls.remove(&part);
-                Ok(Step::Moved)
+                Ok(StepOutcome::Moved)
             }
             Err(failure) => self.call_failed(part, &failure),
         }
     }
 
     /// Searches for the file of a part that may have been uploaded.
-    pub(super) async fn find_file(&mut self, part: usize) -> Result<Step> {
+    pub(super) async fn find_file(&mut self, part: usize) -> Result<StepOutcome> {
         let name = self.remote_name(part);
         let listed = self.server(part)?.files(&self.purpose(part)).await;
         let files = match listed {
@@ -69,22 +69,22 @@ impl<D: Detail> Driver<'_, D> {
         let event = match found {
             Some(file) => {
                 self.end_search(part);
-                Event::Uploaded { id: file.id }
+                PartEvent::Uploaded { id: file.id }
             }
-            None if !self.is_missing(part, "file") => return Ok(Step::Waiting),
-            None => Event::Refused { why: "the file is not at the server".to_owned() },
+            None if !self.is_missing(part, "file") => return Ok(StepOutcome::Waiting),
+            None => PartEvent::Refused { why: "the file is not at the server".to_owned() },
         };
         self.journal.record(part, event)?;
-        Ok(Step::Moved)
+        Ok(StepOutcome::Moved)
     }
 
     /// Creates the batch of a part, if it may be created now and the server has processed the file.
-    pub(super) async fn create(&mut self, part: usize) -> Result<Step> {
+    pub(super) async fn create(&mut self, part: usize) -> Result<StepOutcome> {
         if let Some(pieces) = self.required_pieces(part)? {
             return self.split(part, pieces).await;
         }
         if self.is_held(part)? {
-            return Ok(Step::Waiting);
+            return Ok(StepOutcome::Waiting);
         }
         let Some(file) = self.part(part).files.first().cloned() else {
             return self.refuse(part, "the file has no name");
@@ -93,12 +93,12 @@ impl<D: Detail> Driver<'_, D> {
             match self.server(part)?.file(&file).await {
                 Ok(at_server) => match at_server.readiness {
                     Readiness::Ready => self.notes.ready.insert(file.clone()),
-                    Readiness::Pending => return Ok(Step::Waiting),
+                    Readiness::Pending => return Ok(StepOutcome::Waiting),
                     Readiness::Refused => return Err(self.unreadable_file_error(part)),
                 },
                 // The file was deleted, so upload it again.
                 Err(failure) if failure.failure.status == Some(404) => {
-                    self.journal.record(part, Event::Uploading)?;
+                    self.journal.record(part, PartEvent::Uploading)?;
                     return self.refuse(part, "the file is not at the server any more");
                 }
                 Err(failure) => return self.check_failed(part, &failure),
@@ -110,7 +110,7 @@ impl<D: Detail> Driver<'_, D> {
             return Ok(step);
         }
         let attempt = self.part(part).attempt + 1;
-        self.journal.record(part, Event::Creating { attempt })?;
+        self.journal.record(part, PartEvent::Creating { attempt })?;
         let (mark, url) = (self.mark(part), self.part(part).facts.url.clone());
         let new = NewBatch { file: &file, url: &url, window: &self.args.window, mark: &mark };
         match self.server(part)?.create(new).await {
@@ -120,7 +120,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// Searches for the batch of a part that may have been created.
-    pub(super) async fn find_batch(&mut self, part: usize) -> Result<Step> {
+    pub(super) async fn find_batch(&mut self, part: usize) -> Result<StepOutcome> {
         let listed = self.server(part)?.batches().await;
         let batches = match listed {
             Ok(batches) => batches,
@@ -138,13 +138,13 @@ impl<D: Detail> Driver<'_, D> {
                 self.batch_created(part, batch.id)
             }
             None if self.is_missing(part, "batch") => self.refuse(part, "the batch is not at the server"),
-            None => Ok(Step::Waiting),
+            None => Ok(StepOutcome::Waiting),
         }
     }
 
     /// Searches for a batch that an earlier attempt created although it seemed to fail; `None` if a new one must be
     /// created.
-    async fn find_earlier(&mut self, part: usize) -> Result<Option<Step>> {
+    async fn find_earlier(&mut self, part: usize) -> Result<Option<StepOutcome>> {
         let listed = self.server(part)?.batches().await;
         match listed {
             Ok(batches) => match self.part_batch(part, batches) {
@@ -170,7 +170,7 @@ impl<D: Detail> Driver<'_, D> {
     }
 
     /// Records and prints that the batch of a part is created.
-    fn batch_created(&mut self, part: usize, id: String) -> Result<Step> {
+    fn batch_created(&mut self, part: usize, id: String) -> Result<StepOutcome> {
         let facts = &self.part(part).facts;
         let cost = match facts.dollars.zip(facts.most_dollars) {
             Some((expected, most)) => {
@@ -180,14 +180,14 @@ impl<D: Detail> Driver<'_, D> {
         };
         let line = format!("batch {id} of {}{cost}", counted(facts.requests, "request"));
         self.say(part, &line);
-        self.journal.record(part, Event::Created { id })?;
+        self.journal.record(part, PartEvent::Created { id })?;
         // Wait before the first check.
         self.notes.checked.insert(part);
-        Ok(Step::Moved)
+        Ok(StepOutcome::Moved)
     }
 
     /// Handles a failed upload or creation.
-    fn call_failed(&mut self, part: usize, failure: &AskError) -> Result<Step> {
+    fn call_failed(&mut self, part: usize, failure: &AskError) -> Result<StepOutcome> {
         if let Some(quota) = &failure.quota {
             return self.quota_reached(part, quota);
         }
@@ -199,7 +199,7 @@ impl<D: Detail> Driver<'_, D> {
             }
         } else {
             let why = failure.failure.message.clone();
-            self.journal.record(part, Event::Refused { why })?;
+            self.journal.record(part, PartEvent::Refused { why })?;
             if failure.is_permanent() {
                 return Err(self.fatal(part, failure));
             }
@@ -207,14 +207,14 @@ impl<D: Detail> Driver<'_, D> {
         self.hold(part, failure.wait);
         let name = self.part(part).name.clone();
         self.warn_once(format!("{name}: {failure}; tried again"));
-        Ok(Step::Waiting)
+        Ok(StepOutcome::Waiting)
     }
 
     /// Records that the last call had no effect.
-    fn refuse(&mut self, part: usize, why: &str) -> Result<Step> {
+    fn refuse(&mut self, part: usize, why: &str) -> Result<StepOutcome> {
         let why = why.to_owned();
-        self.journal.record(part, Event::Refused { why })?;
-        Ok(Step::Moved)
+        self.journal.record(part, PartEvent::Refused { why })?;
+        Ok(StepOutcome::Moved)
     }
 
     /// The name of a part's file at the server.

@@ -157,7 +157,7 @@ fn cost_lines<E: Experiment>(
         .filter(|(_, model)| model.model.is_remote())
         .map(|(index, model)| {
             let price = model.price(&experiment.settings().money.prices);
-            let mut by_profile = BTreeMap::<Option<ProfileName>, Tokens>::new();
+            let mut by_profile = BTreeMap::<Option<ProfileName>, TokenCounts>::new();
             for (place, group) in plan.groups() {
                 let degradation = group.condition.as_ref().and_then(|c| c.degradation());
                 let profile = degradation.and_then(Degradation::reading).cloned();
@@ -216,7 +216,7 @@ fn add_load(loads: &mut Vec<Load>, model: &ModelUnderTest, line: &CostLine) {
 
 /// Numbers of requests to one model and of their tokens.
 #[derive(Debug)]
-struct Tokens {
+struct TokenCounts {
     requests: usize,
     text: f64,
     reply: f64,
@@ -224,13 +224,13 @@ struct Tokens {
     image: Option<f64>,
 }
 
-impl Default for Tokens {
+impl Default for TokenCounts {
     fn default() -> Self {
         Self { requests: 0, text: 0.0, reply: 0.0, image: Some(0.0) }
     }
 }
 
-impl Tokens {
+impl TokenCounts {
     fn sum<'t>(terms: impl Iterator<Item = &'t Self>) -> Self {
         terms.fold(Self::default(), |sum, term| Self {
             requests: sum.requests + term.requests,
@@ -258,10 +258,10 @@ impl Tokens {
 fn cost_line(
     model: &ModelUnderTest,
     price: Option<Price>,
-    by_profile: &BTreeMap<Option<ProfileName>, Tokens>,
+    by_profile: &BTreeMap<Option<ProfileName>, TokenCounts>,
     phase: &str,
 ) -> CostLine {
-    let tokens = Tokens::sum(by_profile.values());
+    let tokens = TokenCounts::sum(by_profile.values());
     let requests = tokens.requests as f64;
     let longest = model.model.max_tokens().map(|limit| requests * f64::from(limit));
     CostLine {

@@ -15,7 +15,7 @@ use std::{fmt, fs};
 
 use clap::Args;
 
-use super::entry::{Content, Damaged, Entry, FOOTER, ImageSet, Key, StoredKinds, is_footer_valid};
+use super::entry::{Damaged, Entry, EntryType, FOOTER, ImageSet, Key, StoredKinds, is_footer_valid};
 use super::folder::{StoreFolder, if_exists, sweep};
 use crate::error::{Error, Result};
 use crate::files::{self, FolderAccess};
@@ -120,7 +120,12 @@ impl ImageStore {
 
     /// Reads the entry of a key; `None` if it is missing. A damaged entry is removed and counts as missing, like an
     /// entry for which `is_sufficient` is false. Hits and misses are counted for images only.
-    pub(crate) fn get(&self, key: &Key, content: Content, is_sufficient: impl FnOnce(&Entry) -> bool) -> Option<Entry> {
+    pub(crate) fn get(
+        &self,
+        key: &Key,
+        content: EntryType,
+        is_sufficient: impl FnOnce(&Entry) -> bool,
+    ) -> Option<Entry> {
         if self.with_state(|state| state.health) == Health::Unusable {
             return None;
         }
@@ -140,17 +145,17 @@ impl ImageStore {
             }
         };
         self.with_state(|state| match (content, &entry) {
-            (Content::Measures | Content::Probe | Content::Thumbnail, Some(entry)) => {
+            (EntryType::Measures | EntryType::Probe | EntryType::Thumbnail, Some(entry)) => {
                 state.counts.facts += 1;
                 state.counts.saved_ms += entry.facts.milliseconds;
             }
-            (Content::Measures | Content::Probe | Content::Thumbnail, None) => {}
-            (Content::Image, Some(entry)) => {
+            (EntryType::Measures | EntryType::Probe | EntryType::Thumbnail, None) => {}
+            (EntryType::Image, Some(entry)) => {
                 state.counts.hits += 1;
                 state.counts.hit_bytes += entry.image.len() as u64;
                 state.counts.saved_ms += entry.facts.milliseconds;
             }
-            (Content::Image, None) => state.counts.misses += 1,
+            (EntryType::Image, None) => state.counts.misses += 1,
         });
         entry
     }
@@ -195,7 +200,7 @@ impl ImageStore {
         match self.folder.write(key.digest(), &file) {
             Ok(()) => self.with_state(|state| {
                 state.bytes += bytes;
-                if entry.facts.shown.content == Content::Image {
+                if entry.facts.shown.content == EntryType::Image {
                     state.counts.written += 1;
                     state.counts.written_bytes += bytes;
                 }

@@ -62,7 +62,7 @@ pub(crate) struct EntryFacts {
 /// Type of an entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Content {
+pub(crate) enum EntryType {
     /// An image, with its measures.
     #[default]
     Image,
@@ -78,7 +78,7 @@ pub(crate) enum Content {
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub(crate) struct Shown {
     #[serde(default)]
-    pub(crate) content: Content,
+    pub(crate) content: EntryType,
     /// Name of the enhancer; `None` without one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub(crate) enhancer: Option<String>,
@@ -92,12 +92,12 @@ impl fmt::Display for Shown {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let enhancer = self.enhancer.as_deref();
         match self.content {
-            Content::Probe => {
+            EntryType::Probe => {
                 return write!(f, "tries of {}", enhancer.unwrap_or("an enhancer"));
             }
-            Content::Measures => f.write_str("measures of ")?,
-            Content::Thumbnail => f.write_str("small copies of ")?,
-            Content::Image => {}
+            EntryType::Measures => f.write_str("measures of ")?,
+            EntryType::Thumbnail => f.write_str("small copies of ")?,
+            EntryType::Image => {}
         }
         f.write_str(&self.light)?;
         if let Some(enhancer) = enhancer {
@@ -138,7 +138,7 @@ impl Entry {
     /// # Errors
     /// If the file is truncated or changed, has another format, or belongs to another key.
     pub(super) fn decode(key: &Key, mut file: Vec<u8>) -> Result<Self, Damaged> {
-        let footer = Footer::read(&file)?;
+        let footer = EntryFooter::read(&file)?;
         let (image, rest) = file.split_at(footer.image);
         let facts = rest.get(..footer.facts).ok_or(Damaged)?;
         if digest(key, &footer.numbers, image, facts) != footer.digest {
@@ -174,7 +174,7 @@ fn lengths(footer: &[u8], length: u64) -> Option<(u64, u32)> {
 }
 
 /// Decoded footer of a file.
-struct Footer {
+struct EntryFooter {
     digest: blake3::Hash,
     /// The encoded lengths and sides, which the digest covers.
     numbers: [u8; 20],
@@ -186,7 +186,7 @@ struct Footer {
     size: [u32; 2],
 }
 
-impl Footer {
+impl EntryFooter {
     fn read(file: &[u8]) -> Result<Self, Damaged> {
         let start = file.len().checked_sub(FOOTER).ok_or(Damaged)?;
         let (digest, rest) = file[start..].split_at(32);

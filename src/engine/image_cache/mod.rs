@@ -14,5 +14,5 @@ mod entry;
 mod folder;
 
 pub(crate) use access::{ImageStore, StoreArgs};
-pub(crate) use entry::{Content, Entry, EntryFacts, ImageSet, Key, Shown, StoredKinds};
+pub(crate) use entry::{Entry, EntryFacts, EntryType, ImageSet, Key, Shown, StoredKinds};
 pub(crate) use folder::{clear, listing};

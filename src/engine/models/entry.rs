@@ -1,4 +1,4 @@
-//! One model of a run before it is opened, merged from the flags and the tables of a models file: [`Entry`].
+//! One model of a run before it is opened, merged from the flags and the tables of a models file: [`ModelEntry`].
 //!
 //! Keys in the `[defaults]` of a models file that are settings of the whole run: [`run_defaults`].
 
@@ -49,7 +49,7 @@ const FOREIGN_KEYS: [(&str, &str); 6] = [
 
 /// One model of a run, not opened yet.
 #[derive(Debug, Clone)]
-pub(super) struct Entry {
+pub(super) struct ModelEntry {
     /// Name in tables.
     pub(super) name: String,
     pub(super) id: ModelName,
@@ -67,7 +67,7 @@ pub(super) struct Entry {
     pub(super) place: Option<String>,
 }
 
-impl Entry {
+impl ModelEntry {
     /// A model that a flag names, with the settings of the flags.
     pub(super) fn from_flag(id: ModelName, view: View, asking: AskingArgs) -> Self {
         Self {

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::asking::AskingArgs;
-use super::entry::{Entry, check_keys, flag_of};
+use super::entry::{ModelEntry, check_keys, flag_of};
 use super::file::{Keys, Located, ModelsFile};
 use super::name::{ModelArgs, ModelName};
 use super::trust::{self, Trust};
@@ -119,8 +119,10 @@ impl AskSettings {
             trust::check(file, &entries, asking, context.data, trust)?;
         }
         refuse_models_of_file(&entries, &args.blind_model)?;
-        entries.extend(args.model.iter().map(|name| Entry::from_flag(name.clone(), view, asking.clone())));
-        entries.extend(args.blind_model.iter().map(|name| Entry::from_flag(name.clone(), View::Blind, asking.clone())));
+        entries.extend(args.model.iter().map(|name| ModelEntry::from_flag(name.clone(), view, asking.clone())));
+        entries.extend(
+            args.blind_model.iter().map(|name| ModelEntry::from_flag(name.clone(), View::Blind, asking.clone())),
+        );
         for text in &args.set {
             apply_set(&mut entries, text)?;
         }
@@ -192,7 +194,7 @@ impl AskSettings {
 }
 
 /// Adds the view without images to every model that does not have it.
-fn add_text_baselines(entries: &mut [Entry]) {
+fn add_text_baselines(entries: &mut [ModelEntry]) {
     let blind: BTreeSet<String> =
         entries.iter().filter(|entry| entry.views.contains(&View::Blind)).map(|entry| entry.name.clone()).collect();
     for entry in entries {
@@ -209,7 +211,7 @@ fn entries_from_file(
     view: View,
     asking: &AskingArgs,
     typed: &BTreeSet<String>,
-) -> Result<Vec<Entry>> {
+) -> Result<Vec<ModelEntry>> {
     check_keys(&file.defaults, true)?;
     let is_typed = |key: &str| match key {
         "view" => typed.contains("blind"),
@@ -234,7 +236,7 @@ fn entries_from_file(
             })
             .collect();
         overridden.extend(keys.keys().filter(|key| is_typed(key)).cloned());
-        entries.push(Entry::from_file(keys, &[&defaults, keys], view, asking.clone())?);
+        entries.push(ModelEntry::from_file(keys, &[&defaults, keys], view, asking.clone())?);
     }
     if !overridden.is_empty() {
         let keys: Vec<String> = overridden.into_iter().collect();
@@ -265,7 +267,7 @@ impl Servers {
 }
 
 /// Resolves the endpoint and parameters of a model, with the first of its views.
-fn resolve(entry: &Entry, context: ResolveContext<'_>, servers: &mut Servers) -> Result<ModelSettings> {
+fn resolve(entry: &ModelEntry, context: ResolveContext<'_>, servers: &mut Servers) -> Result<ModelSettings> {
     let AskingArgs { parameters, request, access, sending, constrain, probabilities, seed, reply_headers } =
         entry.asking.clone();
     let with_place = |e: Error| match (&entry.place, e) {
@@ -316,7 +318,7 @@ fn plain_header(headers: &[String], name: &str) -> Option<String> {
 }
 
 /// The settings of a model for the manifest, without keys, passwords and values of secret headers.
-fn manifest_note(entry: &Entry, resolved: &ModelSettings) -> Value {
+fn manifest_note(entry: &ModelEntry, resolved: &ModelSettings) -> Value {
     let access = &entry.asking.access;
     let views: Vec<String> = entry.views.iter().map(ToString::to_string).collect();
     let mut note = json!({
@@ -356,10 +358,10 @@ fn header_names(headers: &[String]) -> Vec<String> {
 
 /// Refuses `--blind-model` with a model of the models file, because it would be asked at another address and with other
 /// settings than with images.
-fn refuse_models_of_file(entries: &[Entry], blind: &[ModelName]) -> Result<()> {
+fn refuse_models_of_file(entries: &[ModelEntry], blind: &[ModelName]) -> Result<()> {
     for name in blind.iter().map(ModelName::label) {
         let known = entries.iter().find(|entry| entry.name == name || entry.id.label() == name);
-        if let Some(Entry { name, id, .. }) = known
+        if let Some(ModelEntry { name, id, .. }) = known
             && matches!(id, ModelName::Remote(_))
         {
             let problem = format_args!(
@@ -387,7 +389,7 @@ fn refuse_same_names(models: &[ModelSettings]) -> Result<()> {
 ///
 /// # Errors
 /// If no model has the name, or the key or its value is invalid.
-fn apply_set(entries: &mut [Entry], text: &str) -> Result<()> {
+fn apply_set(entries: &mut [ModelEntry], text: &str) -> Result<()> {
     let (place, value) =
         text.split_once('=').ok_or_else(|| Error::usage("--set", "NAME.KEY=VALUE expected, as GPT-4o.rpm=60"))?;
     // The longest matching name, because a name may contain a dot and begin with another name.
@@ -425,7 +427,7 @@ fn apply_set(entries: &mut [Entry], text: &str) -> Result<()> {
 ///
 /// # Errors
 /// If no model has one of the names.
-fn retain_only(entries: &mut Vec<Entry>, only: &[String]) -> Result<()> {
+fn retain_only(entries: &mut Vec<ModelEntry>, only: &[String]) -> Result<()> {
     if only.is_empty() {
         return Ok(());
     }

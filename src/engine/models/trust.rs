@@ -6,7 +6,7 @@
 use std::path::{Path, PathBuf};
 
 use super::asking::AskingArgs;
-use super::entry::Entry;
+use super::entry::ModelEntry;
 use super::file::{Keys, Located, ModelsFile};
 use crate::ask::{AccessArgs, BaseUrl, OPENAI_KEY, vendor_variables};
 use crate::error::{Error, Result};
@@ -32,7 +32,7 @@ pub(super) enum Trust {
 /// [`Error::Usage`] with the line of the key.
 pub(super) fn check(
     file: &ModelsFile,
-    entries: &[Entry],
+    entries: &[ModelEntry],
     flags: &AskingArgs,
     data: Option<&Path>,
     trust: Trust,
@@ -78,7 +78,7 @@ struct UntrustedModel<'a> {
     /// The model's own table.
     keys: &'a Keys,
     /// The model merged from flags and tables.
-    entry: &'a Entry,
+    entry: &'a ModelEntry,
     flags: &'a AskingArgs,
 }
 

@@ -15,11 +15,11 @@ const MAX_NUMBERS: usize = 4096;
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ExtraValue {
     /// One number: `ratio = 3`.
-    Number(Number),
+    Number(SidecarNumber),
     /// A vector: `alpha = [1, 2, 3]`.
-    List(Vec<Number>),
+    List(Vec<SidecarNumber>),
     /// A tensor of the image's size, filled with this number: `ratio = { map = 5.0 }`.
-    Map(Number),
+    Map(SidecarNumber),
     /// Normal noise: `z = { noise = "normal", std = 0.9, seed = 0, divide = 8 }`.
     Noise(NoiseStatement),
     /// An expression of the dark image: `gray = { from = "1 - max(image)" }`.
@@ -28,13 +28,13 @@ pub(crate) enum ExtraValue {
 
 /// A number or boolean of the sidecar.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Number {
+pub(crate) enum SidecarNumber {
     Bool(bool),
     Integer(i64),
     Float(f64),
 }
 
-impl fmt::Display for Number {
+impl fmt::Display for SidecarNumber {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Bool(value) => value.fmt(f),
@@ -58,8 +58,8 @@ pub(crate) struct NoiseStatement {
 /// TOML table that states a map, noise or an expression.
 #[derive(Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Table {
-    map: Option<Number>,
+struct SidecarTable {
+    map: Option<SidecarNumber>,
     noise: Option<Distribution>,
     std: Option<f64>,
     seed: Option<u64>,
@@ -74,10 +74,10 @@ enum Distribution {
     Normal,
 }
 
-impl TryFrom<Table> for ExtraValue {
+impl TryFrom<SidecarTable> for ExtraValue {
     type Error = String;
 
-    fn try_from(table: Table) -> Result<Self, String> {
+    fn try_from(table: SidecarTable) -> Result<Self, String> {
         let has_noise_keys = table.std.is_some() || table.seed.is_some() || table.divide.is_some();
         match (table.map, table.noise, table.from) {
             (Some(map), None, None) if !has_noise_keys => Ok(Self::Map(map)),
@@ -100,7 +100,7 @@ impl TryFrom<Table> for ExtraValue {
 /// Accepted forms of a table, for messages.
 const FORMS: &str = "`{ map = NUMBER }`, `{ noise = \"normal\", std = NUMBER, seed = NUMBER, divide = NUMBER }` or `{ from = \"EXPRESSION\" }`";
 
-impl Serialize for Number {
+impl Serialize for SidecarNumber {
     /// Writes an integer as a float if that is exact, so that `1` and `1.0` give the same digest.
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
@@ -119,17 +119,17 @@ impl Serialize for ExtraValue {
         match self {
             Self::Number(number) => number.serialize(serializer),
             Self::List(numbers) => numbers.serialize(serializer),
-            Self::Map(number) => Table { map: Some(*number), ..Table::default() }.serialize(serializer),
-            Self::Noise(noise) => Table {
+            Self::Map(number) => SidecarTable { map: Some(*number), ..SidecarTable::default() }.serialize(serializer),
+            Self::Noise(noise) => SidecarTable {
                 noise: Some(Distribution::Normal),
                 std: Some(noise.std),
                 seed: Some(noise.seed),
                 divide: Some(noise.divide),
-                ..Table::default()
+                ..SidecarTable::default()
             }
             .serialize(serializer),
             Self::From(expression) => {
-                Table { from: Some(expression.clone()), ..Table::default() }.serialize(serializer)
+                SidecarTable { from: Some(expression.clone()), ..SidecarTable::default() }.serialize(serializer)
             }
         }
     }
@@ -146,15 +146,15 @@ impl<'de> Visitor<'de> for ExtraValueVisitor {
     }
 
     fn visit_bool<E: Error>(self, value: bool) -> Result<ExtraValue, E> {
-        Ok(ExtraValue::Number(Number::Bool(value)))
+        Ok(ExtraValue::Number(SidecarNumber::Bool(value)))
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<ExtraValue, E> {
-        Ok(ExtraValue::Number(Number::Integer(value)))
+        Ok(ExtraValue::Number(SidecarNumber::Integer(value)))
     }
 
     fn visit_f64<E: Error>(self, value: f64) -> Result<ExtraValue, E> {
-        Ok(ExtraValue::Number(Number::Float(value)))
+        Ok(ExtraValue::Number(SidecarNumber::Float(value)))
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<ExtraValue, A::Error> {
@@ -169,7 +169,7 @@ impl<'de> Visitor<'de> for ExtraValueVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<ExtraValue, A::Error> {
-        let table = Table::deserialize(MapAccessDeserializer::new(map))?;
+        let table = SidecarTable::deserialize(MapAccessDeserializer::new(map))?;
         ExtraValue::try_from(table).map_err(A::Error::custom)
     }
 }
@@ -180,7 +180,7 @@ impl<'de> Deserialize<'de> for ExtraValue {
     }
 }
 
-impl<'de> Deserialize<'de> for Number {
+impl<'de> Deserialize<'de> for SidecarNumber {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         match ExtraValue::deserialize(deserializer)? {
             ExtraValue::Number(number) => Ok(number),
@@ -196,11 +196,13 @@ impl ExtraValue {
     /// A message about the faulty value of the key `name`.
     pub(super) fn check(&self, name: &str) -> Result<(), String> {
         match self {
-            Self::Number(Number::Float(value)) | Self::Map(Number::Float(value)) if !value.is_finite() => {
+            Self::Number(SidecarNumber::Float(value)) | Self::Map(SidecarNumber::Float(value))
+                if !value.is_finite() =>
+            {
                 Err(format!("extra.{name} is {value}; expected a finite number"))
             }
             Self::List(numbers) => {
-                match numbers.iter().find(|n| matches!(n, Number::Float(value) if !value.is_finite())) {
+                match numbers.iter().find(|n| matches!(n, SidecarNumber::Float(value) if !value.is_finite())) {
                     None => Ok(()),
                     Some(value) => Err(format!("extra.{name} has {value}; expected finite numbers")),
                 }
@@ -216,7 +218,7 @@ impl fmt::Display for ExtraValue {
         match self {
             Self::Number(number) => number.fmt(f),
             Self::List(numbers) => {
-                let numbers: Vec<String> = numbers.iter().map(Number::to_string).collect();
+                let numbers: Vec<String> = numbers.iter().map(SidecarNumber::to_string).collect();
                 write!(f, "[{}]", numbers.join(", "))
             }
             Self::Map(number) => write!(f, "map of {number}"),
@@ -245,11 +247,11 @@ mod tests {
     #[test]
     fn every_form_is_parsed() {
         let rows = [
-            ("3", ExtraValue::Number(Number::Integer(3))),
-            ("0.8", ExtraValue::Number(Number::Float(0.8))),
-            ("true", ExtraValue::Number(Number::Bool(true))),
-            ("[1, 2.5]", ExtraValue::List(vec![Number::Integer(1), Number::Float(2.5)])),
-            ("{ map = 5.0 }", ExtraValue::Map(Number::Float(5.0))),
+            ("3", ExtraValue::Number(SidecarNumber::Integer(3))),
+            ("0.8", ExtraValue::Number(SidecarNumber::Float(0.8))),
+            ("true", ExtraValue::Number(SidecarNumber::Bool(true))),
+            ("[1, 2.5]", ExtraValue::List(vec![SidecarNumber::Integer(1), SidecarNumber::Float(2.5)])),
+            ("{ map = 5.0 }", ExtraValue::Map(SidecarNumber::Float(5.0))),
             (
                 "{ noise = \"normal\", std = 0.9, seed = 7, divide = 8 }",
                 ExtraValue::Noise(NoiseStatement { std: 0.9, seed: 7, divide: 8 }),

@@ -12,5 +12,5 @@ pub(super) use convention::{
     ValueScale,
 };
 pub(super) use describe::Description;
-pub(super) use extra::{ExtraValue, NoiseStatement, Number};
+pub(super) use extra::{ExtraValue, NoiseStatement, SidecarNumber};
 pub(super) use signature::{ImageInput, Signature};

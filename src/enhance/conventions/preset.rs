@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::extra::{ExtraValue, Number};
+use super::extra::{ExtraValue, SidecarNumber};
 use super::sidecar::{ADD, ModelSidecar, OutputChoice};
 use crate::expressions::Expression;
 use crate::graphs::{Port, format_ports};
@@ -115,7 +115,7 @@ fn all_presets() -> Result<BTreeMap<String, PresetContent>> {
 }
 
 /// Value that a preset states for an input of this name, with the preset's name.
-pub(crate) fn known_number(input: &str) -> Option<(Number, String)> {
+pub(crate) fn known_number(input: &str) -> Option<(SidecarNumber, String)> {
     all_presets().ok()?.into_iter().find_map(|(name, content)| match content.sidecar.extra.get(input)? {
         ExtraValue::Number(number) | ExtraValue::Map(number) => Some((*number, name)),
         ExtraValue::List(_) | ExtraValue::Noise(_) | ExtraValue::From(_) => None,

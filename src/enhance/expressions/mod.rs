@@ -27,9 +27,9 @@ use std::str::FromStr;
 
 use super::planes::Planes;
 use darkqa_base::types::text::words::as_text;
-use term::Term;
+use term::StackElement;
 
-pub(super) use term::Sample;
+pub(super) use term::PixelValue;
 
 /// Range of channels, counted from 0; `end` is excluded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -57,7 +57,7 @@ impl ChannelSlice {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Expression {
     text: String,
-    terms: Vec<Term>,
+    terms: Vec<StackElement>,
     names: Vec<String>,
 }
 
@@ -86,7 +86,7 @@ impl Expression {
 
     /// True if the expression is just this name.
     pub(crate) fn is_name(&self, name: &str) -> bool {
-        self.terms == [Term::Name(0)] && self.names[0] == name
+        self.terms == [StackElement::Name(0)] && self.names[0] == name
     }
 
     /// Checks that each name is one of `known`; `key` is the sidecar's key of the expression.
@@ -111,15 +111,15 @@ impl Expression {
     /// Evaluates the expression on images of one size, given in the order of [`Expression::names`].
     pub(crate) fn evaluate(&self, images: &[&Planes], [height, width]: [usize; 2]) -> Planes {
         let plane = height * width;
-        let mut values = vec![Sample::One(0.0); images.len()];
+        let mut values = vec![PixelValue::One(0.0); images.len()];
         let mut stack = Vec::with_capacity(self.terms.len());
         let channels = if plane == 0 {
             1
         } else {
-            let first_pixel: Vec<Sample> = images.iter().map(|image| image.sample(0)).collect();
+            let first_pixel: Vec<PixelValue> = images.iter().map(|image| image.sample(0)).collect();
             match self.value(&first_pixel, &mut stack) {
-                Sample::One(_) => 1,
-                Sample::Three(_) => 3,
+                PixelValue::One(_) => 1,
+                PixelValue::Three(_) => 3,
             }
         };
         let mut samples = vec![0.0; channels * plane];
@@ -138,28 +138,28 @@ impl Expression {
     /// Number of channels of the result, for images with these numbers of channels in the order of
     /// [`Expression::names`].
     pub(crate) fn channels(&self, image_channels: &[usize]) -> usize {
-        let samples: Vec<Sample> = image_channels
+        let samples: Vec<PixelValue> = image_channels
             .iter()
             .map(|channels| match channels {
-                1 => Sample::One(0.0),
-                _ => Sample::Three([0.0; 3]),
+                1 => PixelValue::One(0.0),
+                _ => PixelValue::Three([0.0; 3]),
             })
             .collect();
         match self.value(&samples, &mut Vec::new()) {
-            Sample::One(_) => 1,
-            Sample::Three(_) => 3,
+            PixelValue::One(_) => 1,
+            PixelValue::Three(_) => 3,
         }
     }
 
     /// Value at one pixel; `names` holds the values of the names. The stack is empty before and after.
-    fn value(&self, names: &[Sample], stack: &mut Vec<Sample>) -> Sample {
+    fn value(&self, names: &[PixelValue], stack: &mut Vec<PixelValue>) -> PixelValue {
         for term in &self.terms {
             let first = stack.len() - term.arguments();
             let value = term.value(names, &stack[first..]);
             stack.truncate(first);
             stack.push(value);
         }
-        stack.pop().unwrap_or(Sample::One(f32::NAN))
+        stack.pop().unwrap_or(PixelValue::One(f32::NAN))
     }
 }
 
@@ -171,7 +171,7 @@ const DEEPEST: usize = 50;
 
 /// Terms of an expression in postfix order, and its names in the order of their first use.
 pub(super) struct Parsed {
-    terms: Vec<Term>,
+    terms: Vec<StackElement>,
     names: Vec<String>,
 }
 
@@ -206,7 +206,7 @@ struct Parser {
 impl Parser {
     fn sum(&mut self) -> Result<(), String> {
         self.product()?;
-        while let Some(term) = self.operator(&[('+', Term::Add), ('-', Term::Subtract)]) {
+        while let Some(term) = self.operator(&[('+', StackElement::Add), ('-', StackElement::Subtract)]) {
             self.product()?;
             self.parsed.terms.push(term);
         }
@@ -215,7 +215,7 @@ impl Parser {
 
     fn product(&mut self) -> Result<(), String> {
         self.signed()?;
-        while let Some(term) = self.operator(&[('*', Term::Multiply), ('/', Term::Divide)]) {
+        while let Some(term) = self.operator(&[('*', StackElement::Multiply), ('/', StackElement::Divide)]) {
             self.signed()?;
             self.parsed.terms.push(term);
         }
@@ -230,12 +230,12 @@ impl Parser {
         }
         if self.accept('-') {
             self.signed()?;
-            self.parsed.terms.push(Term::Negate);
+            self.parsed.terms.push(StackElement::Negate);
         } else {
             self.atom()?;
             if self.accept('^') {
                 self.signed()?;
-                self.parsed.terms.push(Term::Power);
+                self.parsed.terms.push(StackElement::Power);
             }
         }
         self.depth -= 1;
@@ -282,7 +282,7 @@ impl Parser {
         }
         match digits.parse::<f32>() {
             Ok(number) if number.is_finite() => {
-                self.parsed.terms.push(Term::Number(number));
+                self.parsed.terms.push(StackElement::Number(number));
                 Ok(())
             }
             _ => {
@@ -302,11 +302,11 @@ impl Parser {
         }
         self.close()?;
         let term = match (name, arguments) {
-            ("min", count) => Term::Min(count),
-            ("max", count) => Term::Max(count),
-            ("clip", 3) => Term::Clip,
-            ("mean", 1) => Term::Mean,
-            ("curves", 2..) => Term::Curves(arguments),
+            ("min", count) => StackElement::Min(count),
+            ("max", count) => StackElement::Max(count),
+            ("clip", 3) => StackElement::Clip,
+            ("mean", 1) => StackElement::Mean,
+            ("curves", 2..) => StackElement::Curves(arguments),
             _ => {
                 self.position = start;
                 return Err(self.error("min(…), max(…), clip(x, low, high), mean(x) or curves(x, a, …)"));
@@ -330,7 +330,7 @@ impl Parser {
             names.push(name);
             names.len() - 1
         });
-        self.parsed.terms.push(Term::Name(index));
+        self.parsed.terms.push(StackElement::Name(index));
         Ok(())
     }
 
@@ -353,7 +353,7 @@ impl Parser {
         is_next
     }
 
-    fn operator(&mut self, operators: &[(char, Term)]) -> Option<Term> {
+    fn operator(&mut self, operators: &[(char, StackElement)]) -> Option<StackElement> {
         operators.iter().find(|(c, _)| self.accept(*c)).map(|(_, term)| *term)
     }
 
@@ -394,14 +394,14 @@ mod tests {
     }
 
     /// Value of an expression for c = (0.5, 0.25, 1) and 0.25 for any other name.
-    fn value(text: &str) -> Sample {
+    fn value(text: &str) -> PixelValue {
         let expression: Expression = text.parse().unwrap();
-        let names: Vec<Sample> = expression
+        let names: Vec<PixelValue> = expression
             .names
             .iter()
             .map(|name| match name.as_str() {
-                "c" => Sample::Three([0.5, 0.25, 1.0]),
-                _ => Sample::One(0.25),
+                "c" => PixelValue::Three([0.5, 0.25, 1.0]),
+                _ => PixelValue::One(0.25),
             })
             .collect();
         expression.value(&names, &mut Vec::new())
@@ -431,15 +431,15 @@ mod tests {
             ("max(c) - min(c)", 0.75),
             ("mean(3)", 3.0),
         ] {
-            assert_eq!(value(text), Sample::One(expected), "{text}");
+            assert_eq!(value(text), PixelValue::One(expected), "{text}");
         }
     }
 
     #[test]
     fn one_channel_is_broadcast_to_three() {
-        assert_eq!(value("c * x"), Sample::Three([0.125, 0.0625, 0.25]));
-        assert_eq!(value("1 - c"), Sample::Three([0.5, 0.75, 0.0]));
-        assert_eq!(value("min(c, 0.5)"), Sample::Three([0.5, 0.25, 0.5]));
+        assert_eq!(value("c * x"), PixelValue::Three([0.125, 0.0625, 0.25]));
+        assert_eq!(value("1 - c"), PixelValue::Three([0.5, 0.75, 0.0]));
+        assert_eq!(value("min(c, 0.5)"), PixelValue::Three([0.5, 0.25, 0.5]));
         let expression: Expression = "a * b".parse().unwrap();
         assert_eq!([[1, 1], [1, 3], [3, 1]].map(|n| expression.channels(&n)), [1, 3, 3]);
     }
@@ -447,7 +447,7 @@ mod tests {
     #[test]
     fn nan_is_propagated() {
         for text in ["max(0 / 0, 1)", "min(1, 0 / 0)", "clip(0 / 0, 0, 1)", "(0 / 0) ^ 1", "mean(c / 0 - c / 0)"] {
-            let Sample::One(found) = value(text) else { panic!("{text}") };
+            let PixelValue::One(found) = value(text) else { panic!("{text}") };
             assert!(found.is_nan(), "{text}: {found}");
         }
     }
@@ -487,7 +487,7 @@ mod tests {
         let message = Expression::from_str(&"1+".repeat(600)).unwrap_err();
         assert!(message.contains("at most 1000"), "{message}");
         let long = "1+".repeat(499) + "1";
-        assert_eq!(value(&long), Sample::One(500.0));
+        assert_eq!(value(&long), PixelValue::One(500.0));
     }
 
     #[test]

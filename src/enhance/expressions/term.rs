@@ -1,10 +1,10 @@
-//! Elements of a sidecar's expression and their values: [`Term`], [`Sample`].
+//! Elements of a sidecar's expression and their values: [`StackElement`], [`PixelValue`].
 
 use crate::conventions::LUMA;
 
 /// Element of an expression in postfix order: pops its arguments from a stack and pushes one value.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Term {
+pub(super) enum StackElement {
     /// A number.
     Number(f32),
     /// Value of the name with this index among the expression's names.
@@ -35,14 +35,14 @@ pub(super) enum Term {
 
 /// Value of an expression at one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Sample {
+pub(crate) enum PixelValue {
     /// One channel.
     One(f32),
     /// Red, green and blue.
     Three([f32; 3]),
 }
 
-impl Sample {
+impl PixelValue {
     /// The three channels; one channel is repeated.
     pub(super) fn spread(self) -> [f32; 3] {
         match self {
@@ -88,7 +88,7 @@ impl Sample {
     }
 }
 
-impl Term {
+impl StackElement {
     /// Number of arguments that the term pops from the stack.
     pub(super) fn arguments(self) -> usize {
         match self {
@@ -100,12 +100,12 @@ impl Term {
         }
     }
 
-    /// Value of the term. `names` holds the values of the names; `arguments` has [`Term::arguments`] elements.
+    /// Value of the term. `names` holds the values of the names; `arguments` has [`StackElement::arguments`] elements.
     ///
     /// Powers are computed by `libm`, so that every machine gives the same bytes.
-    pub(super) fn value(self, names: &[Sample], arguments: &[Sample]) -> Sample {
+    pub(super) fn value(self, names: &[PixelValue], arguments: &[PixelValue]) -> PixelValue {
         match (self, arguments) {
-            (Self::Number(number), _) => Sample::One(number),
+            (Self::Number(number), _) => PixelValue::One(number),
             (Self::Name(index), _) => names[index],
             (Self::Negate, [a]) => a.map(|a| -a),
             (Self::Add, [a, b]) => a.zip_with(*b, |a, b| a + b),
@@ -122,11 +122,11 @@ impl Term {
                 curves.iter().fold(*x, |x, a| x.zip_with(*a, |x, a| x + a * (x * x - x)))
             }
             (Self::Mean, [a]) => match a.fold_channels(|a, b| a + b) {
-                Sample::One(sum) if matches!(a, Sample::Three(_)) => Sample::One(sum / 3.0),
+                PixelValue::One(sum) if matches!(a, PixelValue::Three(_)) => PixelValue::One(sum / 3.0),
                 same => same,
             },
             // Unreachable: the parser gives each term the right number of arguments.
-            _ => Sample::One(f32::NAN),
+            _ => PixelValue::One(f32::NAN),
         }
     }
 }

@@ -39,7 +39,7 @@ fn find(model: &[u8]) -> Result<BTreeSet<String>, Malformed> {
             constants.extend(initializers(model, body.clone()));
         }
         for node in byte_fields(model, body, nodes) {
-            let node = Node::read(model, node)?;
+            let node = ProductNode::read(model, node)?;
             let computed = |name: &String| !name.is_empty() && !constants.contains(name);
             let count = node.inputs.iter().filter(|name| computed(name)).count();
             let is_product = PRODUCTS.contains(&node.operator.as_str())
@@ -78,14 +78,14 @@ fn initializers(model: &[u8], graph: Range<usize>) -> HashSet<String> {
 
 /// A `NodeProto`, as far as it shows what is computed.
 #[derive(Default)]
-struct Node {
+struct ProductNode {
     operator: String,
     inputs: Vec<String>,
     outputs: Vec<String>,
     subgraphs: Vec<Range<usize>>,
 }
 
-impl Node {
+impl ProductNode {
     fn read(model: &[u8], range: Range<usize>) -> Result<Self, Malformed> {
         let mut node = Self::default();
         for field in fields(model, range) {

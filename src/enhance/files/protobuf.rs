@@ -31,9 +31,9 @@ pub(super) enum FieldValue {
 
 /// Iterates over the fields of the message at the position `within` of `buffer`, as pairs of field number and value.
 /// Ends after the first error.
-pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> Fields<'_> {
+pub(super) fn fields(buffer: &[u8], within: Range<usize>) -> FieldIter<'_> {
     let message = buffer.get(..within.end).unwrap_or_default();
-    Fields { message, at: within.start }
+    FieldIter { message, at: within.start }
 }
 
 /// Iterates over the contents of the length-delimited fields with number `wanted`, up to the first malformed field.
@@ -60,14 +60,14 @@ fn push_varint(message: &mut Vec<u8>, mut value: u64) {
 }
 
 /// Iterator returned by [`fields`].
-pub(super) struct Fields<'a> {
+pub(super) struct FieldIter<'a> {
     /// The buffer up to the end of the message.
     message: &'a [u8],
     /// Position of the next field.
     at: usize,
 }
 
-impl Iterator for Fields<'_> {
+impl Iterator for FieldIter<'_> {
     type Item = Result<(u64, FieldValue), Malformed>;
 
     fn next(&mut self) -> Option<Self::Item> {
@@ -82,7 +82,7 @@ impl Iterator for Fields<'_> {
     }
 }
 
-impl Fields<'_> {
+impl FieldIter<'_> {
     /// Position of the next field in the buffer.
     pub(super) fn position(&self) -> usize {
         self.at

@@ -24,7 +24,7 @@ pub(crate) struct RandomOperators {
 }
 
 /// Properties of a `NodeProto` that show whether it is random.
-struct Node {
+struct OperatorNode {
     operator: String,
     inputs: Vec<String>,
     outputs: Vec<String>,
@@ -42,13 +42,13 @@ impl RandomOperators {
     /// If the bytes are not a protobuf message.
     pub(crate) fn find(model: &[u8]) -> Result<Self, Malformed> {
         let mut found = Self::default();
-        let mut nodes: Vec<(Range<usize>, Node)> = Vec::new();
+        let mut nodes: Vec<(Range<usize>, OperatorNode)> = Vec::new();
         let mut constants: BTreeMap<String, bool> = BTreeMap::new();
         // A stack instead of recursion, so that deep nesting cannot overflow the call stack.
         let mut stack = vec![(OnnxMessage::Model, 0..model.len())];
         while let Some((message, range)) = stack.pop() {
             if message == OnnxMessage::Node {
-                nodes.push((range.clone(), Node::read(model, range.clone())?));
+                nodes.push((range.clone(), OperatorNode::read(model, range.clone())?));
             }
             for field in fields(model, range) {
                 let (number, FieldValue::Bytes(bytes)) = field? else {
@@ -119,14 +119,14 @@ impl RandomOperators {
             start = end;
         }
         if message == OnnxMessage::Node && is_unseeded {
-            let node = Node::read(model, range).ok()?;
+            let node = OperatorNode::read(model, range).ok()?;
             push_bytes(&mut copy, 5, &seed_attribute(&node.operator));
         }
         Some(copy)
     }
 }
 
-impl Node {
+impl OperatorNode {
     fn read(model: &[u8], range: Range<usize>) -> Result<Self, Malformed> {
         let mut node =
             Self { operator: String::new(), inputs: Vec::new(), outputs: Vec::new(), has_seed: false, constant: None };

@@ -12,7 +12,7 @@ use crate::conventions::Signature;
 use crate::conventions::preset::Preset;
 use crate::conventions::sidecar::{ADD, ModelSidecar};
 use crate::failure::{RunFailure, describe_load_failure};
-use crate::inputs::{DarkImage, FedImage, InputEncoding, Tensor};
+use crate::inputs::{DegradedImage, FedImage, InputEncoding, Tensor};
 use crate::libraries::{JobEnd, JobLimits, Runtime};
 use crate::limits::{ImageClock, MemoryLimit, TimeLimit};
 use crate::outputs::{Composition, ImageTensor, InvalidValues};
@@ -263,7 +263,7 @@ impl Graph {
     /// Runs the model on a window of an image; returns the bytes of `part`, whose position is relative to the window.
     pub(crate) fn run_window(
         &self,
-        dark: &DarkImage<'_>,
+        dark: &DegradedImage<'_>,
         window: TileWindow,
         part: TileWindow,
     ) -> Result<RunResult<Vec<u8>>> {
@@ -295,7 +295,7 @@ impl Graph {
             Arena::Kept => &self.options,
             Arena::Released => &self.releasing,
         };
-        let dark = DarkImage::new(image);
+        let dark = DegradedImage::new(image);
         self.run(options, &self.fed_window(&dark, window), |_| Ok(()))
     }
 
@@ -330,7 +330,7 @@ impl Graph {
         })
     }
 
-    fn fed_window<'a>(&self, dark: &'a DarkImage<'a>, window: TileWindow) -> FedImage<'a> {
+    fn fed_window<'a>(&self, dark: &'a DegradedImage<'a>, window: TileWindow) -> FedImage<'a> {
         FedImage::Window { dark, window, pad: self.encoding.pad }
     }
 

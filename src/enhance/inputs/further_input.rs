@@ -17,18 +17,18 @@ pub(crate) struct FurtherInput {
     /// Value of the input.
     pub(crate) value: ExtraValue,
     /// Dimensions for channels, rows and columns; `None` for scalars and vectors.
-    axes: Option<Axes>,
+    axes: Option<TensorAxes>,
 }
 
 /// Indices of a tensor's dimensions for channels, rows and columns.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Axes {
+struct TensorAxes {
     channels: Option<usize>,
     rows: usize,
     columns: usize,
 }
 
-impl Axes {
+impl TensorAxes {
     /// Axes of a tensor with the image's size; `None` for scalars, vectors and ranks that no layout has. A layout with
     /// one or three channels is preferred, then the layout of the image.
     fn for_port(port: &Port, image: TensorLayout) -> Option<Self> {
@@ -79,7 +79,7 @@ impl FurtherInput {
         image: TensorLayout,
         image_takes_any_side: bool,
     ) -> Result<Self, String> {
-        let axes = Axes::for_port(port, image);
+        let axes = TensorAxes::for_port(port, image);
         if let Some(axes) = axes
             && axes.has_fixed_size(port)
             && image_takes_any_side
@@ -217,7 +217,7 @@ impl FurtherInput {
     }
 
     /// Dimensions for an image of this size; other dynamic dimensions are 1.
-    fn dims(&self, axes: Axes, channels: usize, [height, width]: [usize; 2]) -> Vec<usize> {
+    fn dims(&self, axes: TensorAxes, channels: usize, [height, width]: [usize; 2]) -> Vec<usize> {
         let mut dims = self.fixed_dims();
         if let Some(axis) = axes.channels {
             dims[axis] = channels;
@@ -228,7 +228,7 @@ impl FurtherInput {
     }
 
     /// Converts planar samples to the order of the tensor's dimensions; `None` if the port's type is not a float type.
-    fn arrange_planes(&self, axes: Axes, channels: usize, size: [usize; 2], planes: Vec<f32>) -> Option<Tensor> {
+    fn arrange_planes(&self, axes: TensorAxes, channels: usize, size: [usize; 2], planes: Vec<f32>) -> Option<Tensor> {
         let plane = size[0] * size[1];
         let is_planar = axes.channels.is_none_or(|axis| axis < axes.rows);
         let values = if is_planar || channels == 1 {
@@ -262,7 +262,7 @@ fn list_line(key: &str, length: usize) -> String {
 }
 
 /// Message about an input without a value, with sidecar lines that would set it.
-fn missing_value_message(port: &Port, axes: Option<Axes>) -> String {
+fn missing_value_message(port: &Port, axes: Option<TensorAxes>) -> String {
     let key = toml_key(&port.name);
     let add = format!("{ADD}, below `[extra]`:");
     let known =
@@ -352,14 +352,14 @@ fn normal_noise(statement: &NoiseStatement, name: &str, channels: usize, fed: &F
 mod tests {
     use super::*;
     use crate::conventions::Padding;
-    use crate::inputs::tensor::DarkImage;
+    use crate::inputs::tensor::DegradedImage;
     use crate::sizing::TileWindow;
     use darkqa_base::types::Rgb;
 
     const NOISE: NoiseStatement = NoiseStatement { std: 0.5, seed: 3, divide: 1 };
 
     fn draw(statement: &NoiseStatement, name: &str, rgb: &Rgb, window: TileWindow) -> Vec<f32> {
-        let dark = DarkImage::new(rgb);
+        let dark = DegradedImage::new(rgb);
         let fed = FedImage::Window { dark: &dark, window, pad: Padding::Reflect };
         normal_noise(statement, name, 2, &fed)
     }

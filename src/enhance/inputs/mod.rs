@@ -6,4 +6,4 @@ mod tensor;
 
 pub(super) use further_input::{FurtherInput, is_map_or_noise};
 pub(super) use input_encoding::InputEncoding;
-pub(super) use tensor::{DarkImage, FedImage, Tensor, TensorData};
+pub(super) use tensor::{DegradedImage, FedImage, Tensor, TensorData};

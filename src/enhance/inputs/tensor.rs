@@ -1,13 +1,13 @@
 //! Value of one graph input: [`Tensor`].
 //!
-//! Image of one run of a model, from which all inputs are computed: [`FedImage`], [`DarkImage`].
+//! Image of one run of a model, from which all inputs are computed: [`FedImage`], [`DegradedImage`].
 
 use std::borrow::Cow;
 use std::cell::OnceCell;
 
 use half::{bf16, f16};
 
-use crate::conventions::{ElementType, Number, Padding};
+use crate::conventions::{ElementType, Padding, SidecarNumber};
 use crate::planes::Planes;
 use crate::sizing::TileWindow;
 use darkqa_base::types::{Digest, Rgb};
@@ -45,10 +45,10 @@ impl TensorData {
     ///
     /// # Errors
     /// If the number does not fit; the message names the number and the type.
-    pub(super) fn repeated(element: &ElementType, number: Number, count: usize) -> Result<Self, String> {
+    pub(super) fn repeated(element: &ElementType, number: SidecarNumber, count: usize) -> Result<Self, String> {
         let fitting = match element {
             ElementType::Bool => match number {
-                Number::Bool(value) => Some(Self::Bool(vec![value; count])),
+                SidecarNumber::Bool(value) => Some(Self::Bool(vec![value; count])),
                 _ => None,
             },
             ElementType::Int8 => repeat_integer(number, count).map(Self::Int8),
@@ -73,10 +73,10 @@ impl TensorData {
     ///
     /// # Errors
     /// If a number does not fit; the message names the number and the type.
-    pub(super) fn from_numbers(element: &ElementType, numbers: &[Number]) -> Result<Self, String> {
-        let mut all = Self::repeated(element, Number::Integer(0), 0).or_else(|_| {
+    pub(super) fn from_numbers(element: &ElementType, numbers: &[SidecarNumber]) -> Result<Self, String> {
+        let mut all = Self::repeated(element, SidecarNumber::Integer(0), 0).or_else(|_| {
             // For booleans, 0 does not fit.
-            Self::repeated(element, Number::Bool(false), 0)
+            Self::repeated(element, SidecarNumber::Bool(false), 0)
         })?;
         for number in numbers {
             match (&mut all, Self::repeated(element, *number, 1)?) {
@@ -113,25 +113,25 @@ impl TensorData {
 }
 
 /// Converts a number to an integer type, if that is exact, and repeats it `count` times.
-fn repeat_integer<T: Copy + TryFrom<i128>>(number: Number, count: usize) -> Option<Vec<T>> {
+fn repeat_integer<T: Copy + TryFrom<i128>>(number: SidecarNumber, count: usize) -> Option<Vec<T>> {
     let whole = match number {
-        Number::Integer(value) => i128::from(value),
+        SidecarNumber::Integer(value) => i128::from(value),
         // Integers of 2^64 or more fit no type; smaller ones convert to `i128` exactly.
-        Number::Float(value) if value.fract() == 0.0 && value.abs() < 2.0_f64.powi(65) => value as i128,
-        Number::Float(_) | Number::Bool(_) => return None,
+        SidecarNumber::Float(value) if value.fract() == 0.0 && value.abs() < 2.0_f64.powi(65) => value as i128,
+        SidecarNumber::Float(_) | SidecarNumber::Bool(_) => return None,
     };
     T::try_from(whole).ok().map(|value| vec![value; count])
 }
 
 /// The number as a float, if it fits the float type by the rules of [`TensorData::repeated`].
-fn fitting_float(element: &ElementType, number: Number) -> Option<f64> {
+fn fitting_float(element: &ElementType, number: SidecarNumber) -> Option<f64> {
     match number {
-        Number::Bool(_) => None,
-        Number::Integer(integer) => {
+        SidecarNumber::Bool(_) => None,
+        SidecarNumber::Integer(integer) => {
             let value = round_to_type(element, integer as f64)?;
             (value.is_finite() && value as i128 == i128::from(integer)).then_some(value)
         }
-        Number::Float(value) => {
+        SidecarNumber::Float(value) => {
             let rounded = round_to_type(element, value)?;
             (rounded.is_finite() && (rounded != 0.0 || value == 0.0)).then_some(value)
         }
@@ -150,12 +150,12 @@ fn round_to_type(element: &ElementType, value: f64) -> Option<f64> {
 }
 
 /// A whole degraded image. Noise inputs depend on its digest, which is computed at most once.
-pub(crate) struct DarkImage<'a> {
+pub(crate) struct DegradedImage<'a> {
     pub(super) rgb: &'a Rgb,
     digest: OnceCell<Digest>,
 }
 
-impl<'a> DarkImage<'a> {
+impl<'a> DegradedImage<'a> {
     pub(crate) fn new(rgb: &'a Rgb) -> Self {
         Self { rgb, digest: OnceCell::new() }
     }
@@ -164,7 +164,7 @@ impl<'a> DarkImage<'a> {
 /// Image that is fed to a model in one run.
 pub(crate) enum FedImage<'a> {
     /// A window of a degraded image, padded beyond the image's edges.
-    Window { dark: &'a DarkImage<'a>, window: TileWindow, pad: Padding },
+    Window { dark: &'a DegradedImage<'a>, window: TileWindow, pad: Padding },
     /// A whole image of floats.
     Whole(&'a Planes),
 }
@@ -245,28 +245,28 @@ fn image_digest(size: [usize; 2], bytes: &[u8]) -> Digest {
 mod tests {
     use super::*;
 
-    fn one(element: &ElementType, number: Number) -> Result<TensorData, String> {
+    fn one(element: &ElementType, number: SidecarNumber) -> Result<TensorData, String> {
         TensorData::repeated(element, number, 1)
     }
 
     #[test]
     fn fitting_numbers_are_converted_to_every_type() {
-        let (whole, half) = (Number::Integer(3), Number::Float(0.5));
+        let (whole, half) = (SidecarNumber::Integer(3), SidecarNumber::Float(0.5));
         let rows = [
-            (ElementType::Bool, Number::Bool(true), TensorData::Bool(vec![true])),
+            (ElementType::Bool, SidecarNumber::Bool(true), TensorData::Bool(vec![true])),
             (ElementType::Int8, whole, TensorData::Int8(vec![3])),
             (ElementType::Int16, whole, TensorData::Int16(vec![3])),
             (ElementType::Int32, whole, TensorData::Int32(vec![3])),
-            (ElementType::Int64, Number::Float(3.0), TensorData::Int64(vec![3])),
+            (ElementType::Int64, SidecarNumber::Float(3.0), TensorData::Int64(vec![3])),
             (ElementType::Uint8, whole, TensorData::Uint8(vec![3])),
             (ElementType::Uint16, whole, TensorData::Uint16(vec![3])),
             (ElementType::Uint32, whole, TensorData::Uint32(vec![3])),
             (ElementType::Uint64, whole, TensorData::Uint64(vec![3])),
             (ElementType::Float16, half, TensorData::Float16(vec![f16::from_f32(0.5)])),
             (ElementType::Bfloat16, half, TensorData::Bfloat16(vec![bf16::from_f32(0.5)])),
-            (ElementType::Float32, Number::Float(0.1), TensorData::Float32(vec![0.1])),
+            (ElementType::Float32, SidecarNumber::Float(0.1), TensorData::Float32(vec![0.1])),
             (ElementType::Float32, whole, TensorData::Float32(vec![3.0])),
-            (ElementType::Float64, Number::Float(0.1), TensorData::Float64(vec![0.1])),
+            (ElementType::Float64, SidecarNumber::Float(0.1), TensorData::Float64(vec![0.1])),
         ];
         for (element, number, data) in rows {
             assert_eq!(one(&element, number), Ok(data), "{element} {number}");
@@ -276,22 +276,22 @@ mod tests {
     #[test]
     fn error_names_the_number_and_the_type_it_does_not_fit() {
         for (element, number, text) in [
-            (ElementType::Int32, Number::Float(3.5), "3.5"),
-            (ElementType::Int32, Number::Integer(1 << 40), "1099511627776"),
-            (ElementType::Int64, Number::Float(1e30), "1e30"),
-            (ElementType::Int64, Number::Bool(true), "true"),
-            (ElementType::Uint8, Number::Integer(-1), "-1"),
-            (ElementType::Uint8, Number::Integer(256), "256"),
-            (ElementType::Bool, Number::Integer(1), "1"),
-            (ElementType::Float16, Number::Float(1e6), "1000000.0"),
-            (ElementType::Float16, Number::Integer(2049), "2049"),
-            (ElementType::Bfloat16, Number::Integer(257), "257"),
-            (ElementType::Float32, Number::Integer((1 << 24) + 1), "16777217"),
-            (ElementType::Float32, Number::Float(1e39), "1e39"),
-            (ElementType::Float32, Number::Float(1e-60), "1e-60"),
-            (ElementType::Float64, Number::Integer((1 << 53) + 1), "9007199254740993"),
-            (ElementType::Float32, Number::Bool(true), "true"),
-            (ElementType::Other("string".into()), Number::Integer(1), "1"),
+            (ElementType::Int32, SidecarNumber::Float(3.5), "3.5"),
+            (ElementType::Int32, SidecarNumber::Integer(1 << 40), "1099511627776"),
+            (ElementType::Int64, SidecarNumber::Float(1e30), "1e30"),
+            (ElementType::Int64, SidecarNumber::Bool(true), "true"),
+            (ElementType::Uint8, SidecarNumber::Integer(-1), "-1"),
+            (ElementType::Uint8, SidecarNumber::Integer(256), "256"),
+            (ElementType::Bool, SidecarNumber::Integer(1), "1"),
+            (ElementType::Float16, SidecarNumber::Float(1e6), "1000000.0"),
+            (ElementType::Float16, SidecarNumber::Integer(2049), "2049"),
+            (ElementType::Bfloat16, SidecarNumber::Integer(257), "257"),
+            (ElementType::Float32, SidecarNumber::Integer((1 << 24) + 1), "16777217"),
+            (ElementType::Float32, SidecarNumber::Float(1e39), "1e39"),
+            (ElementType::Float32, SidecarNumber::Float(1e-60), "1e-60"),
+            (ElementType::Float64, SidecarNumber::Integer((1 << 53) + 1), "9007199254740993"),
+            (ElementType::Float32, SidecarNumber::Bool(true), "true"),
+            (ElementType::Other("string".into()), SidecarNumber::Integer(1), "1"),
         ] {
             let message = one(&element, number).unwrap_err();
             assert_eq!(message, format!("{text} does not fit its type {element}"));
@@ -299,14 +299,14 @@ mod tests {
     }
 
     /// A window with two rows of an image.
-    fn columns<'a>(dark: &'a DarkImage<'a>, left: usize, right: usize) -> FedImage<'a> {
+    fn columns<'a>(dark: &'a DegradedImage<'a>, left: usize, right: usize) -> FedImage<'a> {
         FedImage::Window { dark, window: TileWindow { left, top: 0, right, bottom: 2 }, pad: Padding::Reflect }
     }
 
     #[test]
     fn window_has_padding_origin_and_digest() {
         let rgb = Rgb::new(1, 3, vec![0, 51, 102, 51, 51, 51, 255, 0, 0]).unwrap();
-        let dark = DarkImage::new(&rgb);
+        let dark = DegradedImage::new(&rgb);
         let padded = columns(&dark, 1, 5);
         let planes = padded.planes().into_owned();
         assert_eq!((planes.height, planes.width), (2, 4));
@@ -317,7 +317,7 @@ mod tests {
         assert!(!padded.is_whole() && !part.is_whole());
         assert_eq!(part.digest(), padded.digest());
         let transposed = Rgb::new(3, 1, rgb.samples().to_vec()).unwrap();
-        let transposed = DarkImage::new(&transposed);
+        let transposed = DegradedImage::new(&transposed);
         assert_ne!(part.digest(), columns(&transposed, 0, 1).digest());
     }
 }

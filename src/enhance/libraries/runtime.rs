@@ -303,12 +303,12 @@ impl Runtime {
 
 /// Thread that runs one job after another.
 pub(crate) struct RuntimeThread {
-    jobs: Sender<Job>,
+    jobs: Sender<RuntimeJob>,
     /// True if a job exceeded its limits and could not be stopped.
     stuck: AtomicBool,
 }
 
-type Job = Box<dyn FnOnce() + Send>;
+type RuntimeJob = Box<dyn FnOnce() + Send>;
 
 /// Outcome of a job with limits.
 #[derive(Debug, PartialEq, Eq)]
@@ -330,7 +330,7 @@ pub(crate) struct JobLimits {
 }
 
 /// Message from a job to its caller.
-enum Event<T> {
+enum RuntimeEvent<T> {
     Started,
     Ended(T),
 }
@@ -345,7 +345,7 @@ const POLL_INTERVAL: Duration = Duration::from_millis(500);
 impl RuntimeThread {
     /// Starts the thread. It ends when the value is dropped and all jobs are done.
     pub(super) fn start() -> std::io::Result<Self> {
-        let (jobs, waiting) = channel::<Job>();
+        let (jobs, waiting) = channel::<RuntimeJob>();
         std::thread::Builder::new()
             .name("onnxruntime".to_owned())
             .spawn(move || waiting.into_iter().for_each(|job| job()))?;
@@ -413,12 +413,15 @@ impl RuntimeThread {
     }
 
     /// Sends a job to the thread, and waits until it starts.
-    fn start_job<T: Send + 'static>(&self, job: impl FnOnce() -> T + Send + 'static) -> Result<Receiver<Event<T>>> {
+    fn start_job<T: Send + 'static>(
+        &self,
+        job: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<Receiver<RuntimeEvent<T>>> {
         let (sender, events) = channel();
         let job = Box::new(move || {
             // Sending fails only if the caller no longer waits.
-            drop(sender.send(Event::Started));
-            drop(sender.send(Event::Ended(job())));
+            drop(sender.send(RuntimeEvent::Started));
+            drop(sender.send(RuntimeEvent::Ended(job())));
         });
         if self.stuck.load(Ordering::SeqCst) {
             return Err(stuck());
@@ -429,7 +432,7 @@ impl RuntimeThread {
     }
 
     /// Waits until a job starts, that is, until earlier jobs are done.
-    fn wait_for_start<T>(&self, events: &Receiver<Event<T>>) -> Result<()> {
+    fn wait_for_start<T>(&self, events: &Receiver<RuntimeEvent<T>>) -> Result<()> {
         loop {
             match events.recv_timeout(POLL_INTERVAL) {
                 Ok(_) => return Ok(()),
@@ -445,7 +448,7 @@ impl RuntimeThread {
 
 /// Waits until a job ends or exceeds its limits. A pause of the process (Ctrl-Z, `scontrol suspend`) counts as one
 /// polling interval only.
-fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<JobEnd<T>> {
+fn wait_for_end<T>(events: &Receiver<RuntimeEvent<T>>, limits: JobLimits) -> Result<JobEnd<T>> {
     let mut left = limits.time;
     loop {
         let step = left.map(|left| left.min(POLL_INTERVAL));
@@ -456,8 +459,8 @@ fn wait_for_end<T>(events: &Receiver<Event<T>>, limits: JobLimits) -> Result<Job
             Some(step) => events.recv_timeout(step),
         };
         match event {
-            Ok(Event::Ended(result)) => return Ok(JobEnd::Finished(result)),
-            Ok(Event::Started) | Err(RecvTimeoutError::Disconnected) => return Err(thread_ended()),
+            Ok(RuntimeEvent::Ended(result)) => return Ok(JobEnd::Finished(result)),
+            Ok(RuntimeEvent::Started) | Err(RecvTimeoutError::Disconnected) => return Err(thread_ended()),
             Err(RecvTimeoutError::Timeout) => {}
         }
         left = left.map(|left| left.saturating_sub(running_time(start.elapsed(), step)));

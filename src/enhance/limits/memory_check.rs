@@ -12,7 +12,7 @@ use darkqa_base::error::Result;
 
 /// Estimate of the memory that a model needs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Estimate {
+enum MemoryEstimate {
     /// Not measured yet.
     Unknown,
     /// Cannot be measured; a lower bound from the input and output tensors is used instead.
@@ -23,12 +23,12 @@ enum Estimate {
 
 /// Memory check for one model.
 #[derive(Debug, Clone)]
-pub(crate) struct MemoryCheck(Estimate);
+pub(crate) struct MemoryCheck(MemoryEstimate);
 
 impl MemoryCheck {
     /// Creates a check without measurements.
     pub(crate) fn new() -> Self {
-        Self(Estimate::Unknown)
+        Self(MemoryEstimate::Unknown)
     }
 
     /// Checks a run on an image. The sizes of the input and the image are heights and widths in pixels. Small inputs
@@ -52,10 +52,10 @@ impl MemoryCheck {
         let batch_pixels = graph.batch().saturating_mul(pixels);
         let mut result = MemoryCost::for_tensors().check_fit(batch_pixels, available);
         if result.is_ok() {
-            if self.0 == Estimate::Unknown {
+            if self.0 == MemoryEstimate::Unknown {
                 self.0 = measure(graph, rule, available)?;
             }
-            if let Estimate::Measured(cost) = self.0 {
+            if let MemoryEstimate::Measured(cost) = self.0 {
                 result = cost.check_fit(pixels, available);
             }
         }
@@ -111,9 +111,9 @@ fn remedy(rule: SizeRule, input_size: [usize; 2], image_size: [usize; 2]) -> Str
 
 /// Measures the memory cost on small images of increasing size. Stops before a probe that could need more than half of
 /// the free memory, assuming quadratic growth.
-fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
+fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<MemoryEstimate> {
     if graph.signature.height.is_some() || graph.signature.width.is_some() {
-        return Ok(Estimate::Tensors);
+        return Ok(MemoryEstimate::Tensors);
     }
     // Sides are padded to the model's multiple, unless it exceeds the smallest side: such a multiple is probably wrong.
     let sides = PROBE_SIDES.map(|side| match rule.multiple {
@@ -123,21 +123,21 @@ fn measure(graph: &Graph, rule: SizeRule, available: u64) -> Result<Estimate> {
     let mut measured: Vec<(usize, u64)> = Vec::new();
     // Release the memory that earlier images left in the arena; otherwise the probes would reuse it and show no growth.
     if !probe(graph, sides[0], Arena::Released)? {
-        return Ok(Estimate::Tensors);
+        return Ok(MemoryEstimate::Tensors);
     }
     for side in sides {
         if MemoryCost::worst_case_bytes(&measured, side * side) > available as f64 / 2.0 {
             break;
         }
         if !probe(graph, side, Arena::Kept)? {
-            return Ok(Estimate::Tensors);
+            return Ok(MemoryEstimate::Tensors);
         }
         let Some(resident) = super::resident() else {
-            return Ok(Estimate::Tensors);
+            return Ok(MemoryEstimate::Tensors);
         };
         measured.push((side * side, resident));
     }
-    Ok(MemoryCost::from_probes(&measured).map_or(Estimate::Tensors, Estimate::Measured))
+    Ok(MemoryCost::from_probes(&measured).map_or(MemoryEstimate::Tensors, MemoryEstimate::Measured))
 }
 
 /// Runs a model on a square image with sides of `side` pixels; returns false if the run fails.

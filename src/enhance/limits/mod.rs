@@ -27,7 +27,7 @@ use darkqa_base::types::flags::seconds;
 pub(super) use memory_check::{MemoryCheck, out_of_memory};
 
 /// Names of folders and files in one version of control groups.
-struct Layout {
+struct GroupFiles {
     /// Controller in the group's line in `/proc/self/cgroup`; empty in version 2.
     controller: &'static str,
     /// Folder of all groups, relative to the mount point.
@@ -41,9 +41,15 @@ struct Layout {
 }
 
 /// Layouts of version 2 and version 1.
-const LAYOUTS: [Layout; 2] = [
-    Layout { controller: "", folder: "", limit: "memory.max", used: "memory.current", reclaimable: "inactive_file" },
-    Layout {
+const LAYOUTS: [GroupFiles; 2] = [
+    GroupFiles {
+        controller: "",
+        folder: "",
+        limit: "memory.max",
+        used: "memory.current",
+        reclaimable: "inactive_file",
+    },
+    GroupFiles {
         controller: "memory",
         folder: "memory",
         limit: "memory.limit_in_bytes",
@@ -88,7 +94,7 @@ fn own_group<'a>(own: &'a str, controller: &str) -> Option<&'a str> {
 }
 
 /// Bytes that a group may still use; `None` without a limit.
-fn unused_in_group(group: &Path, layout: &Layout) -> Option<u64> {
+fn unused_in_group(group: &Path, layout: &GroupFiles) -> Option<u64> {
     let limit = read_number(&group.join(layout.limit))?;
     let used = read_number(&group.join(layout.used))?;
     let statistics = fs::read_to_string(group.join("memory.stat")).unwrap_or_default();

@@ -11,8 +11,8 @@ use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use super::plausible::{Facts, UnclampedImage};
-use super::probe::{Conclusion, Endpoints, PairTrial, Probe, RangePair};
-use super::probe_run::{Trials, run_frames};
+use super::probe::{Conclusion, OutputEnds, PairTrial, Probe, RangePair};
+use super::probe_run::{ProbeTrials, run_frames};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar, OutputChoice};
 use crate::conventions::{ChannelOrder, Channels, ValueRange, ValueScale};
 use crate::enhancer::Enhancer;
@@ -85,7 +85,7 @@ impl Enhancer {
                 "fails at 144 × 96, 160 × 120 and 128 × 128; {ADD} the sizes that it takes: `multiple = N` or `fixed = [WIDTH, HEIGHT]`"
             )));
         };
-        let Trials { frames, probes: [probe, swapped] } = trials;
+        let ProbeTrials { frames, probes: [probe, swapped] } = trials;
         let mut others = self.other_outputs(&frames, probe.best())?;
         let plausible: Vec<String> =
             others.iter().filter(|output| output.problem.is_none()).map(|output| output.title.clone()).collect();
@@ -157,7 +157,7 @@ impl Enhancer {
 
     /// Runs the model on dark frames with all value ranges, in the present channel order of the output and in the
     /// other.
-    fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<Trials<2>>> {
+    fn trials_of_all(&self, dark: &[Rgb]) -> Result<Option<ProbeTrials<2>>> {
         let stated = self.convention().clone();
         let swapped = ModelSidecar { color_out: Some(self.other_order()), ..stated.clone() };
         self.trials(dark, [&stated, &swapped], [None; 2])
@@ -465,8 +465,8 @@ pub(super) enum OutputKind {
 
 impl OutputKind {
     /// Kind of an output with these values for black and white; `None` if it may be the image.
-    fn from_endpoints(endpoints: Endpoints) -> Option<Self> {
-        let Endpoints { black, white, .. } = endpoints;
+    fn from_endpoints(endpoints: OutputEnds) -> Option<Self> {
+        let OutputEnds { black, white, .. } = endpoints;
         if white <= MIN_CONTRAST {
             Some(Self::Residual)
         } else if white - black <= MIN_CONTRAST {
@@ -506,7 +506,7 @@ impl Enhancer {
             convention.image = Some(image);
         }
         let conventions = conventions.each_ref();
-        let Some(Trials { probes, .. }) = self.trials(dark, conventions, ranges)? else {
+        let Some(ProbeTrials { probes, .. }) = self.trials(dark, conventions, ranges)? else {
             return Ok(Vec::new());
         };
         let mut trials = Vec::new();

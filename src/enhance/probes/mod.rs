@@ -9,7 +9,7 @@ mod usage;
 pub use doctor::{Examination, ImageOutput, ProposedLine, Settled};
 pub use plausible::{DARK, brightness, shows_nothing};
 pub use probe::FRAMES;
-pub use probe_run::Findings;
+pub use probe_run::ProbeFindings;
 pub use usage::{ImageUse, Implausible, Usage, burnt_out};
 
 pub(super) use plausible::UnclampedImage;

@@ -160,12 +160,12 @@ impl UnclampedImage {
         }
     }
 
-    fn luma(&self) -> Plane {
+    fn luma(&self) -> ChannelPlane {
         let luma = self
             .samples
             .chunks_exact(3)
             .map(|pixel| pixel.iter().zip(LUMA).map(|(code, weight)| weight * f64::from(code.clamp(0.0, 255.0))).sum());
-        Plane { width: self.width, samples: luma.collect() }
+        ChannelPlane { width: self.width, samples: luma.collect() }
     }
 
     /// Means of red, green and blue of each block, in codes.
@@ -174,7 +174,7 @@ impl UnclampedImage {
             let samples =
                 self.samples.iter().skip(channel).step_by(3).map(|code| f64::from(code.clamp(0.0, 255.0))).collect();
             let width = self.width;
-            Plane { width, samples }.blocks().samples
+            ChannelPlane { width, samples }.blocks().samples
         })
     }
 
@@ -308,7 +308,7 @@ fn dot_product(a: &[f64], b: &[f64]) -> f64 {
 }
 
 /// Flaw of an output whose blocks do not follow those of its input in brightness.
-fn structure(before: &Plane, after: &Plane) -> Option<MeasuredFlaw> {
+fn structure(before: &ChannelPlane, after: &ChannelPlane) -> Option<MeasuredFlaw> {
     let order = correlation(&ranks(&before.samples), &ranks(&after.samples));
     if order < -0.3 {
         return impossible(Flaw::Inverted, order);
@@ -334,12 +334,12 @@ fn sign(number: f64) -> f64 {
 }
 
 /// One channel of an image.
-struct Plane {
+struct ChannelPlane {
     width: usize,
     samples: Vec<f64>,
 }
 
-impl Plane {
+impl ChannelPlane {
     /// Means of blocks of [`BLOCK`] × [`BLOCK`] pixels, without incomplete blocks. An image smaller than a block is
     /// returned unchanged.
     fn blocks(&self) -> Self {

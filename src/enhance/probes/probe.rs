@@ -3,7 +3,7 @@
 //! A graph does not declare its value ranges. So every pair of ranges that sidecar, preset and element types allow is
 //! tried. A pair is implausible if at least half of the frames have a flaw.
 //!
-//! Mean output of a model for black and for white input: [`Endpoints`].
+//! Mean output of a model for black and for white input: [`OutputEnds`].
 //!
 //! The value ranges of a model's input and output: [`RangePair`].
 
@@ -38,7 +38,7 @@ pub(super) struct PairTrial {
     /// Flaw of each output.
     pub(super) verdicts: Vec<Option<MeasuredFlaw>>,
     /// Output for black and white; `None` if it was not measured.
-    pub(super) endpoints: Option<Endpoints>,
+    pub(super) endpoints: Option<OutputEnds>,
 }
 
 impl PairTrial {
@@ -59,14 +59,14 @@ impl PairTrial {
 
     /// True if black stays nearly black and white nearly white.
     pub(super) fn is_near(&self) -> bool {
-        self.endpoints.is_some_and(Endpoints::are_near)
+        self.endpoints.is_some_and(OutputEnds::are_near)
     }
 
     /// Description of the ranges, with the outputs for black and white if they were measured.
     fn description(&self) -> String {
         match self.endpoints {
             None => self.ranges.to_string(),
-            Some(Endpoints { black, white, .. }) => format!(
+            Some(OutputEnds { black, white, .. }) => format!(
                 "{} (black becomes {black:.0} of 255, white {white:.0}{})",
                 self.ranges,
                 if self.is_near() { "" } else { ", so it may be another range" }
@@ -333,17 +333,17 @@ pub(super) const SIZE: [usize; 2] = [96, 144];
 /// trained models: the distances add up to at most 20 codes (RUAS); with wrong ranges that still give plausible images,
 /// mostly to 100 and more.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Endpoints {
+pub(super) struct OutputEnds {
     pub(super) black: f64,
     pub(super) white: f64,
     /// Sum of the two mean distances of the channels from 0 and 255.
     pub(super) distance: f64,
 }
 
-/// Maximum [`Endpoints::distance`], in codes, at which black and white count as preserved. Chosen.
+/// Maximum [`OutputEnds::distance`], in codes, at which black and white count as preserved. Chosen.
 const MAX_DISTANCE: f64 = 50.0;
 
-impl Endpoints {
+impl OutputEnds {
     /// True if black stays nearly black and white nearly white.
     pub(super) fn are_near(self) -> bool {
         self.distance <= MAX_DISTANCE
@@ -478,7 +478,7 @@ mod tests {
 
     /// A plausible pair with this distance of black and white, in codes.
     fn pair_at_distance(ranges: RangePair, distance: f64) -> PairTrial {
-        let endpoints = Endpoints { black: distance, white: 255.0, distance };
+        let endpoints = OutputEnds { black: distance, white: 255.0, distance };
         PairTrial { endpoints: Some(endpoints), ..pair(ranges, &[None; 6]) }
     }
 
@@ -606,15 +606,15 @@ mod tests {
     #[test]
     fn black_and_white_have_their_own_codes() {
         let codes = UnclampedImage::from_rgb(&black_and_white([96, 144]));
-        let expected = Endpoints { black: 0.0, white: 255.0, distance: 0.0 };
-        assert_eq!(Endpoints::from_codes(&codes), expected);
+        let expected = OutputEnds { black: 0.0, white: 255.0, distance: 0.0 };
+        assert_eq!(OutputEnds::from_codes(&codes), expected);
     }
 
     #[test]
     fn smallest_images_have_finite_endpoints() {
         for size in [[1, 1], [1, 2], [2, 1]] {
             let codes = UnclampedImage::from_rgb(&black_and_white(size));
-            assert!(Endpoints::from_codes(&codes).distance.is_finite(), "{size:?}");
+            assert!(OutputEnds::from_codes(&codes).distance.is_finite(), "{size:?}");
         }
     }
 

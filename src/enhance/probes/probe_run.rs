@@ -2,14 +2,14 @@
 //!
 //! Outputs of a model for the frames of a trial: [`run_frames`].
 //!
-//! Results of opening and probing an enhancer, to be stored and reused: [`Findings`].
+//! Results of opening and probing an enhancer, to be stored and reused: [`ProbeFindings`].
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
 use super::plausible::UnclampedImage;
-use super::probe::{self, Conclusion, Endpoints, OUTPUT, PairTrial, Probe, RangePair, StatedRanges, black_and_white};
+use super::probe::{self, Conclusion, OUTPUT, OutputEnds, PairTrial, Probe, RangePair, StatedRanges, black_and_white};
 use super::usage::{ImageUse, Implausible, Judgement, Usage, doctor_advice, white_percent};
 use crate::conventions::sidecar::{self, ADD, ModelSidecar};
 use crate::conventions::{Rounding, ValueRange};
@@ -27,7 +27,7 @@ use darkqa_base::types::{EnhancerName, Flaw, Rgb};
 const SIZES: [[usize; 2]; 3] = [[144, 96], [160, 120], [128, 128]];
 
 /// Results of a model on dark frames.
-pub(super) struct Trials<const N: usize> {
+pub(super) struct ProbeTrials<const N: usize> {
     /// The frames, in the size in which they were fed.
     pub(super) frames: Vec<Rgb>,
     /// Results by convention.
@@ -52,7 +52,7 @@ impl Enhancer {
             self.enhance(frame)?;
             trials = self.trials(dark, [self.convention()], self.stated_ranges())?;
         }
-        let Some(Trials { probes: [probe], .. }) = trials else {
+        let Some(ProbeTrials { probes: [probe], .. }) = trials else {
             warn_not_probed(self.name());
             return Ok(());
         };
@@ -169,7 +169,7 @@ impl Enhancer {
         dark: &[Rgb],
         conventions: [&ModelSidecar; N],
         [input, output]: [Option<ValueRange>; 2],
-    ) -> Result<Option<Trials<N>>> {
+    ) -> Result<Option<ProbeTrials<N>>> {
         let usual = self.ranges();
         let ranges = match (input, output) {
             (Some(_), Some(_)) => StatedRanges::Both,
@@ -202,7 +202,7 @@ impl Enhancer {
                     self.rank(probe, convention)?;
                 }
             }
-            return Ok(Some(Trials { frames, probes }));
+            return Ok(Some(ProbeTrials { frames, probes }));
         }
         Ok(None)
     }
@@ -214,7 +214,7 @@ impl Enhancer {
             return Ok(false);
         }
         let endpoints = self.endpoints(convention, probe.usual)?;
-        Ok(endpoints.is_some_and(Endpoints::are_near))
+        Ok(endpoints.is_some_and(OutputEnds::are_near))
     }
 
     /// Trials of the frames in each of these conventions with each pair of ranges. The model runs once for each frame
@@ -271,12 +271,12 @@ impl Enhancer {
     ///
     /// # Errors
     /// If the runtime fails.
-    pub(super) fn endpoints(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Option<Endpoints>> {
+    pub(super) fn endpoints(&self, convention: &ModelSidecar, ranges: RangePair) -> Result<Option<OutputEnds>> {
         let graph = self.read_by(convention, ranges)?;
         let image = black_and_white(self.probe_size(probe::SIZE));
         let made = run_frames(&[graph], &[image])?;
         let codes = made.into_iter().flatten().flatten().next();
-        let endpoints = codes.as_ref().map(Endpoints::from_codes);
+        let endpoints = codes.as_ref().map(OutputEnds::from_codes);
         Ok(endpoints.filter(|endpoints| endpoints.distance.is_finite()))
     }
 
@@ -324,7 +324,7 @@ pub(super) fn run_frames(graphs: &[Graph], frames: &[Rgb]) -> Result<Option<Vec<
 /// Results of opening an enhancer and probing it on dark frames: the content of its usage record before the first
 /// image.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Findings {
+pub struct ProbeFindings {
     /// Rows of the table of the model's input and output convention.
     convention: Vec<ConventionLine>,
     /// Result of the probe; `None` if the model accepts none of its sizes.
@@ -336,7 +336,7 @@ pub struct Findings {
     sizes: Option<String>,
 }
 
-impl Findings {
+impl ProbeFindings {
     /// True if a run with this reaction to implausible images may use the enhancer.
     pub fn allow(&self, implausible: Implausible) -> bool {
         let probe = self.probe.as_ref();
@@ -390,9 +390,9 @@ impl Enhancer {
     }
 
     /// Results of opening and probing; to be called after the probe.
-    pub fn findings(&self) -> Findings {
+    pub fn findings(&self) -> ProbeFindings {
         let note = self.usage().note();
-        Findings {
+        ProbeFindings {
             convention: note.convention,
             probe: note.probe,
             remarks: note.remarks,
@@ -405,7 +405,7 @@ impl Enhancer {
     ///
     /// # Errors
     /// If the graph contradicts its own convention, which is a bug.
-    pub fn with_findings(self, findings: &Findings, usage: Usage) -> Result<Self> {
+    pub fn with_findings(self, findings: &ProbeFindings, usage: Usage) -> Result<Self> {
         let mut enhancer = self.with_usage(usage);
         enhancer.set_remarks(&findings.remarks);
         if let Some(probe) = &findings.probe {

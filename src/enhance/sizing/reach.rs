@@ -1,4 +1,4 @@
-//! Measurement of a model's receptive field ([`Reach`]), and of the context and alignment of its tiles ([`Context`]).
+//! Measurement of a model's receptive field ([`PixelReach`]), and of the context and alignment of its tiles ([`Context`]).
 //!
 //! One pixel in the middle of a trial image is changed by one code. The distance of the farthest output sample that
 //! changes is the reach: 7 pixels for Zero-DCE, as its seven 3 × 3 convolutions imply. A global mean changes too little
@@ -33,7 +33,7 @@ const MAX_EQUAL: f32 = 4e-4;
 /// Context and alignment of a model's tiles, measured once if they are not stated.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Context {
-    reach: Option<Result<Reach, String>>,
+    reach: Option<Result<PixelReach, String>>,
     /// Multiple of pixels at which tiles start.
     alignment: Option<usize>,
 }
@@ -53,7 +53,7 @@ impl Context {
         let size = rule.run_size([FREE_SIDE; 2]);
         if self.reach.is_none() {
             let used = graph.used_time();
-            self.reach = Some(Reach::probe(graph, size)?);
+            self.reach = Some(PixelReach::probe(graph, size)?);
             graph.set_used_time(used);
         }
         let reach = self.reach.clone().unwrap_or_else(|| Err(String::new()));
@@ -147,9 +147,9 @@ fn same_interior(still: &Planes, moved: &Planes, shift: usize, margin: usize) ->
 
 /// Maximum distance, along a side, of the input pixels on which an output pixel depends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Reach(usize);
+pub(super) struct PixelReach(usize);
 
-impl Reach {
+impl PixelReach {
     /// Measures the reach of a model at one size (height, width); the inner error explains why it cannot be measured.
     fn probe(graph: &Graph, size: [usize; 2]) -> error::Result<Result<Self, String>> {
         let mut farthest = 0;
@@ -295,9 +295,9 @@ mod tests {
 
     #[test]
     fn context_fits_into_its_tile() {
-        assert_eq!(Reach(7).context([512, 512]), Some(8));
-        assert_eq!(Reach(12).context([48, 64]), Some(12));
-        assert_eq!(Reach(13).context([48, 64]), None);
-        assert_eq!(Reach(0).context([16, 24]), Some(4));
+        assert_eq!(PixelReach(7).context([512, 512]), Some(8));
+        assert_eq!(PixelReach(12).context([48, 64]), Some(12));
+        assert_eq!(PixelReach(13).context([48, 64]), None);
+        assert_eq!(PixelReach(0).context([16, 24]), Some(4));
     }
 }

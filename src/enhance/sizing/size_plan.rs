@@ -321,9 +321,9 @@ impl SizeSearch {
     fn find_traced_size(&self, graph: &Graph) -> Result<Option<[usize; 2]>> {
         for size in &self.traced {
             match run_trial(graph, *size)? {
-                TrialOutcome::Runs => return Ok(Some(*size)),
-                TrialOutcome::Fails => {}
-                TrialOutcome::OverLimit => return Ok(None),
+                SizeOutcome::Runs => return Ok(Some(*size)),
+                SizeOutcome::Fails => {}
+                SizeOutcome::OverLimit => return Ok(None),
             }
         }
         Ok(None)
@@ -337,9 +337,9 @@ impl SizeSearch {
 fn find_multiple(graph: &Graph) -> Result<Option<usize>> {
     for multiple in MULTIPLES {
         match run_trial(graph, trial_size(multiple))? {
-            TrialOutcome::Runs => return Ok(Some(multiple)),
-            TrialOutcome::Fails => {}
-            TrialOutcome::OverLimit => return Ok(None),
+            SizeOutcome::Runs => return Ok(Some(multiple)),
+            SizeOutcome::Fails => {}
+            SizeOutcome::OverLimit => return Ok(None),
         }
     }
     Ok(None)
@@ -354,7 +354,7 @@ fn trial_size(multiple: usize) -> [usize; 2] {
 }
 
 /// Result of a trial.
-enum TrialOutcome {
+enum SizeOutcome {
     /// The model returned an image of the input's size, with any values.
     Runs,
     Fails,
@@ -362,14 +362,14 @@ enum TrialOutcome {
     OverLimit,
 }
 
-fn run_trial(graph: &Graph, size: [usize; 2]) -> Result<TrialOutcome> {
+fn run_trial(graph: &Graph, size: [usize; 2]) -> Result<SizeOutcome> {
     let window = TileWindow::whole(size);
     graph.restart_clock();
     let result = graph.probe(&texture(size, &CODES[1]), window)?;
     Ok(match result {
-        RunResult::Output(()) | RunResult::Unusable(_) => TrialOutcome::Runs,
-        RunResult::Failed(RunFailure::TimedOut(_) | RunFailure::MemoryExceeded(_)) => TrialOutcome::OverLimit,
-        RunResult::Failed(_) => TrialOutcome::Fails,
+        RunResult::Output(()) | RunResult::Unusable(_) => SizeOutcome::Runs,
+        RunResult::Failed(RunFailure::TimedOut(_) | RunFailure::MemoryExceeded(_)) => SizeOutcome::OverLimit,
+        RunResult::Failed(_) => SizeOutcome::Fails,
     })
 }
 

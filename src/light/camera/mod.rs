@@ -171,9 +171,9 @@ fn check_range(flag: &str, value: f64, [low, high]: [f64; 2]) -> Result<f64> {
 #[serde(deny_unknown_fields)]
 pub struct CameraState {
     /// Matrix from linear sRGB to camera colours; its rows sum to 1.
-    pub rgb_to_camera: Matrix,
+    pub rgb_to_camera: ColourMatrix,
     /// Matrix from camera colours to linear sRGB: the inverse of `rgb_to_camera`.
-    pub camera_to_rgb: Matrix,
+    pub camera_to_rgb: ColourMatrix,
     /// Brightness gain, common to all channels.
     pub rgb_gain: f64,
     /// White-balance gain of red.
@@ -567,10 +567,10 @@ fn select<T>(items: &[T], choice: f64) -> &T {
 }
 
 /// 3 × 3 colour matrix, row by row, applied to a column vector of red, green and blue.
-pub(crate) type Matrix = [[f64; 3]; 3];
+pub(crate) type ColourMatrix = [[f64; 3]; 3];
 
 /// XYZ → camera, for the four cameras of the Darmstadt Noise Dataset (Brooks et al. 2019, `random_ccm`).
-const XYZ_TO_CAMERA: [Matrix; 4] = [
+const XYZ_TO_CAMERA: [ColourMatrix; 4] = [
     [[1.0234, -0.2969, -0.2266], [-0.5625, 1.6328, -0.0469], [-0.0703, 0.2188, 0.6406]],
     [[0.4913, -0.0541, -0.0202], [-0.6130, 1.3513, 0.2906], [-0.1564, 0.2151, 0.7183]],
     [[0.8380, -0.2630, -0.0639], [-0.2887, 1.0725, 0.2496], [-0.0627, 0.1427, 0.5438]],
@@ -578,7 +578,7 @@ const XYZ_TO_CAMERA: [Matrix; 4] = [
 ];
 
 /// Linear sRGB → XYZ, D65 (Brooks et al. 2019, `random_ccm`).
-const SRGB_TO_XYZ: Matrix =
+const SRGB_TO_XYZ: ColourMatrix =
     [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]];
 
 /// Linear sRGB → camera, for a weighted mean of the four cameras. The rows sum to 1, so that grey stays grey (Brooks et
@@ -586,7 +586,7 @@ const SRGB_TO_XYZ: Matrix =
 ///
 /// `weights` must be non-negative and not all zero; their sum does not matter.
 #[must_use]
-pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
+pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> ColourMatrix {
     let total: f64 = weights.iter().sum();
     let mut mix = [[0.0; 3]; 3];
     for (weight, camera) in weights.iter().zip(XYZ_TO_CAMERA) {
@@ -605,7 +605,7 @@ pub(crate) fn rgb_to_camera(weights: [f64; 4]) -> Matrix {
 /// Inverse of a matrix, by cofactors. A zero determinant is not checked: the matrices of [`rgb_to_camera`] are far from
 /// singular.
 #[must_use]
-pub(crate) fn inverse(matrix: &Matrix) -> Matrix {
+pub(crate) fn inverse(matrix: &ColourMatrix) -> ColourMatrix {
     let [a, b, c] = *matrix;
     let cofactors = [cross(b, c), cross(c, a), cross(a, b)];
     let determinant = a[0] * cofactors[0][0] + a[1] * cofactors[0][1] + a[2] * cofactors[0][2];
@@ -616,7 +616,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
-fn product(left: &Matrix, right: &Matrix) -> Matrix {
+fn product(left: &ColourMatrix, right: &ColourMatrix) -> ColourMatrix {
     left.map(|row| {
         std::array::from_fn(|column| row[0] * right[0][column] + row[1] * right[1][column] + row[2] * right[2][column])
     })

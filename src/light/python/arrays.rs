@@ -19,11 +19,11 @@ const MAX_PIXELS: usize = 1 << 28;
 const IMAGE_OVERHEAD: usize = 128;
 
 /// Element type of a returned array.
-pub(crate) trait Output: Sample + Element + Send + Sync {}
+pub(crate) trait ArrayElement: Sample + Element + Send + Sync {}
 
-impl Output for u8 {}
+impl ArrayElement for u8 {}
 
-impl Output for f32 {}
+impl ArrayElement for f32 {}
 
 /// Images of the argument `image`.
 pub(crate) struct Batch {
@@ -114,7 +114,7 @@ fn wrong_shape(shape: &[usize], further: &str) -> PyErr {
 }
 
 /// New array of this shape.
-pub(crate) fn to_numpy<'py, T: Output>(
+pub(crate) fn to_numpy<'py, T: ArrayElement>(
     py: Python<'py>,
     samples: Vec<T>,
     shape: &[usize],

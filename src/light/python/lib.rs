@@ -29,7 +29,7 @@ use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use arguments::{Level, Settings, noise_keys, numbered_keys};
-use arrays::{Batch, Output};
+use arrays::{ArrayElement, Batch};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{Degradation, FrameId, Image, Rgb, Severity};
 use darkqa_light::raw::negative;
@@ -258,7 +258,7 @@ fn terms(noise: bool) -> NoiseTerms {
 
 /// Array of the samples that `make` computes from the index and pixels of each image of a batch. For `levels` see
 /// [`Batch::output_shape`].
-fn output<'py, T: Output>(
+fn output<'py, T: ArrayElement>(
     py: Python<'py>,
     batch: &Batch,
     levels: &[usize],
@@ -288,7 +288,7 @@ fn output<'py, T: Output>(
 }
 
 /// Concatenated samples of images of one size.
-fn join_samples<T: Output>(images: impl Iterator<Item = Image<T>>) -> Vec<T> {
+fn join_samples<T: ArrayElement>(images: impl Iterator<Item = Image<T>>) -> Vec<T> {
     images.map(Image::into_samples).collect::<Vec<Vec<T>>>().concat()
 }
 

@@ -455,7 +455,7 @@ impl Developer {
 
     /// Writes the 8-bit codes of display values after an exposure drop with this [`Developer::factor`].
     pub(crate) fn encode(&self, display: &[f32], factor: f32, codes: &mut [u8]) {
-        self.isa.run(Encode { display, factor, tone: self.tone, codes });
+        self.isa.run(EncodeNegative { display, factor, tone: self.tone, codes });
     }
 
     /// Writes the linear light of display values after an exposure drop. [`Developer::encode`] writes the same as
@@ -547,7 +547,7 @@ impl Developer {
     }
 }
 
-struct Encode<'a> {
+struct EncodeNegative<'a> {
     display: &'a [f32],
     /// Factor of the exposure drop on display values.
     factor: f32,
@@ -555,7 +555,7 @@ struct Encode<'a> {
     codes: &'a mut [u8],
 }
 
-impl Kernel for Encode<'_> {
+impl Kernel for EncodeNegative<'_> {
     #[inline(always)]
     fn run(self) {
         let codes = self.codes.iter_mut().zip(self.display);

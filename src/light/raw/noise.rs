@@ -131,7 +131,7 @@ impl Noise {
             None => 0.0,
         };
         for (parity, samples) in line.planes().into_iter().enumerate() {
-            self.isa.run(PlaneRow {
+            self.isa.run(NoisyRow {
                 noise: self,
                 site: [at, parity],
                 offset: self.bias[Plane::at(at, parity) as usize],
@@ -143,7 +143,7 @@ impl Noise {
 }
 
 /// Sites of one plane in one row, with the noise to add.
-struct PlaneRow<'a> {
+struct NoisyRow<'a> {
     noise: &'a Noise,
     /// Row and first column.
     site: [usize; 2],
@@ -152,7 +152,7 @@ struct PlaneRow<'a> {
     samples: &'a mut [Lanes<f32>],
 }
 
-impl Kernel for PlaneRow<'_> {
+impl Kernel for NoisyRow<'_> {
     #[inline(always)]
     fn run(self) {
         let [row, first] = self.site;

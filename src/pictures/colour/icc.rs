@@ -1,4 +1,4 @@
-//! ICC profiles: matrix profiles for RGB and grey ([`Profile`]), and CMYK profiles ([`InkProfile`]).
+//! ICC profiles: matrix profiles for RGB and grey ([`IccProfile`]), and CMYK profiles ([`InkProfile`]).
 
 use moxcms::{ColorProfile, DataColorSpace, ProfileText, ToneReprCurve};
 
@@ -8,7 +8,7 @@ use super::conversion::{Conversion, IDENTITY, ToneCurve, xyz_to_srgb};
 const MAX_NAME: usize = 60;
 
 /// A profile of tone curves and a matrix, or of one curve for grey.
-pub(super) struct Profile {
+pub(super) struct IccProfile {
     /// Description text of the profile.
     pub(super) name: String,
     pub(super) conversion: Conversion,
@@ -19,13 +19,13 @@ pub(super) struct Profile {
     pub(super) is_video: bool,
 }
 
-impl Profile {
+impl IccProfile {
     /// Reads a profile (ICC.1:2022).
     ///
     /// # Errors
     /// If it is broken, or not a matrix or grey profile.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let header = Header::read(bytes)?;
+        let header = ProfileHeader::read(bytes)?;
         // The header is checked first, because the library would also parse printer tables, which may be large.
         match &header.space {
             b"RGB " | b"GRAY" => {}
@@ -82,7 +82,7 @@ impl InkProfile {
     /// # Errors
     /// If it is broken, or not a CMYK profile.
     pub(super) fn read(bytes: &[u8]) -> Result<Self, String> {
-        let header = Header::read(bytes)?;
+        let header = ProfileHeader::read(bytes)?;
         if &header.space != b"CMYK" {
             return Err("the image is CMYK, but its ICC profile is not for CMYK".to_owned());
         }
@@ -120,7 +120,7 @@ pub(super) fn code_points(profile: &[u8]) -> Option<[u8; 4]> {
 }
 
 /// Fields of a profile that decide if it is supported.
-struct Header {
+struct ProfileHeader {
     /// Signature of the colour space of the codes.
     space: [u8; 4],
     /// Signature of the profile connection space.
@@ -129,7 +129,7 @@ struct Header {
     has_tables: bool,
 }
 
-impl Header {
+impl ProfileHeader {
     fn read(bytes: &[u8]) -> Result<Self, &'static str> {
         Self::fields(bytes).ok_or("the ICC profile is broken: it ends too early")
     }

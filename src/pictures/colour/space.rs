@@ -1,4 +1,4 @@
-//! Colour spaces of images: [`Meaning`] and [`ColourSpace`].
+//! Colour spaces of images: [`CodeMeaning`] and [`ColourSpace`].
 //!
 //! Colours that PNG files and videos state by the numbers of ITU-T H.273: [`CodePoints`].
 //!
@@ -16,7 +16,7 @@ pub(super) const REMEDY: &str = "convert it to sRGB first, or take its codes as 
 
 /// Interpretation of the codes of an image.
 #[derive(Debug, Clone)]
-pub(crate) enum Meaning {
+pub(crate) enum CodeMeaning {
     Srgb,
     /// Linear light with the primaries of sRGB.
     Linear,
@@ -129,17 +129,17 @@ impl CodePoints {
     ///
     /// # Errors
     /// If the codes cannot be converted. The error names the reason, without a remedy.
-    pub(crate) fn meaning(self, depth: CodeDepth) -> Result<Meaning, String> {
+    pub(crate) fn meaning(self, depth: CodeDepth) -> Result<CodeMeaning, String> {
         let (primaries, transfer) = (self.stated_primaries()?, self.stated_transfer()?);
         let space =
-            |name, curve, given, handling| Ok(Meaning::Other(Arc::new(rgb_space(name, curve, &given, handling))));
+            |name, curve, given, handling| Ok(CodeMeaning::Other(Arc::new(rgb_space(name, curve, &given, handling))));
         let (name, given) = match primaries {
             StatedPrimaries::Unspecified | StatedPrimaries::Television => (None, Primaries::SRGB),
             StatedPrimaries::Other(name, given) => (Some(name), given),
         };
         match (transfer, name) {
-            (StatedTransfer::Pq | StatedTransfer::Hlg, _) => Ok(Meaning::Other(Arc::new(hdr(transfer, primaries)))),
-            (StatedTransfer::Linear, None) if depth == CodeDepth::Sixteen => Ok(Meaning::Linear),
+            (StatedTransfer::Pq | StatedTransfer::Hlg, _) => Ok(CodeMeaning::Other(Arc::new(hdr(transfer, primaries)))),
+            (StatedTransfer::Linear, None) if depth == CodeDepth::Sixteen => Ok(CodeMeaning::Linear),
             (StatedTransfer::Linear, None) => Err("the codes are linear light in 8 bits; 16 bits expected".to_owned()),
             (StatedTransfer::Linear, Some(name)) => {
                 Err(format!("the codes are linear light with {name} primaries; those of sRGB expected"))
@@ -148,7 +148,7 @@ impl CodePoints {
                 let name = name.map_or("gamma 2.8".to_owned(), |name| format!("gamma 2.8, {name}"));
                 space(name, ToneCurve::Gamma(2.8), given, ColourHandling::Converted)
             }
-            (_, None) => Ok(Meaning::Srgb),
+            (_, None) => Ok(CodeMeaning::Srgb),
             (StatedTransfer::Unspecified, Some(name)) => {
                 Err(format!("the primaries are {name}, but no transfer is stated: the codes may be HDR"))
             }
@@ -246,14 +246,14 @@ const NUMBERED: [(u8, Primaries); 9] = [
 mod tests {
     use super::*;
 
-    fn meaning(primaries: u8, transfer: u8) -> Result<Meaning, String> {
+    fn meaning(primaries: u8, transfer: u8) -> Result<CodeMeaning, String> {
         CodePoints { primaries, transfer }.meaning(CodeDepth::Sixteen)
     }
 
     /// The 16-bit sRGB codes of one colour.
     fn converted(primaries: u8, transfer: u8, colour: [f64; 3]) -> [f64; 3] {
         let mut codes = colour.map(|value| (value * 65_535.0).round() as u16);
-        if let Meaning::Other(space) = meaning(primaries, transfer).unwrap() {
+        if let CodeMeaning::Other(space) = meaning(primaries, transfer).unwrap() {
             space.conversion.convert_16(&mut codes);
         }
         codes.map(|code| f64::from(code) / 65_535.0 * 255.0)
@@ -269,7 +269,7 @@ mod tests {
         for primaries in [1, 2, 5, 6, 7, 22] {
             for transfer in [1, 2, 4, 6, 7, 11, 12, 13, 14, 15] {
                 let found = meaning(primaries, transfer);
-                assert!(matches!(found, Ok(Meaning::Srgb)), "{primaries}/{transfer}");
+                assert!(matches!(found, Ok(CodeMeaning::Srgb)), "{primaries}/{transfer}");
             }
         }
     }
@@ -286,7 +286,7 @@ mod tests {
             (4, ColourHandling::Converted),
         ] {
             assert_near(converted(9, transfer, red), [255.0, 0.0, 0.0]);
-            let Ok(Meaning::Other(space)) = meaning(9, transfer) else { panic!("{transfer}") };
+            let Ok(CodeMeaning::Other(space)) = meaning(9, transfer) else { panic!("{transfer}") };
             assert_eq!(space.handling, handling);
         }
         for primaries in [4, 8, 9, 11, 12] {
@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn linear_light_needs_16_bits_and_the_primaries_of_srgb() {
-        assert!(matches!(meaning(1, 8), Ok(Meaning::Linear)));
+        assert!(matches!(meaning(1, 8), Ok(CodeMeaning::Linear)));
         assert!(meaning(9, 8).unwrap_err().contains("BT.2020"));
         let linear = CodePoints { primaries: 1, transfer: 8 };
         assert!(linear.meaning(CodeDepth::Eight).is_err());

@@ -1,7 +1,7 @@
 use super::*;
 
 fn is_srgb(tag: &ColourTag) -> bool {
-    matches!(tag.meaning(CodeDepth::Eight), Ok(Meaning::Srgb))
+    matches!(tag.meaning(CodeDepth::Eight), Ok(CodeMeaning::Srgb))
 }
 
 fn gamma(exponent: Option<u32>, primaries: Option<[u32; 8]>) -> ColourTag {
@@ -50,7 +50,7 @@ fn gamma_and_primaries_of_srgb_are_srgb() {
 #[test]
 fn linear_light_needs_16_bits() {
     let linear = gamma(Some(100_000), Some(SRGB));
-    assert!(matches!(linear.meaning(CodeDepth::Sixteen), Ok(Meaning::Linear)));
+    assert!(matches!(linear.meaning(CodeDepth::Sixteen), Ok(CodeMeaning::Linear)));
     assert!(linear.meaning(CodeDepth::Eight).is_err());
     let of_p3 = gamma(Some(100_000), Some(P3));
     assert!(of_p3.meaning(CodeDepth::Sixteen).is_err());
@@ -58,7 +58,7 @@ fn linear_light_needs_16_bits() {
 
 /// The name and handling of a colour space that is converted.
 fn space(tag: &ColourTag) -> (String, ColourHandling) {
-    let Ok(Meaning::Other(space)) = tag.meaning(CodeDepth::Eight) else { panic!("{tag:?}") };
+    let Ok(CodeMeaning::Other(space)) = tag.meaning(CodeDepth::Eight) else { panic!("{tag:?}") };
     let note = space.note(space.handling);
     assert_eq!(note.profile, None);
     (note.from, note.handling)
@@ -163,7 +163,9 @@ fn frames_have_the_codes_of_images() {
     for (primaries, transfer) in [(9, 16), (9, 18), (9, 1), (12, 13), (1, 5)] {
         let (frame, _) = conversion(primaries, transfer).unwrap().convert(&samples);
         let points = CodePoints { primaries, transfer };
-        let Ok(Meaning::Other(space)) = points.meaning(CodeDepth::Sixteen) else { panic!("{primaries}/{transfer}") };
+        let Ok(CodeMeaning::Other(space)) = points.meaning(CodeDepth::Sixteen) else {
+            panic!("{primaries}/{transfer}")
+        };
         let mut image = samples.clone();
         space.conversion.convert_16(&mut image);
         for (code, deep) in frame.iter().zip(&image) {

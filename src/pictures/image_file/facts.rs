@@ -28,7 +28,7 @@ pub(super) struct FileFacts {
     /// Kind of a file with several pictures, of which only the first is read; else `None`.
     pub(super) first_of: Option<&'static str>,
     pub(super) colour: ColourTag,
-    pub(super) depth: Depth,
+    pub(super) depth: SampleType,
     /// Form of the ink amounts of a CMYK file; `None` for other files.
     pub(super) inks: Option<InkForm>,
     /// Reason why the file is not supported; `None` if the headers show none.
@@ -39,7 +39,7 @@ pub(super) struct FileFacts {
 
 /// Number type of the samples of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Depth {
+pub(super) enum SampleType {
     /// Codes of at most 8 bits.
     Eight,
     /// Codes of 16 bits.
@@ -64,7 +64,7 @@ impl FileFacts {
         orientation: Orientation::NoTransforms,
         first_of: None,
         colour: ColourTag::None,
-        depth: Depth::Eight,
+        depth: SampleType::Eight,
         inks: None,
         unsupported: None,
         complete_length: None,
@@ -122,7 +122,7 @@ impl FileFacts {
                 Self {
                     first_of: kind_if_several(layers, "OpenEXR of several layers"),
                     colour: primaries.map_or(ColourTag::None, ColourTag::Primaries),
-                    depth: Depth::Float,
+                    depth: SampleType::Float,
                     ..Self::NONE
                 }
             }
@@ -142,8 +142,8 @@ fn profile_tag(profile: Option<Vec<u8>>) -> ColourTag {
     profile.map_or(ColourTag::None, ColourTag::Profile)
 }
 
-fn code_depth(bits: u64) -> Depth {
-    if bits == 16 { Depth::Sixteen } else { Depth::Eight }
+fn code_depth(bits: u64) -> SampleType {
+    if bits == 16 { SampleType::Sixteen } else { SampleType::Eight }
 }
 
 /// Reason why a TIFF file is not supported; `None` if its tags show none.
@@ -347,7 +347,7 @@ fn unsupported_colours(photometric: Option<u64>) -> Option<&'static str> {
 }
 
 /// One tag of an image file directory.
-struct Entry {
+struct DirectoryEntry {
     tag: u16,
     value_type: u16,
     /// Number of values.
@@ -390,7 +390,7 @@ impl<'a> Reader<'a> {
 
     /// Reads the entries of a directory and the offset of the next one (0 after the last); `None` at offset 0 or if an
     /// entry is truncated.
-    fn directory(&self, at: u64) -> Option<(Vec<Entry>, u64)> {
+    fn directory(&self, at: u64) -> Option<(Vec<DirectoryEntry>, u64)> {
         if at == 0 {
             return None;
         }
@@ -406,14 +406,14 @@ impl<'a> Reader<'a> {
             let inline = entry + 4 + offset_size as u64;
             let length = count.saturating_mul(size_of_type(value_type));
             let offset = if length <= offset_size as u64 { inline } else { self.read_uint(inline, offset_size)? };
-            entries.push(Entry { tag, value_type, count, offset });
+            entries.push(DirectoryEntry { tag, value_type, count, offset });
             entry = entry.checked_add(entry_size)?;
         }
         Some((entries, self.read_uint(entry, offset_size).unwrap_or(0)))
     }
 
     /// Returns the bytes of a tag; `None` if the directory lacks it or the file ends too early.
-    fn bytes(&self, directory: &[Entry], tag: u16) -> Option<&'a [u8]> {
+    fn bytes(&self, directory: &[DirectoryEntry], tag: u16) -> Option<&'a [u8]> {
         let entry = directory.iter().find(|entry| entry.tag == tag)?;
         let start = usize::try_from(entry.offset).ok()?;
         let end = start.checked_add(usize::try_from(entry.count).ok()?)?;
@@ -421,7 +421,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the values of a tag as unsigned integers, up to the end of the file; none if the directory lacks the tag.
-    fn values(&self, directory: &[Entry], tag: u16) -> impl Iterator<Item = u64> {
+    fn values(&self, directory: &[DirectoryEntry], tag: u16) -> impl Iterator<Item = u64> {
         let entry = directory.iter().find(|entry| entry.tag == tag);
         let (offset, count, size) =
             entry.map_or((0, 0, 1), |entry| (entry.offset, entry.count, size_of_type(entry.value_type)));
@@ -431,7 +431,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the first value of a tag; `None` if the directory lacks the tag.
-    fn first_value(&self, directory: &[Entry], tag: u16) -> Option<u64> {
+    fn first_value(&self, directory: &[DirectoryEntry], tag: u16) -> Option<u64> {
         self.values(directory, tag).next()
     }
 }

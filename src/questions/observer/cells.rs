@@ -1,4 +1,4 @@
-//! Geometry of the contrast measurements: [`Cells`] of a frame, and [`Element`]s of its outlines at three scales.
+//! Geometry of the contrast measurements: [`Cells`] of a frame, and [`OutlineElement`]s of its outlines at three scales.
 //!
 //! The frame is cut into square cells. The pixels of one mask in one cell form a patch. A cell of the second or third
 //! scale consists of four or sixteen of the smallest cells, so that its sums are sums of theirs. A cell of the coarsest
@@ -15,7 +15,7 @@
 
 use std::collections::BTreeMap;
 
-use super::local::{Fit, ROUNDING, TileFit};
+use super::local::{ImageFit, ROUNDING, TileFit};
 use darkqa_base::types::Rgb;
 
 /// Number of the smallest cells along the shorter side of the frame (chosen).
@@ -30,7 +30,7 @@ pub(super) const TILE: usize = 4;
 
 /// Consecutive pixels of a row that belong to one patch.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Run {
+pub(super) struct PixelRun {
     pub(super) patch: u32,
     pub(super) length: u32,
 }
@@ -48,7 +48,7 @@ pub(super) struct Patch {
 
 /// An element of an outline: a mask and all other pixels in one cell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Element {
+pub(super) struct OutlineElement {
     /// Index of the patch of the mask.
     pub(super) patch: usize,
     /// Index of the cell.
@@ -65,14 +65,14 @@ pub(super) struct Element {
 
 /// Patches and elements at one scale.
 #[derive(Debug)]
-pub(super) struct Scale {
+pub(super) struct PatchScale {
     /// Index of the patch of this scale that contains each patch of the smallest cells.
     pub(super) part_of: Vec<u32>,
     pub(super) patches: Vec<Patch>,
     /// Number of cells.
     pub(super) cells: usize,
     /// Elements, sorted by cell and mask.
-    pub(super) elements: Vec<Element>,
+    pub(super) elements: Vec<OutlineElement>,
 }
 
 /// Cells of a frame.
@@ -81,11 +81,11 @@ pub(super) struct Cells {
     /// Side of the smallest cells, in pixels.
     pub(super) side: usize,
     /// Runs of all pixels, row by row.
-    pub(super) runs: Vec<Run>,
+    pub(super) runs: Vec<PixelRun>,
     /// Number of masks.
     pub(super) masks: usize,
     /// Scales, the finest first.
-    pub(super) scales: [Scale; 3],
+    pub(super) scales: [PatchScale; 3],
 }
 
 impl Cells {
@@ -98,7 +98,7 @@ impl Cells {
             side,
             runs,
             masks: masks.iter().max().map_or(0, |mask| *mask as usize),
-            scales: SCALES.map(|scale| Scale::from_patches(&patches, columns, side, scale)),
+            scales: SCALES.map(|scale| PatchScale::from_patches(&patches, columns, side, scale)),
         }
     }
 
@@ -113,7 +113,7 @@ impl Cells {
 }
 
 /// Returns the runs of all pixels, and the patches of the smallest cells, sorted by cell and mask.
-fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<Run>, Vec<Patch>) {
+fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<PixelRun>, Vec<Patch>) {
     let columns = width.div_ceil(side);
     let (mut runs, mut patches) = (Vec::new(), Vec::<Patch>::new());
     for (band, rows) in masks.chunks(width.max(1) * side).enumerate() {
@@ -137,13 +137,13 @@ fn cut(masks: &[u32], width: usize, side: usize) -> (Vec<Run>, Vec<Patch>) {
         }));
         let numbers: BTreeMap<(usize, u32), usize> = counts.into_keys().zip(first..).collect();
         runs.extend(
-            found.into_iter().map(|(column, mask, length)| Run { patch: numbers[&(column, mask)] as u32, length }),
+            found.into_iter().map(|(column, mask, length)| PixelRun { patch: numbers[&(column, mask)] as u32, length }),
         );
     }
     (runs, patches)
 }
 
-impl Scale {
+impl PatchScale {
     /// Merges the patches of the smallest cells into cells of `scale` times their side.
     fn from_patches(smallest: &[Patch], columns: usize, side: usize, scale: usize) -> Self {
         let scale_columns = columns.div_ceil(scale);
@@ -170,7 +170,7 @@ impl Scale {
 
 /// Returns the elements: patches for which the mask and the other pixels each cover at least 1/16 of the cell and three
 /// pixels.
-fn elements(patches: &[Patch], cells: usize, side: usize, tile_of: impl Fn(usize) -> usize) -> Vec<Element> {
+fn elements(patches: &[Patch], cells: usize, side: usize, tile_of: impl Fn(usize) -> usize) -> Vec<OutlineElement> {
     let min_pixels = (side * side / 16).max(3) as u32;
     let mut totals = vec![0; cells];
     for patch in patches {
@@ -181,7 +181,7 @@ fn elements(patches: &[Patch], cells: usize, side: usize, tile_of: impl Fn(usize
         .enumerate()
         .filter_map(|(index, patch)| {
             let outside = totals[patch.cell] - patch.count;
-            (patch.mask > 0 && patch.count.min(outside) >= min_pixels).then(|| Element {
+            (patch.mask > 0 && patch.count.min(outside) >= min_pixels).then(|| OutlineElement {
                 patch: index,
                 cell: patch.cell,
                 tile: tile_of(patch.cell),
@@ -245,7 +245,7 @@ impl PatchSums {
 }
 
 /// Sums over the patches of the smallest cells.
-pub(super) fn patch_sums(cells: &Cells, untouched: &[u8], fit: &Fit, image: &Rgb) -> Vec<PatchSums> {
+pub(super) fn patch_sums(cells: &Cells, untouched: &[u8], fit: &ImageFit, image: &Rgb) -> Vec<PatchSums> {
     let tables: [[[u32; 2]; 256]; 3] = [0, 1, 2].map(|channel| {
         let fit = &fit.channels[channel];
         // The conversion to an integer saturates; curves exceed its range only in light near 0.
@@ -303,7 +303,7 @@ pub(super) fn outlines(cells: &Cells, sums: &[PatchSums], tiles: &[TileFit]) -> 
 
 /// Contrast of an element in one channel.
 #[derive(Debug, Clone, Copy)]
-struct Contrast {
+struct ElementContrast {
     /// Difference of the received means, in codes.
     received: f64,
     /// Difference of the predicted means, in codes.
@@ -340,7 +340,13 @@ impl MatchedFilter {
 }
 
 /// Measures the elements of one scale and updates the outlines that they confirm better than the other scales.
-fn measure_scale(scale: &Scale, sums: &[PatchSums], tiles: &[TileFit], min_elements: u32, outlines: &mut [Outline]) {
+fn measure_scale(
+    scale: &PatchScale,
+    sums: &[PatchSums],
+    tiles: &[TileFit],
+    min_elements: u32,
+    outlines: &mut [Outline],
+) {
     let filters = filters(scale, sums, tiles);
     let mut whole = vec![MatchedFilter::default(); outlines.len()];
     for (element, filter) in scale.elements.iter().zip(&filters) {
@@ -383,7 +389,7 @@ fn inflation<'a>(filters: impl Iterator<Item = &'a MatchedFilter> + Clone) -> f6
 
 /// Returns the filter of each element. The variance of each channel is first scaled by the excess scatter of its
 /// contrasts.
-fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<MatchedFilter> {
+fn filters(scale: &PatchScale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<MatchedFilter> {
     let mut sums = vec![PatchSums::default(); scale.patches.len()];
     for (part, whole) in smallest.iter().zip(&scale.part_of) {
         sums[*whole as usize].add(part);
@@ -392,7 +398,7 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Matc
     for (patch, sums) in scale.patches.iter().zip(&sums) {
         totals[patch.cell].add(sums);
     }
-    let contrasts: Vec<[Contrast; 3]> = scale
+    let contrasts: Vec<[ElementContrast; 3]> = scale
         .elements
         .iter()
         .map(|element| {
@@ -424,7 +430,7 @@ fn filters(scale: &Scale, smallest: &[PatchSums], tiles: &[TileFit]) -> Vec<Matc
 
 /// Ratio of the scatter of contrasts around the predicted ones to the scatter expected from their variances; at least
 /// 1.
-fn excess(contrasts: impl Iterator<Item = Contrast>) -> f64 {
+fn excess(contrasts: impl Iterator<Item = ElementContrast>) -> f64 {
     let [sum, count] = contrasts.fold([0.0, 0.0], |[sum, count], contrast| {
         let residual = contrast.received - contrast.predicted;
         [sum + residual * residual / contrast.variance, count + 1.0]
@@ -433,13 +439,13 @@ fn excess(contrasts: impl Iterator<Item = Contrast>) -> f64 {
 }
 
 /// Contrast of an element in each channel.
-fn contrast(element: &Element, inside: &PatchSums, cell: &PatchSums, tile: &TileFit) -> [Contrast; 3] {
+fn contrast(element: &OutlineElement, inside: &PatchSums, cell: &PatchSums, tile: &TileFit) -> [ElementContrast; 3] {
     let outside = cell.without(inside);
     [0, 1, 2].map(|channel| {
         let [received, predicted, noise] = inside.means(channel, element.inside);
         let [around, expected, noise_around] = outside.means(channel, element.outside);
         let (gain, scale) = (tile.gain[channel], tile.noise[channel]);
-        Contrast {
+        ElementContrast {
             received: received - around,
             predicted: gain * (predicted - expected),
             variance: (scale * noise).max(ROUNDING) / element.inside

@@ -2,7 +2,7 @@
 //! [`ColorPosterior`].
 
 use super::cells::{Cells, PatchSums};
-use super::local::{ChannelFit, Fit, MIN_GAIN, NormalEquations, ROUNDING};
+use super::local::{ChannelFit, ImageFit, MIN_GAIN, NormalEquations, ROUNDING};
 use super::tiles::Tiles;
 use crate::colors::{Color, Palette};
 
@@ -41,7 +41,7 @@ pub(super) struct LightEstimate<'a> {
     cells: &'a Cells,
     tiles: &'a Tiles,
     sums: &'a [PatchSums],
-    fit: &'a Fit,
+    fit: &'a ImageFit,
     /// Patches in tiles that are not disturbed; empty if the light is the same everywhere.
     patches: Vec<TilePatch>,
 }
@@ -80,7 +80,7 @@ fn linear_terms(tile: [f64; 2], center: [f64; 2]) -> [f64; 3] {
 }
 
 impl<'a> LightEstimate<'a> {
-    pub(super) fn new(cells: &'a Cells, tiles: &'a Tiles, sums: &'a [PatchSums], fit: &'a Fit) -> Self {
+    pub(super) fn new(cells: &'a Cells, tiles: &'a Tiles, sums: &'a [PatchSums], fit: &'a ImageFit) -> Self {
         let mut light = Self { cells, tiles, sums, fit, patches: Vec::new() };
         if fit.is_local {
             light.patches = light.undisturbed_patches();

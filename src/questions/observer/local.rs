@@ -53,17 +53,17 @@ const SHARED_PIXELS: f64 = 64.0;
 
 /// Fits the channels of a received image: tile by tile if enough tiles agree with one curve, else with one fit for all
 /// pixels.
-pub(super) fn fit(tiles: &Tiles, sums: &TileSums) -> Fit {
-    let whole = Fit::whole(tiles, sums);
+pub(super) fn fit(tiles: &Tiles, sums: &TileSums) -> ImageFit {
+    let whole = ImageFit::whole(tiles, sums);
     by_tile(tiles, sums, &whole).unwrap_or(whole)
 }
 
 /// Fit with the light and noise of each tile; `None` unless at least half of the tiles with contrast agree. `whole` is
 /// the fit to all pixels, from which the iteration starts.
-fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
+fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &ImageFit) -> Option<ImageFit> {
     let curves = curves(tiles, sums, whole);
     let moments = moments(tiles, sums, &curves);
-    let contrasts: Vec<Contrast> = moments.iter().map(Contrast::from_moments).collect();
+    let contrasts: Vec<TileContrast> = moments.iter().map(TileContrast::from_moments).collect();
     let [agreeing, voting] =
         (0..tiles.len()).filter(|tile| tiles.has_contrast(*tile)).fold([0, 0], |[agreeing, voting], tile| {
             let agrees = AGREEING.contains(&contrasts[tile].amplitude);
@@ -101,11 +101,11 @@ fn by_tile(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> Option<Fit> {
             is_disturbed: disturbed[tile],
         })
         .collect();
-    Some(Fit { tiles: tile_fits, channels, is_local: true, explained: whole.explained })
+    Some(ImageFit { tiles: tile_fits, channels, is_local: true, explained: whole.explained })
 }
 
 /// Estimates the curve of each channel by iteratively reweighted least squares over the tiles, starting from `whole`.
-fn curves(tiles: &Tiles, sums: &TileSums, whole: &Fit) -> [[f64; CODES]; 3] {
+fn curves(tiles: &Tiles, sums: &TileSums, whole: &ImageFit) -> [[f64; CODES]; 3] {
     let mut curves = [0, 1, 2].map(|channel| whole.channels[channel].curve);
     let mut weights = vec![1.0; tiles.len()];
     let mut gains = vec![[1.0; 3]; tiles.len()];
@@ -195,7 +195,7 @@ fn moments(tiles: &Tiles, sums: &TileSums, curves: &[[f64; CODES]; 3]) -> Vec<[M
 
 /// Received contrast of a tile compared with the predicted contrast, over all channels.
 #[derive(Debug, Clone, Copy)]
-struct Contrast {
+struct TileContrast {
     /// Slope of received over predicted codes, after the tile's own gain; 0 if no contrast is predicted.
     amplitude: f64,
     /// Sum of the squared predicted contrasts.
@@ -206,7 +206,7 @@ struct Contrast {
     samples: f64,
 }
 
-impl Contrast {
+impl TileContrast {
     fn from_moments(channels: &[Moments; 3]) -> Self {
         let (mut product, mut power, mut residual, mut samples) = (0.0, 0.0, 0.0, 0.0);
         for moments in channels {
@@ -366,7 +366,7 @@ impl Default for TileFit {
 
 /// Fitted channels of an image, and the share of its variance that they explain.
 #[derive(Debug, Clone)]
-pub(super) struct Fit {
+pub(super) struct ImageFit {
     pub(super) channels: [ChannelFit; 3],
     /// Light and noise of each tile.
     pub(super) tiles: Vec<TileFit>,
@@ -377,7 +377,7 @@ pub(super) struct Fit {
     pub(super) explained: f64,
 }
 
-impl Fit {
+impl ImageFit {
     /// Fits one curve for each channel to all pixels.
     pub(super) fn whole(tiles: &Tiles, sums: &TileSums) -> Self {
         let (mut residual, mut total) = (0.0, 0.0);
@@ -516,14 +516,14 @@ mod tests {
     use darkqa_base::types::Rgb;
 
     /// The fit of a row of grey pixels.
-    fn fit(untouched: &[u8], received: &[u8]) -> Fit {
+    fn fit(untouched: &[u8], received: &[u8]) -> ImageFit {
         let [untouched, received] = [untouched, received].map(|codes| {
             let samples = codes.iter().flat_map(|code| [*code; 3]).collect();
             Rgb::new(1, codes.len(), samples).unwrap()
         });
         let tiles = Tiles::new(&untouched, 16);
         let sums = tiles.sums(untouched.samples(), received.samples());
-        Fit::whole(&tiles, &sums)
+        ImageFit::whole(&tiles, &sums)
     }
 
     #[test]

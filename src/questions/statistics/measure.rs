@@ -292,7 +292,7 @@ impl MaskShapes {
 }
 
 /// A pixel of a surface.
-struct Sample {
+struct SurfacePixel {
     position: [usize; 2],
     mask: u32,
     rgb: [u8; 3],
@@ -301,7 +301,7 @@ struct Sample {
 /// Pixels of the frame's surfaces on a regular grid, sorted by row. Classes that emit light or show something else are
 /// left out.
 pub(super) struct LightSamples {
-    samples: Vec<Sample>,
+    samples: Vec<SurfacePixel>,
     /// Quantile of the light of the frame, in percent.
     frame_percent: u64,
     /// Quantile of the light around a mask, in percent.
@@ -321,7 +321,11 @@ impl LightSamples {
                 if is_surface {
                     let (left, right) = (left - y * width, right - y * width);
                     let columns = (left.next_multiple_of(step)..right).step_by(step);
-                    samples.extend(columns.map(|x| Sample { position: [x, y], mask, rgb: pixels[y * width + x] }));
+                    samples.extend(columns.map(|x| SurfacePixel {
+                        position: [x, y],
+                        mask,
+                        rgb: pixels[y * width + x],
+                    }));
                 }
             });
         }

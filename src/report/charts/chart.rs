@@ -482,7 +482,7 @@ pub(crate) struct ReliabilityChart {
 
 /// Horizontal scale, from 0 to the end of a ladder of levels: 9 EV for light (L5), 140 ms for motion blur.
 #[derive(Debug, Clone)]
-pub(crate) struct Scale {
+pub(crate) struct LevelScale {
     pub end: f64,
     /// Distance between two ticks.
     pub step: i32,
@@ -491,7 +491,7 @@ pub(crate) struct Scale {
     pub unit: &'static str,
 }
 
-impl Scale {
+impl LevelScale {
     pub(crate) fn for_axis(axis: Axis) -> Self {
         let (end, step, title) =
             if axis == Axis::MOTION { (140.0, 20, "threshold of motion blur") } else { (9.0, 1, "darkness threshold") };
@@ -513,7 +513,7 @@ pub(crate) struct ThresholdRow {
 #[derive(Debug, Clone)]
 pub(crate) struct ThresholdChart {
     pub rows: Vec<ThresholdRow>,
-    pub scale: Scale,
+    pub scale: LevelScale,
     /// The unit of the intervals: scenes or frames.
     pub unit: String,
 }

@@ -31,7 +31,7 @@ pub(crate) fn figure_specs(findings: &Findings<'_>) -> impl Iterator<Item = Figu
 }
 
 /// Variant, and enhancer if there is one.
-type Light<'f> = (&'f Variant, Option<&'f EnhancerName>);
+type LightView<'f> = (&'f Variant, Option<&'f EnhancerName>);
 
 /// Content of the panel of one quantity.
 struct PanelSpec {
@@ -52,7 +52,7 @@ const PANELS: [PanelSpec; 3] = [
 /// and a line for each variant and enhancer. `None` if no image was measured.
 fn fidelity_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let fidelity = findings.fidelity.as_ref()?;
-    let mut lights = BTreeMap::<Light<'_>, Vec<&ConditionFidelity>>::new();
+    let mut lights = BTreeMap::<LightView<'_>, Vec<&ConditionFidelity>>::new();
     for row in &fidelity.conditions {
         // Photographs in the dark are not at a level.
         if row.level != AxisLevel::PAIR {
@@ -91,7 +91,7 @@ fn is_curve(line: &PlotLine) -> bool {
     matches!(line.content, LineContent::Curve(_))
 }
 
-fn panel(lights: &BTreeMap<Light<'_>, Vec<&ConditionFidelity>>, axis: Axis, spec: &PanelSpec) -> Panel {
+fn panel(lights: &BTreeMap<LightView<'_>, Vec<&ConditionFidelity>>, axis: Axis, spec: &PanelSpec) -> Panel {
     let mut lines = Vec::new();
     for (style, ((variant, enhancer), rows)) in lights.iter().enumerate() {
         if variant.kind.map(Kind::axis) != Some(axis) {

@@ -1,7 +1,7 @@
 use super::*;
-use crate::report::sentences::{Scope, Tone};
+use crate::report::sentences::{EffectDirection, SentenceScope};
 
-fn sentence(kind: &'static str, tone: Tone, text: &str, scope: Scope) -> Sentence {
+fn sentence(kind: &'static str, tone: EffectDirection, text: &str, scope: SentenceScope) -> Sentence {
     Sentence {
         kind,
         tone,
@@ -14,22 +14,22 @@ fn sentence(kind: &'static str, tone: Tone, text: &str, scope: Scope) -> Sentenc
     }
 }
 
-fn scope_of_subject(subject: &str) -> Scope {
-    Scope { subject: Some(subject.to_owned()), ..Scope::default() }
+fn scope_of_subject(subject: &str) -> SentenceScope {
+    SentenceScope { subject: Some(subject.to_owned()), ..SentenceScope::default() }
 }
 
-fn scope_of_light(light: &str, level: &str) -> Scope {
-    Scope { light: Some(light.to_owned()), at: Some(level.to_owned()), ..Scope::default() }
+fn scope_of_light(light: &str, level: &str) -> SentenceScope {
+    SentenceScope { light: Some(light.to_owned()), at: Some(level.to_owned()), ..SentenceScope::default() }
 }
 
 #[test]
 fn a_detected_finding_is_the_main_finding() {
     let sentences = [
-        sentence("enhancer", Tone::NotShown, "a does nothing", scope_of_subject("a")),
-        sentence("enhancer", Tone::Worse, "b harms", scope_of_subject("b")),
-        sentence("fidelity", Tone::Better, "psnr", Scope::default()),
-        sentence("darkness", Tone::NotShown, "no loss", Scope::default()),
-        sentence("best", Tone::Better, "m sees best", Scope::default()),
+        sentence("enhancer", EffectDirection::NotShown, "a does nothing", scope_of_subject("a")),
+        sentence("enhancer", EffectDirection::Worse, "b harms", scope_of_subject("b")),
+        sentence("fidelity", EffectDirection::Better, "psnr", SentenceScope::default()),
+        sentence("darkness", EffectDirection::NotShown, "no loss", SentenceScope::default()),
+        sentence("best", EffectDirection::Better, "m sees best", SentenceScope::default()),
     ];
     let groups = FindingGroups::new(&sentences);
     let first: Vec<(&str, String)> =
@@ -49,14 +49,17 @@ fn enhancer_with_the_largest_effect_stands_for_its_group() {
         sentence.scope.training = format!("{subject} was trained.");
         sentence
     };
-    let mut sentences =
-        vec![of("a", -2.0, Tone::NotShown), of("b", -9.0, Tone::NotShown), of("c", 3.0, Tone::NotShown)];
+    let mut sentences = vec![
+        of("a", -2.0, EffectDirection::NotShown),
+        of("b", -9.0, EffectDirection::NotShown),
+        of("c", 3.0, EffectDirection::NotShown),
+    ];
     let groups = FindingGroups::new(&sentences);
     assert_eq!(groups.main_findings()[0].1.text(), "b acts. b was trained");
     assert_eq!(groups.summary(), "no effect of the 3 enhancers was detected.");
     // A detected effect comes before a larger one that is not detected.
-    sentences[0].tone = Tone::Worse;
-    sentences[2].tone = Tone::Better;
+    sentences[0].tone = EffectDirection::Worse;
+    sentences[2].tone = EffectDirection::Better;
     let groups = FindingGroups::new(&sentences);
     assert_eq!(groups.summary(), "c acts; a acts. c was trained. a was trained.");
 }
@@ -64,9 +67,9 @@ fn enhancer_with_the_largest_effect_stands_for_its_group() {
 #[test]
 fn all_effects_of_an_enhancer_are_one_finding() {
     let sentences = [
-        sentence("enhancer", Tone::Worse, "a harms at L1", scope_of_subject("a")),
-        sentence("enhancer", Tone::Better, "a helps at L4", scope_of_subject("a")),
-        sentence("enhancer", Tone::NotShown, "a at L2", scope_of_subject("a")),
+        sentence("enhancer", EffectDirection::Worse, "a harms at L1", scope_of_subject("a")),
+        sentence("enhancer", EffectDirection::Better, "a helps at L4", scope_of_subject("a")),
+        sentence("enhancer", EffectDirection::NotShown, "a at L2", scope_of_subject("a")),
     ];
     let groups = FindingGroups::new(&sentences);
     assert_eq!(groups.count(), 1);
@@ -76,8 +79,8 @@ fn all_effects_of_an_enhancer_are_one_finding() {
 #[test]
 fn noise_profiles_are_compared_in_one_finding() {
     let sentences = [
-        sentence("darkness", Tone::NotShown, "paper: no loss", scope_of_light("paper", "L3")),
-        sentence("darkness", Tone::Worse, "eld: costs", scope_of_light("eld", "L5")),
+        sentence("darkness", EffectDirection::NotShown, "paper: no loss", scope_of_light("paper", "L3")),
+        sentence("darkness", EffectDirection::Worse, "eld: costs", scope_of_light("eld", "L5")),
     ];
     let groups = FindingGroups::new(&sentences);
     let first = groups.main_findings();
@@ -89,14 +92,14 @@ fn noise_profiles_are_compared_in_one_finding() {
 
 #[test]
 fn a_summary_without_darkness_is_the_first_finding() {
-    let sentences = [sentence("noise", Tone::Worse, "noise costs", Scope::default())];
+    let sentences = [sentence("noise", EffectDirection::Worse, "noise costs", SentenceScope::default())];
     assert_eq!(FindingGroups::new(&sentences).summary(), "noise costs.");
     assert_eq!(FindingGroups::new(&[]).summary(), "");
 }
 
 #[test]
 fn a_sentence_of_an_unknown_kind_is_in_the_last_group() {
-    let sentences = [sentence("novel", Tone::Note, "new", Scope::default())];
+    let sentences = [sentence("novel", EffectDirection::Note, "new", SentenceScope::default())];
     let groups = FindingGroups::new(&sentences);
     assert_eq!((groups.all()[0].title, groups.count()), ("Sample", 1));
     assert!(groups.main_findings().is_empty());

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::alerts::run_alerts;
-use super::combine::{Combined, check_comparable, clusters};
+use super::combine::{CombinedRuns, check_comparable, clusters};
 use super::cost::{PricedRun, TrialCost};
 use super::join::join;
 use crate::error::{Error, Result};
@@ -49,7 +49,7 @@ impl SubjectCosts {
     ///
     /// # Errors
     /// If the prices in a manifest are broken.
-    fn from_joined(combined: &Combined) -> Result<Self> {
+    fn from_joined(combined: &CombinedRuns) -> Result<Self> {
         let mut costs = Self::default();
         let mut is_counted = vec![false; combined.trials.len()];
         for run in &combined.runs {
@@ -78,7 +78,7 @@ impl Baseline {
     /// # Errors
     /// If they share no question, or a shared question has other choices or another true choice.
     pub(super) fn new(
-        combined: &Combined,
+        combined: &CombinedRuns,
         new: Vec<StoredRun<ChoiceDetail>>,
         old: StoredRun<ChoiceDetail>,
     ) -> Result<Self> {

@@ -20,9 +20,9 @@ use darkqa_score::model_in_condition::without_run;
 use darkqa_score::photographs::PhotographedSet;
 
 /// Joined runs of questions with choices.
-pub(super) type Combined = Joined<ChoiceDetail>;
+pub(super) type CombinedRuns = Joined<ChoiceDetail>;
 
-impl Combined {
+impl CombinedRuns {
     /// All results of the runs, computed from their records.
     pub(super) fn findings(&self) -> Findings<'_> {
         let findings = Findings::with_listing(
@@ -149,7 +149,7 @@ pub(super) fn clusters<'a>(
 /// # Errors
 /// If a run shares no question with the others, a question has other choices or another truth in two runs, or the true
 /// answers are known for some questions and not for others.
-pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<Combined> {
+pub(super) fn combine(runs: Vec<StoredRun<ChoiceDetail>>) -> Result<CombinedRuns> {
     check_one_measure(&runs)?;
     if runs.len() > 1 {
         check_comparable(&runs)?;

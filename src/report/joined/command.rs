@@ -12,7 +12,7 @@ use clap::Args;
 
 use super::alerts::{alerts, duplicate_folder_alerts};
 use super::baseline::{Baseline, FAIL_IF_WORSE};
-use super::combine::{Combined, combine};
+use super::combine::{CombinedRuns, combine};
 use super::enhancers::{self, LenientChange};
 use super::join::TrialPlaces;
 use super::listing::write_in_place;
@@ -28,7 +28,7 @@ use crate::report::products::PAGE;
 use crate::report::text::alert::Alert;
 use crate::runs::sharded_run::{open_any_run, open_choice_run};
 use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
-use crate::runs::{Outcome, ShowArgs, StdoutFormat, Syntax, record_table};
+use crate::runs::{Outcome, PrintArgs, StdoutFormat, Syntax, record_table};
 use crate::store::{AddressChange, Store, now};
 use crate::types::manifests::{Counts, Status};
 use crate::types::{AskedItem, ChoiceDetail, Decides, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
@@ -71,7 +71,7 @@ pub(crate) struct ReportArgs {
 pub(crate) struct ReportShowArgs {
     /// The formats that every report has.
     #[command(flatten)]
-    pub show: ShowArgs,
+    pub show: PrintArgs,
     /// Print the report as Markdown, for an issue or a README
     #[arg(long, conflicts_with = "json", help_heading = "Output", add = Decides::Nothing)]
     pub markdown: bool,
@@ -249,7 +249,7 @@ fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
 
 /// Reports on joined runs. Writes the report only if `--out` is set.
 fn report_combined(
-    combined: &Combined,
+    combined: &CombinedRuns,
     baseline: Option<&Baseline>,
     args: &ReportArgs,
     duplicate_alerts: &[Alert],
@@ -378,7 +378,7 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
 ///
 /// # Errors
 /// If there is no such item.
-fn keep_common_items(mut combined: Combined) -> Result<Combined> {
+fn keep_common_items(mut combined: CombinedRuns) -> Result<CombinedRuns> {
     let shared: HashSet<(QuestionId, Vec<String>, u32)> = {
         let grid = combined.grid();
         grid.items

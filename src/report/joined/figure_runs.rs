@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use super::alerts::alerts;
-use super::combine::{Combined, combine};
+use super::combine::{CombinedRuns, combine};
 use super::command::distinct;
 use super::own_answers::without_hidden_models;
 use crate::error::{Error, Result};
@@ -14,7 +14,7 @@ use darkqa_score::findings::Findings;
 
 /// Runs of questions with choices, joined as `report` joins them.
 pub(crate) struct FigureRuns {
-    combined: Combined,
+    combined: CombinedRuns,
     duplicate_alerts: Vec<Alert>,
 }
 

@@ -87,7 +87,7 @@ impl ImageGroups {
         if runs.len() < 2 {
             return Self::default();
         }
-        let comparison = ImageComparison::new(runs);
+        let comparison = CurveAgreement::new(runs);
         let manifests: Vec<&RunManifest> = runs.iter().map(|run| &run.manifest).collect();
         let partitions = comparison.partitions(&manifests, order);
         let mut found = Self { undigested: comparison.undigested.clone(), ..Self::default() };
@@ -149,7 +149,7 @@ fn split_by(group: &[usize], bases: &[&Vec<Vec<usize>>]) -> Vec<Vec<usize>> {
 }
 
 /// Pairwise agreement of the images of runs, by curve.
-struct ImageComparison {
+struct CurveAgreement {
     /// The runs that have each curve.
     curves: BTreeMap<LightCurve, BTreeSet<usize>>,
     /// The agreement of each pair of runs that share images of a curve.
@@ -160,7 +160,7 @@ struct ImageComparison {
 /// Groups of runs with the same images, by curve.
 type Partitions<'a> = BTreeMap<&'a LightCurve, Vec<Vec<usize>>>;
 
-impl ImageComparison {
+impl CurveAgreement {
     /// The groups of runs whose images agree, for each curve. `order` is the order in which runs are added to groups.
     fn partitions(&self, manifests: &[&RunManifest], order: &[usize]) -> Partitions<'_> {
         self.curves

@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
-use super::settings::{Setting, Settings, differing_settings, is_digest, model_settings};
+use super::settings::{FlagValues, Setting, differing_settings, is_digest, model_settings};
 use crate::runs::stored::StoredRun;
 use crate::types::flags::setting_spelling;
 use crate::types::{Condition, QuestionId, RunQuestion, TrialKey, TrialRef, View};
@@ -17,7 +17,7 @@ const MAX_VALUE_CHARS: usize = 24;
 
 /// The properties by which trials of different runs are matched.
 #[derive(PartialEq, Eq, Hash)]
-struct Item<'a> {
+struct MatchKey<'a> {
     view: View,
     model: &'a str,
     condition: Option<&'a Condition>,
@@ -27,7 +27,7 @@ struct Item<'a> {
     repeat: u32,
 }
 
-impl<'a> Item<'a> {
+impl<'a> MatchKey<'a> {
     fn from_trial<D: Detail>(trial: TrialRef<'a, D>) -> Self {
         Self {
             view: trial.view(),
@@ -109,7 +109,7 @@ impl ModelNames {
         let (overlaps, repeated) = overlaps(runs, order, is_compared);
         found.repeated = repeated;
         for (model, runs_of_model) in runs_by_model {
-            let settings: Vec<Option<Settings>> = runs
+            let settings: Vec<Option<FlagValues>> = runs
                 .iter()
                 .enumerate()
                 .map(|(index, run)| {
@@ -285,11 +285,11 @@ fn overlaps<'a, D: Detail>(
         same_words && same_image && [run, other_run].iter().all(|run| parameters_are_known(&runs[*run], trial.model()))
     };
     // The first trial of each run, by item.
-    let mut first_trials = HashMap::<Item<'_>, Vec<(usize, TrialRef<'_, D>)>>::new();
+    let mut first_trials = HashMap::<MatchKey<'_>, Vec<(usize, TrialRef<'_, D>)>>::new();
     let (mut overlaps, mut repeated) = (Overlaps::new(), HashMap::new());
     for &index in order {
         for trial in runs[index].trials.iter().filter(|trial| is_compared(*trial)) {
-            let known = first_trials.entry(Item::from_trial(trial)).or_default();
+            let known = first_trials.entry(MatchKey::from_trial(trial)).or_default();
             if known.last().is_some_and(|(run, _)| *run == index) {
                 continue;
             }

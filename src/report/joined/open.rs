@@ -15,7 +15,7 @@ use super::enhancers;
 use super::join::join;
 use super::listing::{ReportFolder, listing};
 use super::own_answers::{WholeReport, with_summary};
-use super::settings::{Settings, differing_settings, reply_settings};
+use super::settings::{FlagValues, differing_settings, reply_settings};
 use crate::error::{Error, Result};
 use crate::report::markdown::MarkdownReport;
 use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
@@ -26,7 +26,7 @@ use crate::report::text::table::Table;
 use crate::report::text::words;
 use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
 use crate::runs::outcome::{Outcome, ReportLength, StdoutFormat, Syntax};
-use crate::runs::predictions::{AnswerState, Prediction, predictions};
+use crate::runs::predictions::{AnswerState, QuestionAnswer, predictions};
 use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials, text_setting};
 use crate::store::Store;
 use crate::types::flags::read_word;
@@ -38,7 +38,7 @@ use darkqa_score::open::{AnswerOutcome, Group, OpenSummary, QuestionGroups, Scor
 
 /// Scored answers of a run, or of several joined into one.
 pub(crate) struct Scores {
-    pub(crate) run: OpenRun,
+    pub(crate) run: OpenQuestionRun,
     judge: Option<String>,
     protocol: Protocol,
     summary: OpenSummary,
@@ -177,7 +177,7 @@ fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u
 }
 
 /// A run of open questions, or several joined into one, with complete records.
-pub(crate) struct OpenRun {
+pub(crate) struct OpenQuestionRun {
     /// Name of the run; the first one's if several are joined.
     name: String,
     pub(crate) folder: PathBuf,
@@ -198,7 +198,7 @@ struct OtherRun {
     manifest: RunManifest,
 }
 
-impl OpenRun {
+impl OpenQuestionRun {
     /// Names and manifests of all runs.
     fn runs(&self) -> Vec<(&str, &RunManifest)> {
         let first = std::iter::once((&*self.name, &self.manifest));
@@ -215,7 +215,7 @@ impl OpenRun {
 
 /// Several runs joined into one.
 pub(super) struct JoinedRuns {
-    pub(super) run: OpenRun,
+    pub(super) run: OpenQuestionRun,
     /// Alerts about differences between the runs and faults in their numbers.
     pub(super) alerts: Vec<Alert>,
     /// Use of each enhancer.
@@ -253,7 +253,7 @@ pub(super) fn combine(runs: Vec<StoredRun<OpenDetail>>) -> Result<JoinedRuns> {
         record.model = joined.model_names.original_name(&record.model).to_owned();
     }
     alerts.extend(empty_answer_alerts(&records));
-    let run = OpenRun {
+    let run = OpenQuestionRun {
         records,
         others: runs.map(|run| OtherRun { name: run.name, folder: run.folder, manifest: run.manifest }).collect(),
         name: first.name,
@@ -301,7 +301,7 @@ fn is_answer(trial: TrialRef<'_, OpenDetail>) -> bool {
 }
 
 /// Successful marks by the judge of a run.
-fn marks<'a>(run: &'a OpenRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
+fn marks<'a>(run: &'a OpenQuestionRun, judge: Option<&str>) -> MarkIndex<&'a Record<OpenDetail>> {
     let mut marks = MarkIndex::new(&run.questions);
     for record in &run.records {
         if Some(&*record.model) != judge || record.failure.is_some() {
@@ -330,7 +330,7 @@ fn failures(records: &[Record<OpenDetail>]) -> BTreeMap<(&QuestionId, ModelInCon
 }
 
 /// Outcome of an answer, given the record of its mark.
-fn outcome(prediction: &Prediction, mark_record: Option<&Record<OpenDetail>>, protocol: Protocol) -> AnswerOutcome {
+fn outcome(prediction: &QuestionAnswer, mark_record: Option<&Record<OpenDetail>>, protocol: Protocol) -> AnswerOutcome {
     match (&prediction.state, mark_record) {
         (AnswerState::Missing, _) => AnswerOutcome::Missing,
         (AnswerState::Null, _) => AnswerOutcome::Null,
@@ -382,7 +382,7 @@ fn check_same_judge(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
 
 /// Checks that judges of the same name have the same settings, because marks are identified by the judge's name.
 fn check_same_settings(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
-    let judges: Vec<Option<Settings>> = runs.iter().map(|run| judge_settings(&run.manifest)).collect();
+    let judges: Vec<Option<FlagValues>> = runs.iter().map(|run| judge_settings(&run.manifest)).collect();
     let names: Vec<String> = runs.iter().map(StoredRun::name).collect();
     let differences = differing_settings(&judges);
     let Some(first) = differences.first() else {
@@ -399,7 +399,7 @@ fn check_same_settings(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
 
 /// Settings that determine the marks of a run's judge; `None` if no judge was asked, or the manifest does not state
 /// them.
-fn judge_settings(manifest: &RunManifest) -> Option<Settings> {
+fn judge_settings(manifest: &RunManifest) -> Option<FlagValues> {
     let judge = text_setting(manifest, JUDGE)?;
     // Runs of earlier versions list the judge only among the models.
     let columns = [JUDGES, "model"].map(|column| manifest.columns.get(column)?.get(judge));

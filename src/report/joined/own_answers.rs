@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use super::alerts::alerts_without_truths;
-use super::combine::{Combined, frame_ties};
+use super::combine::{CombinedRuns, frame_ties};
 use super::enhancers;
 use super::listing::ReportFolder;
 use crate::error::{Error, Result};
@@ -32,7 +32,7 @@ pub(super) struct ReportOutput {
 pub(super) fn write_report(
     target: &ReportFolder<'_, ChoiceDetail>,
     manifest: &RunManifest,
-    combined: &Combined,
+    combined: &CombinedRuns,
     show: StdoutFormat,
 ) -> Result<String> {
     let agreement = self_agreement(combined);
@@ -52,7 +52,7 @@ pub(super) fn write_report(
 /// The report on several runs, or on one whose report is not written into its folder. The files are empty unless
 /// `with_files` is set.
 pub(super) fn report_output(
-    combined: &Combined,
+    combined: &CombinedRuns,
     duplicate_alerts: &[Alert],
     show: StdoutFormat,
     with_files: bool,
@@ -67,7 +67,7 @@ pub(super) fn report_output(
 }
 
 /// The report on one run, with all its files.
-pub(super) fn whole_report(combined: &Combined) -> Result<WholeReport> {
+pub(super) fn whole_report(combined: &CombinedRuns) -> Result<WholeReport> {
     let agreement = self_agreement(combined);
     let report = report(combined, &agreement, &[]);
     let runs = combined.manifests();
@@ -78,19 +78,23 @@ pub(super) fn whole_report(combined: &Combined) -> Result<WholeReport> {
 }
 
 /// The files of a report, by name.
-fn files(report: &AgreementReport<'_>, combined: &Combined, runs: SummaryRuns<'_>) -> Result<Vec<(String, Vec<u8>)>> {
+fn files(
+    report: &AgreementReport<'_>,
+    combined: &CombinedRuns,
+    runs: SummaryRuns<'_>,
+) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, &combined.page_inputs())?;
     let summary = summary(report, runs, ReportLength::Summary)?;
     Ok(with_summary(products, summary))
 }
 
-fn self_agreement(combined: &Combined) -> SelfAgreement<'_> {
+fn self_agreement(combined: &CombinedRuns) -> SelfAgreement<'_> {
     SelfAgreement::new(&combined.trials, &frame_ties(&combined.questions), &combined.questions, &combined.listing)
         .with_set(combined.photographed_set())
 }
 
 fn report<'a>(
-    combined: &Combined,
+    combined: &CombinedRuns,
     agreement: &'a SelfAgreement<'a>,
     duplicate_alerts: &[Alert],
 ) -> AgreementReport<'a> {

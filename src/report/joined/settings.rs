@@ -10,7 +10,7 @@ use crate::types::flags::setting_spelling;
 use crate::types::manifests::{JUDGES, RunManifest};
 
 /// Values of settings as text, by flag.
-pub(super) type Settings = BTreeMap<String, String>;
+pub(super) type FlagValues = BTreeMap<String, String>;
 
 /// Manifest field of human answers, with the identity of the run whose images people saw.
 const ASKED_ABOUT: &str = "people asked about";
@@ -76,7 +76,7 @@ pub(super) fn joined_with_and<T: AsRef<str>>(texts: &[T]) -> String {
 
 /// Settings whose values differ between runs. Runs that are `None` are skipped. A setting of a column value is compared
 /// only between runs that have the value.
-pub(super) fn differing_settings(runs: &[Option<Settings>]) -> Vec<Setting> {
+pub(super) fn differing_settings(runs: &[Option<FlagValues>]) -> Vec<Setting> {
     let flags: BTreeSet<&String> = runs.iter().flatten().flat_map(BTreeMap::keys).collect();
     flags
         .into_iter()
@@ -94,7 +94,7 @@ pub(super) fn differing_settings(runs: &[Option<Settings>]) -> Vec<Setting> {
 
 /// Value of a setting; [`UNSET`] if the run does not have it. `None` if the setting belongs to a column value that the
 /// run does not have.
-fn value_or_unset(settings: &Settings, flag: &str) -> Option<String> {
+fn value_or_unset(settings: &FlagValues, flag: &str) -> Option<String> {
     if let Some(value) = settings.get(flag) {
         return Some(value.clone());
     }
@@ -105,7 +105,7 @@ fn value_or_unset(settings: &Settings, flag: &str) -> Option<String> {
 }
 
 /// Identity of a run; for human answers, the identity of the run whose images people saw.
-pub(super) fn identity_settings(run: &RunManifest) -> Settings {
+pub(super) fn identity_settings(run: &RunManifest) -> FlagValues {
     match run.identity.get(ASKED_ABOUT) {
         Some(Value::Object(asked)) => asked.iter().map(|(name, value)| field(name, value)).collect(),
         _ => run.identity.iter().map(|(name, value)| field(name, value)).collect(),
@@ -118,7 +118,7 @@ pub(crate) fn has_human_answers(run: &RunManifest) -> bool {
 }
 
 /// Selected fields of a run's identity.
-pub(super) fn identity_fields(run: &RunManifest, fields: &[&str]) -> Settings {
+pub(super) fn identity_fields(run: &RunManifest, fields: &[&str]) -> FlagValues {
     let mut settings = identity_settings(run);
     settings.retain(|flag, _| fields.contains(&flag.as_str()));
     settings
@@ -126,27 +126,27 @@ pub(super) fn identity_fields(run: &RunManifest, fields: &[&str]) -> Settings {
 
 /// Settings of a run that determine its images, except size and encoding. Noise settings are included only if the noise
 /// profiles of `runs` differ.
-pub(super) fn light_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
+pub(super) fn light_settings(run: &RunManifest, runs: &[&RunManifest]) -> FlagValues {
     let variants = column_settings(run, VARIANT);
     let parts = [pixel_settings(run), noise_settings(run, runs), variants, enhancer_settings(run)];
     parts.into_iter().flatten().collect()
 }
 
 /// Settings that determine the pixels of all degraded images.
-pub(super) fn pixel_settings(run: &RunManifest) -> Settings {
+pub(super) fn pixel_settings(run: &RunManifest) -> FlagValues {
     identity_fields(run, &PIXEL_FIELDS)
 }
 
 /// Noise settings of a run: the flags as the user wrote them, and the content of its noise profiles. Empty if the noise
 /// profiles of `runs` are equal, or if this run has none.
-pub(super) fn noise_settings(run: &RunManifest, runs: &[&RunManifest]) -> Settings {
+pub(super) fn noise_settings(run: &RunManifest, runs: &[&RunManifest]) -> FlagValues {
     let own = noise_profiles(run);
     // Equal profiles are the same noise, even if only one run writes out a default.
     let are_equal = runs.iter().filter_map(|other| noise_profiles(other)).all(|other| Some(&other) == own.as_ref());
     if own.is_none() || are_equal {
-        return Settings::new();
+        return FlagValues::new();
     }
-    let mut settings: Settings = NOISE_FLAGS
+    let mut settings: FlagValues = NOISE_FLAGS
         .iter()
         .filter_map(|flag| {
             let value = run.images.get(*flag)?;
@@ -162,27 +162,27 @@ fn noise_profiles(run: &RunManifest) -> Option<BTreeMap<String, Value>> {
 }
 
 /// Settings of the noise profiles and of the degradation kinds that are not in the paper.
-pub(super) fn profile_and_variant_settings(run: &RunManifest) -> Settings {
+pub(super) fn profile_and_variant_settings(run: &RunManifest) -> FlagValues {
     let mut settings = column_settings(run, "reading");
     settings.extend(column_settings(run, VARIANT));
     settings
 }
 
 /// Settings of the enhancers.
-pub(super) fn enhancer_settings(run: &RunManifest) -> Settings {
+pub(super) fn enhancer_settings(run: &RunManifest) -> FlagValues {
     column_settings(run, "enhancer")
 }
 
 /// Settings of a degradation kind that is not in the paper; empty for other kinds.
-pub(super) fn variant_settings(run: &RunManifest, kind: Kind) -> Settings {
+pub(super) fn variant_settings(run: &RunManifest, kind: Kind) -> FlagValues {
     let mut settings = column_settings(run, VARIANT);
     settings.retain(|flag, _| flag.ends_with(&format!("{OF}{kind}")));
     settings
 }
 
 /// Settings of all values in a manifest column, each as `FLAG of VALUE`.
-fn column_settings(run: &RunManifest, column: &str) -> Settings {
-    let mut settings = Settings::new();
+fn column_settings(run: &RunManifest, column: &str) -> FlagValues {
+    let mut settings = FlagValues::new();
     for (name, content) in run.columns.get(column).into_iter().flatten() {
         settings.extend(leaves(content).map(|(flag, value)| (format!("{flag}{OF}{name}"), value)));
     }
@@ -203,7 +203,7 @@ pub(super) fn without_explained(mut settings: Vec<Setting>) -> Vec<Setting> {
 
 /// Settings that determine a model's replies, except question and images. `None` if the manifest does not have the
 /// model.
-pub(super) fn model_settings(run: &RunManifest, model: &str) -> Option<Settings> {
+pub(super) fn model_settings(run: &RunManifest, model: &str) -> Option<FlagValues> {
     let content = run.columns.get("model")?.get(model)?;
     // A built-in model answers by rules and reads no prompt.
     let asked_by = if run.is_built_in(model) { "--rules" } else { "--prompts" };
@@ -212,13 +212,13 @@ pub(super) fn model_settings(run: &RunManifest, model: &str) -> Option<Settings>
 }
 
 /// Settings of a model, without its base URL and name.
-pub(super) fn reply_settings(content: &Value) -> Settings {
+pub(super) fn reply_settings(content: &Value) -> FlagValues {
     leaves(content).filter(|(flag, _)| !["--base-url", "--model"].contains(&flag.as_str())).collect()
 }
 
 /// Settings of all models of a run that have a base URL, without judges; different values of a flag are joined with
 /// "or". `None` if the run has no such model.
-pub(super) fn remote_model_settings(run: &RunManifest) -> Option<Settings> {
+pub(super) fn remote_model_settings(run: &RunManifest) -> Option<FlagValues> {
     let models = run.columns.get("model")?;
     let mut values = BTreeMap::<String, BTreeSet<String>>::new();
     let mut has_remote = false;
@@ -306,14 +306,19 @@ pub(super) fn is_digest(text: &str) -> bool {
 mod tests {
     use super::*;
 
-    fn seed_settings(value: &str) -> Settings {
-        Settings::from([("--seed".to_owned(), value.to_owned())])
+    fn seed_settings(value: &str) -> FlagValues {
+        FlagValues::from([("--seed".to_owned(), value.to_owned())])
     }
 
     #[test]
     fn setting_lists_each_value_once() {
-        let runs =
-            [Some(seed_settings("0")), Some(seed_settings("1")), Some(seed_settings("0")), None, Some(Settings::new())];
+        let runs = [
+            Some(seed_settings("0")),
+            Some(seed_settings("1")),
+            Some(seed_settings("0")),
+            None,
+            Some(FlagValues::new()),
+        ];
         let names = ["a", "b", "c", "d", "e"].map(str::to_owned);
         let [setting] = &*differing_settings(&runs) else {
             panic!("one setting differs");

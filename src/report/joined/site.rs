@@ -11,10 +11,10 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
 
 use super::alerts::alerts;
-use super::combine::{Combined, clusters, combine};
+use super::combine::{CombinedRuns, clusters, combine};
 use super::own_answers::{self, without_hidden_models};
 use super::settings::{
-    ENCODING, Settings, differing_settings, identity_fields, identity_settings, pixel_settings,
+    ENCODING, FlagValues, differing_settings, identity_fields, identity_settings, pixel_settings,
     profile_and_variant_settings, shorten,
 };
 use super::{enhancers, open};
@@ -22,8 +22,8 @@ use crate::error::{Error, Result};
 use crate::report::choice_report::ChoiceReport;
 use crate::report::products::{PAGE, products};
 use crate::report::site::{
-    ChoiceRow, GroupDifference, GroupDigests, GroupRows, OpenRow, Ranking, RunLink, Site, SiteGroup, choice_rows,
-    open_rows,
+    GroupDifference, GroupDigests, GroupRows, LeaderboardSite, ModelRunRow, OpenRow, Ranking, RunLink, SiteGroup,
+    choice_rows, open_rows,
 };
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::{AnyRun, StoredRun, text_setting};
@@ -44,8 +44,8 @@ struct OpenMember {
 ///
 /// # Errors
 /// If a run has no records or a record is broken.
-pub(crate) fn site(runs: Vec<AnyRun>) -> Result<Site> {
-    let mut site = Site { groups: Vec::new(), others: Vec::new(), pages: Vec::new() };
+pub(crate) fn site(runs: Vec<AnyRun>) -> Result<LeaderboardSite> {
+    let mut site = LeaderboardSite { groups: Vec::new(), others: Vec::new(), pages: Vec::new() };
     let (mut choices, mut open) = (Vec::new(), Vec::new());
     let mut pages = BTreeSet::new();
     for run in runs {
@@ -77,7 +77,7 @@ pub(crate) fn site(runs: Vec<AnyRun>) -> Result<Site> {
 
 /// Adds groups of one kind, each with its differences from the first.
 fn add_groups<M>(
-    site: &mut Site,
+    site: &mut LeaderboardSite,
     groups: Vec<Vec<M>>,
     key: impl Fn(&M) -> &GroupKey,
     rows: impl Fn(Vec<M>) -> GroupRows,
@@ -104,7 +104,11 @@ fn add_groups<M>(
 }
 
 /// Adds the page of a run. Returns `None` for a run without rows, and then adds it to the other runs with the reason.
-fn add_choices(run: StoredRun<ChoiceDetail>, link: RunLink, site: &mut Site) -> Result<Option<ChoiceMember>> {
+fn add_choices(
+    run: StoredRun<ChoiceDetail>,
+    link: RunLink,
+    site: &mut LeaderboardSite,
+) -> Result<Option<ChoiceMember>> {
     let combined = combine(vec![without_hidden_models(run)?])?;
     if combined.truths() == Truths::Unknown {
         let page = page_of(own_answers::whole_report(&combined)?.files)?;
@@ -140,7 +144,7 @@ fn add_choices(run: StoredRun<ChoiceDetail>, link: RunLink, site: &mut Site) -> 
 }
 
 /// The trials by which models are compared: raw images at L0 and in the main variant.
-fn compared_trials(combined: &Combined, variant: &Variant) -> Trials<ChoiceDetail> {
+fn compared_trials(combined: &CombinedRuns, variant: &Variant) -> Trials<ChoiceDetail> {
     let trials = combined.trials.iter().filter(|trial| {
         trial.condition().is_some_and(|condition| {
             let own = condition.variant();
@@ -154,7 +158,7 @@ fn compared_trials(combined: &Combined, variant: &Variant) -> Trials<ChoiceDetai
     compared
 }
 
-fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut Site) -> Result<OpenMember> {
+fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut LeaderboardSite) -> Result<OpenMember> {
     let run = without_hidden_models(run)?;
     let key = GroupKey::from_open(&run)?;
     let scores = open::Scores::new(open::combine(vec![run])?)?;
@@ -215,14 +219,14 @@ fn ranked_rows(members: Vec<ChoiceMember>) -> GroupRows {
         .flat_map(|best| best.models.iter().zip(rank_ranges(best)))
         .map(|(model, rank)| (model.model.clone(), rank))
         .collect();
-    let mut rows: Vec<ChoiceRow> = rows
+    let mut rows: Vec<ModelRunRow> = rows
         .into_iter()
         .map(|(name, mut row)| {
             row.rank = ranks.get(&name).copied();
             row
         })
         .collect();
-    rows.sort_by_key(ChoiceRow::sort_key);
+    rows.sort_by_key(ModelRunRow::sort_key);
     let words = words(best.as_ref(), models, &unit);
     GroupRows::Choices(rows, Ranking { words })
 }
@@ -297,7 +301,7 @@ fn words(best: Option<&BestInTheDark>, models: usize, unit: &str) -> String {
 pub(super) struct ChoiceMember {
     key: GroupKey,
     run: RunLink,
-    rows: Vec<ChoiceRow>,
+    rows: Vec<ModelRunRow>,
     trials: Trials<ChoiceDetail>,
     questions: Vec<RunQuestion>,
 }
@@ -324,7 +328,7 @@ pub(super) struct GroupKey {
     /// Names and values of the shared settings, as shown on the page.
     shared: Vec<(String, String)>,
     /// Settings that must be equal.
-    settings: Settings,
+    settings: FlagValues,
     /// Digests of the images sent, by question and condition.
     images: HashMap<(String, String), BTreeSet<Digest>>,
     /// The choices and the true choice, by question.
@@ -336,7 +340,7 @@ impl GroupKey {
     ///
     /// # Errors
     /// If a setting cannot be written.
-    fn from_choices(combined: &Combined, variant: &Variant) -> Result<Self> {
+    fn from_choices(combined: &CombinedRuns, variant: &Variant) -> Result<Self> {
         let manifest = &combined.runs[0].manifest;
         let mut levels = BTreeSet::new();
         let mut images = HashMap::<_, BTreeSet<Digest>>::new();
@@ -500,7 +504,7 @@ fn group_members<M>(members: Vec<M>, key: impl Fn(&M) -> &GroupKey) -> Vec<Vec<M
 }
 
 /// Settings that must be equal: questions, light, prompts and levels.
-fn settings(manifest: &RunManifest, questions: &[RunQuestion], levels: &BTreeSet<AxisLevel>) -> Result<Settings> {
+fn settings(manifest: &RunManifest, questions: &[RunQuestion], levels: &BTreeSet<AxisLevel>) -> Result<FlagValues> {
     let asked: BTreeMap<&String, (&String, BTreeSet<&String>)> = questions
         .iter()
         .map(|question| {
@@ -517,10 +521,10 @@ fn settings(manifest: &RunManifest, questions: &[RunQuestion], levels: &BTreeSet
 }
 
 /// Settings that determine raw images.
-fn light_settings(manifest: &RunManifest) -> Settings {
+fn light_settings(manifest: &RunManifest) -> FlagValues {
     let parts =
         [pixel_settings(manifest), identity_fields(manifest, &ENCODING), profile_and_variant_settings(manifest)];
-    let mut light: Settings = parts.into_iter().flatten().collect();
+    let mut light: FlagValues = parts.into_iter().flatten().collect();
     light.remove(ENHANCEMENT);
     if let Some(taken) = text_setting(manifest, SET_LIGHT) {
         light.insert(SET_LIGHT.to_owned(), taken.to_owned());

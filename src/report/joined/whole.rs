@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use super::alerts::alerts;
-use super::combine::{Combined, combine};
+use super::combine::{CombinedRuns, combine};
 use super::listing::ReportFolder;
 use super::own_answers::{self, WholeReport, with_summary, without_hidden_models};
 use super::{enhancers, open};
@@ -76,7 +76,7 @@ pub(crate) fn write(store: &Store, mut run: StoredRun<ChoiceDetail>, show: Stdou
 pub(super) fn write_report(
     target: &ReportFolder<'_, ChoiceDetail>,
     manifest: &RunManifest,
-    combined: &Combined,
+    combined: &CombinedRuns,
     show: StdoutFormat,
 ) -> Result<String> {
     if combined.truths() == Truths::Unknown {
@@ -104,7 +104,7 @@ pub(super) fn write_report(
 /// The files of a report, by name.
 pub(super) fn files(
     report: &ChoiceReport<'_>,
-    combined: &Combined,
+    combined: &CombinedRuns,
     runs: SummaryRuns<'_>,
 ) -> Result<Vec<(String, Vec<u8>)>> {
     let products = products(report, &combined.page_inputs())?;

@@ -18,10 +18,10 @@ use crate::report::charts::paper::figure;
 use crate::report::json;
 use crate::report::products::{PAGE, table_files};
 use crate::report::text::alert::{Alert, lines};
-use crate::report::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
 use crate::report::text::table::Table;
 use crate::report::text::terminal::{self, wrapped};
-use crate::report::text::words::NoiseProfiles;
+use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
 use crate::types::AxisLevel;
 use crate::types::manifests::RunManifest;
@@ -52,7 +52,7 @@ pub(crate) fn products(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<
 
 /// Head of `summary.json`.
 #[derive(Serialize)]
-struct Head<'a> {
+struct OpenHead<'a> {
     schema: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     folder: Option<&'a Path>,
@@ -65,7 +65,7 @@ struct Head<'a> {
     clustered_by: &'static str,
     clusters: usize,
     /// Noise profiles of the noisy images.
-    readings: NoiseProfiles,
+    readings: ProfileNames,
     alerts: &'a [Alert],
 }
 
@@ -80,7 +80,7 @@ pub(crate) fn summary_json(
     folder: Option<&Path>,
     length: ReportLength,
 ) -> Result<String> {
-    let head = Head {
+    let head = OpenHead {
         schema: "darkqa.openeqa-summary/1",
         folder,
         run: report.manifest,
@@ -187,7 +187,7 @@ fn panel(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>, l
 /// Scores of a series over the levels. L0 is the start of the series in the ladder.
 fn curve(
     ladder: &Ladder<'_, OpenCell>,
-    series: &Series<'_>,
+    series: &LadderSeries<'_>,
     cells: &SeriesByLevel<'_, OpenCell>,
     style: LineStyle,
 ) -> PlotLine {

@@ -2,7 +2,7 @@
 
 use crate::report::tables::EnhancerRow;
 use crate::report::text::alert::Alert;
-use crate::report::text::words::NoiseProfiles;
+use crate::report::text::words::ProfileNames;
 use crate::types::manifests::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
 use darkqa_score::choice::llm_match::Protocol;
@@ -42,8 +42,8 @@ impl OpenReport<'_> {
     }
 
     /// Noise profiles of the noisy images.
-    pub(super) fn noise_profiles(&self) -> NoiseProfiles {
-        NoiseProfiles::new(self.answers.iter().map(|answer| &answer.subject))
+    pub(super) fn noise_profiles(&self) -> ProfileNames {
+        ProfileNames::new(self.answers.iter().map(|answer| &answer.subject))
     }
 }
 

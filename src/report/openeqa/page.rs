@@ -11,8 +11,8 @@ use super::tables::{SECTION, ladder};
 use crate::error::Result;
 use crate::report::charts::chart::Figure;
 use crate::report::page::data::{
-    ABSENT, Distinct, FAILED, Item, PageData, PageKind, PageSubject, Question, SizeLimit, UNREAD, levels, packed_by,
-    shortened, sizes, thumbnails,
+    ABSENT, DistinctList, FAILED, PageData, PageItem, PageKind, PageQuestion, PageSubject, SizeLimit, UNREAD, levels,
+    packed_by, shortened, sizes, thumbnails,
 };
 use crate::report::page::{OpenContent, page_of_open_questions};
 use crate::report::tables::Section;
@@ -184,7 +184,7 @@ pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
 
 /// Results of all answers. Nested lists have a row for each subject and a column for each item.
 struct Results<'a> {
-    items: Vec<Item>,
+    items: Vec<PageItem>,
     /// Mark of each answer, or the code of another outcome.
     codes: Vec<Vec<u8>>,
     /// Index into `reasons` for each answer.
@@ -202,11 +202,11 @@ fn data<'a>(
     subjects: &[&'a model_in_condition::ModelInCondition],
     limit: SizeLimit,
 ) -> PageData<'a> {
-    let (mut frames, mut families) = (Distinct::new(), Distinct::new());
-    let questions: Vec<Question<'_>> = report
+    let (mut frames, mut families) = (DistinctList::new(), DistinctList::new());
+    let questions: Vec<PageQuestion<'_>> = report
         .questions
         .iter()
-        .map(|question| Question {
+        .map(|question| PageQuestion {
             id: &question.id.0,
             frame: frames.index_of(&*question.frame.0),
             family: families.index_of([question.family.name(), words::family(Some(&question.family))]),
@@ -266,9 +266,9 @@ fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&model_in_condition::Mode
             cells[answer.question][subject].push(answer);
         }
     }
-    let mut texts = Distinct::new();
+    let mut texts = DistinctList::new();
     texts.index_of("");
-    let mut reasons = Distinct::new();
+    let mut reasons = DistinctList::new();
     for reason in REASONS {
         reasons.index_of(reason);
     }
@@ -280,7 +280,7 @@ fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&model_in_condition::Mode
     for (number, (question, answers)) in report.questions.iter().zip(&cells).enumerate() {
         let times = answers.iter().map(Vec::len).max();
         for time in 0..times.unwrap_or(0).max(1) {
-            items.push(Item {
+            items.push(PageItem {
                 name: match time {
                     0 => question.id.to_string(),
                     time => format!("{}#{}", question.id, time + 1),

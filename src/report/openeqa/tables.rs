@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::open_report::{OpenReport, ReportedAnswer};
 use crate::error::{Error, Result};
 use crate::report::tables::{enhancers, with_training};
-use crate::report::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
 use crate::report::text::latex::escape;
 use crate::report::text::table::ColumnKind::{self, Accuracy, Count, Points, Share, Text};
 use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell};
@@ -144,7 +144,7 @@ fn notes_without_images(summary: &OpenSummary, ladder: &Ladder<'_, OpenCell>) ->
 /// table, with a column for models without images.
 fn by_group(
     summary: &OpenSummary,
-    series: &Series<'_>,
+    series: &LadderSeries<'_>,
     whole: &Ladder<'_, OpenCell>,
     groups: &[(&Group, Ladder<'_, OpenCell>)],
 ) -> Table {

@@ -75,9 +75,9 @@ pub(crate) struct PageData<'a> {
     /// Width and height of each frame in pixels; `None` if no thumbnail records them.
     pub(crate) sizes: Vec<Option<[u32; 2]>>,
     pub(crate) subjects: Vec<PageSubject<'a>>,
-    pub(crate) questions: Vec<Question<'a>>,
+    pub(crate) questions: Vec<PageQuestion<'a>>,
     pub(crate) choices: Vec<&'a [String]>,
-    pub(crate) items: Vec<Item>,
+    pub(crate) items: Vec<PageItem>,
     /// Result codes by strict parsing.
     pub(crate) strict: Vec<Vec<u8>>,
     /// Result codes by lenient parsing; empty for open questions.
@@ -92,7 +92,7 @@ pub(crate) struct PageData<'a> {
     pub(crate) replies: Vec<Vec<usize>>,
     /// Index into `texts` of each judge's reply; empty without a judge.
     pub(crate) judged: Vec<Vec<usize>>,
-    pub(crate) confusions: Vec<Confusion<'a>>,
+    pub(crate) confusions: Vec<PageConfusion<'a>>,
     /// Images by frame index and condition name.
     pub(crate) thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
 }
@@ -135,7 +135,7 @@ impl<'a> PageSubject<'a> {
 }
 
 #[derive(Serialize)]
-pub(crate) struct Question<'a> {
+pub(crate) struct PageQuestion<'a> {
     pub(crate) id: &'a str,
     pub(crate) frame: usize,
     pub(crate) family: usize,
@@ -154,7 +154,7 @@ pub(crate) struct Question<'a> {
 }
 
 #[derive(Serialize)]
-pub(crate) struct Item {
+pub(crate) struct PageItem {
     /// Question id, with the item's number if it is not the question's first item, as in `id#2`.
     pub(crate) name: String,
     pub(crate) question: usize,
@@ -165,7 +165,7 @@ pub(crate) struct Item {
 }
 
 #[derive(Serialize)]
-pub(crate) struct Confusion<'a> {
+pub(crate) struct PageConfusion<'a> {
     pub(crate) subject: usize,
     pub(crate) family: &'a str,
     pub(crate) labels: &'a [String],
@@ -185,12 +185,12 @@ pub(crate) struct Picture<'a> {
 }
 
 /// List of distinct entries, and the index of each entry.
-pub(crate) struct Distinct<T> {
+pub(crate) struct DistinctList<T> {
     pub(crate) list: Vec<T>,
     pub(crate) indices: HashMap<T, usize>,
 }
 
-impl<T: Copy + Eq + std::hash::Hash> Distinct<T> {
+impl<T: Copy + Eq + std::hash::Hash> DistinctList<T> {
     pub(crate) fn new() -> Self {
         Self { list: Vec::new(), indices: HashMap::new() }
     }

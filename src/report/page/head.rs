@@ -9,10 +9,10 @@ use serde::Serialize;
 use super::run_usage::PageInputs;
 use crate::error::Result;
 use crate::report::charts::chart::{Chart, Figure, FigureChart};
-use crate::report::charts::figures::{Names, overview, split};
+use crate::report::charts::figures::{DisplayNames, overview, split};
 use crate::report::charts::paper::figure;
 use crate::report::choice_report::ChoiceReport;
-use crate::report::finding_groups::{Effect, Finding, FindingGroups};
+use crate::report::finding_groups::{Effect, FindingGroups, GroupedFinding};
 use crate::report::sentences::capitalised;
 use crate::report::text::words::light;
 use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
@@ -45,12 +45,12 @@ struct FindingRow {
     at: String,
     /// Intervals in other variants.
     in_other_lights: Vec<String>,
-    mark: Option<Mark>,
+    mark: Option<IntervalMark>,
 }
 
 /// Interval drawn as a line with a dot, in units from −[`MARK_REACH`] to +[`MARK_REACH`] around zero.
 #[derive(Serialize)]
-struct Mark {
+struct IntervalMark {
     value: f64,
     low: f64,
     high: f64,
@@ -103,7 +103,7 @@ fn with_unbroken_percent(text: &str) -> String {
 }
 
 /// Difference of a finding with the ends of its interval, in points; `None` for a share.
-fn difference(finding: &Finding<'_>) -> Option<[f64; 3]> {
+fn difference(finding: &GroupedFinding<'_>) -> Option<[f64; 3]> {
     match Effect::from_sentence(finding.main_sentence())? {
         Effect::Difference(numbers) => Some(numbers),
         Effect::Share(_) => None,
@@ -111,7 +111,7 @@ fn difference(finding: &Finding<'_>) -> Option<[f64; 3]> {
 }
 
 impl FindingRow {
-    fn new(group: &'static str, finding: &Finding<'_>, reach: f64) -> Self {
+    fn new(group: &'static str, finding: &GroupedFinding<'_>, reach: f64) -> Self {
         let tone = finding.main_sentence().tone;
         let mut intervals = finding.intervals();
         let others = intervals.split_off(intervals.len().min(1));
@@ -129,7 +129,7 @@ impl FindingRow {
             in_other_lights: others.iter().map(ToString::to_string).collect(),
             mark: difference(finding).map(|numbers| {
                 let [value, low, high] = numbers.map(|x| (x / reach * MARK_REACH * 10.0).round() / 10.0);
-                Mark { value, low, high }
+                IntervalMark { value, low, high }
             }),
         }
     }
@@ -138,7 +138,7 @@ impl FindingRow {
 /// Chart of the first screen: mean accuracy by level raw and with each enhancer, else by variant, else accuracy of each
 /// model.
 fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
-    let panels = overview(report.findings, &Names::default());
+    let panels = overview(report.findings, &DisplayNames::default());
     ["enhancers", "variants", "models"]
         .into_iter()
         .find_map(|wanted| {
@@ -177,12 +177,12 @@ struct StripRow {
 struct StripCell {
     url: String,
     alt: String,
-    answers: Vec<Answer>,
+    answers: Vec<ImageAnswer>,
 }
 
 /// A model's answer in one condition.
 #[derive(Serialize)]
-struct Answer {
+struct ImageAnswer {
     class: &'static str,
     sign: char,
     /// Text of the choice or of the reason why there is none, after the model's name if there are several models.
@@ -190,7 +190,7 @@ struct Answer {
 }
 
 /// Variant and enhancer of a row of images.
-struct Row<'a> {
+struct ImageRow<'a> {
     variant: Variant,
     enhancer: Option<&'a EnhancerName>,
 }
@@ -244,7 +244,7 @@ impl Strip {
     }
 }
 
-impl<'a> Row<'a> {
+impl<'a> ImageRow<'a> {
     /// Trial of an item with a model at a level of this row.
     fn trial(&'a self, grid: &'a Grid<'a>, model: &'a str, item: usize, level: AxisLevel) -> StripTrial<'a> {
         StripTrial { grid, model, item, level, row: self }
@@ -271,7 +271,7 @@ impl<'a> Row<'a> {
         let cells = levels.iter().map(|level| {
             let thumbnail =
                 thumbnails.iter().find(|thumbnail| thumbnail.frame == *frame && self.contains(thumbnail, *level))?;
-            let answers: Vec<Answer> = models
+            let answers: Vec<ImageAnswer> = models
                 .iter()
                 .filter_map(|model| self.trial(grid, model, item, *level).answer(models.len() > 1))
                 .collect();
@@ -296,7 +296,7 @@ impl<'a> Row<'a> {
 
 /// Rows of a strip: another variant such as exposure drop alone, the main variant, and the main variant with each
 /// enhancer.
-fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
+fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<ImageRow<'a>> {
     let Some(main) = grid.main_variant() else {
         return Vec::new();
     };
@@ -314,7 +314,7 @@ fn rows<'a>(grid: &Grid<'_>, thumbnails: &[&'a Thumbnail]) -> Vec<Row<'a>> {
         .into_iter()
         .chain(main_variant)
         .take(MAX_ROWS)
-        .map(|(variant, enhancer)| Row { variant: variant.clone(), enhancer: *enhancer })
+        .map(|(variant, enhancer)| ImageRow { variant: variant.clone(), enhancer: *enhancer })
         .collect()
 }
 
@@ -336,7 +336,7 @@ struct StripTrial<'a> {
     model: &'a str,
     item: usize,
     level: AxisLevel,
-    row: &'a Row<'a>,
+    row: &'a ImageRow<'a>,
 }
 
 impl StripTrial<'_> {
@@ -357,7 +357,7 @@ impl StripTrial<'_> {
     }
 
     /// Answer with its mark; `None` if the item was not asked. `has_name` puts the model's name before the text.
-    fn answer(self, has_name: bool) -> Option<Answer> {
+    fn answer(self, has_name: bool) -> Option<ImageAnswer> {
         let result = self.result(self.row.enhancer)?;
         if !result.is_asked() {
             return None;
@@ -376,14 +376,18 @@ impl StripTrial<'_> {
                 }
             }
         };
-        Some(Answer { class, sign, text: if has_name { format!("{}: {text}", self.model) } else { text.to_owned() } })
+        Some(ImageAnswer {
+            class,
+            sign,
+            text: if has_name { format!("{}: {text}", self.model) } else { text.to_owned() },
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::sentences::{Scope, Sentence, Tone};
+    use crate::report::sentences::{EffectDirection, Sentence, SentenceScope};
 
     #[test]
     fn a_percent_sign_stays_with_its_number() {
@@ -395,11 +399,11 @@ mod tests {
         let values = [("difference", -20.0), ("low", -40.0), ("high", -5.0)];
         let wide = Sentence {
             kind: "darkness",
-            tone: Tone::Worse,
+            tone: EffectDirection::Worse,
             text: "Darkness costs.".to_owned(),
             detail: String::new(),
             values: values.map(|(name, value)| (name.to_owned(), value)).into(),
-            scope: Scope::default(),
+            scope: SentenceScope::default(),
         };
         let head = PageHead::without_images(&FindingGroups::new(&[wide]));
         let row = &head.rows[0];

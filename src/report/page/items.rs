@@ -5,8 +5,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::data::{
-    ABSENT, Confusion, Distinct, FAILED, Item, PageData, PageKind, PageSubject, Question, SizeLimit, UNREAD, levels,
-    packed_by, shortened, sizes, thumbnails,
+    ABSENT, DistinctList, FAILED, PageConfusion, PageData, PageItem, PageKind, PageQuestion, PageSubject, SizeLimit,
+    UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
 use super::run_usage::PageInputs;
 use crate::error::Result;
@@ -41,8 +41,8 @@ fn data<'a>(
     replies: &Replies,
     limit: SizeLimit,
 ) -> PageData<'a> {
-    let (mut frames, mut families) = (Distinct::new(), Distinct::new());
-    let (mut question_ids, mut choices) = (Distinct::new(), Distinct::new());
+    let (mut frames, mut families) = (DistinctList::new(), DistinctList::new());
+    let (mut question_ids, mut choices) = (DistinctList::new(), DistinctList::new());
     let mut questions = Vec::new();
     let mut items = Vec::new();
     let mut times = HashMap::<&QuestionId, usize>::new();
@@ -51,7 +51,7 @@ fn data<'a>(
         let number = question_ids.index_of(&*asked.question);
         if number == questions.len() {
             let run_question = run_questions.get(&*asked.question);
-            questions.push(Question {
+            questions.push(PageQuestion {
                 id: &asked.question.0,
                 frame: frames.index_of(&*asked.frame.0),
                 family: families.index_of([asked.family.name(), family(Some(&asked.family))]),
@@ -65,7 +65,7 @@ fn data<'a>(
         }
         let time = times.entry(&asked.question).or_default();
         *time += 1;
-        items.push(Item {
+        items.push(PageItem {
             name: match time {
                 1 => asked.question.to_string(),
                 time => format!("{}#{time}", asked.question),
@@ -174,7 +174,7 @@ impl NoAnswerReason {
 /// Distinct reasons for results without an answer, the first one empty, and the index of the reason by subject and
 /// item.
 fn reasons(grid: &Grid<'_>) -> (Vec<String>, Vec<Vec<usize>>) {
-    let mut reasons = Distinct::new();
+    let mut reasons = DistinctList::new();
     reasons.index_of(NoAnswerReason::None);
     let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
@@ -224,11 +224,11 @@ impl Replies {
     }
 }
 
-fn confusion_data<'a>(grid: &Grid<'_>, confusions: &'a [confusion::Confusion]) -> Vec<Confusion<'a>> {
+fn confusion_data<'a>(grid: &Grid<'_>, confusions: &'a [confusion::Confusion]) -> Vec<PageConfusion<'a>> {
     confusions
         .iter()
         .filter_map(|confusion| {
-            Some(Confusion {
+            Some(PageConfusion {
                 subject: grid.find(&confusion.subject)?,
                 family: confusion.family.name(),
                 labels: &confusion.labels,

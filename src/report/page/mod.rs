@@ -28,7 +28,7 @@ use crate::report::tables::{SECTIONS, Section};
 use crate::report::template::render;
 use crate::report::text::alert::{Alert, AlertKind};
 use crate::report::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
-use crate::report::text::words::{NoiseProfiles, ends, interval, words};
+use crate::report::text::words::{ProfileNames, ends, interval, words};
 use crate::types::flags::setting_spelling;
 use crate::types::manifests::RunManifest;
 use crate::types::{Thumbnail, Truths};
@@ -268,7 +268,7 @@ fn title(who: &str, inputs: &PageInputs<'_>) -> String {
 fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
     let grid = &report.findings.grid;
     let size = format!("{} (95 %) · strict parsing", head(report));
-    let readings = NoiseProfiles::new(&grid.subjects);
+    let readings = ProfileNames::new(&grid.subjects);
     let models = grid.subjects.iter().map(|subject| &*subject.model);
     let has_people = models.clone().any(|model| grid.listing.is_people(model));
     let has_models = models_under_test(models).iter().any(|model| !grid.listing.is_people(model));

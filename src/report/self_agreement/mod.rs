@@ -24,16 +24,16 @@ use crate::error::Result;
 use crate::report::charts::chart::{Chart, Figure, FigureChart, LineContent, LineStyle, Panel, PlotLine};
 use crate::report::charts::paper::figure;
 use crate::report::finding_groups::FindingGroups;
-use crate::report::json::{Rows, RunsHead, SummaryRuns, document};
+use crate::report::json::{JsonRows, RunsHead, SummaryRuns, document};
 use crate::report::page::{PageContent, PageHead, PageInputs, page_of};
 use crate::report::products::files;
 use crate::report::sentences::Sentence;
 use crate::report::short::who_is_judged;
 use crate::report::text::alert::Alert;
-use crate::report::text::ladder::{Ladder, Series, SeriesByLevel};
+use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
 use crate::report::text::table::Table;
 use crate::report::text::terminal::{render, table, wrapped};
-use crate::report::text::words::NoiseProfiles;
+use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
 use crate::types::manifests::RunManifest;
 use crate::types::text::{counted, plural};
@@ -82,7 +82,7 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
         counted(found.grid.subjects.len(), "subject"),
         counted(found.grid.clusters, "cluster")
     );
-    let readings = NoiseProfiles::new(&found.grid.subjects);
+    let readings = ProfileNames::new(&found.grid.subjects);
     std::iter::once(facts).chain(readings.open_question()).collect()
 }
 
@@ -116,11 +116,11 @@ struct Head<'a> {
     #[serde(flatten)]
     runs: RunsHead<'a>,
     measure: &'static str,
-    readings: NoiseProfiles,
+    readings: ProfileNames,
     alerts: &'a [Alert],
     findings: &'a [Sentence],
     /// Rows of `own_answers.csv`.
-    own_answers: Option<Rows<'a>>,
+    own_answers: Option<JsonRows<'a>>,
 }
 
 /// Serializes the summary of runs as JSON, with the rows of `summary.csv`.
@@ -132,10 +132,10 @@ pub(crate) fn summary(report: &AgreementReport<'_>, runs: SummaryRuns<'_>, lengt
     let head = Head {
         runs: runs.head("darkqa.self-agreement/1"),
         measure: AGREEMENT,
-        readings: NoiseProfiles::new(&report.found.grid.subjects),
+        readings: ProfileNames::new(&report.found.grid.subjects),
         alerts: &report.alerts,
         findings: &report.sentences,
-        own_answers: own_answers.map(Rows::new),
+        own_answers: own_answers.map(JsonRows::new),
     };
     document(head, &tables::summary(report.found), &report.tables, length)
 }
@@ -150,7 +150,7 @@ pub(crate) fn text(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)],
         ReportLength::Summary => text += &short_tables(report),
         ReportLength::Full => text += &render(&report.tables),
     }
-    if let Some(question) = NoiseProfiles::new(&report.found.grid.subjects).open_question() {
+    if let Some(question) = ProfileNames::new(&report.found.grid.subjects).open_question() {
         text += &wrapped(" ", &question, " ");
     }
     for (_, folder) in runs {
@@ -333,7 +333,7 @@ fn panels(
 
 fn line(
     found: &SelfAgreement<'_>,
-    series: &Series<'_>,
+    series: &LadderSeries<'_>,
     cells: &SeriesByLevel<'_, AgreementCell>,
     value: impl Fn(&AgreementCell) -> Option<Estimate>,
 ) -> PlotLine {

@@ -372,7 +372,7 @@ fn share(share: Option<Estimate>) -> TableCell {
 }
 
 /// Row of the table.
-struct MeasureRow {
+struct AgreementRow {
     /// Model and condition.
     series: String,
     measure: Measure,
@@ -410,7 +410,7 @@ fn axis_table(found: &SelfAgreement<'_>, axis: Axis, ladder: &Ladder<'_, Agreeme
             if !measure.applies_to(found, cells) {
                 continue;
             }
-            rows.push(MeasureRow {
+            rows.push(AgreementRow {
                 series: format!("{model}, {}", ladder.light(series)),
                 measure,
                 cells: levels

@@ -1,6 +1,6 @@
 //! Sentences that compare new runs with an old run, the baseline.
 
-use super::sentence::{Numbers, Sentence, Tone};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::paired::POWER;
 use darkqa_score::comparisons::{BaselineRow, MIN_PAIRS};
@@ -31,12 +31,12 @@ pub(crate) fn against_baseline(rows: &[BaselineRow], old: &str, unit: ClusterUni
 
 /// The reason why no verdict about these rows is possible.
 pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
-    too_few(rows, &mut Numbers::new(unit))
+    too_few(rows, &mut NamedNumbers::new(unit))
 }
 
 /// The reason why no verdict is possible: missing replies, too few shared questions, or too few clusters for a small
 /// p-value.
-fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
+fn too_few(rows: &[&BaselineRow], numbers: &mut NamedNumbers) -> String {
     let shared = rows.iter().map(|row| row.paired.difference.n).max().unwrap_or(0);
     let most_missing = rows
         .iter()
@@ -67,7 +67,7 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
 /// The sentence about the conditions of a model that share a verdict; `None` without conditions.
 fn detected_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
     let largest = largest(rows, |row| row.paired.difference)?;
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let verdict = largest.verdict;
     let word = if verdict == Verdict::Worse { "worse" } else { "better" };
     let up_to = if rows.len() > 1 { "up to " } else { "" };
@@ -84,17 +84,17 @@ fn detected_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> O
 /// The sentence if no difference is detected, with the largest difference; or if no verdict or no comparison is
 /// possible.
 fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     if rows.is_empty() {
         let text = format!("Nothing can be compared with {old}.");
         let detail = "no model answered the same question about the same image in both".to_owned();
-        return numbers.sentence("baseline", Tone::Note, text, detail);
+        return numbers.sentence("baseline", EffectDirection::Note, text, detail);
     }
     let possible: Vec<&BaselineRow> = rows.iter().copied().filter(|row| row.verdict.is_decided()).collect();
     let Some(largest) = largest(&possible, |row| row.paired.difference) else {
         let text = format!("No verdict against {old} is possible.");
         let detail = too_few(rows, &mut numbers);
-        return numbers.sentence("baseline", Tone::Note, text, detail);
+        return numbers.sentence("baseline", EffectDirection::Note, text, detail);
     };
     let text = format!("It is not shown that any model is worse or better than in {old}.");
     let compared = numbers.count("conditions", possible.len());
@@ -110,11 +110,11 @@ fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
         detail(largest, &mut numbers),
         detectable(&possible, &mut numbers)
     );
-    numbers.sentence("baseline", Tone::NotShown, text, detail)
+    numbers.sentence("baseline", EffectDirection::NotShown, text, detail)
 }
 
 /// The losses that the tests detect with a power of 80 %: in the most sensitive row, and in all rows.
-fn detectable(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
+fn detectable(rows: &[&BaselineRow], numbers: &mut NamedNumbers) -> String {
     let losses = rows.iter().map(|row| row.detectable.min(1.0));
     let least = losses.clone().fold(1.0, f64::min);
     let most = losses.fold(0.0, f64::max);
@@ -127,7 +127,7 @@ fn detectable(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
 }
 
 /// The names of the first conditions, and the number of further ones.
-fn conditions(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
+fn conditions(rows: &[&BaselineRow], numbers: &mut NamedNumbers) -> String {
     let names: Vec<String> = rows.iter().take(MAX_NAMED).map(|row| row.subject.condition()).collect();
     let names = names.join(", ");
     match rows.len().saturating_sub(MAX_NAMED) {
@@ -137,7 +137,7 @@ fn conditions(rows: &[&BaselineRow], numbers: &mut Numbers) -> String {
 }
 
 /// Effect, interval, p and n of a row.
-fn detail(row: &BaselineRow, numbers: &mut Numbers) -> String {
+fn detail(row: &BaselineRow, numbers: &mut NamedNumbers) -> String {
     let difference = numbers.difference("", row.paired.difference);
     let p = numbers.p("p", row.holm);
     let items = numbers.count("n", row.paired.difference.n);

@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 
 use super::pooled::{detail, runs, unconfirmed, with_verdict};
-use super::sentence::{Numbers, Sentence, Tone, capitalised, format_alone, level_runs};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, format_alone, level_runs};
 use crate::report::text::words::family as family_name;
 use crate::types::{Axis, AxisLevel, Variant};
 use darkqa_score::calibration::{Calibration, MIN_CONFIDENT_REPLIES};
@@ -27,7 +27,7 @@ pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<S
             findings.iter().copied().filter(|finding| finding.claim() == Claim::StrictOnly(Verdict::Worse)).collect();
         return format_alone(&strict_only, unit);
     };
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let who = match &largest.models[..] {
         [one] => format!("{one} is"),
         _ => "the models are".to_owned(),
@@ -37,7 +37,7 @@ pub(super) fn pooled(findings: &[&PooledFinding], unit: ClusterUnit) -> Option<S
     let place = capitalised(largest.level.axis().unwrap_or(Axis::LIGHT).place);
     let text = format!("{place} {who} less often right than {below} at {at}.");
     let detail = detail(largest, &mut numbers, &format!("; at {}", largest.level));
-    Some(numbers.sentence("below blind", Tone::Worse, text, detail))
+    Some(numbers.sentence("below blind", EffectDirection::Worse, text, detail))
 }
 
 /// Second side of a pooled finding, in words.
@@ -71,7 +71,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     if let Some(format) = format_alone(&[finding], findings.unit) {
         return Some(format);
     }
-    let mut numbers = Numbers::new(findings.unit);
+    let mut numbers = NamedNumbers::new(findings.unit);
     let (with, without) =
         (numbers.percent("with", finding.strict.first), numbers.percent("without", finding.strict.second));
     let text = match finding.claim() {
@@ -102,7 +102,7 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
         }
     };
     let detail = detail(finding, &mut numbers, "");
-    Some(numbers.sentence("images", Tone::from(finding.claim()), text, detail))
+    Some(numbers.sentence("images", EffectDirection::from(finding.claim()), text, detail))
 }
 
 /// Comparisons between raw images of a variant and no images, for each model whose findings are pooled: by family, and
@@ -131,7 +131,7 @@ pub(super) fn in_a_family(all: &[&Comparison], pooled: &[&PooledFinding], unit: 
         all.iter().copied().filter(|comparison| comparison.family == worst.family).collect();
     let below: Vec<&Comparison> = in_family.iter().copied().filter(|comparison| is_below(comparison)).collect();
     let models_below = model_count(&below);
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let family = capitalised(family_name(worst.family.as_ref()));
     let text = if models_below == 1 {
         let than = second_side(worst);
@@ -144,7 +144,7 @@ pub(super) fn in_a_family(all: &[&Comparison], pooled: &[&PooledFinding], unit: 
         format!("{family}: {fallen} of {models} models are less often right than {than}.")
     };
     let detail = comparison_detail(worst, &mut numbers)?;
-    Some(numbers.sentence("below blind", Tone::Worse, text, detail))
+    Some(numbers.sentence("below blind", EffectDirection::Worse, text, detail))
 }
 
 /// Number of different models on the first sides of comparisons.
@@ -187,7 +187,7 @@ fn levels(comparisons: &[&Comparison]) -> Vec<AxisLevel> {
 }
 
 /// Effect, interval, p and n of a comparison of images with no images.
-fn comparison_detail(comparison: &Comparison, numbers: &mut Numbers) -> Option<String> {
+fn comparison_detail(comparison: &Comparison, numbers: &mut NamedNumbers) -> Option<String> {
     let (model, level) = (&comparison.first.model, comparison.first.level?);
     let against = if is_own(comparison) { String::new() } else { format!(" against {}", comparison.second.model) };
     let tested = &comparison.strict;
@@ -253,7 +253,7 @@ pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Se
         let [value, other] = [a, b].map(|one| one.dark.overconfidence.estimate.value);
         a.is_overconfident().cmp(&b.is_overconfident()).then(value.total_cmp(&other))
     })?;
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let (model, level) = (most.model, most.level);
     let sure = numbers.percent("confidence", most.dark.confidence.value);
     let right = numbers.percent("accuracy", most.dark.accuracy.value);
@@ -262,18 +262,18 @@ pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Se
             "{model} does not know how little it sees at {level}: its mean confidence is {sure} %, and {right} % of its replies are \
              right."
         );
-        (Tone::Worse, text)
+        (EffectDirection::Worse, text)
     } else if most.is_overconfident() {
         let text = format!(
             "At {level} {model} is surer than it is right: its mean confidence is {sure} %, and {right} % of its replies are right."
         );
-        (Tone::Worse, text)
+        (EffectDirection::Worse, text)
     } else {
         let text = format!(
             "{model} was not detected to be surer than it is right at {level}: its mean confidence is {sure} %, and {right} % of its \
              replies are right."
         );
-        (Tone::NotShown, text)
+        (EffectDirection::NotShown, text)
     };
     let difference = numbers.difference("", most.dark.overconfidence.estimate);
     let tested = most.dark.overconfidence;

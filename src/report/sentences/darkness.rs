@@ -4,7 +4,7 @@
 
 use super::pooled::{curve, detail, lower_or_higher, mean_levels, reservation, runs, unconfirmed, with_verdict};
 use super::sample::{Undecided, WIDE, is_impossible, silent_levels};
-use super::sentence::{Numbers, Sentence, Tone, capitalised, format_alone};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, format_alone};
 use crate::report::text::words::light;
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, RunGroup, Variant};
@@ -123,7 +123,7 @@ pub(super) fn with_variant(
     name: Option<&str>,
     unit: ClusterUnit,
 ) -> Option<Sentence> {
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let undecided = Undecided::new(levels, silent);
     let verdict = verdict(levels);
     let is_shown = verdict.is_some_and(Verdict::is_shown);
@@ -184,7 +184,7 @@ pub(super) fn with_variant(
         format!("; missing replies allow no verdict at {}", undecided.at())
     };
     let detail = detail(darkest, &mut numbers, &(more + &without));
-    Some(numbers.sentence("darkness", Tone::from(verdict), text, detail))
+    Some(numbers.sentence("darkness", EffectDirection::from(verdict), text, detail))
 }
 
 /// A sentence that begins with the name of a variant, if any.
@@ -201,7 +201,7 @@ fn over_levels(
     levels: &[&PooledFinding],
     verdict: Verdict,
     name: Option<&str>,
-    mut numbers: Numbers,
+    mut numbers: NamedNumbers,
 ) -> Sentence {
     let size = mean.strict.difference.value;
     let cause = mean.level.axis().unwrap_or(Axis::LIGHT).cause;
@@ -222,7 +222,7 @@ fn over_levels(
 
 /// The largest loss that the intervals do not exclude, if it is large, so that a small sample is not mistaken for good
 /// night vision.
-fn possible_loss(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
+fn possible_loss(levels: &[&PooledFinding], numbers: &mut NamedNumbers) -> String {
     let Some(finding) = levels.iter().min_by(|a, b| {
         let [a, b] = [a, b].map(|finding| finding.strict.difference.low);
         a.total_cmp(&b)

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::pooled::{detail, runs, with_verdict};
-use super::sentence::{Numbers, Sentence, Tone};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence};
 use crate::report::text::words::family as family_name;
 use crate::types::{AxisLevel, Family, Variant};
 use darkqa_score::answers::confusion::{Collapse, FalseAnswer, MIN_EXCESS};
@@ -17,7 +17,7 @@ use darkqa_score::significance::Verdict;
 pub(super) fn false_answers(levels: &[&PooledFinding], answer: FalseAnswer, unit: ClusterUnit) -> Option<Sentence> {
     let detected = with_verdict(levels, Verdict::Worse);
     let worst = detected.last()?;
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let objects = match answer {
         FalseAnswer::No => "that are there",
         FalseAnswer::Yes => "that are not there",
@@ -31,7 +31,7 @@ pub(super) fn false_answers(levels: &[&PooledFinding], answer: FalseAnswer, unit
     );
     let more = format!("; an increase is shown at {}", runs(&detected, levels));
     let detail = detail(worst, &mut numbers, &more);
-    Some(numbers.sentence("hallucination", Tone::Worse, text, detail))
+    Some(numbers.sentence("hallucination", EffectDirection::Worse, text, detail))
 }
 
 /// The answer that a model gives most often to the questions of a family at the darkest level.
@@ -82,7 +82,7 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
         detected.clone().reduce(|largest, next| if next.excess() > largest.excess() { next } else { largest })?;
     let of_family = answers.iter().filter(|answer| answer.family == largest.family);
     let collapsed = detected.clone().filter(|answer| answer.family == largest.family);
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let (level, model, top) = (largest.level, largest.model, &largest.collapse.top);
     let name = family_name(Some(largest.family));
     let share = numbers.percent("share", largest.collapse.share.value);
@@ -106,11 +106,11 @@ pub(super) fn collapse(answers: &[TopAnswer<'_>], unit: ClusterUnit) -> Option<S
     let others: Vec<&str> = others.into_iter().collect();
     let detail = collapse_detail(largest, &mut numbers);
     let detail = if others.is_empty() { detail } else { format!("{detail}; also in {}", others.join(", ")) };
-    Some(numbers.sentence("collapse", Tone::Worse, text, detail))
+    Some(numbers.sentence("collapse", EffectDirection::Worse, text, detail))
 }
 
 /// Share of an answer with its interval, share at L0, limit and n.
-fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut Numbers) -> String {
+fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut NamedNumbers) -> String {
     let share = answer.collapse.share;
     numbers.at(&answer.level);
     let value = numbers.percent("share", share.value);

@@ -41,16 +41,16 @@ use darkqa_score::findings::Findings;
 use darkqa_score::photographs::{ConditionFidelity, FidelityFindings};
 use darkqa_score::significance::ALPHA;
 use pooled::UNCONFIRMED;
-use sentence::Numbers;
+use sentence::NamedNumbers;
 
 #[cfg(test)]
-pub(crate) use sentence::Scope;
+pub(crate) use sentence::SentenceScope;
 
 pub(crate) use baseline::{against_baseline, no_verdict};
 pub(crate) use models::dark_levels;
 pub(crate) use sample::left_out;
 pub(crate) use self_agreement::self_agreement;
-pub(crate) use sentence::{Sentence, Tone, capitalised};
+pub(crate) use sentence::{EffectDirection, Sentence, capitalised};
 
 /// The line below the sentences that explains their signs, p-values and intervals.
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
@@ -153,14 +153,14 @@ fn unread(findings: &Findings<'_>) -> Option<Sentence> {
     if unread == 0 || share > MAX_UNREAD {
         return None;
     }
-    let mut numbers = Numbers::new(findings.unit);
+    let mut numbers = NamedNumbers::new(findings.unit);
     let count = numbers.count("unread", unread);
     let noun = if unread == 1 { "reply" } else { "replies" };
     let percent = numbers.percent("share", share);
     let text = format!("{count} {noun} ({percent} %) could not be read.");
     let all = numbers.count("replies", replies);
     let detail = format!("of {all} replies; those that cannot be read count as wrong");
-    Some(numbers.sentence("unread", Tone::Note, text, detail))
+    Some(numbers.sentence("unread", EffectDirection::Note, text, detail))
 }
 
 /// Whether PSNR predicts right answers within a condition, and the effect of the enhancer with the largest PSNR gain on
@@ -168,20 +168,21 @@ fn unread(findings: &Findings<'_>) -> Option<Sentence> {
 fn fidelity(findings: &Findings<'_>) -> Option<Sentence> {
     let fidelity = findings.fidelity.as_ref()?;
     let auc = fidelity.within[0]?;
-    let mut numbers = Numbers::new(findings.unit);
+    let mut numbers = NamedNumbers::new(findings.unit);
     let estimate = auc.estimate;
     let is_detected = fidelity.p_report.is_some_and(|p| p < ALPHA);
     let excludes_chance = estimate.low > 0.5 || estimate.high < 0.5;
-    let (more, tone) = if estimate.value > 0.5 { ("more", Tone::Better) } else { ("fewer", Tone::Worse) };
+    let (more, tone) =
+        if estimate.value > 0.5 { ("more", EffectDirection::Better) } else { ("fewer", EffectDirection::Worse) };
     let (tone, text) = if is_detected {
         let text = format!("Within a condition, images with a higher PSNR get {more} right answers.");
         (tone, text)
     } else if excludes_chance {
         let text = format!("Within a condition, images with a higher PSNR get {more} right answers{UNCONFIRMED}.");
-        (Tone::NotShown, text)
+        (EffectDirection::NotShown, text)
     } else {
         let text = "Within a condition, PSNR was not detected to tell right from wrong answers.";
-        (Tone::NotShown, text.to_owned())
+        (EffectDirection::NotShown, text.to_owned())
     };
     let ends = [("auc", estimate.value), ("low", estimate.low), ("high", estimate.high)];
     let [value, low, high] = ends.map(|(name, value)| numbers.number(name, value, 2));
@@ -228,7 +229,7 @@ fn largest_gain<'f>(findings: &'f Findings<'_>, fidelity: &'f FidelityFindings) 
         .map(|(_, gain)| gain)
 }
 
-fn example_text(gain: &Gain<'_>, numbers: &mut Numbers) -> String {
+fn example_text(gain: &Gain<'_>, numbers: &mut NamedNumbers) -> String {
     let Gain { enhanced, raw, answers } = gain;
     let (Some(enhancer), Some(before), Some(after)) = (&enhanced.enhancer, raw.means[0], enhanced.means[0]) else {
         return String::new();
@@ -254,7 +255,7 @@ fn readings(found: &[FindingByProfile], unit: ClusterUnit) -> Option<Sentence> {
     let [all, some, reversed, none, open] =
         [Robustness::All, Robustness::Some, Robustness::Reversed, Robustness::None, Robustness::Open]
             .map(|robustness| whole.iter().filter(|one| one.robustness == robustness).count());
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let text = format!(
         "{} of {} findings about noise {} under all {} noise profiles.",
         numbers.count("all", all),
@@ -270,5 +271,5 @@ fn readings(found: &[FindingByProfile], unit: ClusterUnit) -> Option<Sentence> {
         numbers.count("none", none),
         numbers.count("open", open),
     );
-    Some(numbers.sentence("readings", Tone::Note, text, detail))
+    Some(numbers.sentence("readings", EffectDirection::Note, text, detail))
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 use super::darkness::Topic;
 use super::sample::{listed, topic_in_light};
-use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, level_runs};
 use crate::report::text::words::{family, light};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, Family, UnreadReason, Variant, View};
@@ -27,7 +27,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let best = findings.best.as_ref().filter(|best| best.is_possible())?;
     let lenient = findings.lenient_best.as_ref()?;
     let (leader, second) = (best.leader(), best.models.get(1)?);
-    let mut numbers = Numbers::new(findings.unit);
+    let mut numbers = NamedNumbers::new(findings.unit);
     let over = dark_levels(best);
     let axis = best.variant.kind.map_or(Axis::LIGHT, Kind::axis);
     let place = axis.place;
@@ -36,20 +36,20 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let is_best = findings.detected_best().is_some();
     let blind = if best.gain.is_against_blind { "its own replies without images" } else { "chance" };
     let (tone, text) = if let Some(crossing) = &crossing {
-        (Tone::Note, crossing.text())
+        (EffectDirection::Note, crossing.text())
     } else if is_best && best.gain.is_detected() && lenient.gain.is_detected() {
         let text = format!("{} sees best {place} ({over}).", leader.model);
-        (Tone::Better, text)
+        (EffectDirection::Better, text)
     } else if is_best {
         let text = format!(
             "{} has the highest mean accuracy {place} ({over}), but was not detected to be above {blind}.",
             leader.model
         );
-        (Tone::Note, text)
+        (EffectDirection::Note, text)
     } else if leaders.len() > 1 {
         let models = listed(&leaders);
         let text = format!("{models} share the highest mean accuracy {place} ({over}).");
-        (Tone::NotShown, text)
+        (EffectDirection::NotShown, text)
     } else {
         let others = match &best.not_shown_better_than[..] {
             [] => "the others".to_owned(),
@@ -59,7 +59,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
             "{} has the highest mean accuracy {place} ({over}), but was not detected to be better than {others}.",
             leader.model
         );
-        (Tone::NotShown, text)
+        (EffectDirection::NotShown, text)
     };
     let value = numbers.percent("mean", leader.mean.value);
     let ends = numbers.share_ends("mean_", leader.mean);
@@ -151,7 +151,7 @@ impl<'b> DetectedCrossing<'b> {
     }
 
     /// The largest difference in each direction, and the larger p-value of the two.
-    fn detail(&self, numbers: &mut Numbers) -> String {
+    fn detail(&self, numbers: &mut NamedNumbers) -> String {
         let ends = [(&self.light, "_before"), (&self.dark, "_after")];
         let mut p = 0.0_f64;
         let differences: Vec<String> = ends
@@ -196,7 +196,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
     if whole.claim() != Claim::Detected(Verdict::Worse) || of_most.value >= 0.0 {
         return None;
     }
-    let mut numbers = Numbers::new(findings.unit);
+    let mut numbers = NamedNumbers::new(findings.unit);
     let text = format!(
         "{} costs more in {} ({} points at {}) than in {} ({}).",
         capitalised(contrast.level.axis().unwrap_or(Axis::LIGHT).cause),
@@ -218,7 +218,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
         "{of_most}, n = {}, against {of_least}, n = {}: difference {difference}, {p}; {of_pairs} of families",
         sample[0], sample[1]
     );
-    Some(numbers.sentence("families", Tone::Note, text, detail))
+    Some(numbers.sentence("families", EffectDirection::Note, text, detail))
 }
 
 /// One sentence for each person, and for each model excluded from the mean cost of darkness in a light: its accuracy at
@@ -341,7 +341,7 @@ fn sentence(findings: &Findings<'_>, name: &str, variant: &Variant) -> Option<Se
     if accuracies.is_empty() {
         return None;
     }
-    let mut numbers = Numbers::new(findings.unit);
+    let mut numbers = NamedNumbers::new(findings.unit);
     let (mut own_shares, mut other_shares, mut details) = (Vec::new(), Vec::new(), Vec::new());
     for accuracy in &accuracies {
         let level = accuracy.level;
@@ -384,5 +384,5 @@ fn sentence(findings: &Findings<'_>, name: &str, variant: &Variant) -> Option<Se
         let topic = topic_in_light(PooledKind::Darkness, variant, None);
         format!("{details}; in no mean about {topic}")
     };
-    Some(numbers.sentence("apart", Tone::Note, text, detail))
+    Some(numbers.sentence("apart", EffectDirection::Note, text, detail))
 }

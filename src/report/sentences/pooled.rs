@@ -1,7 +1,7 @@
 //! Sentences about noise and enhancers, over all models together.
 
 use super::sample::Undecided;
-use super::sentence::{Numbers, Sentence, Tone, format_alone, level_runs, models};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence, format_alone, level_runs, models};
 use crate::types::AxisLevel;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, PooledFinding};
@@ -45,7 +45,7 @@ impl<'f> DetectedEffect<'f> {
     }
 
     /// The size in words: `up to 5.0 points`, `5.0 points` for one level, or `5.0 points on average`.
-    fn size(&self, numbers: &mut Numbers) -> String {
+    fn size(&self, numbers: &mut NamedNumbers) -> String {
         let size = numbers.size("effect", self.largest.strict.difference.value);
         if self.is_mean() {
             format!("{size} points on average")
@@ -91,7 +91,7 @@ pub(super) fn noise(levels: &[&PooledFinding], means: &[&PooledFinding], unit: C
     let mut sentences = Vec::new();
     for (verdict, word) in [(Verdict::Worse, "lower"), (Verdict::Better, "higher")] {
         for effect in DetectedEffect::all(levels, means, verdict) {
-            let mut numbers = Numbers::new(unit);
+            let mut numbers = NamedNumbers::new(unit);
             let size = effect.size(&mut numbers).replace(" points", &format!(" points {word}"));
             let (at, more) = if effect.is_mean() {
                 (effect.at.clone(), effect.place())
@@ -119,7 +119,7 @@ pub(super) fn noise(levels: &[&PooledFinding], means: &[&PooledFinding], unit: C
     if let Some(format) = format_alone(levels, unit) {
         return vec![format];
     }
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
         let difference = largest.strict.difference.value;
         format!(
@@ -133,7 +133,7 @@ pub(super) fn noise(levels: &[&PooledFinding], means: &[&PooledFinding], unit: C
     };
     let more = format!("; largest at {}{}", largest.level, reservation(largest, &mut numbers));
     let detail = detail(largest, &mut numbers, &more);
-    vec![numbers.sentence("noise", Tone::NotShown, text, detail)]
+    vec![numbers.sentence("noise", EffectDirection::NotShown, text, detail)]
 }
 
 /// The effects of each enhancer: a sentence for each verdict, with its levels.
@@ -166,7 +166,7 @@ fn enhancer(
 ) -> Option<Sentence> {
     let name = effect.largest.enhancer.as_ref()?;
     let at = &effect.at;
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     numbers.about(name);
     let size = effect.size(&mut numbers);
     let is_better = verdict == Verdict::Better;
@@ -192,7 +192,7 @@ fn no_effect(undetected: &[&PooledFinding], levels: &[&PooledFinding], unit: Clu
     if let Some(format) = format_alone(undetected, unit) {
         return Some(format);
     }
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     numbers.about(name);
     let at = runs(undetected, levels);
     let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
@@ -206,7 +206,7 @@ fn no_effect(undetected: &[&PooledFinding], levels: &[&PooledFinding], unit: Clu
     };
     let more = format!("; largest at {}{}", largest.level, reservation(largest, &mut numbers));
     let detail = detail(largest, &mut numbers, &more);
-    Some(numbers.sentence("enhancer", Tone::NotShown, text, detail))
+    Some(numbers.sentence("enhancer", EffectDirection::NotShown, text, detail))
 }
 
 /// True if a finding is about the observer alone, which has its own wording: evidence that it does not confirm may
@@ -237,7 +237,7 @@ pub(super) fn unconfirmed(claim: Claim, difference: Estimate) -> Option<&'static
 
 /// The reason why a finding does not count as detected, although its own test or its interval detects it; empty for
 /// other findings.
-pub(super) fn reservation(finding: &PooledFinding, numbers: &mut Numbers) -> String {
+pub(super) fn reservation(finding: &PooledFinding, numbers: &mut NamedNumbers) -> String {
     let strict = &finding.strict;
     let difference = strict.difference;
     match finding.claim() {
@@ -276,7 +276,7 @@ pub(super) fn runs(some: &[&PooledFinding], all: &[&PooledFinding]) -> String {
 
 /// The differences at all levels, beside one that is quoted because its test detected it: chosen so, it is on average
 /// larger than the true one. Empty for a single level.
-pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut Numbers) -> String {
+pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut NamedNumbers) -> String {
     if levels.len() < 2 {
         return String::new();
     }
@@ -292,7 +292,7 @@ pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut Numbers) -> String 
 }
 
 /// Effect, interval, p and n of a finding, with `more` before n.
-pub(super) fn detail(finding: &PooledFinding, numbers: &mut Numbers, more: &str) -> String {
+pub(super) fn detail(finding: &PooledFinding, numbers: &mut NamedNumbers, more: &str) -> String {
     let who = models(&finding.models, numbers);
     let strict = &finding.strict;
     let difference = numbers.difference("", strict.difference);

@@ -2,7 +2,7 @@
 //! enhancers.
 
 use super::pooled::{lower_or_higher, unconfirmed};
-use super::sentence::{Numbers, Sentence, Tone};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence};
 use crate::report::text::words::light;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{Claim, Comparison, ComparisonKind};
@@ -44,7 +44,7 @@ pub(super) fn real(findings: &Findings<'_>) -> Vec<Sentence> {
 
 /// The loss of a model on photographs in the dark.
 fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let least = if pair.is_lower_bound { "≥ " } else { "" };
     let ev = numbers.number("ev", pair.ev[1], 1);
     let place = format!("Photographed in the dark ({}, {least}{ev} EV)", pair.name);
@@ -67,7 +67,7 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
 
 /// The difference of a model between photographs and synthetic images of the same darkness.
 fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let (model, synthetic) = (&row.first.model, light(&row.second.variant, None));
     let level = row.second.condition();
     let (name, size) = (row.first.condition(), row.strict.paired.difference.value);
@@ -87,7 +87,7 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
 
 /// The effect of an enhancer on photographs.
 fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let name = row.first.enhancer.as_ref().map_or("", |name| name.as_str());
     if let Some(enhancer) = &row.first.enhancer {
         numbers.about(enhancer);
@@ -110,7 +110,7 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
 }
 
 /// An effect that is not detected although its interval excludes 0, as `5.0 points lower`, and the end of its sentence.
-fn unconfirmed_size(row: &Comparison, numbers: &mut Numbers) -> Option<(String, &'static str)> {
+fn unconfirmed_size(row: &Comparison, numbers: &mut NamedNumbers) -> Option<(String, &'static str)> {
     let difference = row.strict.paired.difference;
     let end = unconfirmed(row.claim(), difference)?;
     let size = numbers.size("effect", difference.value);
@@ -127,13 +127,14 @@ fn verdict(row: &Comparison) -> Verdict {
 }
 
 /// A sentence with the difference, its interval, its test and its sample.
-fn sentence(kind: &'static str, row: &Comparison, mut numbers: Numbers, text: String) -> Sentence {
+fn sentence(kind: &'static str, row: &Comparison, mut numbers: NamedNumbers, text: String) -> Sentence {
     let paired = &row.strict.paired;
     let difference = numbers.difference("", paired.difference);
     let p = numbers.p("p", row.strict.p_report.unwrap_or(row.strict.holm));
     let n = numbers.count("n", paired.difference.n);
     let clusters = numbers.clusters(paired.clusters);
     let detail = format!("{difference}, {p}, n = {n} in {clusters}");
-    let tone = if row.claim() == Claim::Impossible { Tone::Note } else { Tone::from(verdict(row)) };
+    let tone =
+        if row.claim() == Claim::Impossible { EffectDirection::Note } else { EffectDirection::from(verdict(row)) };
     numbers.sentence(kind, tone, text, detail)
 }

@@ -4,7 +4,7 @@
 
 use std::collections::BTreeSet;
 
-use super::sentence::{Numbers, Sentence, Tone, level_runs, models};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence, level_runs, models};
 use crate::report::text::words::light;
 use crate::types::{AxisLevel, EnhancerName, Variant, View};
 use darkqa_score::cluster::ClusterUnit;
@@ -72,7 +72,7 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
         least.push((best.pairs.len() as f64 * best.least_p, best.clusters));
     }
     let (p, clusters) = least.into_iter().min_by(|a, b| a.0.total_cmp(&b.0))?;
-    let mut numbers = Numbers::new(findings.unit);
+    let mut numbers = NamedNumbers::new(findings.unit);
     let text = format!(
         "With {} no verdict on {} is possible, however large the effect.",
         numbers.clusters(clusters),
@@ -80,7 +80,7 @@ pub(super) fn impossible(findings: &Findings<'_>) -> Option<Sentence> {
     );
     let p = numbers.p("least_p", p.min(1.0));
     let detail = format!("the smallest possible {p}; take more {}s", findings.unit);
-    Some(numbers.sentence("no verdict", Tone::Note, text, detail))
+    Some(numbers.sentence("no verdict", EffectDirection::Note, text, detail))
 }
 
 /// The half-widths of the narrowest and the widest interval, if the widest exceeds [`WIDE`]. This is not the power of
@@ -103,7 +103,7 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
     if half_width(widest) <= WIDE {
         return None;
     }
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let [least, most] = [("narrowest", narrowest), ("widest", widest)]
         .map(|(name, finding)| numbers.number(name, 100.0 * half_width(finding), 0));
     let range = if least == most { most } else { format!("{least} to {most}") };
@@ -112,7 +112,7 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
         numbers.clusters(widest.clusters)
     );
     let detail = "over all families; an effect much smaller than that cannot be shown with so small a sample";
-    Some(numbers.sentence("power", Tone::Note, text, detail.to_owned()))
+    Some(numbers.sentence("power", EffectDirection::Note, text, detail.to_owned()))
 }
 
 /// Half the width of a finding's interval, as a share.
@@ -141,7 +141,7 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
     grouped
         .into_iter()
         .map(|(set, topics)| {
-            let mut numbers = Numbers::new(findings.unit);
+            let mut numbers = NamedNumbers::new(findings.unit);
             let is_one = set.models.len() == 1;
             let models = if set.models.len() > MAX_NAMED {
                 format!("{} models", numbers.count("models", set.models.len()))
@@ -152,7 +152,7 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
                 let were = if is_one { "was" } else { "were" };
                 let text = format!("Only {models} {were} asked at {}: no mean is made there.", runs(set));
                 let detail = format!("left out of the findings about {}", listed(&topics));
-                return numbers.sentence("left out", Tone::Note, text, detail);
+                return numbers.sentence("left out", EffectDirection::Note, text, detail);
             }
             let [all, answered] = set.items;
             let why = match (answered, is_one) {
@@ -171,7 +171,7 @@ pub(crate) fn left_out(findings: &Findings<'_>) -> Vec<Sentence> {
                 runs(set)
             );
             let detail = format!("in no mean about {}", listed(&topics));
-            numbers.sentence("left out", Tone::Note, text, detail)
+            numbers.sentence("left out", EffectDirection::Note, text, detail)
         })
         .collect()
 }
@@ -226,7 +226,7 @@ impl<'f> Undecided<'f> {
 
     /// The sentence about these levels; `None` without any. `about` completes "no verdict on".
     pub(super) fn sentence(&self, kind: &'static str, about: &str, unit: ClusterUnit) -> Option<Sentence> {
-        let mut numbers = Numbers::new(unit);
+        let mut numbers = NamedNumbers::new(unit);
         let mut reasons = Vec::new();
         let mut details = Vec::new();
         let worst = self.open.iter().max_by(|a, b| missing_share(a).total_cmp(&missing_share(b)));
@@ -261,7 +261,7 @@ impl<'f> Undecided<'f> {
         }
         details.extend(worst.map(|worst| numbers.sample(worst)));
         let text = format!("No verdict on {about} is possible at {}: {}.", self.at(), listed(&reasons));
-        Some(numbers.sentence(kind, Tone::Note, text, details.join("; ")))
+        Some(numbers.sentence(kind, EffectDirection::Note, text, details.join("; ")))
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::sentence::{Numbers, Sentence, Tone, capitalised, level_runs};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, level_runs};
 use crate::report::text::words::light;
 use crate::types::{AxisLevel, EnhancerName, SetLight, Variant};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
@@ -49,14 +49,14 @@ fn unread(found: &SelfAgreement<'_>, model: &str) -> Sentence {
         "Nothing is known about {model}: no answer could be read in any of its replies at L0, so that there is nothing to compare it with."
     );
     let detail = "--request constrain=choice makes a server allow letters alone; --max-tokens may be too low for a model that thinks first";
-    let numbers = Numbers::new(found.unit);
-    numbers.sentence("no_answer_in_the_light", Tone::Note, text, detail.to_owned())
+    let numbers = NamedNumbers::new(found.unit);
+    numbers.sentence("no_answer_in_the_light", EffectDirection::Note, text, detail.to_owned())
 }
 
 /// The sentence for a model whose answer to each question is the same for nearly all images, so that no verdict is
 /// possible.
 fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
-    let mut numbers = Numbers::new(found.unit);
+    let mut numbers = NamedNumbers::new(found.unit);
     let (_, all) = found.informative(model);
     let all = numbers.count("questions", all);
     let text = format!(
@@ -75,7 +75,7 @@ fn cannot_tell(found: &SelfAgreement<'_>, model: &str) -> Sentence {
         "each question has an answer about {images}; such a model agrees with itself whether it sees or not: ask other questions, \
          or about more images"
     );
-    numbers.sentence("bank_cannot_tell", Tone::Note, text, detail)
+    numbers.sentence("bank_cannot_tell", EffectDirection::Note, text, detail)
 }
 
 /// The agreement of each pair of models at L0.
@@ -83,7 +83,7 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     let models = models_under_test(found.models());
     let pairs = found.between.iter().filter(|pair| models.contains(&*pair.first) && models.contains(&*pair.second));
     pairs.map(|pair| {
-        let mut numbers = Numbers::new(found.unit);
+        let mut numbers = NamedNumbers::new(found.unit);
         let same = numbers.percent("same", pair.same.value);
         let text = format!(
             "At L0 {} and {} give the same answer to {same} % of the questions that both answer.",
@@ -98,7 +98,7 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
         let detail = format!(
             "[{ends}] %, {kappa}, n = {n}; each is compared with itself, so that their agreements in the dark can be compared only as far as this"
         );
-        numbers.sentence("models_in_light", Tone::Note, text, detail)
+        numbers.sentence("models_in_light", EffectDirection::Note, text, detail)
     }).collect()
 }
 
@@ -138,7 +138,7 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
         .max_by_key(|cell| cell.subject.level)?;
     let level = dark.subject.level?;
     let agreement = dark.agreement?;
-    let mut numbers = Numbers::new(found.unit);
+    let mut numbers = NamedNumbers::new(found.unit);
     let share = numbers.percent("agreement", agreement.value);
     let ceiling = cells.clone().find(|cell| cell.role() == CellRole::Ceiling);
     let floor = cells.find(|cell| cell.role() == CellRole::Floor);
@@ -156,12 +156,12 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
     );
     let test = compared(found, ComparisonKind::Level, model).find(|comparison| comparison.first == dark.subject);
     let detail = darkness_detail(found, dark, level, test, &mut numbers);
-    let tone = test.map_or(Tone::Note, |test| test.claim().into());
+    let tone = test.map_or(EffectDirection::Note, |test| test.claim().into());
     Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
 }
 
 /// The end of the sentence: where half of the evidence is lost; empty if that is unknown or beyond the darkest level.
-fn half_lost(found: &SelfAgreement<'_>, dark: &AgreementCell, numbers: &mut Numbers) -> String {
+fn half_lost(found: &SelfAgreement<'_>, dark: &AgreementCell, numbers: &mut NamedNumbers) -> String {
     let subject = &dark.subject;
     let curve = found
         .curves
@@ -184,7 +184,7 @@ fn darkness_detail(
     dark: &AgreementCell,
     level: AxisLevel,
     test: Option<&Comparison>,
-    numbers: &mut Numbers,
+    numbers: &mut NamedNumbers,
 ) -> String {
     let model = &*dark.subject.model;
     let mut parts = Vec::new();
@@ -242,7 +242,7 @@ fn enhanced(found: &SelfAgreement<'_>, model: &str, variant: &Variant, enhancer:
     } else {
         level_effects(enhancer, model, &light(variant, None), better, worse)
     };
-    let mut numbers = Numbers::new(found.unit);
+    let mut numbers = NamedNumbers::new(found.unit);
     numbers.about(enhancer);
     let level = strongest.first.level?;
     let difference = numbers.difference("", strongest.strict.paired.difference);
@@ -260,46 +260,50 @@ fn level_effects(
     variant: &str,
     better: Option<String>,
     worse: Option<String>,
-) -> (Tone, String) {
+) -> (EffectDirection, String) {
     match (better, worse) {
         (Some(levels), None) => {
-            (Tone::Better, format!("{enhancer} brings answers of {model} back at {levels} ({variant})."))
+            (EffectDirection::Better, format!("{enhancer} brings answers of {model} back at {levels} ({variant})."))
         }
-        (None, Some(levels)) if levels == "L0" => {
-            (Tone::Worse, format!("{enhancer} changes answers of {model} in the light: harm where nothing was dark."))
-        }
-        (None, Some(levels)) => {
-            (Tone::Worse, format!("{enhancer} takes {model} further from its answers at L0 at {levels} ({variant})."))
-        }
+        (None, Some(levels)) if levels == "L0" => (
+            EffectDirection::Worse,
+            format!("{enhancer} changes answers of {model} in the light: harm where nothing was dark."),
+        ),
+        (None, Some(levels)) => (
+            EffectDirection::Worse,
+            format!("{enhancer} takes {model} further from its answers at L0 at {levels} ({variant})."),
+        ),
         (Some(better), Some(worse)) => (
-            Tone::Note,
+            EffectDirection::Note,
             format!(
                 "{enhancer} brings answers of {model} back at {better}, and changes others at {worse} ({variant})."
             ),
         ),
-        (None, None) => {
-            (Tone::NotShown, format!("{enhancer}: no effect on answers of {model} was detected ({variant})."))
-        }
+        (None, None) => (
+            EffectDirection::NotShown,
+            format!("{enhancer}: no effect on answers of {model} was detected ({variant})."),
+        ),
     }
 }
 
 /// The effect of an enhancer on the answers of a model to photographs in the dark. L0 is also dark here, so a change of
 /// an answer is neither help nor harm.
-fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (Tone, String) {
+fn photograph_effects(enhancer: &EnhancerName, model: &str, change: Claim) -> (EffectDirection, String) {
     match change {
         Claim::Detected(Verdict::Worse) => (
-            Tone::Note,
+            EffectDirection::Note,
             format!("{enhancer} changes answers of {model} to these photographs: whether for the better is not known."),
         ),
         Claim::Detected(_) => (
-            Tone::Note,
+            EffectDirection::Note,
             format!(
                 "{model} answers with {enhancer} as at L0, more often than the same photographs asked about again."
             ),
         ),
-        _ => {
-            (Tone::NotShown, format!("{enhancer}: no effect on answers of {model} to these photographs was detected."))
-        }
+        _ => (
+            EffectDirection::NotShown,
+            format!("{enhancer}: no effect on answers of {model} to these photographs was detected."),
+        ),
     }
 }
 
@@ -311,7 +315,7 @@ fn cannot_tell_shares(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence
         .filter(|cell| cell.subject.model == model && cell.role() == CellRole::Other && cell.subject.enhancer.is_none())
         .max_by_key(|cell| cell.subject.level)?;
     let (level, share) = (dark.subject.level?, dark.cannot_tell?);
-    let mut numbers = Numbers::new(found.unit);
+    let mut numbers = NamedNumbers::new(found.unit);
     let in_light = light.cannot_tell as f64 / light.replies().max(1) as f64;
     let in_light = numbers.percent("light", in_light);
     let here = numbers.percent("share", share.value);
@@ -320,7 +324,7 @@ fn cannot_tell_shares(found: &SelfAgreement<'_>, model: &str) -> Option<Sentence
     let ends = numbers.share_ends("", share);
     let n = numbers.count("n", share.n);
     let detail = format!("[{ends}] % at {level}, n = {n}");
-    Some(numbers.sentence("cannot_tell", Tone::Note, text, detail))
+    Some(numbers.sentence("cannot_tell", EffectDirection::Note, text, detail))
 }
 
 #[cfg(test)]

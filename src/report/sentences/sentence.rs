@@ -21,7 +21,7 @@ pub(crate) struct Sentence {
     pub kind: &'static str,
     /// The direction of the effect.
     #[serde(rename = "verdict")]
-    pub tone: Tone,
+    pub tone: EffectDirection,
     /// One sentence.
     pub text: String,
     /// Effect, interval, p and n.
@@ -30,7 +30,7 @@ pub(crate) struct Sentence {
     pub values: BTreeMap<String, f64>,
     /// Distinguishes the sentence from others of its kind.
     #[serde(skip)]
-    pub scope: Scope,
+    pub scope: SentenceScope,
 }
 
 impl Sentence {
@@ -53,7 +53,7 @@ impl Sentence {
 
 /// The part of a run that a sentence is about.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub(crate) struct Scope {
+pub(crate) struct SentenceScope {
     /// The light, if there are several sentences with the same content about different lights.
     pub light: Option<String>,
     /// The enhancer that the sentence is about.
@@ -66,7 +66,7 @@ pub(crate) struct Scope {
 
 /// The direction of a sentence's effect.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub(crate) enum Tone {
+pub(crate) enum EffectDirection {
     /// An improvement is detected.
     #[serde(rename = "better")]
     Better,
@@ -81,7 +81,7 @@ pub(crate) enum Tone {
     Note,
 }
 
-impl Tone {
+impl EffectDirection {
     /// The sign before the sentence.
     #[must_use]
     pub(crate) fn sign(self) -> char {
@@ -107,7 +107,7 @@ impl Tone {
     }
 }
 
-impl From<Claim> for Tone {
+impl From<Claim> for EffectDirection {
     fn from(claim: Claim) -> Self {
         match claim {
             Claim::Detected(verdict) => verdict.into(),
@@ -116,7 +116,7 @@ impl From<Claim> for Tone {
     }
 }
 
-impl From<Verdict> for Tone {
+impl From<Verdict> for EffectDirection {
     fn from(verdict: Verdict) -> Self {
         match verdict {
             Verdict::Better => Self::Better,
@@ -128,16 +128,16 @@ impl From<Verdict> for Tone {
 
 /// Builder of a [`Sentence`]: each method returns a number as text and records its value under a name.
 #[derive(Debug)]
-pub(super) struct Numbers {
+pub(super) struct NamedNumbers {
     values: BTreeMap<String, f64>,
     unit: ClusterUnit,
-    scope: Scope,
+    scope: SentenceScope,
 }
 
-impl Numbers {
+impl NamedNumbers {
     /// An empty builder; `unit` names the clusters.
     pub(super) fn new(unit: ClusterUnit) -> Self {
-        Self { values: BTreeMap::new(), unit, scope: Scope::default() }
+        Self { values: BTreeMap::new(), unit, scope: SentenceScope::default() }
     }
 
     /// Sets the level, or the levels, of the difference.
@@ -151,7 +151,7 @@ impl Numbers {
     }
 
     /// The sentence with these numbers.
-    pub(super) fn sentence(self, kind: &'static str, tone: Tone, text: String, detail: String) -> Sentence {
+    pub(super) fn sentence(self, kind: &'static str, tone: EffectDirection, text: String, detail: String) -> Sentence {
         Sentence { kind, tone, text, detail, values: self.values, scope: self.scope }
     }
 
@@ -255,7 +255,7 @@ fn with_separators(number: usize) -> String {
 }
 
 /// Models in words: the name of a single model, or their number.
-pub(super) fn models(names: &[String], numbers: &mut Numbers) -> String {
+pub(super) fn models(names: &[String], numbers: &mut NamedNumbers) -> String {
     match names {
         [one] => one.clone(),
         several => format!("mean of these {} models", numbers.count("models", several.len())),
@@ -308,7 +308,7 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
             light => format!("At {level} {light}"),
         },
     };
-    let mut numbers = Numbers::new(unit);
+    let mut numbers = NamedNumbers::new(unit);
     let readable = numbers.size("format", largest.format[0] - largest.format[1]);
     let lenient = numbers.difference("_lenient", largest.lenient.difference);
     let text = format!(
@@ -320,7 +320,7 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
     let p = numbers.p("p", largest.strict.p_report.unwrap_or(1.0));
     let sample = numbers.sample(largest);
     let detail = format!("{who}: {here} % keep to it, {there} % without; strict parsing {strict}, {p}; {sample}");
-    Some(numbers.sentence("format", Tone::Note, text, detail))
+    Some(numbers.sentence("format", EffectDirection::Note, text, detail))
 }
 
 #[cfg(test)]
@@ -329,7 +329,7 @@ mod tests {
 
     #[test]
     fn values_are_rounded_like_text() {
-        let mut numbers = Numbers::new(ClusterUnit::Scene);
+        let mut numbers = NamedNumbers::new(ClusterUnit::Scene);
         assert_eq!(numbers.percent("share", 0.0625), "6.2");
         assert_eq!(numbers.points("effect", -0.0625), "−6.2");
         assert_eq!(numbers.number("kappa", -0.001, 2), "0.00");

@@ -1,4 +1,4 @@
-//! Leaderboard rows of models that answered multiple-choice questions: [`ChoiceRow`].
+//! Leaderboard rows of models that answered multiple-choice questions: [`ModelRunRow`].
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::open::{GroupDigests, RunLink};
@@ -18,7 +18,7 @@ use darkqa_score::threshold::{NoThreshold, Threshold as EvThreshold};
 
 /// Results of one model in one run.
 #[derive(Debug, Clone)]
-pub(crate) struct ChoiceRow {
+pub(crate) struct ModelRunRow {
     pub(crate) model: String,
     pub(crate) run: RunLink,
     /// Rank among the models of its table; `None` if it is not ranked.
@@ -40,7 +40,7 @@ pub(crate) struct ChoiceRow {
     unread: [usize; 2],
 }
 
-impl ChoiceRow {
+impl ModelRunRow {
     /// True for a reference model, which is listed for comparison and has no rank.
     pub(crate) fn is_reference(&self) -> bool {
         is_reference(&self.model)
@@ -67,7 +67,7 @@ impl ChoiceRow {
 }
 
 /// Rows of a run's models with images, in the main variant of its report. All numbers are the same as in the report.
-pub(crate) fn choice_rows(findings: &Findings<'_>, variant: &Variant, run: &RunLink) -> Vec<ChoiceRow> {
+pub(crate) fn choice_rows(findings: &Findings<'_>, variant: &Variant, run: &RunLink) -> Vec<ModelRunRow> {
     let mut models: Vec<&str> = Vec::new();
     for subject in &findings.grid.subjects {
         if subject.view == Some(View::Image) && !models.contains(&&*subject.model) {
@@ -77,7 +77,7 @@ pub(crate) fn choice_rows(findings: &Findings<'_>, variant: &Variant, run: &RunL
     models.into_iter().map(|model| row(findings, variant, model, run)).collect()
 }
 
-fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -> ChoiceRow {
+fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -> ModelRunRow {
     let grid = &findings.grid;
     let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
     let clean = grid.find_up_to_group(&clean).and_then(|index| {
@@ -110,7 +110,7 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
             && !findings.below_blind(subject, None).is_empty()
     });
     let health = findings.health.iter().filter(|health| health.subject.model == model);
-    ChoiceRow {
+    ModelRunRow {
         model: model.to_owned(),
         run: run.clone(),
         rank: None,
@@ -130,7 +130,7 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
 }
 
 /// Table for files. Numbers have the precision of the runs' files. `number` is the group's number on the site.
-pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -> Table {
+pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ModelRunRow]) -> Table {
     TableBuilder::new("leaderboard", rows)
         .column(Count, "csv group", |_| number)
         .column(Count, "csv rank_first", |row| row.rank.map(|rank| rank.first))
@@ -164,7 +164,7 @@ pub(super) fn table(number: usize, digests: &GroupDigests, rows: &[ChoiceRow]) -
         .build()
 }
 
-fn threshold(row: &ChoiceRow) -> TableCell {
+fn threshold(row: &ModelRunRow) -> TableCell {
     let darkest = row.darkest.map_or(0.0, AxisLevel::value);
     match &row.threshold {
         Some(Ok(threshold)) => TableCell::Threshold(*threshold, darkest),
@@ -190,11 +190,11 @@ const HEAD: [&str; 12] = [
 ];
 
 /// Table for the page.
-pub(super) fn board(rows: &[ChoiceRow]) -> BoardTable {
+pub(super) fn board(rows: &[ModelRunRow]) -> BoardTable {
     BoardTable { head: HEAD.map(str::to_owned).to_vec(), rows: rows.iter().map(board_row).collect() }
 }
 
-fn board_row(row: &ChoiceRow) -> BoardRow {
+fn board_row(row: &ModelRunRow) -> BoardRow {
     let rank_key = row.rank.map(|rank| rank.first * 1000 + rank.last);
     let rank = BoardCell::text(&row.rank_text()).with_key(rank_key.map_or_else(String::new, |key| key.to_string()));
     let run = if row.is_reference() { format!("{}, for comparison", row.run.name) } else { row.run.name.clone() };

@@ -1,15 +1,15 @@
-//! Content of a site: [`Site`].
+//! Content of a site: [`LeaderboardSite`].
 
 use serde::Serialize;
 
-use super::choices::ChoiceRow;
+use super::choices::ModelRunRow;
 use super::open::{GroupDigests, OpenRow, RunLink};
 
 /// Name of the file with all rows of the site.
 pub(crate) const DATA: &str = "data.json";
 
 /// A leaderboard and the pages of its runs.
-pub(crate) struct Site {
+pub(crate) struct LeaderboardSite {
     pub(crate) groups: Vec<SiteGroup>,
     /// Runs that are in no table, each with the reason.
     pub(crate) others: Vec<(RunLink, String)>,
@@ -41,7 +41,7 @@ pub(crate) struct GroupDifference {
 /// Rows of a group.
 pub(crate) enum GroupRows {
     /// Multiple-choice questions, with the basis of the ranks.
-    Choices(Vec<ChoiceRow>, Ranking),
+    Choices(Vec<ModelRunRow>, Ranking),
     /// Open questions.
     Open(Vec<OpenRow>),
 }

@@ -12,14 +12,14 @@ use serde::Serialize;
 use super::page::STYLE;
 use super::template::render;
 use crate::error::{Error, Result};
-use crate::report::json::Rows;
+use crate::report::json::JsonRows;
 use crate::report::text::table::{self, Table};
 use crate::report::text::terminal::readable;
 use crate::types::text::counted;
 use board::BoardTable;
 
-pub(crate) use choices::{ChoiceRow, choice_rows};
-pub(crate) use content::{DATA, GroupDifference, GroupRows, Ranking, Site, SiteGroup};
+pub(crate) use choices::{ModelRunRow, choice_rows};
+pub(crate) use content::{DATA, GroupDifference, GroupRows, LeaderboardSite, Ranking, SiteGroup};
 pub(crate) use open::{GroupDigests, OpenRow, PAGES, RunLink, open_rows};
 
 /// Schema of `data.json`.
@@ -36,7 +36,7 @@ struct GroupData<'a> {
     differs: Option<&'a GroupDifference>,
     #[serde(skip_serializing_if = "Option::is_none")]
     ranking: Option<&'a str>,
-    rows: Rows<'a>,
+    rows: JsonRows<'a>,
 }
 
 /// Content of `data.json`.
@@ -52,7 +52,7 @@ struct SiteData<'a> {
 ///
 /// # Errors
 /// If a file cannot be made.
-pub(crate) fn products(site: Site) -> Result<Vec<(String, Vec<u8>)>> {
+pub(crate) fn products(site: LeaderboardSite) -> Result<Vec<(String, Vec<u8>)>> {
     let tables: Vec<Table> = site.groups.iter().zip(1..).map(|(group, number)| table(number, group)).collect();
     // Tables of the same name share a file.
     let mut by_name = tables.clone();
@@ -77,7 +77,7 @@ fn table(number: usize, group: &SiteGroup) -> Table {
 }
 
 /// Contents of `data.json`.
-fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
+fn data(site: &LeaderboardSite, tables: &[Table]) -> Result<Vec<u8>> {
     let groups = site.groups.iter().zip(tables).map(|(group, table)| {
         let (kind, ranking) = match &group.rows {
             GroupRows::Choices(_, ranking) => ("choices", Some(&*ranking.words)),
@@ -90,7 +90,7 @@ fn data(site: &Site, tables: &[Table]) -> Result<Vec<u8>> {
             shared: group.shared.iter().map(|(name, value)| [&**name, &**value]).collect(),
             differs: group.differs.as_ref(),
             ranking,
-            rows: Rows::new(table),
+            rows: JsonRows::new(table),
         }
     });
     let data = SiteData {
@@ -115,7 +115,7 @@ const NOT_RANKED: &str = "Scores are in %, over the answers that were marked. Th
 
 /// Values of the page template.
 #[derive(Serialize)]
-struct Page<'a> {
+struct SitePage<'a> {
     groups: Vec<PageTable<'a>>,
     others: Vec<ExcludedRun>,
     downloads: &'a [String],
@@ -153,7 +153,7 @@ struct ExcludedRun {
 ///
 /// # Errors
 /// If the template cannot be rendered.
-fn index(site: &Site, downloads: &[String]) -> Result<String> {
+fn index(site: &LeaderboardSite, downloads: &[String]) -> Result<String> {
     let others = site
         .others
         .iter()
@@ -161,7 +161,7 @@ fn index(site: &Site, downloads: &[String]) -> Result<String> {
         .collect();
     render(
         PAGE,
-        Page {
+        SitePage {
             facts: format!("{} in {}", counted(site.pages.len(), "run"), counted(site.groups.len(), "table")),
             groups: site.groups.iter().zip(1..).map(|(group, id)| page_table(group, id)).collect(),
             others,

@@ -44,12 +44,12 @@ fn file_table(found: &[FindingByProfile]) -> Table {
 }
 
 /// Row of the report's table: a finding, or the thresholds of a finding's model.
-enum Row<'f> {
+enum ProfileRow<'f> {
     Finding(&'f FindingByProfile),
     Thresholds(&'f FindingByProfile, Vec<&'f Curve>),
 }
 
-impl Row<'_> {
+impl ProfileRow<'_> {
     fn finding(&self) -> &FindingByProfile {
         match self {
             Self::Finding(finding) | Self::Thresholds(finding, _) => finding,
@@ -62,16 +62,16 @@ fn report_table(findings: &Findings<'_>, profiles: &[&ProfileName]) -> Table {
     let mut rows = Vec::new();
     let found = &findings.by_profile;
     for same_model in found.chunk_by(|a, b| (&a.model, &a.group) == (&b.model, &b.group)) {
-        rows.extend(same_model.iter().map(Row::Finding));
+        rows.extend(same_model.iter().map(ProfileRow::Finding));
         let curves = noise_curves(findings, &same_model[0]);
-        rows.push(Row::Thresholds(&same_model[0], curves));
+        rows.push(ProfileRow::Thresholds(&same_model[0], curves));
     }
     let mut table = TableBuilder::new("readings", &rows)
         .page("readings", "Findings by noise profile, in percentage points [95 %]")
         .column(Text, "terminal model | page model", |row| subject(row.finding()))
         .column(Text, "terminal finding | page finding", |row| match row {
-            Row::Finding(finding) => title(finding),
-            Row::Thresholds(..) => "the break (threshold EV)".to_owned(),
+            ProfileRow::Finding(finding) => title(finding),
+            ProfileRow::Thresholds(..) => "the break (threshold EV)".to_owned(),
         });
     for (index, profile) in profiles.iter().enumerate() {
         let heads = ColumnHeads {
@@ -80,25 +80,25 @@ fn report_table(findings: &Findings<'_>, profiles: &[&ProfileName]) -> Table {
             ..ColumnHeads::default()
         };
         table = table.column(Text, heads, |row| match row {
-            Row::Finding(finding) => effect(finding.effects[index].effect.as_ref()),
-            Row::Thresholds(_, curves) => threshold(curves, profile),
+            ProfileRow::Finding(finding) => effect(finding.effects[index].effect.as_ref()),
+            ProfileRow::Thresholds(_, curves) => threshold(curves, profile),
         });
     }
     let mut table = table
         .column(Text, "terminal holds | page holds", |row| match row {
-            Row::Finding(finding) => TableCell::from(match finding.robustness {
+            ProfileRow::Finding(finding) => TableCell::from(match finding.robustness {
                 Robustness::Reversed => "opposite effects",
                 other => other.word(),
             }),
-            Row::Thresholds(..) => TableCell::Blank,
+            ProfileRow::Thresholds(..) => TableCell::Blank,
         })
         .column(Count, "page n", |row| match row {
-            Row::Finding(finding) => TableCell::Count(items(finding)),
-            Row::Thresholds(..) => TableCell::Blank,
+            ProfileRow::Finding(finding) => TableCell::Count(items(finding)),
+            ProfileRow::Thresholds(..) => TableCell::Blank,
         })
         .column(Text, "page in words", |row| match row {
-            Row::Finding(finding) => TableCell::from(sentence(finding)),
-            Row::Thresholds(..) => TableCell::Blank,
+            ProfileRow::Finding(finding) => TableCell::from(sentence(finding)),
+            ProfileRow::Thresholds(..) => TableCell::Blank,
         })
         .build();
     let heading =

@@ -180,12 +180,12 @@ pub(super) fn too_few_clusters(least: impl Iterator<Item = (f64, usize)>, unit: 
 }
 
 /// Two models with the comparison that they belong to.
-struct PairRow<'b> {
+struct PooledPair<'b> {
     best: &'b BestInTheDark,
     pair: &'b DarkPair,
 }
 
-impl<'b> PairRow<'b> {
+impl<'b> PooledPair<'b> {
     /// Accuracy of the first model over the dark levels.
     fn first(&self) -> Option<&'b DarkAccuracy> {
         self.accuracy(&self.pair.first)
@@ -209,7 +209,7 @@ fn loss(accuracy: Option<&DarkAccuracy>) -> Option<String> {
 /// Builds the table; it has no rows if there are fewer than two models.
 pub(super) fn best(findings: &Findings<'_>) -> Table {
     let is_detected = findings.detected_best().is_some();
-    let pairs = findings.best.iter().flat_map(|best| best.pairs.iter().map(move |pair| PairRow { best, pair }));
+    let pairs = findings.best.iter().flat_map(|best| best.pairs.iter().map(move |pair| PooledPair { best, pair }));
     let variant = findings.best.as_ref().map(|best| light(&best.variant, None));
     let levels = findings.best.as_ref().map(dark_levels);
     let caption = format!(

@@ -11,7 +11,7 @@ use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition};
 
 /// Row of the table.
-enum Line<'a> {
+enum GroupRow<'a> {
     /// Score of a model in a condition.
     Cell(&'a GroupCell),
     /// Score of guessing, with a subject that names it.
@@ -67,42 +67,43 @@ fn table(
     caption: &str,
     is_shown: impl Fn(Option<&Family>) -> bool,
 ) -> Table {
-    let cells = score.cells.iter().filter(|cell| is_shown(cell.family.as_ref())).map(Line::Cell);
+    let cells = score.cells.iter().filter(|cell| is_shown(cell.family.as_ref())).map(GroupRow::Cell);
     let chance = score
         .chance
         .iter()
         .filter(|chance| is_shown(chance.family.as_ref()))
-        .map(|chance| Line::Chance(chance, chance_subject()));
+        .map(|chance| GroupRow::Chance(chance, chance_subject()));
     let lines = cells.chain(chance);
     let builder = TableBuilder::new("groups", lines)
         .page("groups", caption)
-        .subject(Line::subject, |variant| variant.word().into_owned())
+        .subject(GroupRow::subject, |variant| variant.word().into_owned())
         .column(Text, "terminal subject | latex Subject", |line| match line {
-            Line::Cell(cell) => format!("{} {}", cell.subject.model, cell.subject.condition()),
-            Line::Chance(..) => CHANCE.to_owned(),
+            GroupRow::Cell(cell) => format!("{} {}", cell.subject.model, cell.subject.condition()),
+            GroupRow::Chance(..) => CHANCE.to_owned(),
         })
-        .family(Line::family)
+        .family(GroupRow::family)
         .column(Text, "csv mode", |line| match line {
-            Line::Cell(cell) if cell.mode == ParsingMode::Lenient => "lenient",
-            Line::Cell(_) | Line::Chance(..) => "strict",
+            GroupRow::Cell(cell) if cell.mode == ParsingMode::Lenient => "lenient",
+            GroupRow::Cell(_) | GroupRow::Chance(..) => "strict",
         });
     let builder = number_columns(builder, findings, score)
         .column(Text, "csv reading", |line| TableCell::profile(line.subject()))
-        .model_facts(&findings.grid.listing, Line::subject);
+        .model_facts(&findings.grid.listing, GroupRow::subject);
     let has_light = score.cells.iter().any(|cell| run_group(&cell.subject).is_some());
     let mut builder =
         if has_light { builder.column(Text, "csv light", |line| run_group(line.subject())) } else { builder };
     for format in [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex] {
-        builder = builder.hide(format, |line| matches!(line, Line::Cell(cell) if cell.mode == ParsingMode::Lenient));
+        builder =
+            builder.hide(format, |line| matches!(line, GroupRow::Cell(cell) if cell.mode == ParsingMode::Lenient));
     }
     builder.build()
 }
 
 fn number_columns<'a>(
-    builder: TableBuilder<Line<'a>>,
+    builder: TableBuilder<GroupRow<'a>>,
     findings: &Findings<'_>,
     score: &StrictScore,
-) -> TableBuilder<Line<'a>> {
+) -> TableBuilder<GroupRow<'a>> {
     builder
         .column(Count, "csv n | terminal groups | page groups | latex Groups", |line| {
             line.share().map_or(0, |share| share.n)
@@ -114,32 +115,32 @@ fn number_columns<'a>(
         .column(Count, "csv clusters", |line| line.cell().map(|cell| cell.clusters))
         .column(Share, "csv value low high | terminal all right | page all right [95 %] | latex All right", |line| {
             match line {
-                Line::Cell(cell) => TableCell::from(cell.share),
-                Line::Chance(chance, _) => chance.share.map_or(TableCell::Missing, TableCell::Guess),
+                GroupRow::Cell(cell) => TableCell::from(cell.share),
+                GroupRow::Chance(chance, _) => chance.share.map_or(TableCell::Missing, TableCell::Guess),
             }
         })
         .column(Percent, "terminal lenient | page lenient", |line| {
             let lenient = line.cell().and_then(|cell| score.lenient(cell));
             match line {
-                Line::Cell(_) => TableCell::from(lenient.and_then(|cell| cell.share)),
-                Line::Chance(..) => TableCell::Blank,
+                GroupRow::Cell(_) => TableCell::from(lenient.and_then(|cell| cell.share)),
+                GroupRow::Chance(..) => TableCell::Blank,
             }
         })
         .column(Percent, "terminal accuracy | page accuracy | latex Accuracy", |line| {
             let cell = findings.summary.family_cells(line.family(), ParsingMode::Strict).find(|cell| match line {
-                Line::Cell(group_cell) => cell.subject == group_cell.subject,
-                Line::Chance(..) => cell.subject.view.is_none(),
+                GroupRow::Cell(group_cell) => cell.subject == group_cell.subject,
+                GroupRow::Chance(..) => cell.subject.view.is_none(),
             });
             Some(cell?.accuracy?.value)
         })
 }
 
 /// Table cell with a count; blank for chance.
-fn count(line: &Line<'_>, count: impl Fn(&GroupCell) -> usize) -> TableCell {
+fn count(line: &GroupRow<'_>, count: impl Fn(&GroupCell) -> usize) -> TableCell {
     line.cell().map_or(TableCell::Blank, |cell| count(cell).into())
 }
 
-impl Line<'_> {
+impl GroupRow<'_> {
     fn cell(&self) -> Option<&GroupCell> {
         match self {
             Self::Cell(cell) => Some(cell),

@@ -13,7 +13,7 @@ use darkqa_score::photographs::PairDarkness;
 
 /// A model in one variant, raw or with one enhancer.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Series<'a> {
+pub(crate) struct LadderSeries<'a> {
     /// The place of the model among those of the ladder.
     place: usize,
     pub(crate) model: &'a str,
@@ -21,7 +21,7 @@ pub(crate) struct Series<'a> {
     variant: &'a Variant,
 }
 
-impl<'a> Series<'a> {
+impl<'a> LadderSeries<'a> {
     fn new(subject: &'a ModelInCondition, place: usize) -> Self {
         Self { place, model: &subject.model, enhancer: subject.enhancer.as_ref(), variant: &subject.variant }
     }
@@ -58,7 +58,7 @@ pub(crate) struct Ladder<'a, C> {
     /// The levels of all series.
     pub(crate) levels: BTreeSet<AxisLevel>,
     /// Cells of models with images.
-    pub(crate) series: BTreeMap<Series<'a>, SeriesByLevel<'a, C>>,
+    pub(crate) series: BTreeMap<LadderSeries<'a>, SeriesByLevel<'a, C>>,
     /// Cells without a level: models without images, and chance.
     pub(crate) without_level: Vec<(&'a ModelInCondition, &'a C)>,
     /// The darkness of the photographs in the dark.
@@ -85,7 +85,7 @@ impl<'a, C> Ladder<'a, C> {
             match (subject.view, subject.level) {
                 (Some(View::Image), Some(level)) => {
                     ladder.levels.insert(level);
-                    let series = ladder.series.entry(Series::new(subject, place));
+                    let series = ladder.series.entry(LadderSeries::new(subject, place));
                     series.or_default().insert(level, cell);
                 }
                 _ => ladder.without_level.push((subject, cell)),
@@ -100,7 +100,7 @@ impl<'a, C> Ladder<'a, C> {
     }
 
     /// The variant and the enhancer of a series in words.
-    pub(crate) fn light(&self, series: &Series<'_>) -> String {
+    pub(crate) fn light(&self, series: &LadderSeries<'_>) -> String {
         let words = series.light(self.pairs);
         match self.set {
             SetLight::Lit => words,
@@ -171,7 +171,7 @@ impl<'a, C> Ladder<'a, C> {
 
     /// The cell of a series at L0, after [`with_clean`](Self::with_clean). For an enhancer without clean frames, the
     /// cell without an enhancer.
-    pub(crate) fn l0_cell(&self, series: &Series<'_>) -> Option<&'a C> {
+    pub(crate) fn l0_cell(&self, series: &LadderSeries<'_>) -> Option<&'a C> {
         let raw = self.series.iter().filter(|(other, _)| {
             let is_clean = other.variant.is_untouched();
             let groups = [*other, series].map(|series| series.variant.group.as_ref());
@@ -245,7 +245,7 @@ impl<'a, C> Ladder<'a, C> {
 /// A row of the table of a [`Ladder`].
 pub(crate) enum LadderRow<'a, C> {
     /// A series with its cells by level.
-    Series(&'a Series<'a>, &'a SeriesByLevel<'a, C>),
+    Series(&'a LadderSeries<'a>, &'a SeriesByLevel<'a, C>),
     /// A subject without a level, and its cell.
     WithoutLevel(&'a ModelInCondition, &'a C),
 }

@@ -5,7 +5,7 @@
 //!
 //! The number of frames in a report, in words: [`frames`].
 //!
-//! [`NoiseProfiles`]: the noise profiles of the images in a report.
+//! [`ProfileNames`]: the noise profiles of the images in a report.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -324,9 +324,9 @@ pub(crate) fn frames(grid: &Grid<'_>) -> String {
 /// The noise profiles of the subjects with noise, `paper` first.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[serde(transparent)]
-pub(crate) struct NoiseProfiles(BTreeSet<ProfileName>);
+pub(crate) struct ProfileNames(BTreeSet<ProfileName>);
 
-impl NoiseProfiles {
+impl ProfileNames {
     pub(crate) fn new<'s>(subjects: impl IntoIterator<Item = &'s ModelInCondition>) -> Self {
         Self(subjects.into_iter().filter_map(|subject| subject.variant.reading.clone()).collect())
     }
@@ -404,12 +404,12 @@ mod tests {
         assert_eq!(serde_json::to_string(&several).unwrap(), r#"["paper","eld"]"#);
     }
 
-    fn profiles(conditions: &[&str]) -> NoiseProfiles {
+    fn profiles(conditions: &[&str]) -> ProfileNames {
         let subjects: Vec<ModelInCondition> = conditions
             .iter()
             .map(|text| text.parse::<Condition>().unwrap())
             .map(|condition| ModelInCondition::new("m", Some(&condition)))
             .collect();
-        NoiseProfiles::new(&subjects)
+        ProfileNames::new(&subjects)
     }
 }

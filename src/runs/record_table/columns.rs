@@ -8,7 +8,7 @@ use std::sync::Arc;
 use serde::Serialize;
 use serde_json::Value;
 
-use super::reader::{Row, SentImage, TableDetail};
+use super::reader::{RecordRow, SentImage, TableDetail};
 use crate::error::Result;
 use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
 use crate::runs::predictions::{AnswerState, answer_state};
@@ -44,9 +44,9 @@ fn double<'r>(number: Option<f64>) -> Cell<'r> {
 }
 
 /// Columns of question, model and condition.
-fn leading_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
+fn leading_columns<D: TableDetail>() -> Vec<Column<RecordRow<D>>> {
     vec![
-        column("key", Key, Always, |row: &Row<D>| Cell::Bytes(row.record.key.as_bytes())),
+        column("key", Key, Always, |row: &RecordRow<D>| Cell::Bytes(row.record.key.as_bytes())),
         column("question", Text, Always, |row| Cell::text(Some(&row.record.question.0))),
         column("frame", Text, Always, |row| Cell::text(Some(row.record.detail.frame()))),
         column("scene", Text, MayBeNull, |row| {
@@ -65,9 +65,9 @@ fn leading_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
 }
 
 /// Columns of the reply.
-pub(super) fn reply_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
+pub(super) fn reply_columns<D: TableDetail>() -> Vec<Column<RecordRow<D>>> {
     vec![
-        column("reply", LongText, MayBeNull, |row: &Row<D>| Cell::text(row.record.reply.as_deref())),
+        column("reply", LongText, MayBeNull, |row: &RecordRow<D>| Cell::text(row.record.reply.as_deref())),
         column("refusal", LongText, MayBeNull, |row| Cell::text(row.record.refusal.as_deref())),
         column("failure_kind", Text, MayBeNull, |row| {
             let failure = row.record.failure.as_ref();
@@ -94,14 +94,14 @@ pub(super) fn reply_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
     ]
 }
 
-fn usage<'r, D: TableDetail>(row: &Row<D>, tokens: impl Fn(&Usage) -> Option<u64>) -> Cell<'r> {
+fn usage<'r, D: TableDetail>(row: &RecordRow<D>, tokens: impl Fn(&Usage) -> Option<u64>) -> Cell<'r> {
     Cell::int(row.record.usage.as_ref().and_then(tokens))
 }
 
 /// Columns of the first image sent.
-pub(super) fn image_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
+pub(super) fn image_columns<D: TableDetail>() -> Vec<Column<RecordRow<D>>> {
     vec![
-        column("image_digest", Digest, MayBeNull, |row: &Row<D>| {
+        column("image_digest", Digest, MayBeNull, |row: &RecordRow<D>| {
             let image = row.record.detail.image();
             image.map_or(Cell::Null, |image| Cell::Bytes(image.digest.as_bytes()))
         }),
@@ -113,9 +113,9 @@ pub(super) fn image_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
 }
 
 /// Further columns of condition, tokens and endpoint, which were added later.
-fn trailing_columns<D: TableDetail>() -> Vec<Column<Row<D>>> {
+fn trailing_columns<D: TableDetail>() -> Vec<Column<RecordRow<D>>> {
     vec![
-        column("reading", Text, MayBeNull, |row: &Row<D>| Cell::text(row.condition.profile.as_deref())),
+        column("reading", Text, MayBeNull, |row: &RecordRow<D>| Cell::text(row.condition.profile.as_deref())),
         column("severity", Double, MayBeNull, |row| double(row.condition.severity)),
         column("cached_tokens", Int32, MayBeNull, |row| usage(row, |usage| usage.cached_tokens)),
         column("provider", Text, MayBeNull, |row| Cell::text(row.record.provider.as_deref())),
@@ -130,8 +130,8 @@ impl TableDetail for ChoiceDetail {
 
     type Extra = ();
 
-    fn columns() -> Vec<Column<Row<Self>>> {
-        let own = vec![column("shown_frame", Text, MayBeNull, |row: &Row<Self>| {
+    fn columns() -> Vec<Column<RecordRow<Self>>> {
+        let own = vec![column("shown_frame", Text, MayBeNull, |row: &RecordRow<Self>| {
             let shown = row.record.detail.shown_frame.as_ref();
             Cell::text(shown.map(|frame| &*frame.0))
         })];
@@ -174,7 +174,7 @@ impl TableDetail for ChoiceDetail {
     }
 }
 
-type ChoiceRow = Row<ChoiceDetail>;
+type ChoiceRow = RecordRow<ChoiceDetail>;
 
 /// Columns of the choices and the true choice.
 fn question_columns() -> Vec<Column<ChoiceRow>> {
@@ -252,9 +252,9 @@ impl TableDetail for OpenDetail {
 
     type Extra = MarkedAnswer;
 
-    fn columns() -> Vec<Column<Row<Self>>> {
+    fn columns() -> Vec<Column<RecordRow<Self>>> {
         let own = vec![
-            column("image_count", Int32, MayBeNull, |row: &Row<Self>| {
+            column("image_count", Int32, MayBeNull, |row: &RecordRow<Self>| {
                 let images = row.record.detail.images.as_ref();
                 Cell::int(images.map(|images| images.images))
             }),
@@ -330,9 +330,9 @@ fn unmarked(outcome: AnswerOutcome) -> MarkedAnswer {
 }
 
 /// Columns of the true answer, the model's answer and its mark.
-fn mark_columns() -> Vec<Column<Row<OpenDetail>>> {
+fn mark_columns() -> Vec<Column<RecordRow<OpenDetail>>> {
     vec![
-        column("answer", Text, MayBeNull, |row: &Row<OpenDetail>| {
+        column("answer", Text, MayBeNull, |row: &RecordRow<OpenDetail>| {
             let question = row.question.as_ref();
             Cell::text(question.and_then(|question| question.answer.as_deref()))
         }),

@@ -4,7 +4,7 @@
 //!
 //! Places of a run's records in its log file, in the order of the table: [`ordered_places`].
 //!
-//! A row of the table of records ([`Row`]), and the interface to the columns of an experiment ([`TableDetail`]).
+//! A row of the table of records ([`RecordRow`]), and the interface to the columns of an experiment ([`TableDetail`]).
 
 use std::collections::{BTreeSet, HashMap};
 use std::fmt::Write as _;
@@ -240,7 +240,7 @@ impl<D: TableDetail> RowBatches<D> {
     ///
     /// # Errors
     /// If a record is malformed.
-    pub(super) fn next_batch(&mut self) -> Result<Option<Vec<Row<D>>>> {
+    pub(super) fn next_batch(&mut self) -> Result<Option<Vec<RecordRow<D>>>> {
         let unread = &self.places[self.read..];
         if unread.is_empty() {
             return Ok(None);
@@ -270,7 +270,7 @@ fn batch_length(places: &[LinePlace]) -> usize {
 
 /// The place of a record with its sort keys, in 48 bytes, so that the records themselves need not be kept in memory.
 #[derive(Debug, Clone, Copy)]
-struct Place {
+struct RecordPlace {
     /// Number of the question in the run, from 1; 0 if the run does not have it.
     question: u32,
     /// Number of the condition in order of appearance.
@@ -293,7 +293,7 @@ fn ordered_places(folder: &Path, manifest: &RunManifest, questions: &[RunQuestio
     let mut models = Numbering::<String>::default();
     let mut all = Vec::new();
     each_trial(folder, |trial, line| {
-        all.push(Place {
+        all.push(RecordPlace {
             question: ids.get(&trial.question).copied().unwrap_or(0),
             condition: conditions.number(trial.condition),
             model: models.number(trial.model),
@@ -357,7 +357,7 @@ pub(super) trait TableDetail: Detail + Sync + 'static {
     type Extra: Send + Sync;
 
     /// The columns, in order.
-    fn columns() -> Vec<Column<Row<Self>>>;
+    fn columns() -> Vec<Column<RecordRow<Self>>>;
 
     /// Reads the data of the whole run that rows need.
     ///
@@ -388,7 +388,7 @@ pub(super) struct SentImage<'a> {
 }
 
 /// A record with the data of the run that its columns need.
-pub(super) struct Row<D: TableDetail> {
+pub(super) struct RecordRow<D: TableDetail> {
     pub(super) record: Record<D>,
     pub(super) condition: Arc<ConditionCells>,
     /// `None` if the run does not have the question.
@@ -463,7 +463,7 @@ impl<D: TableDetail> Rows<D> {
     }
 
     /// The row of a record; `None` if it has none.
-    pub(super) fn row(&mut self, mut record: Record<D>) -> Option<Row<D>> {
+    pub(super) fn row(&mut self, mut record: Record<D>) -> Option<RecordRow<D>> {
         rename_record(&mut record, &self.names);
         let extra = D::extra(&self.context, &record)?;
         let condition = if let Some(known) = self.conditions.get(&record.condition) {
@@ -473,6 +473,6 @@ impl<D: TableDetail> Rows<D> {
             self.conditions.insert(record.condition.clone(), Arc::clone(&cells));
             cells
         };
-        Some(Row { question: self.questions.get(&record.question).map(Arc::clone), condition, extra, record })
+        Some(RecordRow { question: self.questions.get(&record.question).map(Arc::clone), condition, extra, record })
     }
 }

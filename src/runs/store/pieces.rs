@@ -26,7 +26,7 @@ pub(super) struct Pieces<'p> {
 }
 
 /// Some complete lines of a file.
-pub(super) struct Piece {
+pub(super) struct LineBlock {
     bytes: Vec<u8>,
     /// The byte offset of the first line in the file.
     start: u64,
@@ -82,7 +82,7 @@ impl<'p> Pieces<'p> {
     ///
     /// # Errors
     /// If the file cannot be read, or a line is longer than any line of a run.
-    pub(super) fn next(&mut self) -> Result<Option<Piece>> {
+    pub(super) fn next(&mut self) -> Result<Option<LineBlock>> {
         let mut bytes = std::mem::take(&mut self.rest);
         loop {
             let searched = bytes.len();
@@ -104,7 +104,7 @@ impl<'p> Pieces<'p> {
                 return Err(Error::line(self.path, self.lines + 1, problem));
             }
         }
-        let piece = Piece { start: self.start, lines: self.lines, bytes };
+        let piece = LineBlock { start: self.start, lines: self.lines, bytes };
         self.start += piece.bytes.len() as u64;
         #[expect(clippy::naive_bytecount, reason = "fast enough without a crate")]
         let line_ends = piece.bytes.iter().filter(|byte| **byte == b'\n').count();
@@ -113,7 +113,7 @@ impl<'p> Pieces<'p> {
     }
 }
 
-impl Piece {
+impl LineBlock {
     /// The lines that are not blank, in order.
     pub(super) fn lines(&self) -> Vec<FileLine<'_>> {
         let (mut start, mut lines) = (self.start, Vec::new());

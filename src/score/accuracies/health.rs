@@ -1,6 +1,6 @@
 //! Counts of replies, unreadable replies and failures of each subject: [`Health`].
 //!
-//! Share of the items answered by other models that a model has answered: [`Coverage`].
+//! Share of the items answered by other models that a model has answered: [`LevelCoverage`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -93,9 +93,9 @@ pub(super) const MIN_SHARE: f64 = 0.9;
 
 /// Items that a model answered at each level, on all sides of a comparison.
 #[derive(Debug)]
-pub(crate) struct Coverage(BTreeMap<AxisLevel, Vec<bool>>);
+pub(crate) struct LevelCoverage(BTreeMap<AxisLevel, Vec<bool>>);
 
-impl Coverage {
+impl LevelCoverage {
     /// Finds the items at each level to which all of these subjects, given by their indices, replied.
     pub(crate) fn new(
         grid: &Grid<'_>,
@@ -155,9 +155,9 @@ pub(crate) type Lacking = Vec<(AxisLevel, [usize; 2])>;
 /// Selects the coverage to average over: the one that retains the most answers if models that lack some of it are
 /// reported separately. Ties go to the larger one, then to the first. A model that was asked fewer or more items than
 /// the others therefore does not change their results. `None` without models.
-pub(crate) fn shared(coverages: &[Coverage]) -> Option<&Coverage> {
+pub(crate) fn shared(coverages: &[LevelCoverage]) -> Option<&LevelCoverage> {
     let mut seen = BTreeSet::new();
-    let mut best: Option<((usize, usize), &Coverage)> = None;
+    let mut best: Option<((usize, usize), &LevelCoverage)> = None;
     for coverage in coverages {
         // Most models have the same coverage.
         if !seen.insert(coverage.counts()) {

@@ -8,7 +8,7 @@ mod strict_score;
 
 pub(super) use accuracy::{CommonItems, summarize};
 pub(super) use curve::{CurvePoints, Floor, first_failures};
-pub(super) use health::{Coverage, Lacking, shared};
+pub(super) use health::{Lacking, LevelCoverage, shared};
 
 pub use accuracy::{AccuracyCell, AccuracySummary, OfferedChoices, shared_items};
 pub use balance::{MAX_ANSWER_SHARE, UnbalancedFamily};

@@ -102,7 +102,7 @@ fn is_within(letter: &Name, texts: &[Name]) -> bool {
 }
 
 /// An occurrence of the text of a choice, before overlaps are resolved.
-struct Candidate {
+struct Occurrence {
     start: usize,
     end: usize,
     choice: usize,
@@ -142,13 +142,13 @@ pub(super) fn texts(text: &str, folded: &str, tokens: &[Token], offered: &Choice
 }
 
 /// Occurrences of the texts as they are spelled.
-fn exact(folded: &str, offered: &ChoiceViews) -> Vec<Candidate> {
+fn exact(folded: &str, offered: &ChoiceViews) -> Vec<Occurrence> {
     let mut candidates = Vec::new();
     for (text, choice) in &offered.folded {
         for (start, _) in folded.match_indices(text.as_str()) {
             let end = start + text.len();
             if stands_alone(folded, start, end) {
-                candidates.push(Candidate { start, end, choice: *choice, is_respaced: false });
+                candidates.push(Occurrence { start, end, choice: *choice, is_respaced: false });
             }
         }
     }
@@ -163,7 +163,7 @@ fn respaced<'a>(
     folded: &'a str,
     tokens: &'a [Token],
     offered: &'a ChoiceViews,
-) -> impl Iterator<Item = Candidate> + 'a {
+) -> impl Iterator<Item = Occurrence> + 'a {
     let longest = offered.joined.keys().map(String::len).max().unwrap_or(0);
     tokens.iter().enumerate().flat_map(move |(at, token)| {
         let word = token.slice(folded);
@@ -184,13 +184,13 @@ fn respaced<'a>(
 }
 
 /// A candidate at `start..end` for each choice that consists of these letters, ignoring spaces.
-fn joined_choices(offered: &ChoiceViews, letters: &str, start: usize, end: usize) -> Vec<Candidate> {
+fn joined_choices(offered: &ChoiceViews, letters: &str, start: usize, end: usize) -> Vec<Occurrence> {
     offered
         .joined
         .get(letters)
         .into_iter()
         .flatten()
-        .map(|&choice| Candidate { start, end, choice, is_respaced: true })
+        .map(|&choice| Occurrence { start, end, choice, is_respaced: true })
         .collect()
 }
 

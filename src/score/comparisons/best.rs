@@ -1,6 +1,6 @@
 //! Ranking of models by accuracy in the dark: [`BestInTheDark`].
 //!
-//! Right replies of all models by item and level ([`Scores`]), and what they show of models and pairs of models.
+//! Right replies of all models by item and level ([`CommonScores`]), and what they show of models and pairs of models.
 //!
 //! Ranks of models as ranges: [`RankRange`].
 
@@ -10,7 +10,7 @@ use std::ops::Range;
 use super::comparison::compares_models;
 use super::paired::{BoundedSums, PairedTest, net_bounds};
 use super::pooled::pool;
-use crate::accuracies::{Coverage, shared};
+use crate::accuracies::{LevelCoverage, shared};
 use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
@@ -117,7 +117,7 @@ pub(crate) fn is_dark(level: AxisLevel, kind: Kind) -> bool {
 }
 
 /// A model and the levels at which it was asked.
-type Asked<'g> = (&'g str, BTreeSet<AxisLevel>);
+type AskedLevels<'g> = (&'g str, BTreeSet<AxisLevel>);
 
 /// Compares the models in the dark, with replies parsed in `mode`. If the models share no dark level, the darkest
 /// shared level counts as dark. `None` if the grid has too many models to compare, if fewer than two models were asked
@@ -129,7 +129,7 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
     }
     let variant = grid.main_variant()?;
     let kind = variant.kind?;
-    let (compared, mut without): (Vec<Asked<'_>>, Vec<Asked<'_>>) = pool(grid)
+    let (compared, mut without): (Vec<AskedLevels<'_>>, Vec<AskedLevels<'_>>) = pool(grid)
         .into_iter()
         .map(|model| (model, levels(grid, model, &variant)))
         .partition(|(_, levels)| levels.len() > 1 && levels.contains(&AxisLevel::L0));
@@ -150,7 +150,7 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
     let asked: BTreeSet<AxisLevel> =
         compared.iter().flat_map(|(_, levels)| levels).copied().filter(|level| *level >= dark[0]).collect();
     let names: Vec<&str> = compared.iter().map(|(model, _)| *model).collect();
-    let scores = Scores::new(grid, &names, &variant, &levels, mode);
+    let scores = CommonScores::new(grid, &names, &variant, &levels, mode);
     if scores.items.is_empty() {
         return None;
     }
@@ -203,17 +203,17 @@ fn levels(grid: &Grid<'_>, model: &str, variant: &Variant) -> BTreeSet<AxisLevel
 /// reduce the items on which all models are compared.
 fn split_by_coverage<'g>(
     grid: &Grid<'_>,
-    models: Vec<Asked<'g>>,
+    models: Vec<AskedLevels<'g>>,
     variant: &Variant,
-) -> (Vec<Asked<'g>>, Vec<Asked<'g>>) {
-    let coverages: Vec<Coverage> = models
+) -> (Vec<AskedLevels<'g>>, Vec<AskedLevels<'g>>) {
+    let coverages: Vec<LevelCoverage> = models
         .iter()
         .map(|(model, levels)| {
             let sides = levels.iter().filter_map(|level| {
                 let subject = grid.find_up_to_group(&ModelInCondition::with_images(model, *level, variant, None))?;
                 Some((*level, vec![subject]))
             });
-            Coverage::new(grid, sides, |_| true)
+            LevelCoverage::new(grid, sides, |_| true)
         })
         .collect();
     let Some(most) = shared(&coverages) else {
@@ -347,7 +347,7 @@ impl ItemScores {
 }
 
 /// Scores of all models on the items that every model was asked at every level.
-pub(super) struct Scores {
+pub(super) struct CommonScores {
     /// Items that every model answered at every level.
     items: Vec<ItemScores>,
     /// Items of which a reply is missing.
@@ -360,7 +360,7 @@ pub(super) struct Scores {
     all_clusters: usize,
 }
 
-impl Scores {
+impl CommonScores {
     fn new(grid: &Grid<'_>, models: &[&str], variant: &Variant, levels: &[AxisLevel], mode: ParsingMode) -> Self {
         let subjects: Vec<Vec<usize>> = models
             .iter()

@@ -182,10 +182,10 @@ pub(crate) fn comparisons(grid: &Grid<'_>) -> Vec<Comparison> {
 }
 
 /// A kind, a family, and the indices of the two sides.
-type Job<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
+type Pairing<'a> = (ComparisonKind, Option<&'a Family>, usize, usize);
 
 /// Computes the comparisons that have items, before correction.
-fn uncorrected(grid: &Grid<'_>, jobs: Vec<Job<'_>>) -> Vec<Comparison> {
+fn uncorrected(grid: &Grid<'_>, jobs: Vec<Pairing<'_>>) -> Vec<Comparison> {
     jobs.into_par_iter()
         .filter_map(|(kind, family, first, second)| {
             let strict = PairedComparison::new(grid, first, second, family, ParsingMode::Strict)?;

@@ -16,7 +16,7 @@ use rayon::prelude::*;
 use super::comparison::compares_enhancers;
 use super::paired::BoundedSums;
 use super::pooled_kind::PooledKind;
-use crate::accuracies::{Coverage, Lacking, shared};
+use crate::accuracies::{Lacking, LevelCoverage, shared};
 use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::{ModelInCondition, pooled_models};
@@ -48,7 +48,7 @@ fn models<'g>(grid: &'g Grid<'_>, view: View) -> Vec<&'g str> {
 /// A kind, variant and enhancers; Holm's correction is applied to each family of such a set, and of all pairs of
 /// enhancers together.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-struct PooledSet {
+struct PooledFamily {
     kind: PooledKind,
     variant: Variant,
     enhancer: Option<EnhancerName>,
@@ -56,7 +56,7 @@ struct PooledSet {
     against: Option<EnhancerName>,
 }
 
-impl PooledSet {
+impl PooledFamily {
     /// All sets for which the grid may contain both sides.
     fn all(grid: &Grid<'_>) -> BTreeSet<Self> {
         let mut sets = Self::of_enhancers_and_raw(grid);
@@ -140,14 +140,14 @@ impl PooledSet {
     /// separately.
     fn models<'g>(&self, grid: &'g Grid<'_>, levels: &BTreeSet<AxisLevel>) -> SetModels<'g> {
         let all = self.asked_models(grid, levels);
-        let coverages: Vec<Coverage> = all
+        let coverages: Vec<LevelCoverage> = all
             .iter()
             .map(|[model, other]| {
                 let sides = levels.iter().filter_map(|level| {
                     let (first, second) = self.sides(grid, model, other, *level)?;
                     Some((*level, vec![first, second]))
                 });
-                Coverage::new(grid, sides, |item| self.kind.is_about(&grid.items[item]))
+                LevelCoverage::new(grid, sides, |item| self.kind.is_about(&grid.items[item]))
             })
             .collect();
         let mut models = SetModels::default();
@@ -192,7 +192,7 @@ impl PooledSet {
 struct SetModels<'g> {
     /// Pooled models, as pairs of first and second side.
     pooled: Vec<[&'g str; 2]>,
-    /// Models that answered too few items, with the levels and the numbers of items of [`Coverage::lacking`].
+    /// Models that answered too few items, with the levels and the numbers of items of [`LevelCoverage::lacking`].
     left_out: Vec<(&'g str, Lacking)>,
     /// Pooled models that were asked at more levels than the others, with these levels.
     extra_levels: Vec<(&'g str, Vec<AxisLevel>)>,
@@ -202,7 +202,7 @@ struct SetModels<'g> {
 /// enhancer, family and level.
 #[must_use]
 pub fn pooled(grid: &Grid<'_>) -> (Vec<PooledFinding>, Vec<PooledFinding>) {
-    let sets: Vec<PooledSet> = PooledSet::all(grid).into_iter().collect();
+    let sets: Vec<PooledFamily> = PooledFamily::all(grid).into_iter().collect();
     let findings: Vec<PooledFinding> = sets.into_par_iter().flat_map_iter(|set| set_findings(grid, &set)).collect();
     let (mut levels, means): (Vec<PooledFinding>, Vec<PooledFinding>) =
         findings.into_iter().partition(|finding| finding.mean_over.is_empty());
@@ -231,7 +231,7 @@ fn correct_enhancer_pairs(findings: &mut [PooledFinding]) {
 /// them. An effect that grows with the level is not averaged over the lighter levels.
 fn averaged(
     grid: &Grid<'_>,
-    set: &PooledSet,
+    set: &PooledFamily,
     models: &[[&str; 2]],
     levels: &[(AxisLevel, Vec<PooledItem>)],
 ) -> Vec<PooledFinding> {
@@ -281,7 +281,7 @@ struct PoolOfLevels<'m> {
 }
 
 /// Computes the findings of a set, for all families together and for each family.
-fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
+fn set_findings(grid: &Grid<'_>, set: &PooledFamily) -> Vec<PooledFinding> {
     let levels = set.levels(grid);
     let models = set.models(grid, &levels).pooled;
     if models.is_empty() {
@@ -307,7 +307,7 @@ fn set_findings(grid: &Grid<'_>, set: &PooledSet) -> Vec<PooledFinding> {
 }
 
 /// Items that some model was asked on both sides; `None` if a model lacks a side.
-fn items(grid: &Grid<'_>, set: &PooledSet, models: &[[&str; 2]], level: AxisLevel) -> Option<Vec<PooledItem>> {
+fn items(grid: &Grid<'_>, set: &PooledFamily, models: &[[&str; 2]], level: AxisLevel) -> Option<Vec<PooledItem>> {
     let pairs: Vec<(usize, usize)> =
         models.iter().map(|[model, other]| set.sides(grid, model, other, level)).collect::<Option<_>>()?;
     let items =
@@ -340,7 +340,7 @@ fn items(grid: &Grid<'_>, set: &PooledSet, models: &[[&str; 2]], level: AxisLeve
 /// Computes the finding of a level and a family, before correction; `None` if no item was answered by all models.
 fn finding(
     grid: &Grid<'_>,
-    set: &PooledSet,
+    set: &PooledFamily,
     pool: PoolOfLevels<'_>,
     level: AxisLevel,
     items: &[PooledItem],

@@ -73,7 +73,7 @@ pub struct Prediction {
 }
 
 /// PSNR and SSIM of images.
-type Measured<'a> = HashMap<ImageKey<'a>, [Option<f64>; 2]>;
+type MeasuredImages<'a> = HashMap<ImageKey<'a>, [Option<f64>; 2]>;
 
 /// A frame and the digest of an image of it. Both are needed, because two frames may have the same image, for example a
 /// black one, but different clean frames.
@@ -86,7 +86,7 @@ impl FidelityFindings {
     /// Computes the findings for the measured images; `None` if no reply is about a measured image.
     #[must_use]
     pub fn new<'a>(grid: &Grid<'a>, measured: &'a [ImageFidelity]) -> Option<Self> {
-        let measured: Measured<'_> = measured
+        let measured: MeasuredImages<'_> = measured
             .iter()
             .map(|image| ((&*image.frame, image.image), [Some(image.psnr.unwrap_or(f64::INFINITY)), image.ssim]))
             .collect();
@@ -140,7 +140,7 @@ impl FidelityFindings {
 
 /// Sums over the replies in one condition.
 struct ConditionSums<'a> {
-    images: Measured<'a>,
+    images: MeasuredImages<'a>,
     right: usize,
     replies: usize,
     /// Pairs by PSNR and by SSIM.
@@ -148,7 +148,7 @@ struct ConditionSums<'a> {
 }
 
 impl<'a> ConditionSums<'a> {
-    fn new(grid: &Grid<'a>, subjects: &[usize], measured: &Measured<'a>) -> Self {
+    fn new(grid: &Grid<'a>, subjects: &[usize], measured: &MeasuredImages<'a>) -> Self {
         let mut sums = Self {
             images: HashMap::new(),
             right: 0,

@@ -148,11 +148,11 @@ impl<'de> Deserialize<'de> for EnhancerName {
 /// A point on the axis of a curve: L0 (the untouched frame) or a severity. All kinds on one axis share its points,
 /// which are ordered by severity. The darkness of pairs is on no axis, because it differs by frame; it is ordered last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct AxisLevel(Point);
+pub struct AxisLevel(AxisPoint);
 
 /// Position of an [`AxisLevel`] on its axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
-enum Point {
+enum AxisPoint {
     Untouched,
     Degraded(Kind, Severity),
     Pair,
@@ -160,23 +160,23 @@ enum Point {
 
 impl AxisLevel {
     /// The untouched frame, the first point of every axis.
-    pub const L0: Self = Self(Point::Untouched);
+    pub const L0: Self = Self(AxisPoint::Untouched);
 
     /// The darkness of pairs, photographed or synthetic.
-    pub const PAIR: Self = Self(Point::Pair);
+    pub const PAIR: Self = Self(AxisPoint::Pair);
 
     /// The level of a severity of a kind.
     #[must_use]
     pub fn new(kind: Kind, severity: Severity) -> Self {
-        Self(Point::Degraded(kind.first_of_axis(), severity))
+        Self(AxisPoint::Degraded(kind.first_of_axis(), severity))
     }
 
     /// The severity; `None` for L0 and for pairs.
     #[must_use]
     pub fn severity(self) -> Option<Severity> {
         match self.0 {
-            Point::Degraded(_, severity) => Some(severity),
-            Point::Untouched | Point::Pair => None,
+            AxisPoint::Degraded(_, severity) => Some(severity),
+            AxisPoint::Untouched | AxisPoint::Pair => None,
         }
     }
 
@@ -184,8 +184,8 @@ impl AxisLevel {
     #[must_use]
     pub fn axis(self) -> Option<Axis> {
         match self.0 {
-            Point::Degraded(kind, _) => Some(kind.axis()),
-            Point::Untouched | Point::Pair => None,
+            AxisPoint::Degraded(kind, _) => Some(kind.axis()),
+            AxisPoint::Untouched | AxisPoint::Pair => None,
         }
     }
 
@@ -193,9 +193,9 @@ impl AxisLevel {
     #[must_use]
     pub fn belongs_to(self, axis: Axis) -> bool {
         match self.0 {
-            Point::Untouched => true,
-            Point::Degraded(kind, _) => kind.axis() == axis,
-            Point::Pair => axis == Axis::LIGHT,
+            AxisPoint::Untouched => true,
+            AxisPoint::Degraded(kind, _) => kind.axis() == axis,
+            AxisPoint::Pair => axis == Axis::LIGHT,
         }
     }
 
@@ -224,9 +224,9 @@ impl From<&Treatment> for AxisLevel {
 impl fmt::Display for AxisLevel {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.0 {
-            Point::Untouched => f.pad("L0"),
-            Point::Degraded(kind, severity) => f.pad(&kind.label(severity)),
-            Point::Pair => f.pad("dark"),
+            AxisPoint::Untouched => f.pad("L0"),
+            AxisPoint::Degraded(kind, severity) => f.pad(&kind.label(severity)),
+            AxisPoint::Pair => f.pad("dark"),
         }
     }
 }

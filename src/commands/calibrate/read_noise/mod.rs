@@ -19,7 +19,7 @@ use std::cell::RefCell;
 
 use serde::Serialize;
 
-use super::sums::{Residuals, STEPS};
+use super::sums::{ResidualHistogram, STEPS};
 
 /// Read noise of a setting, with the derivatives for resampling its frames.
 #[derive(Debug, Clone)]
@@ -39,8 +39,8 @@ impl ReadNoise {
     ///
     /// # Errors
     /// If the residuals have no spread, or the likelihood has no maximum.
-    pub(super) fn fit(groups: &[Residuals]) -> Result<Self, String> {
-        let mut all = Residuals::default();
+    pub(super) fn fit(groups: &[ResidualHistogram]) -> Result<Self, String> {
+        let mut all = ResidualHistogram::default();
         for group in groups {
             all.add(group);
         }
@@ -86,7 +86,7 @@ const DERIVATIVE_STEP: f64 = 2e-3;
 pub(super) struct Folded(Vec<(f64, f64)>);
 
 impl Folded {
-    fn new(residuals: &Residuals) -> Self {
+    fn new(residuals: &ResidualHistogram) -> Self {
         let mut folded: Vec<(i64, u64)> = Vec::new();
         let mut all: Vec<(i64, u64)> =
             residuals.counts().into_iter().map(|(steps, count)| (steps.abs(), count)).collect();
@@ -348,7 +348,7 @@ pub(crate) struct PlotFit {
 /// al. 2021, section 3.2; Filliben 1975). The rounding of codes counts as noise.
 ///
 /// Equal residuals fill an interval of probability; each is plotted at the mean quantile of that interval.
-pub(super) fn plot_fit(residuals: &Residuals) -> PlotFit {
+pub(super) fn plot_fit(residuals: &ResidualHistogram) -> PlotFit {
     let counts = residuals.counts();
     let total: f64 = counts.iter().map(|(_, count)| *count as f64).sum();
     let centre = counts.iter().map(|(steps, count)| *count as f64 * (*steps as f64 / STEPS as f64)).sum::<f64>()

@@ -3,8 +3,8 @@ use crate::commands::calibrate::frames::{Cfa, HotPixels, Layout};
 use crate::commands::calibrate::sums::{Centres, PlaneSums, STEPS};
 use darkqa_light::draws::tukey_lambda;
 
-/// Residuals of a frame of 512 × 512 sites whose noise has these quantiles, in pseudorandom order.
-fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
+/// ResidualHistogram of a frame of 512 × 512 sites whose noise has these quantiles, in pseudorandom order.
+fn residuals(shape: f64, scale: f64, seed: u64) -> ResidualHistogram {
     let layout = Layout { cfa: Cfa::Mono, height: 512, width: 512 };
     let sites = layout.height * layout.width;
     let samples: Vec<u16> = (0..sites)
@@ -19,7 +19,7 @@ fn residuals(shape: f64, scale: f64, seed: u64) -> Residuals {
         .collect();
     let hot = HotPixels::none(layout.plane_rows());
     let sums = PlaneSums::new(layout, &samples, &hot);
-    Residuals::new(layout, &samples, &sums, &hot, Centres::RowsAndPlanes)
+    ResidualHistogram::new(layout, &samples, &sums, &hot, Centres::RowsAndPlanes)
 }
 
 #[test]
@@ -79,7 +79,7 @@ fn frames_without_noise_are_refused() {
     let hot = HotPixels::none(layout.plane_rows());
     let samples = vec![512; 256 * 256];
     let sums = PlaneSums::new(layout, &samples, &hot);
-    let none = Residuals::new(layout, &samples, &sums, &hot, Centres::RowsAndPlanes);
+    let none = ResidualHistogram::new(layout, &samples, &sums, &hot, Centres::RowsAndPlanes);
     let problem = ReadNoise::fit(&[none]).unwrap_err();
     assert!(problem.contains("without any noise"), "{problem}");
 }

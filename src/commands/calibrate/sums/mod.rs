@@ -3,7 +3,7 @@
 //!
 //! Sums of single frames: [`PlaneSums`] and [`TopCode`].
 //!
-//! Histogram of bias frames after removing offsets and row noise: [`Residuals`].
+//! Histogram of bias frames after removing offsets and row noise: [`ResidualHistogram`].
 
 pub(crate) mod pair;
 
@@ -145,19 +145,19 @@ pub(super) enum Centres<'a> {
 
 /// Histogram of residuals, in steps of 1 / [`STEPS`] ADU.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Residuals {
+pub(super) struct ResidualHistogram {
     /// Counts from −`WINDOW` to `WINDOW`.
     near: Vec<u64>,
     far: BTreeMap<i64, u64>,
 }
 
-impl Default for Residuals {
+impl Default for ResidualHistogram {
     fn default() -> Self {
         Self { near: vec![0; (2 * WINDOW * STEPS + 1) as usize], far: BTreeMap::new() }
     }
 }
 
-impl Residuals {
+impl ResidualHistogram {
     /// Computes the residuals of a frame. `sums` must be the sums of the same frame without the same hot pixels.
     pub(crate) fn new(
         layout: Layout,
@@ -230,7 +230,7 @@ struct Counter<'a> {
 
 impl Counter<'_> {
     /// Counts the residuals of a sensor row.
-    fn count(&self, row: usize, part: &mut Vec<u16>, residuals: &mut Residuals) {
+    fn count(&self, row: usize, part: &mut Vec<u16>, residuals: &mut ResidualHistogram) {
         match self.centres {
             Centres::RowsAndPlanes => self.count_around_planes(row, part, residuals),
             Centres::MeanFrame { sums, frames } => {
@@ -244,7 +244,7 @@ impl Counter<'_> {
         self.plane_means[self.layout.cfa.plane(row, parity)]
     }
 
-    fn count_around_planes(&self, row: usize, part: &mut Vec<u16>, residuals: &mut Residuals) {
+    fn count_around_planes(&self, row: usize, part: &mut Vec<u16>, residuals: &mut ResidualHistogram) {
         let step = self.layout.cfa.step();
         let parts = row * step..(row + 1) * step;
         let (mut count, mut left) = (0.0, 0.0);
@@ -266,7 +266,7 @@ impl Counter<'_> {
         }
     }
 
-    fn count_around_mean_frame(&self, row: usize, sums: &[u32], frames: f64, residuals: &mut Residuals) {
+    fn count_around_mean_frame(&self, row: usize, sums: &[u32], frames: f64, residuals: &mut ResidualHistogram) {
         let Layout { width, cfa, .. } = self.layout;
         let codes = &self.samples[row * width..][..width];
         let mut is_used = vec![true; width];
@@ -330,7 +330,7 @@ mod tests {
 
     fn residuals(samples: &[u16], hot: &HotPixels, centres: Centres<'_>) -> Vec<(i64, u64)> {
         let sums = PlaneSums::new(RESIDUALS_LAYOUT, samples, hot);
-        Residuals::new(RESIDUALS_LAYOUT, samples, &sums, hot, centres).counts()
+        ResidualHistogram::new(RESIDUALS_LAYOUT, samples, &sums, hot, centres).counts()
     }
 
     /// Offsets of planes and of rows leave nothing behind.

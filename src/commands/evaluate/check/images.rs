@@ -1,6 +1,6 @@
 //! Checks of the images of the questions: [`check_images`].
 //!
-//! Findings of `check`, one per line: [`Findings`].
+//! Findings of `check`, one per line: [`ImageFindings`].
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 
@@ -31,13 +31,13 @@ const SAMPLE_SIZE: usize = 32;
 /// The result of inspecting an image.
 struct Inspection<'a> {
     id: &'a FrameId,
-    facts: Result<ImageFacts>,
+    facts: Result<UsableImage>,
     /// Size of the file.
     bytes: u64,
 }
 
 /// Properties of a usable image.
-struct ImageFacts {
+struct UsableImage {
     size: (u32, u32),
     digest: Digest,
     /// Changes made when the image was read, if any.
@@ -51,7 +51,7 @@ pub(super) fn check_images(
     questions: &[Question],
     depth: Depth,
     progress: &Progress,
-    findings: &mut Findings,
+    findings: &mut ImageFindings,
 ) {
     let shown = shown_frames(dataset, questions);
     let bar = progress.bar("reading images", shown.len());
@@ -70,9 +70,9 @@ pub(super) fn check_images(
         match facts {
             Err(e) => {
                 unusable += 1;
-                findings.add_of_kind("images that cannot be used", Mark::Problem, e.to_string());
+                findings.add_of_kind("images that cannot be used", FindingSeverity::Problem, e.to_string());
             }
-            Ok(ImageFacts { size, digest, note }) => {
+            Ok(UsableImage { size, digest, note }) => {
                 total_bytes += bytes;
                 *sizes.entry(size).or_insert(0_usize) += 1;
                 if let Some(note) = note {
@@ -83,7 +83,7 @@ pub(super) fn check_images(
                         "{:?} and {:?} are the same image under two names: each gets its own noise",
                         first.0, id.0
                     );
-                    findings.add_of_kind("images that occur twice", Mark::Warning, text);
+                    findings.add_of_kind("images that occur twice", FindingSeverity::Warning, text);
                 }
             }
         }
@@ -127,13 +127,13 @@ fn inspect<'a>(dataset: &Dataset, id: &'a FrameId, depth: Depth) -> Inspection<'
             picture.decode()?;
         }
         let note = Some(picture.note()).filter(|note| *note != InputNote::default());
-        Ok(ImageFacts { size, digest: picture.digest(), note: note.map(Box::new) })
+        Ok(UsableImage { size, digest: picture.digest(), note: note.map(Box::new) })
     });
     Inspection { id, facts, bytes }
 }
 
 /// Measures the brightness of a sample of the images, and warns if they are already dark.
-fn check_brightness(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut Findings) {
+fn check_brightness(dataset: &Dataset, shown: &[&FrameId], dark: DarkImages, findings: &mut ImageFindings) {
     let number = shown.len().min(SAMPLE_SIZE);
     let mut sample: Vec<f64> = (0..number)
         .into_par_iter()
@@ -174,7 +174,7 @@ fn megabytes(bytes: u64) -> String {
 /// Severity of a finding.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Mark {
+pub(super) enum FindingSeverity {
     /// No problem.
     Ok,
     /// A run would continue, but its numbers may be misleading.
@@ -183,7 +183,7 @@ pub(super) enum Mark {
     Problem,
 }
 
-impl Mark {
+impl FindingSeverity {
     fn word(self) -> &'static str {
         match self {
             Self::Ok => "ok     ",
@@ -195,8 +195,8 @@ impl Mark {
 
 /// One finding.
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Finding {
-    pub(super) mark: Mark,
+pub(super) struct ImageFinding {
+    pub(super) mark: FindingSeverity,
     pub(super) text: String,
 }
 
@@ -205,32 +205,32 @@ const MAX_SHOWN: usize = 5;
 
 /// All findings, in order.
 #[derive(Debug, Default)]
-pub(super) struct Findings {
-    all: Vec<Finding>,
+pub(super) struct ImageFindings {
+    all: Vec<ImageFinding>,
     /// Number of findings of each kind, and index of the last one shown.
     kinds: BTreeMap<&'static str, (usize, usize)>,
 }
 
-impl Findings {
+impl ImageFindings {
     pub(super) fn ok(&mut self, text: impl Into<String>) {
-        self.add(Mark::Ok, text);
+        self.add(FindingSeverity::Ok, text);
     }
 
     pub(super) fn warn(&mut self, text: impl Into<String>) {
-        self.add(Mark::Warning, text);
+        self.add(FindingSeverity::Warning, text);
     }
 
     pub(super) fn problem(&mut self, text: impl Into<String>) {
-        self.add(Mark::Problem, text);
+        self.add(FindingSeverity::Problem, text);
     }
 
-    fn add(&mut self, mark: Mark, text: impl Into<String>) {
+    fn add(&mut self, mark: FindingSeverity, text: impl Into<String>) {
         let text = text.into();
-        self.all.push(Finding { mark, text });
+        self.all.push(ImageFinding { mark, text });
     }
 
     /// Adds a finding of a kind. Only the first [`MAX_SHOWN`] of a kind are shown.
-    pub(super) fn add_of_kind(&mut self, kind: &'static str, mark: Mark, text: impl Into<String>) {
+    pub(super) fn add_of_kind(&mut self, kind: &'static str, mark: FindingSeverity, text: impl Into<String>) {
         let count = self.kinds.entry(kind).or_default();
         count.0 += 1;
         if count.0 <= MAX_SHOWN {
@@ -240,15 +240,15 @@ impl Findings {
     }
 
     /// The findings, with a line for the number of each kind that is not shown.
-    pub(super) fn finish(mut self) -> Vec<Finding> {
-        let mut rest: Vec<(usize, Finding)> = self
+    pub(super) fn finish(mut self) -> Vec<ImageFinding> {
+        let mut rest: Vec<(usize, ImageFinding)> = self
             .kinds
             .iter()
             .filter(|(_, (count, _))| *count > MAX_SHOWN)
             .map(|(kind, (count, last))| {
                 let mark = self.all[*last].mark;
                 let text = format!("and {} more: {kind}", count - MAX_SHOWN);
-                (*last, Finding { mark, text })
+                (*last, ImageFinding { mark, text })
             })
             .collect();
         rest.sort_by_key(|(last, _)| std::cmp::Reverse(*last));
@@ -260,11 +260,11 @@ impl Findings {
 
     /// Number of problems, including those that are not shown.
     pub(super) fn problem_count(&self) -> usize {
-        let shown = self.all.iter().filter(|finding| finding.mark == Mark::Problem).count();
+        let shown = self.all.iter().filter(|finding| finding.mark == FindingSeverity::Problem).count();
         let hidden: usize = self
             .kinds
             .values()
-            .filter(|(_, last)| self.all[*last].mark == Mark::Problem)
+            .filter(|(_, last)| self.all[*last].mark == FindingSeverity::Problem)
             .map(|(count, _)| count.saturating_sub(MAX_SHOWN))
             .sum();
         shown + hidden
@@ -272,7 +272,7 @@ impl Findings {
 }
 
 /// The findings as lines of text.
-pub(super) fn lines(findings: &[Finding]) -> String {
+pub(super) fn lines(findings: &[ImageFinding]) -> String {
     findings
         .iter()
         .map(|finding| {
@@ -288,12 +288,12 @@ mod tests {
 
     #[test]
     fn many_findings_of_a_kind_are_counted() {
-        let mut findings = Findings::default();
+        let mut findings = ImageFindings::default();
         findings.ok("files");
         for n in 0..7 {
-            findings.add_of_kind("missing images", Mark::Problem, format!("{n}.png is missing"));
+            findings.add_of_kind("missing images", FindingSeverity::Problem, format!("{n}.png is missing"));
         }
-        findings.add_of_kind("grey images", Mark::Warning, "x.png is grey");
+        findings.add_of_kind("grey images", FindingSeverity::Warning, "x.png is grey");
         assert_eq!(findings.problem_count(), 7);
         let text = lines(&findings.finish());
         assert!(

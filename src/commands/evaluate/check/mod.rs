@@ -37,7 +37,7 @@ use darkqa_enhance::{Install, RuntimeSearch};
 use darkqa_light::LightSettings;
 use darkqa_score::accuracies::MAX_ANSWER_SHARE;
 use darkqa_score::tested_sentences::RunContents;
-use images::{Depth, Finding, Findings, Mark, lines};
+use images::{Depth, FindingSeverity, ImageFinding, ImageFindings, lines};
 
 /// The flags of `check` besides those of the evaluation.
 #[derive(Debug, Clone, Args)]
@@ -63,13 +63,13 @@ pub(crate) fn check(mut args: EvaluateArgs, check: &CheckArgs, progress: &Progre
     }
     let is_json = std::mem::take(&mut args.job.output.show.json);
     args.job.money.dry_run = true;
-    let mut findings = Findings::default();
+    let mut findings = ImageFindings::default();
     check_settings(&args, &mut findings);
     let asked = check_data(&args, check, progress, &mut findings)?;
     check_plan(args, progress, &mut findings);
     let problems = findings.problem_count();
     let findings = findings.finish();
-    let warnings = findings.iter().filter(|finding| finding.mark == Mark::Warning).count();
+    let warnings = findings.iter().filter(|finding| finding.mark == FindingSeverity::Warning).count();
     let output = if is_json {
         findings_json(&findings, asked, problems)
     } else {
@@ -89,13 +89,18 @@ fn verdict(asked: usize, problems: usize, warnings: usize) -> String {
     }
 }
 
-fn findings_json(findings: &[Finding], questions: usize, problems: usize) -> String {
+fn findings_json(findings: &[ImageFinding], questions: usize, problems: usize) -> String {
     let value = json!({"findings": findings, "questions": questions, "problems": problems});
     format!("{value:#}\n")
 }
 
 /// Checks data, questions and images; returns the number of questions that would be asked.
-fn check_data(args: &EvaluateArgs, check: &CheckArgs, progress: &Progress, findings: &mut Findings) -> Result<usize> {
+fn check_data(
+    args: &EvaluateArgs,
+    check: &CheckArgs,
+    progress: &Progress,
+    findings: &mut ImageFindings,
+) -> Result<usize> {
     let rule = args.decode.rule();
     let selection = &args.selection;
     let place = args.scene.place(args.data.place());
@@ -156,7 +161,7 @@ fn check_data(args: &EvaluateArgs, check: &CheckArgs, progress: &Progress, findi
 }
 
 /// Checks the models, and estimates the run. Nothing is sent, and no key is read.
-fn check_plan(args: EvaluateArgs, progress: &Progress, findings: &mut Findings) {
+fn check_plan(args: EvaluateArgs, progress: &Progress, findings: &mut ImageFindings) {
     if args.job.models.is_empty() {
         findings.warn("no model is named: --model NAME adds it to the check, and what a run would take");
         return;
@@ -211,7 +216,7 @@ fn hex(bytes: &[u8]) -> String {
 }
 
 /// Checks the flags and the files that they name. No data is read.
-fn check_settings(args: &EvaluateArgs, findings: &mut Findings) {
+fn check_settings(args: &EvaluateArgs, findings: &mut ImageFindings) {
     let place = args.scene.place(args.data.place());
     let set = args.scene.set_light(&place, &args.data.set.root.data_root);
     let light = set.and_then(|set| Ok((set, LightSettings::resolve(&args.job.light, set)?)));
@@ -243,7 +248,7 @@ fn file_line(what: &str, path: Option<&Path>) -> Option<String> {
 }
 
 /// Adds the line or the error of a step to the findings.
-fn add(findings: &mut Findings, result: Result<Option<String>>) {
+fn add(findings: &mut ImageFindings, result: Result<Option<String>>) {
     match result {
         Ok(Some(line)) => findings.ok(line),
         Ok(None) => {}
@@ -276,7 +281,7 @@ fn try_enhancers(args: &EvaluateArgs) -> Result<Option<String>> {
 const MAX_FAMILIES: usize = 12;
 
 /// Reports families, numbers of choices and chance accuracy, and warns of questions that give their answers away.
-fn check_questions(questions: &[Question], findings: &mut Findings) {
+fn check_questions(questions: &[Question], findings: &mut ImageFindings) {
     let (mut families, mut sizes) = (BTreeMap::new(), BTreeMap::new());
     let mut chance = 0.0;
     for question in questions {
@@ -302,7 +307,7 @@ fn check_questions(questions: &[Question], findings: &mut Findings) {
 }
 
 /// Warns of an answer or letter that is true so often that a constant reply scores well.
-fn warn_of_common_answers(questions: &[Question], findings: &mut Findings) {
+fn warn_of_common_answers(questions: &[Question], findings: &mut ImageFindings) {
     let letters: Vec<String> =
         questions.iter().filter_map(|question| Some(letter(question.choices.truth()?).to_string())).collect();
     let texts: Vec<String> = questions
@@ -333,20 +338,20 @@ fn warn_of_common_answers(questions: &[Question], findings: &mut Findings) {
 }
 
 /// Warns of questions that occur twice.
-fn warn_of_repeats(questions: &[Question], findings: &mut Findings) {
+fn warn_of_repeats(questions: &[Question], findings: &mut ImageFindings) {
     let mut seen = HashMap::new();
     for question in questions {
         let content = (&question.frame, &question.text, question.choices.texts());
         if let Some(first) = seen.insert(content, &question.id) {
             let text =
                 format!("the questions {:?} and {:?} are the same", excerpt(&first.0, 60), excerpt(&question.id.0, 60));
-            findings.add_of_kind("questions that occur twice", Mark::Warning, text);
+            findings.add_of_kind("questions that occur twice", FindingSeverity::Warning, text);
         }
     }
 }
 
 /// Warns of questions whose text contains the true choice and no other.
-fn warn_of_contained_answers(questions: &[Question], findings: &mut Findings) {
+fn warn_of_contained_answers(questions: &[Question], findings: &mut ImageFindings) {
     for question in questions {
         let text = format!(" {} ", words(&question.text));
         let texts = question.choices.texts();
@@ -361,7 +366,7 @@ fn warn_of_contained_answers(questions: &[Question], findings: &mut Findings) {
                 excerpt(truth, 60),
                 excerpt(&question.text, 120)
             );
-            findings.add_of_kind("questions that hold their answers", Mark::Warning, line);
+            findings.add_of_kind("questions that hold their answers", FindingSeverity::Warning, line);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! recorder was killed. Message bodies are read on demand and one at a time, so memory does not depend on the size of
 //! files and chunks.
 //!
-//! Streaming decompression of a chunk of an MCAP file: [`Chunk`].
+//! Streaming decompression of a chunk of an MCAP file: [`OpenChunk`].
 
 use std::collections::HashMap;
 use std::io::{self, BufReader, ErrorKind, Read, Seek, SeekFrom, Take};
@@ -65,7 +65,7 @@ mod opcode {
 #[derive(Debug)]
 pub(crate) enum Event {
     /// A message. Its body may be read next.
-    Message(Message),
+    Message(MessageHeader),
     /// End of a chunk. Its messages are intact.
     ChunkRead,
     /// The messages of this chunk may be wrong; the rest of the chunk was skipped.
@@ -80,7 +80,7 @@ pub(crate) enum Event {
 
 /// Message without its body.
 #[derive(Debug, Clone)]
-pub(crate) struct Message {
+pub(crate) struct MessageHeader {
     pub(crate) channel: Arc<Channel>,
     /// Time when it was recorded.
     pub(crate) log_time: Nanoseconds,
@@ -92,7 +92,7 @@ pub(crate) struct Message {
 
 /// Reader of a recording.
 pub(crate) struct McapReader<R: Read> {
-    source: Source<R>,
+    source: McapSource<R>,
     /// Length of the file, in bytes.
     length: u64,
     /// Offset in the file of the record after the current one.
@@ -109,9 +109,9 @@ pub(crate) struct McapReader<R: Read> {
     broken: Option<String>,
 }
 
-enum Source<R: Read> {
+enum McapSource<R: Read> {
     File(BufReader<R>),
-    Chunk(Chunk<R>),
+    Chunk(OpenChunk<R>),
     Ended,
 }
 
@@ -161,7 +161,7 @@ impl<R: Read + Seek> McapReader<R> {
             return Err("not an MCAP file; a recording of ROS 2 or Foxglove that ends in .mcap expected".to_owned());
         }
         Ok(Self {
-            source: Source::File(file),
+            source: McapSource::File(file),
             length,
             next_record: MAGIC.len() as u64,
             unread: 0,
@@ -176,7 +176,7 @@ impl<R: Read + Seek> McapReader<R> {
     /// Reads the next event; `None` at the end.
     pub(crate) fn next(&mut self) -> Option<Event> {
         loop {
-            if matches!(self.source, Source::Ended) {
+            if matches!(self.source, McapSource::Ended) {
                 return None;
             }
             match self.step() {
@@ -224,9 +224,9 @@ impl<R: Read + Seek> McapReader<R> {
         let Self { source, body, unread, .. } = self;
         body.reserve_exact(count.min(MAX_MESSAGE_BYTES) as usize);
         let read = match source {
-            Source::File(file) => file.take(count).read_to_end(body),
-            Source::Chunk(chunk) => chunk.take(count).read_to_end(body),
-            Source::Ended => Ok(0),
+            McapSource::File(file) => file.take(count).read_to_end(body),
+            McapSource::Chunk(chunk) => chunk.take(count).read_to_end(body),
+            McapSource::Ended => Ok(0),
         };
         let problem = match read {
             Ok(read) => {
@@ -246,8 +246,8 @@ impl<R: Read + Seek> McapReader<R> {
         }
         self.skip_rest()?;
         self.body.clear();
-        match mem::replace(&mut self.source, Source::Ended) {
-            Source::Chunk(chunk) if chunk.remaining == 0 => return self.end_chunk(chunk),
+        match mem::replace(&mut self.source, McapSource::Ended) {
+            McapSource::Chunk(chunk) if chunk.remaining == 0 => return self.end_chunk(chunk),
             source => self.source = source,
         }
         let (opcode, length) = self.read_record_head()?;
@@ -263,9 +263,9 @@ impl<R: Read + Seek> McapReader<R> {
                     self.add_channel(&record)?;
                 }
             }
-            opcode::CHUNK if matches!(self.source, Source::File(_)) => self.open_chunk(length)?,
-            opcode::DATA_END if matches!(self.source, Source::File(_)) => {
-                self.source = Source::Ended;
+            opcode::CHUNK if matches!(self.source, McapSource::File(_)) => self.open_chunk(length)?,
+            opcode::DATA_END if matches!(self.source, McapSource::File(_)) => {
+                self.source = McapSource::Ended;
             }
             _ => self.unread = length,
         }
@@ -276,13 +276,13 @@ impl<R: Read + Seek> McapReader<R> {
     fn recover(&mut self, fault: Fault) -> Event {
         self.unread = 0;
         let is_whole = self.next_record <= self.length;
-        let source = mem::replace(&mut self.source, Source::Ended);
+        let source = mem::replace(&mut self.source, McapSource::Ended);
         let (file, times, problem) = match (source, fault) {
-            (Source::Chunk(chunk), Fault::Broken(problem)) if is_whole => {
+            (McapSource::Chunk(chunk), Fault::Broken(problem)) if is_whole => {
                 let times = chunk.times;
                 (chunk.into_file().ok(), times, problem)
             }
-            (Source::File(file), Fault::UnreadableChunk { times, problem }) => (Some(file), times, problem),
+            (McapSource::File(file), Fault::UnreadableChunk { times, problem }) => (Some(file), times, problem),
             (_, Fault::Broken(problem) | Fault::UnreadableChunk { problem, .. }) => {
                 return Event::Cut(problem);
             }
@@ -290,7 +290,7 @@ impl<R: Read + Seek> McapReader<R> {
         if let Some(mut file) = file
             && file.seek(SeekFrom::Start(self.next_record)).is_ok()
         {
-            self.source = Source::File(file);
+            self.source = McapSource::File(file);
         }
         let times = times.map(u64::cast_signed);
         Event::ChunkDamaged { times, problem }
@@ -300,18 +300,18 @@ impl<R: Read + Seek> McapReader<R> {
     fn skip_rest(&mut self) -> Result<(), Fault> {
         let count = mem::take(&mut self.unread);
         match &mut self.source {
-            Source::File(file) => {
+            McapSource::File(file) => {
                 if self.next_record > self.length {
                     return Err(io::Error::from(ErrorKind::UnexpectedEof).into());
                 }
                 file.seek_relative(count.cast_signed())?;
             }
-            Source::Chunk(chunk) => {
+            McapSource::Chunk(chunk) => {
                 if io::copy(&mut chunk.take(count), &mut io::sink())? < count {
                     return Err(io::Error::from(ErrorKind::UnexpectedEof).into());
                 }
             }
-            Source::Ended => {}
+            McapSource::Ended => {}
         }
         Ok(())
     }
@@ -323,11 +323,11 @@ impl<R: Read + Seek> McapReader<R> {
         let [opcode, length @ ..] = head;
         let length = u64::from_le_bytes(length);
         match &self.source {
-            Source::Chunk(chunk) if length > chunk.remaining => {
+            McapSource::Chunk(chunk) if length > chunk.remaining => {
                 return Err(format!("a record of {length} bytes runs past the end of the chunk").into());
             }
-            Source::Chunk(_) | Source::Ended => {}
-            Source::File(_) => {
+            McapSource::Chunk(_) | McapSource::Ended => {}
+            McapSource::File(_) => {
                 self.next_record = self.next_record.saturating_add(RECORD_HEAD).saturating_add(length);
             }
         }
@@ -336,9 +336,9 @@ impl<R: Read + Seek> McapReader<R> {
 
     fn read_exact(&mut self, bytes: &mut [u8]) -> io::Result<()> {
         match &mut self.source {
-            Source::File(file) => file.read_exact(bytes),
-            Source::Chunk(chunk) => chunk.read_exact(bytes),
-            Source::Ended => Err(ErrorKind::UnexpectedEof.into()),
+            McapSource::File(file) => file.read_exact(bytes),
+            McapSource::Chunk(chunk) => chunk.read_exact(bytes),
+            McapSource::Ended => Err(ErrorKind::UnexpectedEof.into()),
         }
     }
 
@@ -350,18 +350,18 @@ impl<R: Read + Seek> McapReader<R> {
         let mut fields = FieldReader::unaligned(&head);
         let (id, _sequence, log_time) = (fields.u16()?, fields.u32()?, fields.u64()?);
         self.unread = body;
-        if matches!(self.source, Source::File(_)) && self.next_record > self.length {
+        if matches!(self.source, McapSource::File(_)) && self.next_record > self.length {
             return Err(ends_too_early().into());
         }
         let Some(channel) = self.channels.get(&id) else {
             self.messages_without_channel += 1;
             return Ok(None);
         };
-        Ok(Some(Event::Message(Message {
+        Ok(Some(Event::Message(MessageHeader {
             channel: Arc::clone(channel),
             log_time: log_time.cast_signed(),
             length: body,
-            is_in_chunk: matches!(self.source, Source::Chunk(_)),
+            is_in_chunk: matches!(self.source, McapSource::Chunk(_)),
         })))
     }
 
@@ -426,11 +426,11 @@ impl<R: Read + Seek> McapReader<R> {
             return Err(Fault::UnreadableChunk { times, problem });
         }
         let header = ChunkHeader { times, length: content, crc, compression, stored_length };
-        if let Source::File(file) = mem::replace(&mut self.source, Source::Ended) {
-            match Chunk::open(&header, file) {
-                Ok(chunk) => self.source = Source::Chunk(chunk),
+        if let McapSource::File(file) = mem::replace(&mut self.source, McapSource::Ended) {
+            match OpenChunk::open(&header, file) {
+                Ok(chunk) => self.source = McapSource::Chunk(chunk),
                 Err((file, problem)) => {
-                    self.source = Source::File(file);
+                    self.source = McapSource::File(file);
                     return Err(Fault::UnreadableChunk { times, problem });
                 }
             }
@@ -439,9 +439,9 @@ impl<R: Read + Seek> McapReader<R> {
     }
 
     /// Checks the checksum of a chunk, and continues after it.
-    fn end_chunk(&mut self, chunk: Chunk<R>) -> Result<Option<Event>, Fault> {
+    fn end_chunk(&mut self, chunk: OpenChunk<R>) -> Result<Option<Event>, Fault> {
         let (is_intact, times) = (chunk.is_intact(), chunk.times);
-        self.source = Source::File(chunk.into_file()?);
+        self.source = McapSource::File(chunk.into_file()?);
         Ok(Some(if is_intact {
             Event::ChunkRead
         } else {
@@ -491,10 +491,10 @@ pub(super) struct ChunkHeader {
 }
 
 /// An open chunk.
-pub(super) struct Chunk<R: Read> {
+pub(super) struct OpenChunk<R: Read> {
     /// First and last log time of the chunk's messages, in nanoseconds.
     pub(super) times: [u64; 2],
-    content: Content<R>,
+    content: ChunkRecords<R>,
     /// Number of decompressed bytes that are not read yet.
     pub(super) remaining: u64,
     hasher: crc32fast::Hasher,
@@ -503,13 +503,13 @@ pub(super) struct Chunk<R: Read> {
 }
 
 /// Records of a chunk, by compression.
-enum Content<R: Read> {
+enum ChunkRecords<R: Read> {
     Plain(Take<BufReader<R>>),
     Zstd(Decoder<'static, Take<BufReader<R>>>),
     Lz4(Box<FrameDecoder<Take<BufReader<R>>>>),
 }
 
-impl<R: Read> Chunk<R> {
+impl<R: Read> OpenChunk<R> {
     /// Opens the chunk whose records begin at the position of `file`.
     ///
     /// # Errors
@@ -524,12 +524,12 @@ impl<R: Read> Chunk<R> {
         }
         let stored = file.take(header.stored_length);
         let content = match &*header.compression {
-            "" => Content::Plain(stored),
+            "" => ChunkRecords::Plain(stored),
             "zstd" => match Decoder::try_with_buffer(stored) {
-                Ok(decoder) => Content::Zstd(decoder),
+                Ok(decoder) => ChunkRecords::Zstd(decoder),
                 Err((stored, e)) => return Err((stored.into_inner(), e.to_string())),
             },
-            "lz4" => Content::Lz4(Box::new(FrameDecoder::new(stored))),
+            "lz4" => ChunkRecords::Lz4(Box::new(FrameDecoder::new(stored))),
             other => {
                 let problem = format!("compression {other:?}; zstd, lz4 or none expected");
                 return Err((stored.into_inner(), problem));
@@ -545,7 +545,7 @@ impl<R: Read> Chunk<R> {
     }
 }
 
-impl<R: Read + Seek> Chunk<R> {
+impl<R: Read + Seek> OpenChunk<R> {
     /// True if the chunk has no CRC-32, or the bytes read so far match it. Call it after all bytes are read.
     pub(super) fn is_intact(&self) -> bool {
         self.crc == 0 || self.crc == self.hasher.clone().finalize()
@@ -557,9 +557,9 @@ impl<R: Read + Seek> Chunk<R> {
     /// If the seek fails.
     pub(super) fn into_file(self) -> io::Result<BufReader<R>> {
         let stored = match self.content {
-            Content::Plain(stored) => stored,
-            Content::Zstd(decoder) => decoder.into_inner(),
-            Content::Lz4(decoder) => decoder.into_inner(),
+            ChunkRecords::Plain(stored) => stored,
+            ChunkRecords::Zstd(decoder) => decoder.into_inner(),
+            ChunkRecords::Lz4(decoder) => decoder.into_inner(),
         };
         let unread = stored.limit();
         let mut file = stored.into_inner();
@@ -568,14 +568,14 @@ impl<R: Read + Seek> Chunk<R> {
     }
 }
 
-impl<R: Read> Read for Chunk<R> {
+impl<R: Read> Read for OpenChunk<R> {
     fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
         let length = usize::try_from(self.remaining).unwrap_or(usize::MAX).min(bytes.len());
         let bytes = &mut bytes[..length];
         let count = match &mut self.content {
-            Content::Plain(stored) => stored.read(bytes),
-            Content::Zstd(decoder) => decoder.read(bytes),
-            Content::Lz4(decoder) => decoder.read(bytes),
+            ChunkRecords::Plain(stored) => stored.read(bytes),
+            ChunkRecords::Zstd(decoder) => decoder.read(bytes),
+            ChunkRecords::Lz4(decoder) => decoder.read(bytes),
         }?;
         self.remaining -= count as u64;
         if self.crc != 0 {

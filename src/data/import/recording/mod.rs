@@ -23,9 +23,9 @@ pub(crate) mod video;
 pub(crate) use channel::{Channel, ChannelContent, ForeignData, camera_name, camera_of_info, intrinsics_names};
 pub(crate) use exposure::{Encoding, Exposure};
 pub(crate) use image_message::{CameraInfo, ImageMessage, MessageImage, is_without_image, stamp};
-pub(crate) use mcap::{Event, MAX_MESSAGE_BYTES, McapReader, Message};
+pub(crate) use mcap::{Event, MAX_MESSAGE_BYTES, McapReader, MessageHeader};
 pub(crate) use overview::{FileImage, Overview, TopicOverview};
-pub(crate) use sampling::{Place, Sampler, SamplingArgs, Stretches, Thumbnail, TopicClock};
+pub(crate) use sampling::{GreyBlocks, Place, Sampler, SamplingArgs, Stretches, TopicClock};
 
 /// Time in nanoseconds, usually since 1970.
 pub(crate) type Nanoseconds = i64;

@@ -6,7 +6,7 @@ use std::io::{Read, Seek};
 use super::channel::ChannelContent;
 use super::exposure::Encoding;
 use super::image_message::{ImageMessage, MessageImage, has_unread_kind};
-use super::mcap::{Event, MAX_MESSAGE_BYTES, McapReader, Message};
+use super::mcap::{Event, MAX_MESSAGE_BYTES, McapReader, MessageHeader};
 use super::{Nanoseconds, seconds};
 use crate::types::text::excerpt;
 
@@ -78,7 +78,7 @@ impl TopicOverview {
     fn look<R: Read + Seek>(
         &mut self,
         reader: &mut McapReader<R>,
-        message: &Message,
+        message: &MessageHeader,
         image: impl Fn(&str, &[u8]) -> FileImage,
     ) {
         let channel = &message.channel;
@@ -123,7 +123,7 @@ impl TopicOverview {
     fn image_format<R: Read + Seek>(
         &mut self,
         reader: &mut McapReader<R>,
-        message: &Message,
+        message: &MessageHeader,
         encoding: Encoding,
         image: impl Fn(&str, &[u8]) -> FileImage,
     ) -> Result<Option<String>, String> {
@@ -211,7 +211,7 @@ impl Overview {
     }
 
     /// Counts a message, and returns its topic.
-    fn count(&mut self, message: &Message) -> Option<&mut TopicOverview> {
+    fn count(&mut self, message: &MessageHeader) -> Option<&mut TopicOverview> {
         let channel = &message.channel;
         let time = message.log_time;
         self.start.get_or_insert(time);

@@ -2,7 +2,7 @@
 //!
 //! Division of a drive into stretches of equal duration, one scene each: [`Stretches`].
 //!
-//! Small grey copy of a frame, to compare frames: [`Thumbnail`].
+//! Small grey copy of a frame, to compare frames: [`GreyBlocks`].
 
 use std::num::NonZeroUsize;
 
@@ -105,7 +105,7 @@ pub(crate) struct Sampler {
     progress: SamplerProgress,
     /// Minimum difference from the last chosen frame, in 8-bit codes; `None` if pixels do not matter.
     min_change: Option<f64>,
-    last_taken: Option<Thumbnail>,
+    last_taken: Option<GreyBlocks>,
 }
 
 /// Progress of a sampler.
@@ -157,7 +157,7 @@ impl Sampler {
     }
 
     /// Chooses a due frame if it differs enough from the last chosen frame.
-    pub(crate) fn has_changed(&mut self, thumbnail: Thumbnail) -> bool {
+    pub(crate) fn has_changed(&mut self, thumbnail: GreyBlocks) -> bool {
         let min_change = self.min_change.unwrap_or(0.0);
         let has_changed = self.last_taken.as_ref().is_none_or(|last| last.difference(&thumbnail) > min_change);
         if has_changed {
@@ -295,9 +295,9 @@ const SIDE: usize = 16;
 
 /// Mean grey codes of 16 × 16 blocks; grey is the mean of the three channels.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Thumbnail(Vec<f64>);
+pub(crate) struct GreyBlocks(Vec<f64>);
 
-impl Thumbnail {
+impl GreyBlocks {
     /// Makes the thumbnail of an image.
     pub(crate) fn new(image: &Rgb) -> Self {
         let mut blocks = vec![(0_u64, 0_u64); SIDE * SIDE];
@@ -388,7 +388,7 @@ mod tests {
             .map(|(i, code)| {
                 let place = Place { time: i, since: i, stretch: 0 };
                 let grey = crate::types::Rgb::new(1, 1, vec![code; 3]).unwrap();
-                sampler.is_due(place) && sampler.has_changed(Thumbnail::new(&grey))
+                sampler.is_due(place) && sampler.has_changed(GreyBlocks::new(&grey))
             })
             .collect();
         // 15 differs by 5 from the last chosen frame, 10, and 16 by 6.
@@ -461,8 +461,8 @@ mod tests {
         }
     }
 
-    fn flat(code: u8) -> Thumbnail {
-        Thumbnail::new(&Rgb::new(20, 33, vec![code; 20 * 33 * 3]).unwrap())
+    fn flat(code: u8) -> GreyBlocks {
+        GreyBlocks::new(&Rgb::new(20, 33, vec![code; 20 * 33 * 3]).unwrap())
     }
 
     #[test]
@@ -470,8 +470,8 @@ mod tests {
         assert!((flat(10).difference(&flat(17)) - 7.0).abs() < 1e-9);
         let mut half = vec![0; 32 * 32 * 3];
         half[..16 * 32 * 3].fill(200);
-        let half = Thumbnail::new(&Rgb::new(32, 32, half).unwrap());
-        let black = Thumbnail::new(&Rgb::black(32, 32));
+        let half = GreyBlocks::new(&Rgb::new(32, 32, half).unwrap());
+        let black = GreyBlocks::new(&Rgb::black(32, 32));
         assert!((half.difference(&black) - 100.0).abs() < 1e-9);
     }
 }

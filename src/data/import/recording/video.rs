@@ -48,7 +48,7 @@ pub(crate) struct VideoFrame {
 
 /// Conversion of the frames of a video to sRGB.
 #[derive(Debug)]
-struct Conversion {
+struct VideoConversion {
     rule: FrameConversion,
     /// Number of pixels so far, and of those with light above white.
     pixels: usize,
@@ -68,7 +68,7 @@ pub(crate) struct VideoFrames {
     facts: Receiver<FrameFacts>,
     log: Option<JoinHandle<FfmpegLog>>,
     /// `None` if the codes are taken as sRGB codes.
-    conversion: Option<Conversion>,
+    conversion: Option<VideoConversion>,
     /// Colours of the last frame.
     colours: Option<FrameColours>,
     /// The first frame, which was read to learn the colours.
@@ -196,7 +196,7 @@ impl Video {
             output: BufReader::with_capacity(1 << 20, output),
             facts,
             log: Some(log),
-            conversion: conversion.map(Conversion::new),
+            conversion: conversion.map(VideoConversion::new),
             colours: None,
             first: None,
             ended_log: FfmpegLog::default(),
@@ -204,7 +204,7 @@ impl Video {
     }
 }
 
-impl Conversion {
+impl VideoConversion {
     fn new(conversion: FrameConversion) -> Self {
         Self { rule: conversion, pixels: 0, clipped: 0 }
     }

@@ -1,6 +1,6 @@
 //! Value in a row of a ready-made set: [`Cell`].
 //!
-//! Path from a cell to a value inside it: [`Step`].
+//! Path from a cell to a value inside it: [`PathStep`].
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -37,7 +37,7 @@ pub(crate) enum Cell {
     /// Bytes of a file. Only in rows that are read for their image.
     Bytes(Box<[u8]>),
     /// Digest and format of a file whose bytes were dropped. Only in rows that are read for their question.
-    File(Box<FileFacts>),
+    File(Box<DroppedFile>),
     List(Box<[Cell]>),
     Fields(Fields),
 }
@@ -61,13 +61,13 @@ impl FieldNames {
 
 /// Digest and format of a file whose bytes were dropped.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct FileFacts {
+pub(crate) struct DroppedFile {
     pub(crate) digest: Digest,
     /// Image format, from the first bytes; `None` if it is not supported.
     pub(crate) format: Option<FileFormat>,
 }
 
-impl FileFacts {
+impl DroppedFile {
     pub(crate) fn from_bytes(bytes: &[u8]) -> Self {
         Self { digest: Digest::from_bytes(bytes), format: FileFormat::detect(bytes).ok() }
     }
@@ -81,7 +81,7 @@ impl Cell {
             Self::Number(text) => text.len(),
             Self::Text(text) => text.len(),
             Self::Bytes(bytes) => bytes.len(),
-            Self::File(_) => size_of::<FileFacts>(),
+            Self::File(_) => size_of::<DroppedFile>(),
             Self::List(cells) => cells.iter().map(Self::memory_size).sum(),
             Self::Fields(fields) => fields.iter().map(|(_, cell)| size_of::<Arc<str>>() + cell.memory_size()).sum(),
         };
@@ -91,9 +91,9 @@ impl Cell {
     /// Replaces the bytes of files by their digest and format.
     pub(super) fn without_files(self, names: &mut FieldNames) -> Self {
         match self {
-            Self::Bytes(bytes) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
+            Self::Bytes(bytes) => Self::File(Box::new(DroppedFile::from_bytes(&bytes))),
             Self::Text(text) if text.len() > MAX_KEPT_BASE64 => match (decode_base64(&text), parse_list(&text)) {
-                (Some(bytes), _) => Self::File(Box::new(FileFacts::from_bytes(&bytes))),
+                (Some(bytes), _) => Self::File(Box::new(DroppedFile::from_bytes(&bytes))),
                 (None, Some(items)) => {
                     Self::List(items.into_iter().map(|item| Self::Text(item).without_files(names)).collect())
                 }
@@ -256,7 +256,7 @@ fn is_base64_or_space(byte: u8) -> bool {
 
 /// Step of the path from a cell to a value inside it.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
-pub(crate) enum Step {
+pub(crate) enum PathStep {
     /// Item of a list, or of a text with a list.
     Item(usize),
     /// Field of a struct.
@@ -265,18 +265,18 @@ pub(crate) enum Step {
 
 impl Cell {
     /// Value at the end of a path; `None` if there is none.
-    pub(crate) fn value_at(&self, steps: &[Step]) -> Option<Self> {
+    pub(crate) fn value_at(&self, steps: &[PathStep]) -> Option<Self> {
         let Some((step, rest)) = steps.split_first() else {
             return Some(self.clone());
         };
         match (self, step) {
-            (Self::List(cells), Step::Item(index)) => cells.get(*index)?.value_at(rest),
-            (Self::Text(text), Step::Item(index)) => {
+            (Self::List(cells), PathStep::Item(index)) => cells.get(*index)?.value_at(rest),
+            (Self::Text(text), PathStep::Item(index)) => {
                 let item = parse_list(text)?.into_iter().nth(*index)?;
                 Self::Text(item).value_at(rest)
             }
-            (_, Step::Field(name)) => self.field(name)?.value_at(rest),
-            (_, Step::Item(_)) => None,
+            (_, PathStep::Field(name)) => self.field(name)?.value_at(rest),
+            (_, PathStep::Item(_)) => None,
         }
     }
 }
@@ -310,8 +310,8 @@ mod tests {
         let file = vec![9; 4000];
         let text = Cell::Text(STANDARD.encode(&file)).without_files(&mut FieldNames::default());
         assert_eq!(text, Cell::Bytes(file.clone().into()).without_files(&mut FieldNames::default()));
-        assert_eq!(text, Cell::File(Box::new(FileFacts::from_bytes(&file))));
-        assert_ne!(text, Cell::File(Box::new(FileFacts::from_bytes(&file[1..]))));
+        assert_eq!(text, Cell::File(Box::new(DroppedFile::from_bytes(&file))));
+        assert_ne!(text, Cell::File(Box::new(DroppedFile::from_bytes(&file[1..]))));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! The rows of a ready-made set: [`Table`].
+//! The rows of a ready-made set: [`SetRows`].
 //!
 //! Question and answer in a conversation: [`ConversationPaths`].
 //!
@@ -14,7 +14,7 @@ use std::sync::Arc;
 use csv::Position;
 
 use super::cell::{Cell, FieldNames};
-use crate::data::ready_made::columns::map::{ColumnMap, Role, known_names, normalize};
+use crate::data::ready_made::columns::map::{ColumnMap, ColumnRole, known_names, normalize};
 
 /// Maximum number of columns of a set (chosen).
 const MAX_COLUMNS: usize = 4096;
@@ -28,7 +28,7 @@ const MAX_TABLE_BYTES: usize = 1 << 30;
 
 /// All rows of a set, in the order of its files.
 #[derive(Debug, Default)]
-pub(crate) struct Table {
+pub(crate) struct SetRows {
     pub(crate) files: Vec<FileLabel>,
     pub(crate) columns: Vec<String>,
     /// Index of each column by its name.
@@ -57,7 +57,7 @@ pub(crate) struct FileLabel {
 /// One row. Trailing absent cells are not stored.
 #[derive(Debug)]
 pub(crate) struct Row {
-    /// Index of its file in [`Table::files`].
+    /// Index of its file in [`SetRows::files`].
     pub(crate) file: usize,
     pub(crate) place: RowPlace,
     cells: Box<[Cell]>,
@@ -123,7 +123,7 @@ impl fmt::Display for RowPlace {
     }
 }
 
-impl Table {
+impl SetRows {
     /// Starts the rows of another file.
     pub(crate) fn begin_file(&mut self, file: FileLabel) {
         self.files.push(file);
@@ -230,7 +230,7 @@ impl Table {
     /// # Errors
     /// As [`Self::add_column`].
     pub(crate) fn add_ids(&mut self, from: usize, ids: Vec<String>) -> Result<(), String> {
-        let names = known_names(Role::Id);
+        let names = known_names(ColumnRole::Id);
         if self.columns.iter().any(|column| names.contains(&normalize(column))) {
             return Ok(());
         }
@@ -290,7 +290,7 @@ pub(crate) struct ConversationPaths {
 
 impl ConversationPaths {
     /// Paths in the first column of conversations; `None` if there is no such column.
-    pub(crate) fn find(table: &Table) -> Option<Self> {
+    pub(crate) fn find(table: &SetRows) -> Option<Self> {
         let row = table.rows.first()?;
         table.columns.iter().enumerate().find_map(|(index, name)| Self::from_cell(name, row.cell(index)))
     }

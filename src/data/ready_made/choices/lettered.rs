@@ -10,7 +10,7 @@ use crate::types::questions::letter;
 use crate::types::text::excerpt;
 
 /// Letter of an option in a text: `(A)`, `A.`, `A)` or `A:`.
-struct Mark {
+struct OptionLetter {
     /// Byte offset of the mark.
     start: usize,
     /// Byte offset of the option after the mark.
@@ -112,7 +112,7 @@ fn without_announcement(text: &str) -> &str {
 ///
 /// # Errors
 /// If it is not clear where the last option ends.
-fn split_options<'a>(text: &'a str, run: &[&Mark]) -> Result<(Vec<String>, &'a str), String> {
+fn split_options<'a>(text: &'a str, run: &[&OptionLetter]) -> Result<(Vec<String>, &'a str), String> {
     let mut options = option_texts(text, run);
     let Some(last) = options.pop() else {
         return Ok((options, ""));
@@ -190,8 +190,8 @@ fn capital_letter(c: char) -> Option<char> {
 }
 
 /// Marks A, B, … in alphabetical order, starting at the first mark, which must be A. Other marks are skipped.
-fn alphabetical_run(marks: &[Mark]) -> Vec<&Mark> {
-    let mut run: Vec<&Mark> = Vec::new();
+fn alphabetical_run(marks: &[OptionLetter]) -> Vec<&OptionLetter> {
+    let mut run: Vec<&OptionLetter> = Vec::new();
     for mark in marks {
         if run.len() < Choices::MOST && mark.letter == letter(run.len()) {
             run.push(mark);
@@ -201,7 +201,7 @@ fn alphabetical_run(marks: &[Mark]) -> Vec<&Mark> {
 }
 
 /// Texts between the marks of a run, without commas and semicolons at their ends.
-fn option_texts(text: &str, run: &[&Mark]) -> Vec<String> {
+fn option_texts(text: &str, run: &[&OptionLetter]) -> Vec<String> {
     let ends = run[1..].iter().map(|mark| mark.start).chain([text.len()]);
     run.iter()
         .zip(ends)
@@ -214,7 +214,7 @@ fn option_texts(text: &str, run: &[&Mark]) -> Vec<String> {
 }
 
 /// All marks with capital letters in a text.
-fn marks(text: &str) -> Vec<Mark> {
+fn marks(text: &str) -> Vec<OptionLetter> {
     let mut marks = Vec::new();
     let mut before = None;
     for (start, c) in text.char_indices() {
@@ -236,26 +236,26 @@ fn marks(text: &str) -> Vec<Mark> {
         };
         if is_closed {
             let end = text.len() - chars.as_str().len();
-            marks.push(Mark::new(text, start, end, name));
+            marks.push(OptionLetter::new(text, start, end, name));
         }
     }
     marks
 }
 
 /// All marks with a letter in brackets in a text. Letters of either case become capitals.
-fn bracket_marks(text: &str) -> Vec<Mark> {
+fn bracket_marks(text: &str) -> Vec<OptionLetter> {
     text.match_indices(['(', '（'])
         .filter_map(|(start, open)| {
             let mut chars = text[start + open.len()..].chars();
             let (name, close) = (chars.next()?, chars.next()?);
             let name = capital_letter(name.to_ascii_uppercase())?;
             let end = text.len() - chars.as_str().len();
-            matches!(close, ')' | '）').then(|| Mark::new(text, start, end, name))
+            matches!(close, ')' | '）').then(|| OptionLetter::new(text, start, end, name))
         })
         .collect()
 }
 
-impl Mark {
+impl OptionLetter {
     /// A mark whose option begins at the first character after `end` that is not a space.
     fn new(text: &str, start: usize, end: usize, letter: char) -> Self {
         let rest = &text[end..];

@@ -11,4 +11,4 @@ pub(super) use lettered::{LetteredOptions, find_in_question};
 pub(crate) use option_list::one_line;
 pub(super) use option_list::{OptionInterner, OptionList};
 pub(super) use options::Options;
-pub(super) use truths::{ParsedQuestion, find_truths, is_native_format};
+pub(super) use truths::{SetQuestion, find_truths, is_native_format};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::lettered::{split_cell, without_letters};
 use super::option_list::OptionList;
 use crate::data::ready_made::cells::{Cell, Fields, Row, parse_list, parse_object};
-use crate::data::ready_made::columns::{Column, Roles};
+use crate::data::ready_made::columns::{ColumnRoles, SetColumn};
 use crate::types::questions::letter;
 use crate::types::shell_word;
 use crate::types::text::excerpt;
@@ -25,7 +25,7 @@ pub(crate) enum Options {
 
 impl Options {
     /// Reads the options of a row from the columns that have this role.
-    pub(crate) fn from_row(row: &Row, roles: &Roles) -> Self {
+    pub(crate) fn from_row(row: &Row, roles: &ColumnRoles) -> Self {
         let mut found: Vec<(String, OptionList)> = Vec::new();
         let (texts, positions): (Vec<String>, Vec<usize>) = roles
             .option_cells
@@ -69,7 +69,7 @@ impl Options {
 }
 
 /// Error message for a cell that is not a list of options, with the sign that probably separates them.
-fn not_a_list(column: &Column, cell: &Cell) -> String {
+fn not_a_list(column: &SetColumn, cell: &Cell) -> String {
     let text = cell.text().unwrap_or_default();
     let separator = [("\n", r"\n"), ("|", "|"), (";", ";"), (",", ",")]
         .into_iter()
@@ -137,7 +137,7 @@ fn lettered_options(fields: &[(Arc<str>, Cell)]) -> Result<OptionList, String> {
 }
 
 /// The names of columns with commas between them, as in the value of `--map`.
-fn joined_names(columns: &[Column]) -> String {
+fn joined_names(columns: &[SetColumn]) -> String {
     let names: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
     names.join(",")
 }

@@ -6,17 +6,17 @@ use super::answer_format::{
     AnswerFormat, FormatSearch, RowAnswer, asks_yes_or_no, digit_index, find_format, yes_no_index,
 };
 use super::option_list::OptionList;
-use crate::data::ready_made::cells::{Cell, Table};
-use crate::data::ready_made::columns::map::{CellFormat, Role, map_flag};
-use crate::data::ready_made::columns::{Column, Roles, answer_column, describe_columns};
-use crate::data::ready_made::items::{AnswerCell, Item};
-use crate::data::ready_made::omissions::{OmissionReason, Omissions};
+use crate::data::ready_made::cells::{Cell, SetRows};
+use crate::data::ready_made::columns::map::{CellFormat, ColumnRole, map_flag};
+use crate::data::ready_made::columns::{ColumnRoles, SetColumn, answer_column, describe_columns};
+use crate::data::ready_made::items::{AnswerCell, RowQuestion};
+use crate::data::ready_made::omissions::{Omissions, RowOmission};
 use crate::types::Choices;
 use crate::types::text::{counted, excerpt};
 
 /// Question of a row with its choices, including the correct one.
 #[derive(Debug)]
-pub(crate) struct ParsedQuestion {
+pub(crate) struct SetQuestion {
     /// Index of the row in the table.
     pub(crate) row: usize,
     pub(crate) text: String,
@@ -25,8 +25,8 @@ pub(crate) struct ParsedQuestion {
 
 /// Questions of a set with their correct options.
 #[derive(Debug, Default)]
-pub(crate) struct Truths {
-    pub(crate) questions: Vec<ParsedQuestion>,
+pub(crate) struct SetTruths {
+    pub(crate) questions: Vec<SetQuestion>,
     /// Answer columns with their formats as text, for the summary.
     pub(crate) columns: Vec<String>,
 }
@@ -43,12 +43,12 @@ const MIN_VERB_SHARE: f64 = 0.9;
 /// # Errors
 /// If there are no answers, no format fits any row, or two formats fit but identify different options.
 pub(crate) fn find_truths(
-    table: &Table,
-    roles: &Roles,
+    table: &SetRows,
+    roles: &ColumnRoles,
     format: &CellFormat,
-    items: Vec<Item>,
+    items: Vec<RowQuestion>,
     omissions: &mut Omissions,
-) -> Result<Truths, String> {
+) -> Result<SetTruths, String> {
     if roles.answers.is_empty() && items.iter().all(|item| item.options.is_none()) {
         return Err(format!(
             "neither options nor answers among its columns: --map options=COLUMN,answer=COLUMN names them, and --map answer=COLUMN \
@@ -66,8 +66,8 @@ pub(crate) fn find_truths(
     let (with_options, without_options) = items
         .into_iter()
         .map(|item| if letters_are_not_options(table, roles, &item) { item.without_options() } else { item })
-        .partition::<Vec<Item>, _>(|item| item.options.is_some());
-    let mut truths = Truths::default();
+        .partition::<Vec<RowQuestion>, _>(|item| item.options.is_some());
+    let mut truths = SetTruths::default();
     add_choice_questions(table, roles, format, with_options, omissions, &mut truths)?;
     add_yes_no_questions(table, roles, without_options, omissions, &mut truths)?;
     truths.questions.sort_by_key(|question| question.row);
@@ -76,7 +76,7 @@ pub(crate) fn find_truths(
 
 /// True if lettered texts in a question are labels in the image, not options: the answer is yes or no, and identifies
 /// none of them.
-fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
+fn letters_are_not_options(table: &SetRows, roles: &ColumnRoles, item: &RowQuestion) -> bool {
     // `whole` is set only if the options were found in the question's text.
     let Some(options) = item.options.as_deref().filter(|_| item.whole.is_some()) else {
         return false;
@@ -98,7 +98,7 @@ fn letters_are_not_options(table: &Table, roles: &Roles, item: &Item) -> bool {
 }
 
 /// True if the table is in this program's own format, in which the answer is the text of a choice.
-pub(crate) fn is_native_format(table: &Table) -> bool {
+pub(crate) fn is_native_format(table: &SetRows) -> bool {
     const FIELDS: [&str; 11] =
         ["id", "frame", "image", "family", "question", "choices", "answer", "evidence", "group", "group_size", "scene"];
     ["question", "choices", "answer"].iter().all(|name| table.find(name).is_some())
@@ -106,7 +106,7 @@ pub(crate) fn is_native_format(table: &Table) -> bool {
 }
 
 /// True if all cells of the column are texts.
-fn are_texts(table: &Table, column: &Column) -> bool {
+fn are_texts(table: &SetRows, column: &SetColumn) -> bool {
     table.rows.iter().all(|row| matches!(column.cell(row), Cell::Text(_)))
 }
 
@@ -116,19 +116,19 @@ fn are_texts(table: &Table, column: &Column) -> bool {
 /// If the column has no answer in any row. The error suggests `other_column_flag`, the flag to read another column, if
 /// there is one.
 fn with_answers(
-    table: &Table,
-    column: &Column,
-    items: Vec<Item>,
+    table: &SetRows,
+    column: &SetColumn,
+    items: Vec<RowQuestion>,
     omissions: &mut Omissions,
     other_column_flag: Option<String>,
-) -> Result<Vec<(Item, String)>, String> {
+) -> Result<Vec<(RowQuestion, String)>, String> {
     let mut absent = Vec::new();
     let mut found = Vec::with_capacity(items.len());
     for item in items {
         match AnswerCell::from_row(&table.rows[item.row], column) {
             AnswerCell::One(answer) => found.push((item, answer)),
             AnswerCell::Several(excerpt) => {
-                omissions.add(OmissionReason::SeveralTruths, || excerpt);
+                omissions.add(RowOmission::SeveralTruths, || excerpt);
             }
             AnswerCell::Absent => absent.push(item.row),
         }
@@ -142,19 +142,19 @@ fn with_answers(
     }
     for row in absent {
         omissions
-            .add(OmissionReason::Bad, || format!("{}: no answer (column {:?})", table.place_in_set(row), column.name));
+            .add(RowOmission::Bad, || format!("{}: no answer (column {:?})", table.place_in_set(row), column.name));
     }
     Ok(found)
 }
 
 /// Adds the multiple-choice questions with their correct options to `truths`.
 fn add_choice_questions(
-    table: &Table,
-    roles: &Roles,
+    table: &SetRows,
+    roles: &ColumnRoles,
     format: &CellFormat,
-    items: Vec<Item>,
+    items: Vec<RowQuestion>,
     omissions: &mut Omissions,
-    truths: &mut Truths,
+    truths: &mut SetTruths,
 ) -> Result<(), String> {
     if items.is_empty() {
         return Ok(());
@@ -170,10 +170,10 @@ fn add_choice_questions(
     truths.columns.push(format!("{} ({name})", column.name));
     truths.questions.reserve(items.len());
     for (item, answer) in items {
-        let Item { row, text, options, .. } = item;
+        let RowQuestion { row, text, options, .. } = item;
         match column_format.choices(&answer, &options.unwrap_or_default()) {
-            Ok(choices) => truths.questions.push(ParsedQuestion { row, text, choices }),
-            Err(problem) => omissions.add(OmissionReason::Bad, || format!("{}: {problem}", table.place_in_set(row))),
+            Ok(choices) => truths.questions.push(SetQuestion { row, text, choices }),
+            Err(problem) => omissions.add(RowOmission::Bad, || format!("{}: {problem}", table.place_in_set(row))),
         }
     }
     Ok(())
@@ -193,7 +193,12 @@ impl ColumnFormat {
     ///
     /// # Errors
     /// If the format fits no row, or two formats fit but identify different options.
-    fn choose(table: &Table, column: &Column, format: &CellFormat, items: &[(Item, String)]) -> Result<Self, String> {
+    fn choose(
+        table: &SetRows,
+        column: &SetColumn,
+        format: &CellFormat,
+        items: &[(RowQuestion, String)],
+    ) -> Result<Self, String> {
         let none = OptionList::default();
         let rows: Vec<RowAnswer<'_>> = items
             .iter()
@@ -287,14 +292,14 @@ fn infer_format(rows: &[RowAnswer<'_>]) -> Result<AnswerFormat, ([AnswerFormat; 
 
 /// Error message for an answer that identifies a different option in each of two formats.
 fn ambiguous_answer(
-    table: &Table,
-    item: &Item,
+    table: &SetRows,
+    item: &RowQuestion,
     RowAnswer { answer, options }: RowAnswer<'_>,
     formats: [AnswerFormat; 2],
-    column: &Column,
+    column: &SetColumn,
 ) -> String {
     let [one, other] = formats.map(AnswerFormat::name);
-    let [one_flag, other_flag] = formats.map(|format| map_flag(Role::Answer, &column.name, Some(format)));
+    let [one_flag, other_flag] = formats.map(|format| map_flag(ColumnRole::Answer, &column.name, Some(format)));
     format!(
         "{}: the answer {:?} may be read as {one} or as {other}, which differ among the options {}; {one_flag} or {other_flag} says which is meant",
         table.place_in_set(item.row),
@@ -306,11 +311,11 @@ fn ambiguous_answer(
 /// Adds the yes/no questions with their correct options to `truths`. The other questions without options are
 /// open-ended: they are added to the omissions.
 fn add_yes_no_questions(
-    table: &Table,
-    roles: &Roles,
-    items: Vec<Item>,
+    table: &SetRows,
+    roles: &ColumnRoles,
+    items: Vec<RowQuestion>,
     omissions: &mut Omissions,
-    truths: &mut Truths,
+    truths: &mut SetTruths,
 ) -> Result<(), String> {
     if items.is_empty() {
         return Ok(());
@@ -322,15 +327,15 @@ fn add_yes_no_questions(
         && items.iter().all(|(_, answer)| digit_index(answer).is_some());
     let yes_and_no: Arc<[String]> = ["yes", "no"].map(str::to_owned).into();
     let mut count = 0;
-    for (Item { row, text, .. }, answer) in items {
+    for (RowQuestion { row, text, .. }, answer) in items {
         let digit = if digits_mean_yes_no { digit_index(&answer) } else { None };
         let truth = digit.or_else(|| yes_no_index(&answer));
         match Choices::with_truth(Arc::clone(&yes_and_no), truth) {
             Ok(choices) if choices.truth().is_some() => {
                 count += 1;
-                truths.questions.push(ParsedQuestion { row, text, choices });
+                truths.questions.push(SetQuestion { row, text, choices });
             }
-            Ok(_) | Err(_) => omissions.add(OmissionReason::Open, || format!("{:?}", excerpt(&answer, 60))),
+            Ok(_) | Err(_) => omissions.add(RowOmission::Open, || format!("{:?}", excerpt(&answer, 60))),
         }
     }
     if count > 0 {

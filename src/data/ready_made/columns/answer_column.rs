@@ -3,26 +3,26 @@
 //! Columns are compared in the rows where both have a valid answer, so a gap or a broken answer in a column does not
 //! exclude it.
 
-use super::column::Column;
-use super::map::{Role, map_flag};
-use super::roles::Roles;
-use crate::data::ready_made::cells::Table;
+use super::column::SetColumn;
+use super::map::{ColumnRole, map_flag};
+use super::roles::ColumnRoles;
+use crate::data::ready_made::cells::SetRows;
 use crate::data::ready_made::choices::{AnswerFormat, OptionList, digit_index, yes_no_index};
-use crate::data::ready_made::items::{AnswerCell, Item};
+use crate::data::ready_made::items::{AnswerCell, RowQuestion};
 use crate::types::text::excerpt;
 
 /// Index of the choice that each row of a column identifies; `None` for a row without a valid answer.
 type RowChoices = Vec<Option<usize>>;
 
 /// Column that may have the answers.
-struct Candidate<'a> {
-    column: &'a Column,
+struct AnswerCandidate<'a> {
+    column: &'a SetColumn,
     /// Choices of the rows in each format that fits, at least one.
     interpretations: Vec<RowChoices>,
 }
 
 /// Answer of a row in a column; `None` if it has none or several.
-fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
+fn answer(table: &SetRows, item: &RowQuestion, column: &SetColumn) -> Option<String> {
     match AnswerCell::from_row(&table.rows[item.row], column) {
         AnswerCell::One(answer) => Some(answer),
         AnswerCell::Absent | AnswerCell::Several(_) => None,
@@ -30,7 +30,7 @@ fn answer(table: &Table, item: &Item, column: &Column) -> Option<String> {
 }
 
 /// Answer of each row in a column.
-fn column_answers(table: &Table, items: &[Item], column: &Column) -> Vec<Option<String>> {
+fn column_answers(table: &SetRows, items: &[RowQuestion], column: &SetColumn) -> Vec<Option<String>> {
     items.iter().map(|item| answer(table, item, column)).collect()
 }
 
@@ -38,13 +38,17 @@ fn column_answers(table: &Table, items: &[Item], column: &Column) -> Vec<Option<
 ///
 /// # Errors
 /// If two columns have different answers for a row; the error shows the row and the flags to choose a column.
-pub(crate) fn option_column<'a>(table: &Table, roles: &'a Roles, items: &[Item]) -> Result<&'a Column, String> {
+pub(crate) fn option_column<'a>(
+    table: &SetRows,
+    roles: &'a ColumnRoles,
+    items: &[RowQuestion],
+) -> Result<&'a SetColumn, String> {
     choose(table, roles, items, |column| option_candidate(table, items, column))
 }
 
 /// A column as candidate for the answers of questions with options; `None` if at most half of its answers identify
 /// options.
-fn option_candidate<'a>(table: &Table, items: &[Item], column: &'a Column) -> Option<Candidate<'a>> {
+fn option_candidate<'a>(table: &SetRows, items: &[RowQuestion], column: &'a SetColumn) -> Option<AnswerCandidate<'a>> {
     let none = OptionList::default();
     let answers = column_answers(table, items, column);
     let filled = answers.iter().flatten().count();
@@ -68,18 +72,18 @@ fn option_candidate<'a>(table: &Table, items: &[Item], column: &'a Column) -> Op
             interpretations.push(choices);
         }
     }
-    Some(Candidate { column, interpretations })
+    Some(AnswerCandidate { column, interpretations })
 }
 
 /// Flag for a column without a role whose cells identify an option in every row, in the first format that fits; `None`
 /// if there is no such column.
-pub(crate) fn suggest_column(table: &Table, roles: &Roles, items: &[Item]) -> Option<String> {
+pub(crate) fn suggest_column(table: &SetRows, roles: &ColumnRoles, items: &[RowQuestion]) -> Option<String> {
     let none = OptionList::default();
     for (index, name) in table.columns.iter().enumerate() {
         if roles.uses(index) {
             continue;
         }
-        let column = Column::new(index, name);
+        let column = SetColumn::new(index, name);
         let fitting = AnswerFormat::ALL.into_iter().find(|format| {
             items.iter().all(|item| {
                 let options = item.options.as_deref().unwrap_or(&none);
@@ -87,7 +91,7 @@ pub(crate) fn suggest_column(table: &Table, roles: &Roles, items: &[Item]) -> Op
             })
         });
         if let Some(format) = fitting {
-            return Some(map_flag(Role::Answer, name, Some(format)));
+            return Some(map_flag(ColumnRole::Answer, name, Some(format)));
         }
     }
     None
@@ -97,12 +101,20 @@ pub(crate) fn suggest_column(table: &Table, roles: &Roles, items: &[Item]) -> Op
 ///
 /// # Errors
 /// As [`option_column`].
-pub(crate) fn yes_or_no_column<'a>(table: &Table, roles: &'a Roles, items: &[Item]) -> Result<&'a Column, String> {
+pub(crate) fn yes_or_no_column<'a>(
+    table: &SetRows,
+    roles: &'a ColumnRoles,
+    items: &[RowQuestion],
+) -> Result<&'a SetColumn, String> {
     choose(table, roles, items, |column| yes_or_no_candidate(table, items, column))
 }
 
 /// A column as candidate for the answers of yes/no questions; `None` if it has no answers.
-fn yes_or_no_candidate<'a>(table: &Table, items: &[Item], column: &'a Column) -> Option<Candidate<'a>> {
+fn yes_or_no_candidate<'a>(
+    table: &SetRows,
+    items: &[RowQuestion],
+    column: &'a SetColumn,
+) -> Option<AnswerCandidate<'a>> {
     let answers = column_answers(table, items, column);
     if !answers.iter().any(Option::is_some) {
         return None;
@@ -111,7 +123,7 @@ fn yes_or_no_candidate<'a>(table: &Table, items: &[Item], column: &'a Column) ->
     if answers.iter().flatten().all(|answer| digit_index(answer).is_some()) {
         interpretations.push(parse_answers(&answers, digit_index));
     }
-    Some(Candidate { column, interpretations })
+    Some(AnswerCandidate { column, interpretations })
 }
 
 /// Index of yes or no for each answer, and a third index for other words.
@@ -130,15 +142,15 @@ fn count_valid(choices: &RowChoices) -> usize {
 /// # Errors
 /// If another candidate contradicts the chosen one.
 fn choose<'a>(
-    table: &Table,
-    roles: &'a Roles,
-    items: &[Item],
-    candidate: impl Fn(&'a Column) -> Option<Candidate<'a>>,
-) -> Result<&'a Column, String> {
+    table: &SetRows,
+    roles: &'a ColumnRoles,
+    items: &[RowQuestion],
+    candidate: impl Fn(&'a SetColumn) -> Option<AnswerCandidate<'a>>,
+) -> Result<&'a SetColumn, String> {
     if let [only] = &*roles.answers {
         return Ok(only);
     }
-    let candidates: Vec<Candidate<'a>> = roles.answers.iter().filter_map(candidate).collect();
+    let candidates: Vec<AnswerCandidate<'a>> = roles.answers.iter().filter_map(candidate).collect();
     let unambiguous = candidates.iter().find(|candidate| candidate.interpretations.len() == 1);
     let Some(chosen) = unambiguous.or(candidates.first()) else {
         return Ok(&roles.answers[0]);
@@ -152,7 +164,7 @@ fn choose<'a>(
 }
 
 /// Index of a row in which two columns differ in every interpretation; `None` if some interpretations agree.
-fn first_difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize> {
+fn first_difference(one: &AnswerCandidate<'_>, other: &AnswerCandidate<'_>) -> Option<usize> {
     let mut first = None;
     for choices in &one.interpretations {
         for other_choices in &other.interpretations {
@@ -167,7 +179,7 @@ fn first_difference(one: &Candidate<'_>, other: &Candidate<'_>) -> Option<usize>
 }
 
 /// Error message for two columns with different answers in a row.
-fn differing_answers(table: &Table, item: &Item, one: &Column, other: &Column) -> String {
+fn differing_answers(table: &SetRows, item: &RowQuestion, one: &SetColumn, other: &SetColumn) -> String {
     format!(
         "{}: the answers of {:?} and {:?} differ, {:?} and {:?}; {} or {} says which is meant",
         table.place_in_set(item.row),
@@ -175,11 +187,11 @@ fn differing_answers(table: &Table, item: &Item, one: &Column, other: &Column) -
         other.name,
         answer_excerpt(table, item, one),
         answer_excerpt(table, item, other),
-        map_flag(Role::Answer, &one.name, None),
-        map_flag(Role::Answer, &other.name, None)
+        map_flag(ColumnRole::Answer, &one.name, None),
+        map_flag(ColumnRole::Answer, &other.name, None)
     )
 }
 
-fn answer_excerpt(table: &Table, item: &Item, column: &Column) -> String {
+fn answer_excerpt(table: &SetRows, item: &RowQuestion, column: &SetColumn) -> String {
     excerpt(&answer(table, item, column).unwrap_or_default(), 60)
 }

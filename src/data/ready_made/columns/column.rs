@@ -1,10 +1,10 @@
-//! Column of a set: [`Column`].
+//! Column of a set: [`SetColumn`].
 
 use crate::data::ready_made::cells::{Cell, Row};
 
 /// A column, or a field of the structs in it.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Column {
+pub(crate) struct SetColumn {
     /// Index in the table.
     pub(crate) index: usize,
     /// Path of the field, with dots; `None` for the whole cell.
@@ -13,7 +13,7 @@ pub(crate) struct Column {
     pub(crate) name: String,
 }
 
-impl Column {
+impl SetColumn {
     /// A whole column.
     pub(crate) fn new(index: usize, name: &str) -> Self {
         Self { index, field: None, name: name.to_owned() }

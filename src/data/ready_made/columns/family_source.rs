@@ -1,14 +1,14 @@
 //! Source of the families of questions: [`FamilySource`].
 
-use super::column::Column;
+use super::column::SetColumn;
 use super::roles::FamilyColumns;
-use crate::data::ready_made::cells::{Row, Table};
-use crate::data::ready_made::choices::ParsedQuestion;
+use crate::data::ready_made::cells::{Row, SetRows};
+use crate::data::ready_made::choices::SetQuestion;
 
 /// Source of the family of each question.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum FamilySource {
-    Column(Column),
+    Column(SetColumn),
     /// The configuration of the repository that has the row.
     Configuration,
     None,
@@ -17,7 +17,7 @@ pub(crate) enum FamilySource {
 impl FamilySource {
     /// Chooses the column given by the user. Without one: the first candidate with more than one value among the
     /// questions, else the configuration if there are several, else the first candidate.
-    pub(crate) fn choose(table: &Table, families: &FamilyColumns, questions: &[ParsedQuestion]) -> Self {
+    pub(crate) fn choose(table: &SetRows, families: &FamilyColumns, questions: &[SetQuestion]) -> Self {
         let columns = match families {
             FamilyColumns::Candidates(columns) => columns,
             FamilyColumns::Chosen(column) => {
@@ -37,7 +37,7 @@ impl FamilySource {
     }
 
     /// Name of the family of a row: the cell of the column, else the configuration; `None` if both are empty.
-    pub(crate) fn family(&self, table: &Table, row: &Row) -> Option<String> {
+    pub(crate) fn family(&self, table: &SetRows, row: &Row) -> Option<String> {
         if let Self::Column(column) = self
             && let Some(text) = column.text(row)
         {
@@ -57,7 +57,7 @@ impl FamilySource {
     }
 }
 
-fn config<'a>(table: &'a Table, row: &Row) -> &'a str {
+fn config<'a>(table: &'a SetRows, row: &Row) -> &'a str {
     &table.files[row.file].config
 }
 

@@ -1,6 +1,6 @@
 //! Column mapping given by the user with `--map`: [`ColumnMap`].
 //!
-//! Known names of columns and known instructions in questions: [`Role`], [`known_names`], [`split_instructions`].
+//! Known names of columns and known instructions in questions: [`ColumnRole`], [`known_names`], [`split_instructions`].
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -23,7 +23,7 @@ pub struct ColumnMap {
 /// One `role=column` entry of a map.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct MapEntry {
-    pub(super) role: Role,
+    pub(super) role: ColumnRole,
     /// One column, several (for options or images) or a template with `{Column}`; empty turns the role off.
     pub(crate) columns: Vec<String>,
     /// Text of `columns` before it was split at commas. A column with exactly this name takes precedence.
@@ -43,12 +43,12 @@ pub(crate) enum CellFormat {
 }
 
 /// Writes a `--map` flag for one column, quoted for the shell, with the format of answers if one is given.
-pub(crate) fn map_flag(role: Role, column: &str, format: Option<AnswerFormat>) -> String {
+pub(crate) fn map_flag(role: ColumnRole, column: &str, format: Option<AnswerFormat>) -> String {
     let suffix = match format {
         Some(format) => format!(":{}", format.name()),
         // A colon ends a column name that contains colons: the text after the last colon is the format, and an empty
         // one is inferred.
-        None if column.contains(':') && matches!(role, Role::Options | Role::Answer) => ":".to_owned(),
+        None if column.contains(':') && matches!(role, ColumnRole::Options | ColumnRole::Answer) => ":".to_owned(),
         None => String::new(),
     };
     let value = format!("{column}{suffix}");
@@ -69,7 +69,7 @@ impl ColumnMap {
     }
 
     /// Entry of a role; `None` if the map does not have the role.
-    pub(crate) fn entry(&self, role: Role) -> Option<&MapEntry> {
+    pub(crate) fn entry(&self, role: ColumnRole) -> Option<&MapEntry> {
         self.entries.iter().find(|entry| entry.role == role)
     }
 }
@@ -86,7 +86,7 @@ impl FromStr for ColumnMap {
     fn from_str(text: &str) -> Result<Self, String> {
         let starts = entry_starts(text);
         if starts.first() != Some(&0) {
-            let roles = Role::ALL.map(Role::name).join(", ");
+            let roles = ColumnRole::ALL.map(ColumnRole::name).join(", ");
             return Err(format!("role=column expected, with one of the roles {roles}"));
         }
         let ends = starts[1..].iter().map(|start| start - 1).chain([text.len()]);
@@ -109,7 +109,7 @@ fn entry_starts(text: &str) -> Vec<usize> {
         .filter(|start| {
             text[*start..]
                 .split_once('=')
-                .is_some_and(|(name, _)| Role::ALL.iter().any(|role| role.name() == name.trim()))
+                .is_some_and(|(name, _)| ColumnRole::ALL.iter().any(|role| role.name() == name.trim()))
         })
         .collect()
 }
@@ -118,10 +118,11 @@ fn entry_starts(text: &str) -> Vec<usize> {
 fn parse_entry(text: &str) -> Result<MapEntry, String> {
     let (name, value) = text.split_once('=').ok_or("role=column expected")?;
     let name = name.trim();
-    let role = Role::ALL.into_iter().find(|role| role.name() == name).ok_or_else(|| format!("no role {name:?}"))?;
+    let role =
+        ColumnRole::ALL.into_iter().find(|role| role.name() == name).ok_or_else(|| format!("no role {name:?}"))?;
     let (column, format) = match (role, value.rsplit_once(':')) {
-        (Role::Options | Role::Answer, Some((column, ""))) => (column, CellFormat::Inferred),
-        (Role::Options, Some((column, split))) => {
+        (ColumnRole::Options | ColumnRole::Answer, Some((column, ""))) => (column, CellFormat::Inferred),
+        (ColumnRole::Options, Some((column, split))) => {
             let separator = split
                 .strip_prefix("split(")
                 .and_then(|rest| rest.strip_suffix(')'))
@@ -130,7 +131,7 @@ fn parse_entry(text: &str) -> Result<MapEntry, String> {
             let separator = separator.replace("\\n", "\n").replace("\\t", "\t");
             (column, CellFormat::Split(separator))
         }
-        (Role::Answer, Some((column, name))) => {
+        (ColumnRole::Answer, Some((column, name))) => {
             let format = AnswerFormat::from_name(name).ok_or_else(|| {
                 let names = AnswerFormat::ALL.map(AnswerFormat::name).join(", ");
                 format!("answer=COLUMN:HOW expected, with one of {names}")
@@ -139,7 +140,7 @@ fn parse_entry(text: &str) -> Result<MapEntry, String> {
         }
         _ => (value, CellFormat::Inferred),
     };
-    let is_list = matches!(role, Role::Options | Role::Image) && !column.contains('{');
+    let is_list = matches!(role, ColumnRole::Options | ColumnRole::Image) && !column.contains('{');
     let columns = if column.is_empty() {
         Vec::new()
     } else if is_list {
@@ -156,7 +157,7 @@ const COLUMNS: &str = include_str!("../columns.toml");
 /// Role of a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Role {
+pub(crate) enum ColumnRole {
     Question,
     Image,
     Options,
@@ -169,7 +170,7 @@ pub(crate) enum Role {
     Evidence,
 }
 
-impl Role {
+impl ColumnRole {
     /// Roles that `--map` accepts.
     pub(super) const ALL: [Self; 9] = [
         Self::Question,
@@ -203,7 +204,7 @@ impl Role {
 /// Content of `columns.toml`.
 #[derive(Deserialize)]
 struct KnownColumns {
-    roles: BTreeMap<Role, Vec<String>>,
+    roles: BTreeMap<ColumnRole, Vec<String>>,
     instructions: Instructions,
 }
 
@@ -226,7 +227,7 @@ static ENDINGS: LazyLock<Vec<Regex>> = LazyLock::new(|| {
 });
 
 /// Known column names of a role, normalized, in order of preference.
-pub(crate) fn known_names(role: Role) -> &'static [String] {
+pub(crate) fn known_names(role: ColumnRole) -> &'static [String] {
     KNOWN.as_ref().and_then(|known| known.roles.get(&role)).map_or(&[], Vec::as_slice)
 }
 
@@ -268,30 +269,30 @@ mod tests {
     fn map_names_columns_by_role() {
         let map: ColumnMap = TEXT.parse().unwrap();
         assert_eq!(map.to_string(), TEXT);
-        assert_eq!(map.entry(Role::Image).unwrap().columns.clone(), ["pics/{bild}.png"]);
-        assert_eq!(map.entry(Role::Family).unwrap().columns.clone(), Vec::<String>::new());
-        assert_eq!(map.entry(Role::Options).unwrap().format, CellFormat::Split("|".into()));
-        assert_eq!(map.entry(Role::Answer).unwrap().format, CellFormat::Answer(AnswerFormat::Index1));
-        assert_eq!(map.entry(Role::Hint), None);
+        assert_eq!(map.entry(ColumnRole::Image).unwrap().columns.clone(), ["pics/{bild}.png"]);
+        assert_eq!(map.entry(ColumnRole::Family).unwrap().columns.clone(), Vec::<String>::new());
+        assert_eq!(map.entry(ColumnRole::Options).unwrap().format, CellFormat::Split("|".into()));
+        assert_eq!(map.entry(ColumnRole::Answer).unwrap().format, CellFormat::Answer(AnswerFormat::Index1));
+        assert_eq!(map.entry(ColumnRole::Hint), None);
     }
 
     #[test]
     fn option_columns_split_at_commas() {
         assert!("options=first,second:x,third".parse::<ColumnMap>().is_err());
         let cells: ColumnMap = "options=first,second,answer=truth".parse().unwrap();
-        assert_eq!(cells.entry(Role::Options).unwrap().columns, ["first", "second"]);
+        assert_eq!(cells.entry(ColumnRole::Options).unwrap().columns, ["first", "second"]);
         let comma: ColumnMap = "options=all:split(,)".parse().unwrap();
-        assert_eq!(comma.entry(Role::Options).unwrap().format, CellFormat::Split(",".into()));
+        assert_eq!(comma.entry(ColumnRole::Options).unwrap().format, CellFormat::Split(",".into()));
         let line_break: ColumnMap = r"options=all:split(\n)".parse().unwrap();
-        assert_eq!(line_break.entry(Role::Options).unwrap().format, CellFormat::Split("\n".into()));
+        assert_eq!(line_break.entry(ColumnRole::Options).unwrap().format, CellFormat::Split("\n".into()));
     }
 
     #[test]
     fn later_map_replaces_roles() {
         let map: ColumnMap = TEXT.parse().unwrap();
         let both = ColumnMap::merge([&map, &"id=,answer=x".parse().unwrap()]);
-        assert_eq!(both.entry(Role::Id).unwrap().columns, Vec::<String>::new());
-        assert_eq!(both.entry(Role::Question).unwrap().columns, ["frage"]);
+        assert_eq!(both.entry(ColumnRole::Id).unwrap().columns, Vec::<String>::new());
+        assert_eq!(both.entry(ColumnRole::Question).unwrap().columns, ["frage"]);
     }
 
     #[test]
@@ -312,7 +313,7 @@ mod tests {
     fn names_in_the_file_are_normalized() {
         let known = toml::from_str::<KnownColumns>(COLUMNS).unwrap();
         // Groups have no known names, because only the user assigns them.
-        for role in Role::ALL.iter().filter(|role| **role != Role::Group) {
+        for role in ColumnRole::ALL.iter().filter(|role| **role != ColumnRole::Group) {
             assert!(!known.roles[role].is_empty(), "{role:?}");
         }
         assert!(known.roles.values().flatten().all(|name| normalize(name) == *name));

@@ -6,8 +6,8 @@ mod family_source;
 pub(super) mod map;
 mod roles;
 
-pub(super) use column::Column;
+pub(super) use column::SetColumn;
 pub(super) use family_source::FamilySource;
 pub(super) use roles::{
-    ImageColumns, OptionsInQuestion, QuestionSource, Roles, describe_columns, embedded_images, find_column,
+    ColumnRoles, ImageColumns, OptionsInQuestion, QuestionSource, describe_columns, embedded_images, find_column,
 };

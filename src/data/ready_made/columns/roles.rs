@@ -1,31 +1,31 @@
-//! Roles of the columns of a set: [`Roles`].
+//! Roles of the columns of a set: [`ColumnRoles`].
 //!
 //! Templates for the names of image files: [`Template`].
 
 use std::collections::BTreeSet;
 
-use super::column::Column;
-use super::map::{CellFormat, ColumnMap, Role, known_names, map_flag, normalize};
-use crate::data::ready_made::cells::{Cell, ConversationPaths, Row, Table};
+use super::column::SetColumn;
+use super::map::{CellFormat, ColumnMap, ColumnRole, known_names, map_flag, normalize};
+use crate::data::ready_made::cells::{Cell, ConversationPaths, Row, SetRows};
 use crate::types::Choices;
 use crate::types::questions::letter;
 use crate::types::text::excerpt;
 
 /// Columns by role. If a role has several columns, they are in order of preference.
 #[derive(Debug)]
-pub(crate) struct Roles {
+pub(crate) struct ColumnRoles {
     pub(crate) question: QuestionSource,
     pub(crate) images: ImageColumns,
     /// Columns with all options of a row in one cell.
-    pub(crate) option_lists: Vec<Column>,
+    pub(crate) option_lists: Vec<SetColumn>,
     /// Columns with one option each, in order.
-    pub(crate) option_cells: Vec<Column>,
-    pub(crate) answers: Vec<Column>,
-    pub(crate) ids: Vec<Column>,
-    pub(crate) hint: Option<Column>,
+    pub(crate) option_cells: Vec<SetColumn>,
+    pub(crate) answers: Vec<SetColumn>,
+    pub(crate) ids: Vec<SetColumn>,
+    pub(crate) hint: Option<SetColumn>,
     pub(crate) families: FamilyColumns,
-    pub(crate) evidence: Option<Column>,
-    pub(crate) scene: Option<Column>,
+    pub(crate) evidence: Option<SetColumn>,
+    pub(crate) scene: Option<SetColumn>,
     /// Text between the options in one cell, if given by the user.
     pub(crate) option_separator: Option<String>,
     pub(crate) in_question: OptionsInQuestion,
@@ -34,7 +34,7 @@ pub(crate) struct Roles {
 /// Source of the text of a question.
 #[derive(Debug)]
 pub(crate) enum QuestionSource {
-    Column(Column),
+    Column(SetColumn),
     /// The question is in the image, according to the user. The prompt only refers to it.
     Image,
 }
@@ -44,7 +44,7 @@ impl QuestionSource {
     pub(crate) const IN_IMAGE_TEXT: &str = "Answer the question in the image.";
 
     /// Column of the text; `None` if the question is in the image.
-    pub(crate) fn column(&self) -> Option<&Column> {
+    pub(crate) fn column(&self) -> Option<&SetColumn> {
         match self {
             Self::Column(column) => Some(column),
             Self::Image => None,
@@ -56,13 +56,13 @@ impl QuestionSource {
 #[derive(Debug)]
 pub(crate) enum FamilyColumns {
     /// Candidates by their names, in order of preference.
-    Candidates(Vec<Column>),
+    Candidates(Vec<SetColumn>),
     /// Column given by the user, or none.
-    Chosen(Option<Column>),
+    Chosen(Option<SetColumn>),
 }
 
 impl FamilyColumns {
-    fn as_slice(&self) -> &[Column] {
+    fn as_slice(&self) -> &[SetColumn] {
         match self {
             Self::Candidates(columns) => columns,
             Self::Chosen(column) => column.as_slice(),
@@ -82,22 +82,22 @@ pub(crate) enum OptionsInQuestion {
 #[derive(Debug)]
 pub(crate) enum ImageColumns {
     /// The first of these columns with an image.
-    First(Vec<Column>),
+    First(Vec<SetColumn>),
     /// All of these columns.
-    All(Vec<Column>),
+    All(Vec<SetColumn>),
     /// The file named by a template.
     Template(Template),
 }
 
-impl Roles {
+impl ColumnRoles {
     /// Assigns roles to the columns of a table, by the map, else by their names.
     ///
     /// # Errors
     /// If a column of the map does not exist, there is no question column, or a row has several questions.
-    pub(crate) fn new(table: &Table, map: &ColumnMap) -> Result<Self, String> {
-        let question = columns_of(table, map, Role::Question)?;
+    pub(crate) fn new(table: &SetRows, map: &ColumnMap) -> Result<Self, String> {
+        let question = columns_of(table, map, ColumnRole::Question)?;
         refuse_several_questions(table, map)?;
-        let question = match (question.into_iter().next(), map.entry(Role::Question)) {
+        let question = match (question.into_iter().next(), map.entry(ColumnRole::Question)) {
             (Some(column), _) => QuestionSource::Column(column),
             (None, Some(_)) => QuestionSource::Image,
             (None, None) => return Err(no_question(table, map)?),
@@ -109,29 +109,29 @@ impl Roles {
     ///
     /// # Errors
     /// If a column of the map does not exist.
-    pub(crate) fn with_question(table: &Table, map: &ColumnMap, question: QuestionSource) -> Result<Self, String> {
-        let options_entry = map.entry(Role::Options);
-        let options = columns_of(table, map, Role::Options)?;
+    pub(crate) fn with_question(table: &SetRows, map: &ColumnMap, question: QuestionSource) -> Result<Self, String> {
+        let options_entry = map.entry(ColumnRole::Options);
+        let options = columns_of(table, map, ColumnRole::Options)?;
         let (option_lists, option_cells) = match options_entry {
             Some(_) if options.len() > 1 => (Vec::new(), options),
             Some(_) => (options, Vec::new()),
             None => (options, option_cells(table)),
         };
-        let evidence = columns_of(table, map, Role::Evidence)?.into_iter().next();
+        let evidence = columns_of(table, map, ColumnRole::Evidence)?.into_iter().next();
         Ok(Self {
             question,
             images: image_columns(table, map)?,
             option_lists,
             option_cells,
-            answers: columns_of(table, map, Role::Answer)?,
-            ids: columns_of(table, map, Role::Id)?,
-            hint: columns_of(table, map, Role::Hint)?.into_iter().next(),
-            families: match map.entry(Role::Family) {
-                Some(_) => FamilyColumns::Chosen(columns_of(table, map, Role::Family)?.into_iter().next()),
-                None => FamilyColumns::Candidates(columns_of(table, map, Role::Family)?),
+            answers: columns_of(table, map, ColumnRole::Answer)?,
+            ids: columns_of(table, map, ColumnRole::Id)?,
+            hint: columns_of(table, map, ColumnRole::Hint)?.into_iter().next(),
+            families: match map.entry(ColumnRole::Family) {
+                Some(_) => FamilyColumns::Chosen(columns_of(table, map, ColumnRole::Family)?.into_iter().next()),
+                None => FamilyColumns::Candidates(columns_of(table, map, ColumnRole::Family)?),
             },
             evidence,
-            scene: columns_of(table, map, Role::Scene)?.into_iter().next(),
+            scene: columns_of(table, map, ColumnRole::Scene)?.into_iter().next(),
             in_question: match options_entry {
                 Some(entry) if entry.columns.is_empty() => OptionsInQuestion::None,
                 _ => OptionsInQuestion::Search,
@@ -144,7 +144,7 @@ impl Roles {
     }
 
     /// Columns of the question text, its options and its answer.
-    fn question_columns(&self) -> impl Iterator<Item = &Column> {
+    fn question_columns(&self) -> impl Iterator<Item = &SetColumn> {
         self.question
             .column()
             .into_iter()
@@ -188,12 +188,12 @@ impl Roles {
 }
 
 /// Columns of a role: those in the map, else those with a known name, in order of preference.
-fn columns_of(table: &Table, map: &ColumnMap, role: Role) -> Result<Vec<Column>, String> {
+fn columns_of(table: &SetRows, map: &ColumnMap, role: ColumnRole) -> Result<Vec<SetColumn>, String> {
     if let Some(entry) = map.entry(role) {
         if entry.columns.len() > 1
             && let Some(index) = table.find(&entry.unsplit)
         {
-            return Ok(vec![Column::new(index, &entry.unsplit)]);
+            return Ok(vec![SetColumn::new(index, &entry.unsplit)]);
         }
         return entry.columns.iter().map(|name| find_column(table, name)).collect();
     }
@@ -205,20 +205,20 @@ fn columns_of(table: &Table, map: &ColumnMap, role: Role) -> Result<Vec<Column>,
                 .iter()
                 .enumerate()
                 .filter(move |(_, column)| normalize(column) == *name)
-                .map(|(index, column)| Column::new(index, column))
+                .map(|(index, column)| SetColumn::new(index, column))
         })
         .collect())
 }
 
 /// Columns of images: by the map, else by their names and numbers.
-fn image_columns(table: &Table, map: &ColumnMap) -> Result<ImageColumns, String> {
-    let entry = map.entry(Role::Image);
+fn image_columns(table: &SetRows, map: &ColumnMap) -> Result<ImageColumns, String> {
+    let entry = map.entry(ColumnRole::Image);
     if let Some([template]) = entry.map(|entry| &*entry.columns)
         && template.contains('{')
     {
         return Template::parse(table, template, |name| find_column(table, name)).map(ImageColumns::Template);
     }
-    let columns = columns_of(table, map, Role::Image)?;
+    let columns = columns_of(table, map, ColumnRole::Image)?;
     if entry.is_some() && columns.len() > 1 {
         return Ok(ImageColumns::All(columns));
     }
@@ -233,8 +233,8 @@ fn image_columns(table: &Table, map: &ColumnMap) -> Result<ImageColumns, String>
 
 /// Column without a role that most likely has the questions: the one with most texts that end in a question mark, else
 /// with most texts.
-fn likely_question_column(table: &Table) -> Option<&String> {
-    let known: BTreeSet<&String> = Role::ALL.iter().flat_map(|role| known_names(*role)).collect();
+fn likely_question_column(table: &SetRows) -> Option<&String> {
+    let known: BTreeSet<&String> = ColumnRole::ALL.iter().flat_map(|role| known_names(*role)).collect();
     let option_cells = option_cells(table);
     table
         .columns
@@ -261,29 +261,29 @@ fn likely_question_column(table: &Table) -> Option<&String> {
 }
 
 /// Error message for a table without a question column, with the `--map` flag that most likely helps.
-fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
+fn no_question(table: &SetRows, map: &ColumnMap) -> Result<String, String> {
     let has_images = embedded_images(table).is_some();
-    let [options, answers] = [Role::Options, Role::Answer].map(|role| columns_of(table, map, role));
+    let [options, answers] = [ColumnRole::Options, ColumnRole::Answer].map(|role| columns_of(table, map, role));
     let is_unanswerable = options?.is_empty() && answers?.is_empty();
     let remedy = match (ConversationPaths::find(table), likely_question_column(table)) {
         (Some(ConversationPaths { question, answer }), _) => {
             let answer = answer.map_or_else(String::new, |path| format!(",answer={path}"));
             format!(
                 "it holds conversations, whose first question is read with {}",
-                map_flag(Role::Question, &format!("{question}{answer}"), None)
+                map_flag(ColumnRole::Question, &format!("{question}{answer}"), None)
             )
         }
         (None, Some(name)) => format!(
             "say which is which, e.g. {}; {} if it stands in the image",
-            map_flag(Role::Question, name, None),
-            map_flag(Role::Question, "", None)
+            map_flag(ColumnRole::Question, name, None),
+            map_flag(ColumnRole::Question, "", None)
         ),
         (None, None) if is_unanswerable && has_images => {
             "--ask home asks questions of its own about the images".to_owned()
         }
         (None, None) => format!(
             "if the question stands in the image, {} asks {:?}; else say which is which: --map question=COLUMN,image=COLUMN,options=COLUMN,answer=COLUMN",
-            map_flag(Role::Question, "", None),
+            map_flag(ColumnRole::Question, "", None),
             QuestionSource::IN_IMAGE_TEXT
         ),
     };
@@ -291,28 +291,28 @@ fn no_question(table: &Table, map: &ColumnMap) -> Result<String, String> {
 }
 
 /// A column with images in its cells.
-pub(crate) fn embedded_images(table: &Table) -> Option<Column> {
+pub(crate) fn embedded_images(table: &SetRows) -> Option<SetColumn> {
     let is_image = |cell: &Cell| match cell {
         Cell::Bytes(_) | Cell::File(_) => true,
         Cell::Fields(fields) => fields.iter().any(|(name, _)| &**name == "bytes"),
         _ => false,
     };
     let index = table.rows.iter().find_map(|row| (0..table.columns.len()).find(|index| is_image(row.cell(*index))))?;
-    Some(Column::new(index, &table.columns[index]))
+    Some(SetColumn::new(index, &table.columns[index]))
 }
 
 /// Finds a column by its name, or a field of the structs in a column, such as `meta.source`.
 ///
 /// # Errors
 /// If there is no such column; the error lists the columns.
-pub(crate) fn find_column(table: &Table, name: &str) -> Result<Column, String> {
+pub(crate) fn find_column(table: &SetRows, name: &str) -> Result<SetColumn, String> {
     if let Some(index) = table.find(name) {
-        return Ok(Column::new(index, name));
+        return Ok(SetColumn::new(index, name));
     }
     if let Some((column, field)) = name.split_once('.')
         && let Some(index) = table.find(column)
     {
-        return Ok(Column::with_field(index, column, field));
+        return Ok(SetColumn::with_field(index, column, field));
     }
     let similar = table
         .columns
@@ -323,13 +323,13 @@ pub(crate) fn find_column(table: &Table, name: &str) -> Result<Column, String> {
 }
 
 /// Columns with one of these names and a number, in the order of their numbers.
-fn numbered_columns(table: &Table, names: &[&str]) -> Vec<Column> {
-    let mut found: Vec<(u32, Column)> = Vec::new();
+fn numbered_columns(table: &SetRows, names: &[&str]) -> Vec<SetColumn> {
+    let mut found: Vec<(u32, SetColumn)> = Vec::new();
     for (index, column) in table.columns.iter().enumerate() {
         let normalized = normalize(column);
         let number = names.iter().find_map(|name| normalized.strip_prefix(name)).and_then(|digits| digits.parse().ok());
         if let Some(number) = number {
-            found.push((number, Column::new(index, column)));
+            found.push((number, SetColumn::new(index, column)));
         }
     }
     found.sort_by_key(|(number, _)| *number);
@@ -337,11 +337,11 @@ fn numbered_columns(table: &Table, names: &[&str]) -> Vec<Column> {
 }
 
 /// Columns with one option each: `A`, `B`, … (at least these two), or `option0`, `option_a`, `choice_a` and so on.
-fn option_cells(table: &Table) -> Vec<Column> {
-    let letters: Vec<Column> = (0..Choices::MOST)
+fn option_cells(table: &SetRows) -> Vec<SetColumn> {
+    let letters: Vec<SetColumn> = (0..Choices::MOST)
         .map_while(|option| {
             let name = letter(option).to_string();
-            table.find(&name).map(|index| Column::new(index, &name))
+            table.find(&name).map(|index| SetColumn::new(index, &name))
         })
         .collect();
     if letters.len() > 1 {
@@ -351,21 +351,21 @@ fn option_cells(table: &Table) -> Vec<Column> {
     if numbered.len() > 1 {
         return numbered;
     }
-    let named: Vec<Column> = (0..Choices::MOST)
+    let named: Vec<SetColumn> = (0..Choices::MOST)
         .map_while(|option| {
             let letter = letter(option).to_ascii_lowercase();
             let names = [format!("option{letter}"), format!("choice{letter}")];
             let index = table.columns.iter().position(|column| names.contains(&normalize(column)))?;
-            Some(Column::new(index, &table.columns[index]))
+            Some(SetColumn::new(index, &table.columns[index]))
         })
         .collect();
     if named.len() > 1 { named } else { Vec::new() }
 }
 
 /// Refuses a table with several questions per row, unless the map chooses one.
-fn refuse_several_questions(table: &Table, map: &ColumnMap) -> Result<(), String> {
+fn refuse_several_questions(table: &SetRows, map: &ColumnMap) -> Result<(), String> {
     let questions = numbered_columns(table, &["question"]);
-    if questions.len() < 2 || map.entry(Role::Question).is_some() {
+    if questions.len() < 2 || map.entry(ColumnRole::Question).is_some() {
         return Ok(());
     }
     let names: Vec<&str> = questions.iter().map(|column| column.name.as_str()).collect();
@@ -373,7 +373,7 @@ fn refuse_several_questions(table: &Table, map: &ColumnMap) -> Result<(), String
         "several questions per row, in the columns {}; one question per row is read: write a row for each, or take the ones in a column \
          with {}",
         names.join(", "),
-        map_flag(Role::Question, names[0], None)
+        map_flag(ColumnRole::Question, names[0], None)
     ))
 }
 
@@ -387,7 +387,7 @@ const MAX_VALUES_LENGTH: usize = 360;
 const MAX_LISTED_NAME: usize = 40;
 
 /// Lists the columns with their kinds and an example value, one per line.
-pub(crate) fn describe_columns(table: &Table) -> String {
+pub(crate) fn describe_columns(table: &SetRows) -> String {
     let width = table.columns.iter().map(|name| name.chars().count()).max();
     let width = width.unwrap_or(0).min(24);
     let columns = table.columns.len().clamp(1, MAX_LISTED_COLUMNS);
@@ -426,7 +426,7 @@ enum TemplatePart {
     /// Literal text.
     Literal(String),
     /// Text of a cell, with leading zeros up to a minimum width.
-    Cell { column: Column, width: usize },
+    Cell { column: SetColumn, width: usize },
 }
 
 impl Template {
@@ -435,9 +435,9 @@ impl Template {
     /// # Errors
     /// If a brace or a column is missing.
     pub(super) fn parse(
-        table: &Table,
+        table: &SetRows,
         text: &str,
-        find_column: impl Fn(&str) -> Result<Column, String>,
+        find_column: impl Fn(&str) -> Result<SetColumn, String>,
     ) -> Result<Self, String> {
         let mut parts = Vec::new();
         let mut rest = text;
@@ -474,9 +474,9 @@ impl Template {
 /// Parses a field in braces: a column, or a column with a width in Python's notation, `id:012` or `id:012d`. A column
 /// with the whole name takes precedence.
 fn parse_field(
-    table: &Table,
+    table: &SetRows,
     field: &str,
-    find_column: impl Fn(&str) -> Result<Column, String>,
+    find_column: impl Fn(&str) -> Result<SetColumn, String>,
 ) -> Result<TemplatePart, String> {
     if table.find(field).is_none()
         && let Some((name, format)) = field.rsplit_once(':')

@@ -68,11 +68,7 @@ fn card_configs(tree: &Tree) -> (Vec<Config>, Option<String>) {
 ///
 /// # Errors
 /// If there are no files, or it is not clear which to use; the error lists the files.
-pub(super) fn choose_files(
-    tree: &Tree,
-    files: Vec<PathBuf>,
-    args: &SetArgs,
-) -> Result<(Vec<Candidate>, Option<String>)> {
+pub(super) fn choose_files(tree: &Tree, files: Vec<PathBuf>, args: &SetArgs) -> Result<(Vec<RowFile>, Option<String>)> {
     let has_parquet = files.iter().any(|path| extension(path) == "parquet");
     if is_arrow(tree) && !has_parquet {
         return Err(Error::data(tree.place().display(), arrow_problem(tree)));
@@ -87,7 +83,7 @@ pub(super) fn choose_files(
         }
         files_by_kind(tree, files)?
             .into_iter()
-            .map(|path| Candidate { split: split_in_name(&path), config: String::new(), path })
+            .map(|path| RowFile { split: split_in_name(&path), config: String::new(), path })
             .collect()
     } else {
         let wanted = args.config_name.as_deref().or(args.preset_config.as_deref());
@@ -102,7 +98,7 @@ pub(super) fn choose_files(
 ///
 /// # Errors
 /// If there is no such configuration; the error lists them.
-fn files_by_card(tree: &Tree, configs: &[Config], files: &[PathBuf], wanted: Option<&str>) -> Result<Vec<Candidate>> {
+fn files_by_card(tree: &Tree, configs: &[Config], files: &[PathBuf], wanted: Option<&str>) -> Result<Vec<RowFile>> {
     let names: Vec<&str> = configs.iter().map(|config| config.name.as_str()).collect();
     let chosen: Vec<&Config> = match wanted {
         Some("all") => configs.iter().collect(),
@@ -124,7 +120,7 @@ fn files_by_card(tree: &Tree, configs: &[Config], files: &[PathBuf], wanted: Opt
     for config in chosen {
         for (split, paths) in files_of_config(tree, config, files)? {
             for path in paths {
-                candidates.push(Candidate {
+                candidates.push(RowFile {
                     split: match &*split {
                         "" => split_in_name(&path),
                         split => split.to_owned(),
@@ -240,7 +236,7 @@ fn require_one_kind(tree: &Tree, files: Vec<PathBuf>) -> Result<Vec<PathBuf>> {
 
 /// File of rows, with its split and configuration.
 #[derive(Debug, Clone)]
-pub(super) struct Candidate {
+pub(super) struct RowFile {
     /// Name of the split; empty if the path names none.
     pub(super) split: String,
     pub(super) config: String,
@@ -280,7 +276,7 @@ fn usual_word(name: &str) -> &str {
 /// # Errors
 /// If the wanted split does not exist, or if no split is wanted and several exist without `test`. The error lists the
 /// splits.
-fn choose_split(tree: &Tree, files: Vec<Candidate>, wanted: Option<&str>) -> Result<Vec<Candidate>> {
+fn choose_split(tree: &Tree, files: Vec<RowFile>, wanted: Option<&str>) -> Result<Vec<RowFile>> {
     let mut splits: BTreeMap<&str, Vec<&Path>> = BTreeMap::new();
     for file in &files {
         splits.entry(&file.split).or_default().push(&file.path);
@@ -354,7 +350,7 @@ mod tests {
         let tree = Tree::from_folder(folder.path()).unwrap();
         let files = splits
             .iter()
-            .map(|split| Candidate { split: (*split).to_owned(), config: String::new(), path: split.into() })
+            .map(|split| RowFile { split: (*split).to_owned(), config: String::new(), path: split.into() })
             .collect();
         let files = choose_split(&tree, files, wanted)?;
         Ok(files.into_iter().map(|file| file.path).collect())

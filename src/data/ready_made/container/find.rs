@@ -26,12 +26,12 @@ pub(crate) struct FoundFiles {
     pub(crate) archive: Option<Arc<Archive>>,
     /// Notes about skipped or missing files.
     pub(crate) notes: Vec<String>,
-    pub(crate) joined: Joined,
+    pub(crate) joined: FileRelation,
 }
 
 /// Relation of several files to each other.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Joined {
+pub(crate) enum FileRelation {
     /// Parts of one table, which must have the same columns.
     OneTable,
     /// Files of a folder or a ZIP file, which may have different columns.
@@ -80,7 +80,7 @@ fn named_files(places: &[PathBuf], args: &SetArgs) -> Result<FoundFiles> {
         further: folders.collect(),
         archive: None,
         notes: check_shards(places).err().map(|e| e.to_string()).into_iter().collect(),
-        joined: Joined::OneTable,
+        joined: FileRelation::OneTable,
     })
 }
 
@@ -124,7 +124,7 @@ fn files_at(place: &Path, args: &SetArgs) -> Result<FoundFiles> {
             folder: place.parent().unwrap_or(Path::new("")).to_owned(),
             further: Vec::new(),
             archive: None,
-            joined: Joined::OneTable,
+            joined: FileRelation::OneTable,
             notes: single_shard_note(place).into_iter().collect(),
         });
     }
@@ -156,7 +156,7 @@ fn matching_files(place: &Path, text: &str, args: &SetArgs) -> Result<FoundFiles
         folder,
         further: Vec::new(),
         archive: None,
-        joined: Joined::OneTable,
+        joined: FileRelation::OneTable,
         notes: Vec::new(),
     })
 }
@@ -181,7 +181,7 @@ fn files_in_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
             files,
             folder: folder.clone(),
             further: blobs.iter().cloned().collect(),
-            joined: Joined::Folder,
+            joined: FileRelation::Folder,
             archive: None,
             notes,
         },
@@ -189,7 +189,7 @@ fn files_in_tree(tree: &Tree, args: &SetArgs) -> Result<FoundFiles> {
             files,
             folder: archive.path.parent().unwrap_or(Path::new("")).to_owned(),
             further: Vec::new(),
-            joined: Joined::Folder,
+            joined: FileRelation::Folder,
             archive: Some(Arc::clone(archive)),
             notes,
         },

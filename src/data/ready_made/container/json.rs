@@ -12,7 +12,7 @@ use std::sync::Arc;
 
 use serde_json::{Map, Value};
 
-use super::super::cells::{Cell, JsonUnit, RowPlace, Table};
+use super::super::cells::{Cell, JsonUnit, RowPlace, SetRows};
 use crate::error::{Error, Result};
 use crate::files::{self, NOT_UTF8, json_problem};
 use crate::types::shell_word;
@@ -51,7 +51,7 @@ fn check_values(bytes: &[u8]) -> Result<(), String> {
 }
 
 /// Appends the rows of a file with one object per line. Empty lines and a byte order mark are skipped.
-pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
+pub(super) fn read_lines(path: &Path, table: &mut SetRows) -> Result<()> {
     let mut reader = open(path)?;
     let mut offset = 0;
     for number in 1.. {
@@ -92,7 +92,7 @@ pub(super) fn read_lines(path: &Path, table: &mut Table) -> Result<()> {
 }
 
 /// Appends the rows of a JSON file. `rows` is the path to their list, such as `items` or `images.*.qa`.
-pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut Table) -> Result<()> {
+pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut SetRows) -> Result<()> {
     let steps: Vec<&str> = rows.iter().flat_map(|rows| rows.split('.')).collect();
     let before = table.rows.len();
     let scanner = JsonScanner::new(open(path)?);
@@ -105,7 +105,7 @@ pub(super) fn read(path: &Path, rows: Option<&str>, table: &mut Table) -> Result
 }
 
 /// Appends the rows of the list at the end of a path.
-fn read_rows_at(mut scanner: FileScanner, path: &Path, steps: &[&str], table: &mut Table) -> Result<(), String> {
+fn read_rows_at(mut scanner: FileScanner, path: &Path, steps: &[&str], table: &mut SetRows) -> Result<(), String> {
     match (scanner.next_kind()?, steps) {
         (ValueKind::Other, _) => return Err("neither a list nor an object".to_owned()),
         (ValueKind::Object, []) => return read_rows_by_id(path, table),
@@ -115,7 +115,7 @@ fn read_rows_at(mut scanner: FileScanner, path: &Path, steps: &[&str], table: &m
 }
 
 /// Scans to the list of rows and appends them.
-fn scan_to_rows(scanner: &mut FileScanner, steps: &[&str], table: &mut Table) -> Result<(), String> {
+fn scan_to_rows(scanner: &mut FileScanner, steps: &[&str], table: &mut SetRows) -> Result<(), String> {
     match (steps, scanner.next_kind()?) {
         ([] | ["*", _], ValueKind::List) => {
             let inner = steps.get(1).copied();
@@ -135,7 +135,7 @@ fn scan_to_rows(scanner: &mut FileScanner, steps: &[&str], table: &mut Table) ->
 
 /// Appends an object as a row. With `inner`, appends the objects in its list of this name, each with the other fields
 /// of the object.
-fn push_value(value: &JsonValue, number: u64, inner: Option<&str>, table: &mut Table) -> Result<(), String> {
+fn push_value(value: &JsonValue, number: u64, inner: Option<&str>, table: &mut SetRows) -> Result<(), String> {
     let fields = parse_object(value, number)?;
     let Some(list) = inner else {
         return push_row(table, object_place(value, number, None), fields, None);
@@ -176,7 +176,7 @@ fn parse_object(value: &JsonValue, number: u64) -> Result<Map<String, Value>, St
 ///
 /// # Errors
 /// If the fields are not objects. If they are lists, the error lists them with their columns.
-fn read_rows_by_id(path: &Path, table: &mut Table) -> Result<(), String> {
+fn read_rows_by_id(path: &Path, table: &mut SetRows) -> Result<(), String> {
     let mut scanner = JsonScanner::new(open(path).map_err(|e| e.to_string())?);
     let (mut lists, mut number, mut others) = (Vec::new(), 0, 0);
     let (before, mut keys) = (table.rows.len(), Vec::new());
@@ -231,7 +231,7 @@ fn first_object_keys(scanner: &mut FileScanner) -> Result<Option<Vec<String>>, S
 
 /// Appends a row. It inherits the fields of `outer` that it does not have.
 fn push_row(
-    table: &mut Table,
+    table: &mut SetRows,
     place: RowPlace,
     fields: Map<String, Value>,
     outer: Option<&Map<String, Value>>,

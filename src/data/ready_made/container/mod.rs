@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use csv::{ByteRecord, Position, Reader, ReaderBuilder};
 use tempfile::NamedTempFile;
 
-use super::cells::{Cell, FileLabel, RowPlace, Step, Table};
+use super::cells::{Cell, FileLabel, PathStep, RowPlace, SetRows};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::types::shell_word;
@@ -28,7 +28,7 @@ pub(crate) use find::is_set_folder;
 pub(crate) use parquet_columns::ParquetColumns;
 pub(crate) use tree::cached_snapshot;
 
-pub(super) use find::{FoundFiles, Joined, find_files};
+pub(super) use find::{FileRelation, FoundFiles, find_files};
 
 /// Supported file types, for messages.
 const SUPPORTED: &str = ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the texts also as .gz), or a .zip of these";
@@ -37,7 +37,7 @@ const SUPPORTED: &str = ".parquet, .tsv, .csv, .jsonl, .ndjson or .json (the tex
 #[derive(Debug)]
 pub(crate) struct SetFile {
     pub(super) label: FileLabel,
-    kind: FileKind,
+    kind: RowFormat,
     /// Decompressed copy of a compressed file, deleted when dropped.
     decompressed: Option<NamedTempFile>,
     /// Footer of a Parquet file.
@@ -46,7 +46,7 @@ pub(crate) struct SetFile {
 
 /// Format of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum FileKind {
+enum RowFormat {
     Table { delimiter: u8 },
     JsonLines,
     Json,
@@ -76,10 +76,10 @@ impl SetFile {
         };
         let content = decompressed.as_ref().map_or(path.as_path(), NamedTempFile::path);
         let kind = match &*extension(&uncompressed_name) {
-            name @ ("tsv" | "csv") => FileKind::Table { delimiter: delimiter(content, name)? },
-            "jsonl" | "ndjson" => FileKind::JsonLines,
-            "json" => FileKind::Json,
-            "parquet" => FileKind::Parquet,
+            name @ ("tsv" | "csv") => RowFormat::Table { delimiter: delimiter(content, name)? },
+            "jsonl" | "ndjson" => RowFormat::JsonLines,
+            "json" => RowFormat::Json,
+            "parquet" => RowFormat::Parquet,
             "arrow" => {
                 let name = path.file_name().unwrap_or_default().to_string_lossy();
                 let program = "import sys, datasets; datasets.Dataset.from_file(sys.argv[1]).to_parquet('set.parquet')";
@@ -104,8 +104,8 @@ impl SetFile {
     }
 
     /// Appends the rows of the file to a table. In a JSON file, `rows` is the path to the list of rows.
-    pub(super) fn read(&self, rows: Option<&str>, table: &mut Table) -> Result<()> {
-        if let Some(rows) = rows.filter(|_| self.kind != FileKind::Json) {
+    pub(super) fn read(&self, rows: Option<&str>, table: &mut SetRows) -> Result<()> {
+        if let Some(rows) = rows.filter(|_| self.kind != RowFormat::Json) {
             let problem =
                 format_args!("{} is not a JSON file of one object that could hold {rows:?}", self.label.path.display());
             return Err(Error::usage("--read rows", problem));
@@ -113,10 +113,10 @@ impl SetFile {
         table.begin_file(self.label.clone());
         let path = self.content_path();
         let result = match self.kind {
-            FileKind::Table { delimiter } => read(path, delimiter, table),
-            FileKind::JsonLines => json::read_lines(path, table),
-            FileKind::Json => json::read(path, rows, table),
-            FileKind::Parquet => parquet::read(path, &self.footer, table),
+            RowFormat::Table { delimiter } => read(path, delimiter, table),
+            RowFormat::JsonLines => json::read_lines(path, table),
+            RowFormat::Json => json::read(path, rows, table),
+            RowFormat::Parquet => parquet::read(path, &self.footer, table),
         };
         // Name the compressed file instead of its temporary copy.
         result.map_err(|error| match error {
@@ -129,13 +129,13 @@ impl SetFile {
     }
 
     /// Reads the bytes or the text of one value: the end of the path `steps` in the cell of `column` in a row.
-    pub(super) fn value(&self, row: &RowPlace, column: &str, steps: &[Step]) -> Result<Vec<u8>> {
+    pub(super) fn value(&self, row: &RowPlace, column: &str, steps: &[PathStep]) -> Result<Vec<u8>> {
         let cell = match (row, self.kind) {
             (RowPlace::Parquet { group, row, .. }, _) => {
                 let path = self.content_path();
                 return parquet::bytes(path, &self.footer, *group, *row, column, steps);
             }
-            (RowPlace::Record(position), FileKind::Table { delimiter }) => {
+            (RowPlace::Record(position), RowFormat::Table { delimiter }) => {
                 cell(self.content_path(), delimiter, position, column)?
             }
             (RowPlace::Json { offset, length, inner, .. }, _) => {
@@ -299,7 +299,7 @@ fn open_reader(path: &Path, delimiter: u8) -> Result<Reader<RecordLimited>> {
 }
 
 /// Adds all rows of a file to a table.
-fn read(path: &Path, delimiter: u8, table: &mut Table) -> Result<()> {
+fn read(path: &Path, delimiter: u8, table: &mut SetRows) -> Result<()> {
     let mut reader = open_reader(path, delimiter)?;
     let header = reader.byte_headers().map_err(|e| Error::data(path.display(), e))?.clone();
     let mut columns = Vec::new();

@@ -20,7 +20,7 @@ use parquet::file::serialized_reader::SerializedPageReader;
 use parquet::record::{Field, Row as Record};
 use serde_json::Value;
 
-use super::super::cells::{MAX_ROWS, RowPlace, Step, Table, parse_list, too_many_rows};
+use super::super::cells::{MAX_ROWS, PathStep, RowPlace, SetRows, parse_list, too_many_rows};
 use super::json::MAX_ROW_BYTES;
 use crate::data::ready_made::cells::Cell;
 use crate::error::{Error, Result};
@@ -69,7 +69,7 @@ pub(super) fn count(path: &Path) -> Result<u64> {
 ///
 /// # Errors
 /// If the file is corrupt, a compression codec is not supported, or there are too many rows or too many bytes in a row.
-pub(super) fn read(path: &Path, footer: &Footer, table: &mut Table) -> Result<()> {
+pub(super) fn read(path: &Path, footer: &Footer, table: &mut SetRows) -> Result<()> {
     let metadata = footer.metadata(path)?;
     check_codecs(path, &metadata)?;
     // The footer has the number of rows: reject a large file before reading any row.
@@ -269,12 +269,12 @@ pub(super) fn bytes(
     group: usize,
     row: usize,
     column: &str,
-    steps: &[Step],
+    steps: &[PathStep],
 ) -> Result<Vec<u8>> {
     let footer = footer.metadata(path)?;
     let item = steps.iter().find_map(|step| match step {
-        Step::Item(at) => Some(*at),
-        Step::Field(_) => None,
+        PathStep::Item(at) => Some(*at),
+        PathStep::Field(_) => None,
     });
     guarded(|| {
         let columns = footer.row_groups().get(group).ok_or("no such row group")?.columns();
@@ -303,12 +303,16 @@ pub(super) fn bytes(
 
 /// Index of the first leaf column under `column` whose path has the fields of `steps` in their order, the last one at
 /// its end; any leaf matches if `steps` has no field. Parts of the path between them are the lists of Parquet.
-fn leaf_index(columns: &[parquet::file::metadata::ColumnChunkMetaData], column: &str, steps: &[Step]) -> Option<usize> {
+fn leaf_index(
+    columns: &[parquet::file::metadata::ColumnChunkMetaData],
+    column: &str,
+    steps: &[PathStep],
+) -> Option<usize> {
     let fields: Vec<&String> = steps
         .iter()
         .filter_map(|step| match step {
-            Step::Field(name) => Some(name),
-            Step::Item(_) => None,
+            PathStep::Field(name) => Some(name),
+            PathStep::Item(_) => None,
         })
         .collect();
     columns.iter().position(|chunk| {

@@ -8,7 +8,7 @@ use parquet::data_type::{ByteArray, DataType};
 use parquet::file::metadata::{ColumnChunkMetaData, ParquetMetaData};
 use parquet::file::serialized_reader::SerializedPageReader;
 
-use super::super::cells::Step;
+use super::super::cells::PathStep;
 use super::parquet::{Footer, bytes, check_codecs, corrupt_file, open};
 use super::refuse_lfs_pointer;
 use crate::error::{Error, Result};
@@ -129,7 +129,7 @@ impl ParquetColumns {
     /// # Errors
     /// If the file lacks the column or is damaged, or the bytes are null.
     pub(crate) fn image(&self, column: &str, group: usize, row: usize) -> Result<Vec<u8>> {
-        let field = [Step::Field("bytes".to_owned())];
+        let field = [PathStep::Field("bytes".to_owned())];
         bytes(&self.path, &self.footer, group, row, column, &field)
     }
 

@@ -7,7 +7,7 @@ use crate::data::ready_made::settings::{SetArgs, SeveralImages};
 
 /// Reason why a row is not asked.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum OmissionReason {
+pub(crate) enum RowOmission {
     SeveralImages,
     NoImage,
     /// The question has no options.
@@ -19,7 +19,7 @@ pub(crate) enum OmissionReason {
     Rotation,
 }
 
-impl OmissionReason {
+impl RowOmission {
     /// Name in the manifest and in messages.
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -59,24 +59,24 @@ impl OmissionReason {
 /// Number of rows that are not asked, with a description of the first, by reason.
 #[derive(Debug, Default)]
 pub(crate) struct Omissions {
-    counts: BTreeMap<OmissionReason, (usize, String)>,
+    counts: BTreeMap<RowOmission, (usize, String)>,
 }
 
 impl Omissions {
     /// Adds a row with its problem.
-    pub(crate) fn add(&mut self, reason: OmissionReason, problem: impl FnOnce() -> String) {
+    pub(crate) fn add(&mut self, reason: RowOmission, problem: impl FnOnce() -> String) {
         let (count, _) = self.counts.entry(reason).or_insert_with(|| (0, problem()));
         *count += 1;
     }
 
     /// Number of rows left out, by reason.
-    pub(crate) fn counts(&self) -> impl Iterator<Item = (OmissionReason, usize)> {
+    pub(crate) fn counts(&self) -> impl Iterator<Item = (RowOmission, usize)> {
         self.counts.iter().map(|(reason, (count, _))| (*reason, *count))
     }
 
     /// Number of broken rows, and the problem of the first; `None` if there are none.
     pub(crate) fn bad(&self) -> Option<(usize, &str)> {
-        let (count, first) = self.counts.get(&OmissionReason::Bad)?;
+        let (count, first) = self.counts.get(&RowOmission::Bad)?;
         Some((*count, first))
     }
 
@@ -90,19 +90,19 @@ impl Omissions {
         for (&reason, (count, first)) in &self.counts {
             let head = format!("{count} of {rows} rows");
             let head = match reason {
-                OmissionReason::SeveralImages => format!("{head} show {first}"),
-                OmissionReason::NoImage => format!("no image in {head}"),
-                OmissionReason::Open => {
+                RowOmission::SeveralImages => format!("{head} show {first}"),
+                RowOmission::NoImage => format!("no image in {head}"),
+                RowOmission::Open => {
                     format!("no options in {head}, where the answer is e.g. {first}")
                 }
-                OmissionReason::SeveralTruths => {
+                RowOmission::SeveralTruths => {
                     format!("{head} have several true options, e.g. {first}")
                 }
-                OmissionReason::Bad | OmissionReason::Rotation => {
+                RowOmission::Bad | RowOmission::Rotation => {
                     format!("{head} are broken; the first: {first}")
                 }
             };
-            let skip = args.bad.filter(|_| reason == OmissionReason::Bad);
+            let skip = args.bad.filter(|_| reason == RowOmission::Bad);
             if let Some(Err(problem)) = skip.map(|skip| skip.check(*count, rows, "rows", first)) {
                 problems.push(problem);
             } else if !reason.is_allowed(args) {
@@ -111,11 +111,11 @@ impl Omissions {
                     _ => "leaves them out",
                 };
                 let flag = match reason {
-                    OmissionReason::Bad => SkipBad::allowing(*count, rows).flag(),
+                    RowOmission::Bad => SkipBad::allowing(*count, rows).flag(),
                     reason => reason.flag().to_owned(),
                 };
                 let other = match reason {
-                    OmissionReason::SeveralImages => ", --multi-image send shows all of them in one request",
+                    RowOmission::SeveralImages => ", --multi-image send shows all of them in one request",
                     _ => "",
                 };
                 problems.push(format!("{head}; {flag} {verb}{other}"));
@@ -137,9 +137,9 @@ mod tests {
     fn rows_are_left_out_only_with_flags() {
         let mut left = Omissions::default();
         assert!(left.check(40, &SetArgs::default()).is_ok());
-        left.add(OmissionReason::NoImage, String::new);
-        left.add(OmissionReason::SeveralImages, || "2 images".into());
-        left.add(OmissionReason::SeveralImages, || "3 images".into());
+        left.add(RowOmission::NoImage, String::new);
+        left.add(RowOmission::SeveralImages, || "2 images".into());
+        left.add(RowOmission::SeveralImages, || "3 images".into());
         let problem = left.check(40, &SetArgs::default()).unwrap_err();
         assert!(problem.contains("2 of 40 rows show 2 images; --multi-image skip leaves them out, --multi-image send shows all of them in one request\n no image in 1 of 40 rows; --skip no-image leaves it out"), "{problem}");
         let args =
@@ -152,7 +152,7 @@ mod tests {
     fn too_many_bad_rows_are_an_error() {
         let args = SetArgs { bad: Some(SkipBad::default()), ..SetArgs::default() };
         let mut left = Omissions::default();
-        left.add(OmissionReason::Bad, || "a.csv, line 3: empty".into());
+        left.add(RowOmission::Bad, || "a.csv, line 3: empty".into());
         assert!(left.check(20, &args).is_ok());
         let problem = left.check(19, &args).unwrap_err();
         assert!(problem.contains("line 3: empty; --skip bad leaves out at most 5 %"), "{problem}");

@@ -7,18 +7,18 @@ mod skip_bad;
 
 use std::collections::{BTreeSet, HashMap};
 
-use super::cells::Table;
-use super::choices::ParsedQuestion;
+use super::cells::SetRows;
+use super::choices::SetQuestion;
 use super::settings::SetArgs;
 use crate::types::Digest;
 
-pub(super) use left_out::{OmissionReason, Omissions};
+pub(super) use left_out::{Omissions, RowOmission};
 
 pub(crate) use skip_bad::SkipBad;
 
 /// Pairs of indices of questions with equal digests and different answers. Every contradicted question is in at least
 /// one pair.
-pub(super) fn find_contradictions(questions: &[ParsedQuestion], digests: &[Digest]) -> Vec<[usize; 2]> {
+pub(super) fn find_contradictions(questions: &[SetQuestion], digests: &[Digest]) -> Vec<[usize; 2]> {
     let truth = |index: usize| questions[index].choices.truth();
     let mut first: HashMap<&Digest, usize> = HashMap::new();
     let mut opposed: HashMap<&Digest, usize> = HashMap::new();
@@ -51,9 +51,9 @@ pub(super) fn find_contradictions(questions: &[ParsedQuestion], digests: &[Diges
 /// # Errors
 /// If the user does not allow it; the error names the first pair.
 pub(super) fn omit_contradictions(
-    table: &Table,
+    table: &SetRows,
     args: &SetArgs,
-    questions: &mut Vec<ParsedQuestion>,
+    questions: &mut Vec<SetQuestion>,
     omissions: &mut Omissions,
     pairs: &[[usize; 2]],
 ) -> Result<(), String> {
@@ -61,7 +61,7 @@ pub(super) fn omit_contradictions(
     for pair in pairs {
         for index in pair {
             if omitted.insert(*index) {
-                omissions.add(OmissionReason::Bad, || describe_contradiction(table, questions, *pair));
+                omissions.add(RowOmission::Bad, || describe_contradiction(table, questions, *pair));
             }
         }
     }
@@ -78,9 +78,9 @@ pub(super) fn omit_contradictions(
 }
 
 /// Message about two questions that are equal except for their answers.
-fn describe_contradiction(table: &Table, questions: &[ParsedQuestion], pair: [usize; 2]) -> String {
+fn describe_contradiction(table: &SetRows, questions: &[SetQuestion], pair: [usize; 2]) -> String {
     let [one, other] = pair.map(|index| {
-        let ParsedQuestion { row, choices, .. } = &questions[index];
+        let SetQuestion { row, choices, .. } = &questions[index];
         let truth = choices.truth().map_or("", |truth| &choices.texts()[truth]);
         format!("{} ({truth:?})", table.place_in_set(*row))
     });

@@ -1,4 +1,4 @@
-//! Frames of the questions of a set: [`Frames`].
+//! Frames of the questions of a set: [`SetFrames`].
 
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::hash::Hash;
@@ -8,10 +8,10 @@ use std::sync::Arc;
 use super::images::{CellPart, EmbeddedImage, ImageForm, RowImage, images};
 use crate::data::Root;
 use crate::data::openeqa::ImageSource;
-use crate::data::ready_made::cells::{Cell, FileFacts, MAX_NAME_LENGTH, Step, Table};
-use crate::data::ready_made::choices::ParsedQuestion;
-use crate::data::ready_made::columns::map::{Role, map_flag};
-use crate::data::ready_made::columns::{Column, Roles};
+use crate::data::ready_made::cells::{Cell, DroppedFile, MAX_NAME_LENGTH, PathStep, SetRows};
+use crate::data::ready_made::choices::SetQuestion;
+use crate::data::ready_made::columns::map::{ColumnRole, map_flag};
+use crate::data::ready_made::columns::{ColumnRoles, SetColumn};
 use crate::data::ready_made::container::{Archive, SetFile};
 use crate::data::ready_made::settings::SeveralImages;
 use crate::error::{Error, Result};
@@ -21,7 +21,7 @@ use crate::types::{Digest, FrameId};
 /// Image of a question.
 pub(super) enum LocatedImage {
     /// In a cell of a row.
-    Cell { row: usize, column: usize, steps: Vec<Step>, facts: FileFacts },
+    Cell { row: usize, column: usize, steps: Vec<PathStep>, facts: DroppedFile },
     /// An image file: the name of its frame and its path.
     File(FrameId, PathBuf),
     /// An image file in the archive.
@@ -31,18 +31,18 @@ pub(super) enum LocatedImage {
 }
 
 /// Names and collects the frames of a set. Equal image data in several cells are one frame, with one noise seed.
-pub(crate) struct Frames<'a> {
-    pub(super) table: &'a Table,
+pub(crate) struct SetFrames<'a> {
+    pub(super) table: &'a SetRows,
     root: &'a Root,
     /// ZIP file of the set.
     pub(super) archive: Option<&'a Arc<Archive>>,
     files: &'a [Arc<SetFile>],
     /// Row with the embedded image that other rows refer to, by file and row id.
     image_rows: HashMap<(usize, String), usize>,
-    pub(super) roles: &'a Roles,
+    pub(super) roles: &'a ColumnRoles,
     form: ImageForm,
     /// Shared parts of rows, by column and path in its cell.
-    parts: HashMap<(usize, Vec<Step>), Arc<CellPart>>,
+    parts: HashMap<(usize, Vec<PathStep>), Arc<CellPart>>,
     /// Names of embedded images.
     names: HashMap<Digest, FrameId>,
     sources: BTreeMap<FrameId, ImageSource>,
@@ -52,13 +52,13 @@ pub(crate) struct Frames<'a> {
 /// Images of each row with several, by the name that stands for all of them.
 pub(crate) type Series = BTreeMap<FrameId, Vec<FrameId>>;
 
-impl<'a> Frames<'a> {
+impl<'a> SetFrames<'a> {
     pub(crate) fn new(
-        table: &'a Table,
+        table: &'a SetRows,
         root: &'a Root,
         archive: Option<&'a Arc<Archive>>,
         files: &'a [Arc<SetFile>],
-        roles: &'a Roles,
+        roles: &'a ColumnRoles,
         form: ImageForm,
         several: Option<SeveralImages>,
     ) -> Self {
@@ -119,7 +119,7 @@ impl<'a> Frames<'a> {
     }
 
     /// True if every row has a text in the column and the keys made of its file and text are unique.
-    fn is_unique<K: Eq + Hash>(&self, column: &Column, key: impl Fn(usize, String) -> K) -> bool {
+    fn is_unique<K: Eq + Hash>(&self, column: &SetColumn, key: impl Fn(usize, String) -> K) -> bool {
         let mut seen = HashSet::new();
         self.table
             .rows
@@ -128,7 +128,7 @@ impl<'a> Frames<'a> {
     }
 
     /// Finds the rows whose images other rows may refer to by their ids in this column.
-    fn index_image_rows(&mut self, column: &Column) {
+    fn index_image_rows(&mut self, column: &SetColumn) {
         for (index, row) in self.table.rows.iter().enumerate() {
             let found = images(row, self.roles);
             if let ([RowImage::Embedded { .. }], Some(id)) = (&*found, column.text(row)) {
@@ -206,7 +206,7 @@ impl<'a> Frames<'a> {
         });
         match image_column {
             Some((_, name)) => {
-                format!("{problem}; the column {name:?} holds images: {}", map_flag(Role::Image, name, None))
+                format!("{problem}; the column {name:?} holds images: {}", map_flag(ColumnRole::Image, name, None))
             }
             None => problem,
         }
@@ -246,7 +246,7 @@ impl<'a> Frames<'a> {
 
     /// Frame of a question, or the name that stands for all frames of a question with several images. Adds their
     /// sources.
-    pub(crate) fn frame(&mut self, question: &ParsedQuestion) -> Result<FrameId> {
+    pub(crate) fn frame(&mut self, question: &SetQuestion) -> Result<FrameId> {
         let images: Vec<LocatedImage> = self.in_row(question.row).collect::<Result<_>>()?;
         let frames: Vec<FrameId> = images.into_iter().map(|image| self.add_source(image)).collect();
         if let [only] = &*frames {

@@ -4,11 +4,11 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
-use super::frames::{Frames, LocatedImage};
-use crate::data::ready_made::cells::Table;
-use crate::data::ready_made::choices::{ParsedQuestion, is_native_format};
-use crate::data::ready_made::columns::Column;
-use crate::data::ready_made::columns::map::{ColumnMap, Role, map_flag};
+use super::frames::{LocatedImage, SetFrames};
+use crate::data::ready_made::cells::SetRows;
+use crate::data::ready_made::choices::{SetQuestion, is_native_format};
+use crate::data::ready_made::columns::SetColumn;
+use crate::data::ready_made::columns::map::{ColumnMap, ColumnRole, map_flag};
 use crate::data::ready_made::omissions::find_contradictions;
 use crate::data::ready_made::summary::count;
 use crate::error::{Error, Result};
@@ -55,9 +55,9 @@ enum ImageIdentity {
     Name,
 }
 
-impl Frames<'_> {
+impl SetFrames<'_> {
     /// Makes ids for the questions: from the first column with a different value for each, else from their content.
-    pub(crate) fn ids(&self, questions: &[ParsedQuestion]) -> Result<Ids> {
+    pub(crate) fn ids(&self, questions: &[SetQuestion]) -> Result<Ids> {
         for column in &self.roles.ids {
             let Some(texts) = self.unique_texts(column, questions) else {
                 continue;
@@ -83,7 +83,7 @@ impl Frames<'_> {
     }
 
     /// Texts of the questions in a column; `None` if one is missing or two are equal.
-    fn unique_texts(&self, column: &Column, questions: &[ParsedQuestion]) -> Option<Vec<String>> {
+    fn unique_texts(&self, column: &SetColumn, questions: &[SetQuestion]) -> Option<Vec<String>> {
         let mut seen = HashSet::new();
         questions
             .iter()
@@ -95,7 +95,7 @@ impl Frames<'_> {
     }
 
     /// Digest of each question over its images, its text and its options.
-    fn digests(&self, questions: &[ParsedQuestion], identity: ImageIdentity) -> Result<Vec<Digest>> {
+    fn digests(&self, questions: &[SetQuestion], identity: ImageIdentity) -> Result<Vec<Digest>> {
         let mut files: HashMap<FrameId, Digest> = HashMap::new();
         questions
             .iter()
@@ -171,7 +171,7 @@ pub(crate) type SceneNames = BTreeMap<FrameId, String>;
 /// Collects the scenes of the frames from the column of scenes.
 #[derive(Debug)]
 pub(crate) struct Scenes<'a> {
-    column: Option<&'a Column>,
+    column: Option<&'a SetColumn>,
     /// True if the user gave the column, or the table is in this program's own format. Then a frame with two scenes is
     /// an error; otherwise the column is ignored.
     is_required: bool,
@@ -183,10 +183,10 @@ pub(crate) struct Scenes<'a> {
 
 impl<'a> Scenes<'a> {
     /// No frames yet.
-    pub(crate) fn new(table: &Table, map: &ColumnMap, column: Option<&'a Column>) -> Self {
+    pub(crate) fn new(table: &SetRows, map: &ColumnMap, column: Option<&'a SetColumn>) -> Self {
         Self {
             column,
-            is_required: map.entry(Role::Scene).is_some() || is_native_format(table),
+            is_required: map.entry(ColumnRole::Scene).is_some() || is_native_format(table),
             names: SceneNames::new(),
             frames: BTreeSet::new(),
             contradiction: None,
@@ -197,7 +197,7 @@ impl<'a> Scenes<'a> {
     ///
     /// # Errors
     /// If the frame already has another scene and the column is required.
-    pub(crate) fn add(&mut self, table: &Table, row: usize, frame: &FrameId) -> Result<()> {
+    pub(crate) fn add(&mut self, table: &SetRows, row: usize, frame: &FrameId) -> Result<()> {
         let Some(column) = self.column else {
             return Ok(());
         };
@@ -213,7 +213,7 @@ impl<'a> Scenes<'a> {
         }
         let problem = format!("the image {:?} is of the scene {scene:?} here and of {known:?} before", frame.0);
         if self.is_required {
-            let remedy = map_flag(Role::Scene, "", None);
+            let remedy = map_flag(ColumnRole::Scene, "", None);
             let problem = format!("{problem}; an image has one scene ({remedy} ignores scenes)");
             return Err(Error::data(table.place(row), problem));
         }

@@ -7,9 +7,9 @@ use std::sync::{Arc, LazyLock};
 use regex::{Captures, Regex};
 
 use crate::data::ready_made::cells::{
-    Cell, FileFacts, MAX_NAME_LENGTH, Row, RowPlace, Step, decode_base64, parse_list,
+    Cell, DroppedFile, MAX_NAME_LENGTH, PathStep, Row, RowPlace, decode_base64, parse_list,
 };
-use crate::data::ready_made::columns::{Column, ImageColumns, Roles};
+use crate::data::ready_made::columns::{ColumnRoles, ImageColumns, SetColumn};
 use crate::data::ready_made::container::SetFile;
 use crate::error::{Error, Result};
 use crate::pictures::image_file::format::FileFormat;
@@ -21,7 +21,7 @@ use crate::types::text::image_mark::mark;
 #[derive(Debug, Clone)]
 pub(crate) enum RowImage {
     /// Bytes or base64 in a cell.
-    Embedded { column: usize, steps: Vec<Step>, facts: FileFacts },
+    Embedded { column: usize, steps: Vec<PathStep>, facts: DroppedFile },
     /// Path of a file.
     File(String),
     /// Short text that may be the id of another row, or a path.
@@ -40,7 +40,7 @@ pub(crate) enum ImageForm {
 }
 
 /// Frame of other data that a row is about, if it has one.
-fn named_frame(row: &Row, roles: &Roles) -> Option<RowImage> {
+fn named_frame(row: &Row, roles: &ColumnRoles) -> Option<RowImage> {
     let (ImageColumns::First(columns) | ImageColumns::All(columns)) = &roles.images else {
         return None;
     };
@@ -49,7 +49,7 @@ fn named_frame(row: &Row, roles: &Roles) -> Option<RowImage> {
 
 impl ImageForm {
     /// Images of a row, in order.
-    pub(crate) fn in_row(self, row: &Row, roles: &Roles) -> Vec<RowImage> {
+    pub(crate) fn in_row(self, row: &Row, roles: &ColumnRoles) -> Vec<RowImage> {
         match self {
             Self::Files => images(row, roles),
             Self::Frames => named_frame(row, roles).into_iter().collect(),
@@ -58,7 +58,7 @@ impl ImageForm {
 }
 
 /// Images of a row, in order. If several columns may have the image, the first with image data is preferred to paths.
-pub(crate) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
+pub(crate) fn images(row: &Row, roles: &ColumnRoles) -> Vec<RowImage> {
     let mut found = Vec::new();
     match &roles.images {
         ImageColumns::First(columns) => {
@@ -86,18 +86,18 @@ pub(crate) fn images(row: &Row, roles: &Roles) -> Vec<RowImage> {
 }
 
 /// Adds the images of a row in a column.
-fn add_column_images(row: &Row, column: &Column, found: &mut Vec<RowImage>) {
+fn add_column_images(row: &Row, column: &SetColumn, found: &mut Vec<RowImage>) {
     let steps = field_steps(column.field.as_deref());
     add_images(column.cell(row), column.index, &steps, found);
 }
 
 /// Steps to a field, given as a path with dots.
-fn field_steps(field: Option<&str>) -> Vec<Step> {
-    field.into_iter().flat_map(|field| field.split('.')).map(|field| Step::Field(field.to_owned())).collect()
+fn field_steps(field: Option<&str>) -> Vec<PathStep> {
+    field.into_iter().flat_map(|field| field.split('.')).map(|field| PathStep::Field(field.to_owned())).collect()
 }
 
 /// Adds the images in a cell, or in a part of a cell at the end of `steps`.
-fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
+fn add_images(cell: &Cell, column: usize, steps: &[PathStep], found: &mut Vec<RowImage>) {
     if cell.is_absent() {
         return;
     }
@@ -105,7 +105,7 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
         Cell::File(facts) => found.push(RowImage::Embedded { column, steps: steps.to_vec(), facts: (**facts).clone() }),
         Cell::List(cells) => {
             for (index, cell) in cells.iter().enumerate() {
-                add_images(cell, column, &with_step(steps, Step::Item(index)), found);
+                add_images(cell, column, &with_step(steps, PathStep::Item(index)), found);
             }
         }
         Cell::Fields(_) => {
@@ -114,7 +114,7 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
                 .filter_map(|name| Some((name, cell.field(name)?)))
                 .find(|(_, cell)| !cell.is_absent());
             if let Some((name, cell)) = field {
-                add_images(cell, column, &with_step(steps, Step::Field(name.to_owned())), found);
+                add_images(cell, column, &with_step(steps, PathStep::Field(name.to_owned())), found);
             }
         }
         Cell::Text(text) => add_text_images(text, column, steps, found),
@@ -123,19 +123,19 @@ fn add_images(cell: &Cell, column: usize, steps: &[Step], found: &mut Vec<RowIma
     }
 }
 
-fn with_step(steps: &[Step], step: Step) -> Vec<Step> {
+fn with_step(steps: &[PathStep], step: PathStep) -> Vec<PathStep> {
     [steps, &[step]].concat()
 }
 
 /// Adds the images in a text: a file in base64, a list of texts, a path, or the id of a row.
-fn add_text_images(text: &str, column: usize, steps: &[Step], found: &mut Vec<RowImage>) {
+fn add_text_images(text: &str, column: usize, steps: &[PathStep], found: &mut Vec<RowImage>) {
     if let Some(bytes) = decode_base64(text) {
-        found.push(RowImage::Embedded { column, steps: steps.to_vec(), facts: FileFacts::from_bytes(&bytes) });
+        found.push(RowImage::Embedded { column, steps: steps.to_vec(), facts: DroppedFile::from_bytes(&bytes) });
         return;
     }
     if let Some(items) = parse_list(text) {
         for (index, item) in items.into_iter().enumerate() {
-            let steps = [steps, &[Step::Item(index)]].concat();
+            let steps = [steps, &[PathStep::Item(index)]].concat();
             add_images(&Cell::Text(item), column, &steps, found);
         }
         return;
@@ -154,7 +154,7 @@ pub(crate) struct EmbeddedImage {
     pub(super) file: Arc<SetFile>,
     pub(super) row: RowPlace,
     pub(super) part: Arc<CellPart>,
-    pub(super) facts: FileFacts,
+    pub(super) facts: DroppedFile,
 }
 
 /// Part of a row that has an image. Most images of a set share it.
@@ -162,7 +162,7 @@ pub(crate) struct EmbeddedImage {
 pub(super) struct CellPart {
     pub(super) column: String,
     /// Path from the cell to the image.
-    pub(super) steps: Vec<Step>,
+    pub(super) steps: Vec<PathStep>,
 }
 
 impl EmbeddedImage {
@@ -179,7 +179,7 @@ impl EmbeddedImage {
         let place = format!("{}, {}", self.file.label.path.display(), self.row);
         let value = self.file.value(&self.row, &self.part.column, &self.part.steps)?;
         let bytes = std::str::from_utf8(&value).ok().and_then(decode_base64).unwrap_or(value);
-        if FileFacts::from_bytes(&bytes) != self.facts {
+        if DroppedFile::from_bytes(&bytes) != self.facts {
             let problem = "the image has changed since the file was opened; start again";
             return Err(Error::data(place, problem));
         }

@@ -4,7 +4,7 @@ mod frames;
 mod ids;
 mod images;
 
-pub(super) use frames::Frames;
+pub(super) use frames::SetFrames;
 pub(super) use ids::{Ids, Scenes};
 pub(super) use images::{ImageForm, ImageMarks, images};
 

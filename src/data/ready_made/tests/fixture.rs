@@ -91,7 +91,7 @@ fn table(rows: &[Map<String, Value>], delimiter: u8) -> String {
 
 /// Type of a Parquet column, from its first value.
 #[derive(Clone, Copy, PartialEq)]
-enum Form {
+enum ColumnType {
     Text,
     Number,
     Texts,
@@ -99,13 +99,13 @@ enum Form {
     Images,
 }
 
-fn form(rows: &[Map<String, Value>], column: &str) -> Form {
+fn form(rows: &[Map<String, Value>], column: &str) -> ColumnType {
     match rows.iter().find_map(|row| row.get(column).filter(|value| !value.is_null())) {
-        Some(Value::Number(_)) => Form::Number,
-        Some(Value::Array(items)) if items[0].is_object() => Form::Images,
-        Some(Value::Array(_)) => Form::Texts,
-        Some(Value::Object(_)) => Form::Image,
-        _ => Form::Text,
+        Some(Value::Number(_)) => ColumnType::Number,
+        Some(Value::Array(items)) if items[0].is_object() => ColumnType::Images,
+        Some(Value::Array(_)) => ColumnType::Texts,
+        Some(Value::Object(_)) => ColumnType::Image,
+        _ => ColumnType::Text,
     }
 }
 
@@ -143,13 +143,13 @@ fn image(name: &str) -> TypePtr {
 
 /// Values of a leaf with their definition and repetition levels.
 #[derive(Default)]
-struct Levels {
+struct LeafLevels {
     values: Vec<ByteArray>,
     defined: Vec<i16>,
     repeated: Vec<i16>,
 }
 
-impl Levels {
+impl LeafLevels {
     fn add(&mut self, value: Option<Vec<u8>>, defined: i16, absent: i16, repeated: i16) {
         self.defined.push(if value.is_some() { defined } else { absent });
         self.repeated.push(repeated);
@@ -171,13 +171,13 @@ pub(super) fn set_with_features(rows: &[Map<String, Value>], features: &Value) -
 fn parquet(path: &Path, rows: &[Map<String, Value>], metadata: Option<Vec<KeyValue>>) {
     let columns = columns(rows);
     let text = Some(LogicalType::String);
-    let forms: Vec<Form> = columns.iter().map(|column| form(rows, column)).collect();
+    let forms: Vec<ColumnType> = columns.iter().map(|column| form(rows, column)).collect();
     let fields = columns.iter().zip(&forms).map(|(column, form)| match form {
-        Form::Text => leaf(column, Physical::BYTE_ARRAY, text.clone()),
-        Form::Number => leaf(column, Physical::INT64, None),
-        Form::Texts => list(column, leaf("element", Physical::BYTE_ARRAY, text.clone())),
-        Form::Image => image(column),
-        Form::Images => list(column, image("element")),
+        ColumnType::Text => leaf(column, Physical::BYTE_ARRAY, text.clone()),
+        ColumnType::Number => leaf(column, Physical::INT64, None),
+        ColumnType::Texts => list(column, leaf("element", Physical::BYTE_ARRAY, text.clone())),
+        ColumnType::Image => image(column),
+        ColumnType::Images => list(column, image("element")),
     });
     let schema = group("schema", Repetition::REQUIRED, None, fields.collect());
     let schema =
@@ -190,7 +190,7 @@ fn parquet(path: &Path, rows: &[Map<String, Value>], metadata: Option<Vec<KeyVal
     for rows in rows.chunks(half) {
         let mut group = writer.next_row_group().unwrap();
         for (column, form) in columns.iter().zip(&forms) {
-            let numbers = *form == Form::Number;
+            let numbers = *form == ColumnType::Number;
             if numbers {
                 let mut leaf = group.next_column().unwrap().unwrap();
                 let values: Vec<i64> = rows.iter().filter_map(|row| row.get(column)?.as_i64()).collect();
@@ -214,19 +214,19 @@ fn parquet(path: &Path, rows: &[Map<String, Value>], metadata: Option<Vec<KeyVal
 }
 
 /// Leaves of a column of texts, lists or images.
-fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> {
+fn leaves(rows: &[Map<String, Value>], column: &str, form: ColumnType) -> Vec<LeafLevels> {
     let cells = rows.iter().map(|row| row.get(column).filter(|value| !value.is_null()));
     match form {
-        Form::Text | Form::Number => {
-            let mut levels = Levels::default();
+        ColumnType::Text | ColumnType::Number => {
+            let mut levels = LeafLevels::default();
             for cell in cells {
                 let value = cell.map(|cell| cell.as_str().map_or_else(|| cell.to_string(), str::to_owned));
                 levels.add(value.map(String::into_bytes), 1, 0, 0);
             }
             vec![levels]
         }
-        Form::Texts => {
-            let mut levels = Levels::default();
+        ColumnType::Texts => {
+            let mut levels = LeafLevels::default();
             for cell in cells {
                 let Some(items) = cell.and_then(Value::as_array) else {
                     levels.add(None, 3, 0, 0);
@@ -239,8 +239,8 @@ fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> 
             }
             vec![levels]
         }
-        Form::Image => {
-            let (mut first, mut second) = (Levels::default(), Levels::default());
+        ColumnType::Image => {
+            let (mut first, mut second) = (LeafLevels::default(), LeafLevels::default());
             for cell in cells {
                 let absent = i16::from(cell.is_some());
                 first.add(cell.and_then(decoded_bytes), 2, absent, 0);
@@ -248,8 +248,8 @@ fn leaves(rows: &[Map<String, Value>], column: &str, form: Form) -> Vec<Levels> 
             }
             vec![first, second]
         }
-        Form::Images => {
-            let (mut first, mut second) = (Levels::default(), Levels::default());
+        ColumnType::Images => {
+            let (mut first, mut second) = (LeafLevels::default(), LeafLevels::default());
             for cell in cells {
                 let Some(items) = cell.and_then(Value::as_array) else {
                     first.add(None, 4, 0, 0);

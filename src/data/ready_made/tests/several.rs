@@ -11,10 +11,10 @@ fn send() -> SetArgs {
 }
 
 /// Id and text of a question, and the name and the red value of each of its images.
-type Shown = (String, String, Vec<(String, u8)>);
+type SeenQuestion = (String, String, Vec<(String, u8)>);
 
 /// Each question with the red values of its images, from every format with embedded images.
-fn shown(rows: &[Map<String, Value>]) -> Vec<Shown> {
+fn shown(rows: &[Map<String, Value>]) -> Vec<SeenQuestion> {
     let mut all = ["set.parquet", "set.json", "set.jsonl"].map(|name| {
         let (_folder, path) = set(name, rows);
         let dataset = open(&path, &send()).unwrap();

@@ -16,14 +16,14 @@ use crate::pattern::{self, ALL_COLORS, Paint, Surface, SurfaceFinish, linear_rgb
 const TABLE: &str = include_str!("parts.txt");
 
 /// Entries of the table; empty if a line cannot be parsed, which a test rules out.
-static RECIPES: LazyLock<Vec<Recipe>> = LazyLock::new(|| parse(TABLE).unwrap_or_default());
+static RECIPES: LazyLock<Vec<PartEntry>> = LazyLock::new(|| parse(TABLE).unwrap_or_default());
 
 /// Colour of warm light for a camera that is white-balanced for daylight.
 const WARM: Vec3 = Vec3::new(1.0, 0.94, 0.85);
 
 /// An entry of the table.
 #[derive(Debug)]
-struct Recipe {
+struct PartEntry {
     /// Name in the table, which distinguishes variants of a thing: `sink:2`.
     name: &'static str,
     kind: ThingKind,
@@ -59,8 +59,8 @@ enum Copies {
 ///
 /// # Errors
 /// The first line that cannot be parsed.
-fn parse(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
-    let mut recipes: Vec<Recipe> = Vec::new();
+fn parse(table: &'static str) -> Result<Vec<PartEntry>, &'static str> {
+    let mut recipes: Vec<PartEntry> = Vec::new();
     for line in table.lines().filter(|line| !line.starts_with('#')).filter(|line| !line.trim().is_empty()) {
         if line.starts_with('[') {
             recipes.push(parse_head(line).ok_or(line)?);
@@ -73,14 +73,14 @@ fn parse(table: &'static str) -> Result<Vec<Recipe>, &'static str> {
 }
 
 /// Parses the first line of an entry.
-fn parse_head(line: &'static str) -> Option<Recipe> {
+fn parse_head(line: &'static str) -> Option<PartEntry> {
     let (name, rest) = line.strip_prefix('[')?.split_once(']')?;
     let (word, _) = name.split_once(':').unwrap_or((name, ""));
     let mut cells = rest.split('|').map(|cell| cell.split_whitespace());
     let class = cells.next()?.next()?;
     let places = cells.next()?.collect();
     let mut scale = cells.next()?.map(|number| number.parse().ok());
-    Some(Recipe {
+    Some(PartEntry {
         name,
         kind: ThingKind { word, class },
         places,
@@ -223,7 +223,7 @@ pub(crate) fn piece(name: &str, rng: &mut SeededRng) -> Piece {
     piece_in_paint(name, main, rng)
 }
 
-fn find(name: &str) -> Option<&'static Recipe> {
+fn find(name: &str) -> Option<&'static PartEntry> {
     RECIPES.iter().find(|recipe| recipe.name == name)
 }
 

@@ -1,7 +1,7 @@
 use std::fs::File;
 
 use super::*;
-use crate::engine::image_cache::{Content, EntryFacts, Shown};
+use crate::engine::image_cache::{EntryFacts, EntryType, Shown};
 
 fn key(name: &str) -> Key {
     Key::from_recipe(&[name]).unwrap()
@@ -27,7 +27,7 @@ fn total_bytes(store: &ImageStore) -> u64 {
 }
 
 fn image(store: &ImageStore, name: &str) -> Option<Vec<u8>> {
-    store.get(&key(name), Content::Image, |_| true).map(|entry| entry.image)
+    store.get(&key(name), EntryType::Image, |_| true).map(|entry| entry.image)
 }
 
 #[test]
@@ -37,7 +37,7 @@ fn two_stores_of_one_folder_share_their_images() {
     assert_eq!(image(&one, "a"), None);
     one.put(&key("a"), &entry(9));
     assert_eq!(image(&other, "a"), Some(vec![7; 9]));
-    assert_eq!(other.get(&key("a"), Content::Image, |_| false), None);
+    assert_eq!(other.get(&key("a"), EntryType::Image, |_| false), None);
     let counts = other.counts();
     assert_eq!((counts.hits, counts.misses, counts.hit_bytes), (1, 1, 9));
     assert_eq!(counts.saved_ms, 30);
@@ -134,14 +134,14 @@ fn only_the_user_can_enter_the_folder() {
 fn entries_without_an_image_are_counted_separately() {
     let place = tempfile::tempdir().unwrap();
     let store = store(place.path(), 1 << 20);
-    let shown = Shown { content: Content::Probe, ..Shown::default() };
+    let shown = Shown { content: EntryType::Probe, ..Shown::default() };
     let facts = EntryFacts::new(shown, 500, serde_json::json!("found"));
     assert!(!store.contains(&key("a")));
     store.put(&key("a"), &Entry::from_facts(facts));
     assert!(store.contains(&key("a")));
-    let read = store.get(&key("a"), Content::Probe, |_| true).unwrap();
+    let read = store.get(&key("a"), EntryType::Probe, |_| true).unwrap();
     assert_eq!(read.facts.notes, serde_json::json!("found"));
-    assert_eq!(store.get(&key("b"), Content::Measures, |_| true), None);
+    assert_eq!(store.get(&key("b"), EntryType::Measures, |_| true), None);
     let counts = store.counts();
     assert_eq!((counts.hits, counts.misses, counts.written), (0, 0, 0));
     assert_eq!((counts.facts, counts.saved_ms), (1, 500));

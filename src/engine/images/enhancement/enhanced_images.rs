@@ -52,13 +52,13 @@ pub(crate) struct DarkImage<'a> {
 }
 
 /// A reason why an image cannot be used. Images with the same `words` are reported together.
-struct Fault {
+struct ImageFault {
     words: &'static str,
     /// Details about this file; may be empty.
     detail: String,
 }
 
-impl Fault {
+impl ImageFault {
     fn new(words: &'static str, detail: impl Into<String>) -> Self {
         Self { words, detail: detail.into() }
     }
@@ -168,7 +168,7 @@ impl EnhancedImages {
             let path = path(&image.frame.id, image.condition)?;
             match self.check_image(&path, image) {
                 Ok(is_unchanged) => unchanged += usize::from(is_unchanged),
-                Err(Fault { words, detail }) => {
+                Err(ImageFault { words, detail }) => {
                     let named = match &*detail {
                         "" => path.clone(),
                         detail => format!("{path} ({detail})"),
@@ -208,32 +208,33 @@ impl EnhancedImages {
     ///
     /// # Errors
     /// The fault of the image.
-    fn check_image(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, Fault> {
+    fn check_image(&self, path: &str, dark: &DarkImage<'_>) -> std::result::Result<bool, ImageFault> {
         if dark.condition.pair().is_some() {
             let words = "`synthesize` does not write dark photographs or their matches; see --llie-on";
-            return Err(Fault::new(words, ""));
+            return Err(ImageFault::new(words, ""));
         }
         let Some(file) = self.files.get(path) else {
             let other = self.other_format(path).unwrap_or_default();
-            return Err(Fault::new("missing", other));
+            return Err(ImageFault::new("missing", other));
         };
-        let (width, height) = *file.size.as_ref().map_err(|problem| Fault::new("not an 8-bit PNG file", &**problem))?;
+        let (width, height) =
+            *file.size.as_ref().map_err(|problem| ImageFault::new("not an 8-bit PNG file", &**problem))?;
         if (width, height) != dark.frame.size {
             let (w, h) = dark.frame.size;
             let words = "another size than the dark image, and nothing is resized";
-            return Err(Fault::new(words, format!("{width}×{height}, not {w}×{h}")));
+            return Err(ImageFault::new(words, format!("{width}×{height}, not {w}×{h}")));
         }
         let json = self.folder.join(path).with_extension("json");
         if !json.exists() {
             let words =
                 "the JSON file of the dark image, from `synthesize`, is missing; copy it next to the enhanced one";
-            return Err(Fault::new(words, ""));
+            return Err(ImageFault::new(words, ""));
         }
         let words = "the JSON file next to it is not from `synthesize`";
-        let sidecar = Sidecar::<ImageRecipe>::read(&json).map_err(|e| Fault::new(words, e.to_string()))?;
+        let sidecar = Sidecar::<ImageRecipe>::read(&json).map_err(|e| ImageFault::new(words, e.to_string()))?;
         if sidecar.recipe != dark.recipe {
             let words = "made from another dark image than this run's; call `synthesize` with the same data and the same light flags";
-            return Err(Fault::new(words, recipe_differences(&sidecar.recipe, &dark.recipe)));
+            return Err(ImageFault::new(words, recipe_differences(&sidecar.recipe, &dark.recipe)));
         }
         Ok(sidecar.has_digest(file.digest))
     }

@@ -12,7 +12,7 @@ use crate::engine::images::workers::ThreadArgs;
 use crate::error::{Error, Result};
 use crate::types::{Digest, EnhancerName, Rgb};
 use darkqa_enhance::{
-    Enhancer, Findings, ImageUse, Implausible, LoadLimits, ModelFile, ProbeArgs, Runtime, RuntimeArgs, SizeArgs,
+    Enhancer, ImageUse, Implausible, LoadLimits, ModelFile, ProbeArgs, ProbeFindings, Runtime, RuntimeArgs, SizeArgs,
     Stopper, Usage,
 };
 
@@ -203,7 +203,7 @@ pub(crate) struct LazyEnhancer {
     name: EnhancerName,
     path: PathBuf,
     settings: EnhancerRunArgs,
-    findings: Findings,
+    findings: ProbeFindings,
     usage: Usage,
     session: Mutex<Session>,
     /// Stops the session; set when it is opened.
@@ -221,7 +221,7 @@ enum Session {
 
 impl LazyEnhancer {
     /// The model in a file, with the findings of its probe in an earlier run.
-    pub(crate) fn new(file: ModelFile, settings: EnhancerRunArgs, findings: Findings) -> Self {
+    pub(crate) fn new(file: ModelFile, settings: EnhancerRunArgs, findings: ProbeFindings) -> Self {
         findings.warn(file.name(), file.path());
         tracing::debug!("{}: not opened, because the store has all its images", file.name());
         Self {

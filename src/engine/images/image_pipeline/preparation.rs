@@ -21,7 +21,7 @@ use crate::engine::images::trials::SourcePlan;
 use crate::engine::images::workers::Workers;
 use crate::error::Result;
 use crate::types::{EnhancerName, ImageFacts, Rgb};
-use darkqa_enhance::{Enhancer, FRAMES, Findings, Stopper, Usage, sets_in_memory};
+use darkqa_enhance::{Enhancer, FRAMES, ProbeFindings, Stopper, Usage, sets_in_memory};
 
 /// Size in bytes above which some servers and proxies refuse an image.
 const LARGE_IMAGE: usize = 5_000_000;
@@ -198,9 +198,9 @@ enum StoredState<'a> {
     /// Nothing, so the enhancer is opened and probed. The findings are written to this place, if there is a store.
     Nothing(Option<FindingsPlace<'a>>),
     /// The findings of the probe.
-    Findings(Findings),
+    Findings(ProbeFindings),
     /// The findings of the probe and all images of the plan.
-    All(Findings),
+    All(ProbeFindings),
 }
 
 impl<'a> ImagePipeline<'a> {

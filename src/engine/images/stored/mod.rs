@@ -6,5 +6,7 @@ mod stored_images;
 pub(super) use output_image::differing_fields;
 pub(super) use stored_images::{FindingsPlace, Similarity, StoredImage, StoredNotes, StoredPlace};
 
-pub(crate) use output_image::{ImageCounts, ImageOrigin, ImageOutcome, OutputFile, OutputImage, Refusals, Sidecar};
+pub(crate) use output_image::{
+    ImageCounts, ImageOrigin, ImageOutcome, ImageRefusals, OutputFile, OutputImage, Sidecar,
+};
 pub(crate) use stored_images::{Needed, StoredFindings, StoredImages};

@@ -4,7 +4,7 @@
 //! and bytes match, or else its pixels; other images are refused. The image is written before its sidecar, so that no
 //! sidecar exists without its image.
 //!
-//! Images that were not made because other images exist in their place: [`Refusals`].
+//! Images that were not made because other images exist in their place: [`ImageRefusals`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -133,19 +133,19 @@ pub(crate) enum ImageOutcome {
     /// The image existed already.
     Unchanged,
     /// Another image exists in its place.
-    Refused(Refusal),
+    Refused(ImageRefusal),
 }
 
 /// An image that was not made, because another one exists in its place.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Refusal {
+pub(crate) struct ImageRefusal {
     /// Path of the existing image.
     pub(crate) image: PathBuf,
     /// How it differs, and the remedy.
     pub(crate) problem: String,
 }
 
-impl Refusal {
+impl ImageRefusal {
     /// The error for a command that makes only one image.
     pub(crate) fn into_error(self) -> Error {
         Error::data(self.image.display(), self.problem)
@@ -163,7 +163,7 @@ pub(crate) struct ImageCounts {
 impl ImageCounts {
     /// Counts an image. A refusal counts as failed and is returned.
     #[must_use]
-    pub(crate) fn add(&mut self, outcome: ImageOutcome) -> Option<Refusal> {
+    pub(crate) fn add(&mut self, outcome: ImageOutcome) -> Option<ImageRefusal> {
         match outcome {
             ImageOutcome::Written => self.written += 1,
             ImageOutcome::Unchanged => self.unchanged += 1,
@@ -285,7 +285,7 @@ impl OutputImage {
     }
 
     fn refuse(&self, problem: &str) -> ImageOutcome {
-        ImageOutcome::Refused(Refusal {
+        ImageOutcome::Refused(ImageRefusal {
             image: self.image.clone(),
             problem: format!("{problem}; --force overwrites it, another --out keeps both"),
         })
@@ -323,10 +323,10 @@ fn decode(path: &Path, bytes: &[u8]) -> Option<Rgb> {
 
 /// The refused images of a command by reason; thread-safe.
 #[derive(Debug, Default)]
-pub(crate) struct Refusals(Mutex<BTreeMap<String, BTreeSet<PathBuf>>>);
+pub(crate) struct ImageRefusals(Mutex<BTreeMap<String, BTreeSet<PathBuf>>>);
 
-impl Refusals {
-    pub(crate) fn add(&self, Refusal { image, problem }: Refusal) {
+impl ImageRefusals {
+    pub(crate) fn add(&self, ImageRefusal { image, problem }: ImageRefusal) {
         let mut refused = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         refused.entry(problem).or_default().insert(image);
     }

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use serde::{Deserialize, Serialize};
 
-use crate::engine::image_cache::{Content, Entry, EntryFacts, ImageStore, Key, Shown, StoredKinds};
+use crate::engine::image_cache::{Entry, EntryFacts, EntryType, ImageStore, Key, Shown, StoredKinds};
 use crate::engine::images::enhancement::enhancers::{EnhancerModels, Model};
 use crate::engine::images::frames::{Source, SourceFrame};
 use crate::engine::images::notes::{self, ShownObjects};
@@ -20,7 +20,7 @@ use crate::error::Result;
 use crate::pictures::Payload;
 use crate::types::questions::PixelBox;
 use crate::types::{Condition, Digest, FrameId, Thumbnail};
-use darkqa_enhance::{self, Findings, ImageUse};
+use darkqa_enhance::{self, ImageUse, ProbeFindings};
 
 /// The image store, with the settings that decide images besides their recipes.
 #[derive(Debug, Clone, Copy)]
@@ -34,7 +34,7 @@ pub(crate) struct StoredImages<'a> {
 struct StoredRecipe<'a> {
     /// Content that is stored instead of the image; `None` if the image itself is stored.
     #[serde(skip_serializing_if = "Option::is_none")]
-    content: Option<Content>,
+    content: Option<EntryType>,
     image: ImageKeyFacts<'a>,
     program: &'static str,
     /// `None` without an enhancer, because a degraded image depends neither on the machine nor on the runtime.
@@ -81,12 +81,12 @@ impl<'a> StoredImages<'a> {
         condition: &Condition,
     ) -> Result<StoredPlace<'a>> {
         let stored_content = match (self.store.kinds(), &condition.enhancer) {
-            (StoredKinds::All, _) | (StoredKinds::Enhanced, Some(_)) => Content::Image,
-            (StoredKinds::Enhanced, None) => Content::Measures,
+            (StoredKinds::All, _) | (StoredKinds::Enhanced, Some(_)) => EntryType::Image,
+            (StoredKinds::Enhanced, None) => EntryType::Measures,
         };
-        let key = |content: Content| {
+        let key = |content: EntryType| {
             Key::from_recipe(&StoredRecipe {
-                content: (content != Content::Image).then_some(content),
+                content: (content != EntryType::Image).then_some(content),
                 image: recipe.key_facts(source, frame, condition)?,
                 program: self.maker.program(),
                 enhanced_with: condition.enhancer.is_some().then_some(self.maker),
@@ -101,10 +101,10 @@ impl<'a> StoredImages<'a> {
         };
         Ok(StoredPlace {
             store: self.store,
-            image: key(Content::Image)?,
+            image: key(EntryType::Image)?,
             similarity: match stored_content {
-                Content::Image => None,
-                Content::Measures | Content::Probe | Content::Thumbnail => Some(key(Content::Measures)?),
+                EntryType::Image => None,
+                EntryType::Measures | EntryType::Probe | EntryType::Thumbnail => Some(key(EntryType::Measures)?),
             },
             shown,
         })
@@ -173,7 +173,7 @@ impl<'a> StoredPlace<'a> {
             return None;
         }
         let mut notes = None;
-        let entry = self.store.get(&self.image, Content::Image, |entry| {
+        let entry = self.store.get(&self.image, EntryType::Image, |entry| {
             let read: Option<StoredNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
             notes = read.filter(|notes| {
                 let is_enhanced = self.shown.enhancer.is_some();
@@ -189,7 +189,7 @@ impl<'a> StoredPlace<'a> {
     pub(crate) fn similarity(&self) -> Option<Similarity> {
         let key = self.similarity.as_ref()?;
         let mut similarity = None;
-        self.store.get(key, Content::Measures, |entry| {
+        self.store.get(key, EntryType::Measures, |entry| {
             let notes: Option<StoredNotes> = serde_json::from_value(entry.facts.notes.clone()).ok();
             similarity = notes.and_then(|notes| notes.similarity);
             similarity.is_some()
@@ -237,7 +237,7 @@ pub(crate) struct ThumbnailPlace<'a> {
 /// The facts that decide a thumbnail.
 #[derive(Serialize)]
 struct ThumbnailRecipe<'a> {
-    content: Content,
+    content: EntryType,
     version: u32,
     /// Digest of the image's key.
     image: &'a Digest,
@@ -258,7 +258,7 @@ impl<'a> ThumbnailPlace<'a> {
         objects: Option<ShownObjects<'_>>,
     ) -> Option<Self> {
         let key = Key::from_recipe(&ThumbnailRecipe {
-            content: Content::Thumbnail,
+            content: EntryType::Thumbnail,
             version: notes::VERSION,
             image: image.digest(),
             frame,
@@ -266,13 +266,13 @@ impl<'a> ThumbnailPlace<'a> {
             objects: objects.map(|shown| (shown.size, shown.objects)),
         })
         .ok()?;
-        Some(Self { store, key, shown: Shown { content: Content::Thumbnail, ..shown.clone() } })
+        Some(Self { store, key, shown: Shown { content: EntryType::Thumbnail, ..shown.clone() } })
     }
 
     /// Reads the thumbnail of the image with this digest; `None` if the store does not have it.
     pub(crate) fn read(&self, image: Digest) -> Option<Thumbnail> {
         let mut stored = None;
-        self.store.get(&self.key, Content::Thumbnail, |entry| {
+        self.store.get(&self.key, EntryType::Thumbnail, |entry| {
             let read: Option<Thumbnail> = serde_json::from_slice(&entry.image).ok();
             stored = read.filter(|thumbnail| thumbnail.image == image);
             stored.is_some()
@@ -355,7 +355,7 @@ impl<'a> StoredFindings<'a> {
             store: self.store,
             opened_key: self.key(model, None)?,
             probe_key: self.key(model, Some(facts))?,
-            shown: Shown { content: Content::Probe, enhancer: Some(model.name().to_string()), ..Shown::default() },
+            shown: Shown { content: EntryType::Probe, enhancer: Some(model.name().to_string()), ..Shown::default() },
         })
     }
 }
@@ -391,9 +391,9 @@ pub(crate) struct FindingsPlace<'a> {
 
 impl FindingsPlace<'_> {
     /// Reads the findings; `None` if the store does not have them.
-    pub(crate) fn read(&self) -> Option<Findings> {
-        let mut findings: Option<Findings> = None;
-        self.store.get(&self.probe_key, Content::Probe, |entry| {
+    pub(crate) fn read(&self) -> Option<ProbeFindings> {
+        let mut findings: Option<ProbeFindings> = None;
+        self.store.get(&self.probe_key, EntryType::Probe, |entry| {
             findings = serde_json::from_value(entry.facts.notes.clone()).ok();
             findings.is_some()
         })?;
@@ -401,7 +401,7 @@ impl FindingsPlace<'_> {
     }
 
     /// Writes the findings, then marks the model as opened. `took` is the duration of opening and probing.
-    pub(crate) fn write(&self, findings: &Findings, took: Duration) {
+    pub(crate) fn write(&self, findings: &ProbeFindings, took: Duration) {
         let milliseconds = took.as_millis() as u64;
         for (key, milliseconds, notes) in [
             (&self.probe_key, milliseconds, serde_json::json!(findings)),

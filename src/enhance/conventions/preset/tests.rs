@@ -201,7 +201,7 @@ fn pairlie_is_an_expression_or_takes_its_exponent_as_an_input() {
     let inputs = ports(&[("x", 3), ("exposure", 0)]);
     let outputs = ports(&[("output", 3)]);
     let found = preset("pairlie-lol").for_graph(&ModelSidecar::default(), &inputs, &outputs);
-    let exponent = ExtraValue::Number(Number::Float(0.14));
+    let exponent = ExtraValue::Number(SidecarNumber::Float(0.14));
     assert_eq!(found.unwrap().extra["exposure"], exponent);
 }
 

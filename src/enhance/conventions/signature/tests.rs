@@ -1,6 +1,6 @@
 use super::*;
 use crate::conventions::convention::ElementType;
-use crate::conventions::extra::{ExtraValue, Number};
+use crate::conventions::extra::{ExtraValue, SidecarNumber};
 
 use crate::graphs::Dim;
 
@@ -181,7 +181,7 @@ fn further_inputs_need_values() {
     let message = signature(&switch, &[image("y")]).unwrap_err();
     assert!(message.contains("`on = true` or `on = false`"), "{message}");
     let found = infer_with(&inputs, &[image("y")], "[extra]\nstrength = 0.25").unwrap();
-    assert_eq!(found.extras[0].value, ExtraValue::Number(Number::Float(0.25)));
+    assert_eq!(found.extras[0].value, ExtraValue::Number(SidecarNumber::Float(0.25)));
     for (text, part) in [
         ("[extra]\ngamma = 1", "its value is unknown"),
         ("[extra]\nstrength = 1\ngamma = 1", "\"gamma\" under [extra], which is not an input"),

@@ -1,6 +1,6 @@
 use super::*;
 use crate::conventions::{Channels, Padding};
-use crate::inputs::{DarkImage, FedImage, InputEncoding, Tensor, TensorData};
+use crate::inputs::{DegradedImage, FedImage, InputEncoding, Tensor, TensorData};
 use darkqa_base::types::Rgb;
 
 const ENCODING: InputEncoding = InputEncoding {
@@ -46,7 +46,7 @@ fn near(a: &TensorData, b: &TensorData) -> bool {
 
 /// Encodes a window of an image.
 fn encode(encoding: &InputEncoding, image: &Rgb, window: TileWindow) -> Tensor {
-    let dark = DarkImage::new(image);
+    let dark = DegradedImage::new(image);
     let fed = FedImage::Window { dark: &dark, window, pad: encoding.pad };
     encoding.tensor(&fed).unwrap()
 }

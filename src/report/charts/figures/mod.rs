@@ -22,7 +22,7 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, models_under_test, pooled_models};
 
-pub(crate) use names::{KnownNames, Names};
+pub(crate) use names::{DisplayNames, KnownNames};
 pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use split::split;
 pub(crate) use story::{StoryCurves, story_curves};
@@ -53,7 +53,7 @@ pub(crate) const FIGURES: [&str; 10] = [
 ];
 
 /// All figures that have data. `names` sets the displayed names and the order of models and enhancers.
-pub(crate) fn figure_specs(findings: &Findings<'_>, names: &Names) -> Vec<FigureSpec> {
+pub(crate) fn figure_specs(findings: &Findings<'_>, names: &DisplayNames) -> Vec<FigureSpec> {
     let builder = FigureBuilder::new(findings, names);
     let charts = [
         ("accuracy", builder.accuracy()),
@@ -88,7 +88,7 @@ struct FigureBuilder<'a> {
     under_test: usize,
     enhancers: Vec<&'a EnhancerName>,
     levels: BTreeSet<AxisLevel>,
-    names: Names,
+    names: DisplayNames,
 }
 
 /// Caption sentence that explains the horizontal lines; empty without any. It calls them horizontal because curves may
@@ -107,7 +107,7 @@ fn horizontal_lines_note<'l>(lines: impl IntoIterator<Item = &'l PlotLine>) -> &
 }
 
 impl<'a> FigureBuilder<'a> {
-    fn new(findings: &'a Findings<'a>, names: &Names) -> Self {
+    fn new(findings: &'a Findings<'a>, names: &DisplayNames) -> Self {
         let subjects = &findings.grid.subjects;
         // The subjects are sorted by model.
         let mut models: Vec<&str> = subjects

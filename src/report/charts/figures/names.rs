@@ -1,4 +1,4 @@
-//! Display names and display order of models, enhancers and families in figures: [`Names`].
+//! Display names and display order of models, enhancers and families in figures: [`DisplayNames`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use darkqa_score::findings::Findings;
 
 /// Display names and order for figures. The default keeps the names and the order of the runs.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Names {
+pub(crate) struct DisplayNames {
     /// Display name by recorded name.
     labels: BTreeMap<String, String>,
     /// Recorded names of the models that are displayed in their short form.
@@ -67,7 +67,7 @@ fn check_known(flag: &str, name: &str, sets: &[&BTreeSet<String>]) -> Result<()>
     Err(Error::usage(flag, problem))
 }
 
-impl Names {
+impl DisplayNames {
     /// Renames by `labels` (old and new name), puts the names of `order` first, and draws the model `black` in black. A
     /// model without a label gets its short form unless another name has it.
     ///
@@ -169,7 +169,7 @@ mod tests {
             enhancers: set(&["lift"]),
             families: BTreeSet::new(),
         };
-        let names = Names::new(&[], &[], None, &known).unwrap();
+        let names = DisplayNames::new(&[], &[], None, &known).unwrap();
         assert_eq!(names.display_name("script:sim-A.jsonl"), "sim-A");
         assert_eq!(names.display_name("org/vlm-7b"), "vlm-7b");
         for name in ["a/same", "b/same", "x/lift", "folder/"] {
@@ -177,8 +177,8 @@ mod tests {
         }
         assert_eq!(names.short_names_note(), "Short names: vlm-7b is org/vlm-7b, sim-A is script:sim-A.jsonl.");
         let labels = [("org/vlm-7b".to_owned(), "sim-A".to_owned())];
-        let names = Names::new(&labels, &[], None, &known).unwrap();
+        let names = DisplayNames::new(&labels, &[], None, &known).unwrap();
         assert_eq!(names.display_name("script:sim-A.jsonl"), "script:sim-A.jsonl");
-        assert_eq!(Names::default().short_names_note(), "");
+        assert_eq!(DisplayNames::default().short_names_note(), "");
     }
 }

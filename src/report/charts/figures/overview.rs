@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{ACCURACY, FigureBuilder, Names, horizontal_lines_note};
+use super::{ACCURACY, DisplayNames, FigureBuilder, horizontal_lines_note};
 use crate::report::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Variant};
@@ -27,7 +27,7 @@ pub(crate) struct OverviewPanels {
 
 /// Panels of a run: accuracy of each model, mean over the models by variant, and mean over the models raw and with each
 /// enhancer.
-pub(crate) fn overview(findings: &Findings<'_>, names: &Names) -> OverviewPanels {
+pub(crate) fn overview(findings: &Findings<'_>, names: &DisplayNames) -> OverviewPanels {
     let builder = FigureBuilder::new(findings, names);
     let variant = builder.main_variant();
     let enhancer = builder.enhancers.first().map(|name| {

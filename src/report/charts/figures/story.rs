@@ -1,6 +1,6 @@
 //! Curves for the story image, which shows one item and the accuracy over all items: [`story_curves`].
 
-use super::{FigureBuilder, Names};
+use super::{DisplayNames, FigureBuilder};
 use crate::report::charts::chart::{LineContent, LineItems, LineStyle, PlotLine};
 use crate::report::text::words::light;
 use crate::types::{EnhancerName, Variant};
@@ -24,7 +24,7 @@ pub(crate) struct StoryCurves {
 
 /// Curves of a run; `None` if no model was shown a dark image.
 pub(crate) fn story_curves(findings: &Findings<'_>) -> Option<StoryCurves> {
-    let builder = FigureBuilder::new(findings, &Names::default());
+    let builder = FigureBuilder::new(findings, &DisplayNames::default());
     let variant = builder.main_variant()?;
     let mut lines = Vec::new();
     for model in &builder.models {

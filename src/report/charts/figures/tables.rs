@@ -4,8 +4,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::{FigureBuilder, FigureSpec, Names};
-use crate::report::charts::chart::{FigureChart, Scale, ThresholdChart, ThresholdRow};
+use super::{DisplayNames, FigureBuilder, FigureSpec};
+use crate::report::charts::chart::{FigureChart, LevelScale, ThresholdChart, ThresholdRow};
 use crate::report::tables::missing_threshold_reason;
 use crate::report::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
 use crate::report::text::words::{family as family_name, stops};
@@ -24,7 +24,7 @@ const BELOW: &str = "↓: detected to be below the answers without images.";
 
 /// All tables that have data: accuracy by level, accuracy by family at L0 and at the darkest level, and a table for
 /// each enhancer.
-pub(crate) fn paper_tables(findings: &Findings<'_>, names: &Names) -> Vec<Table> {
+pub(crate) fn paper_tables(findings: &Findings<'_>, names: &DisplayNames) -> Vec<Table> {
     let builder = FigureBuilder::new(findings, names);
     let variants = builder.tested_variants();
     let mut tables: Vec<Table> = variants.iter().map(|variant| builder.by_level(variant)).collect();
@@ -321,7 +321,7 @@ impl FigureBuilder<'_> {
             caption: caption.to_owned(),
             chart: FigureChart::Thresholds(ThresholdChart {
                 rows,
-                scale: Scale::for_axis(axis),
+                scale: LevelScale::for_axis(axis),
                 unit: self.findings.unit.to_string(),
             }),
         })

@@ -6,7 +6,7 @@ use super::font::Font;
 use super::legend::{Legend, LegendEntry, LegendSample};
 use super::sheet::{Anchor, GRID, Point, Shape, Stroke, TextDirection};
 use super::title::{LEADING, Title, draw_percent_grid};
-use super::{Look, Palette, Sheet, sheet, svg};
+use super::{FigureColours, Look, Sheet, sheet, svg};
 use crate::error::{Error, Result};
 use crate::report::charts::chart::{
     Bar, BarChart, BarPanel, CountPanel, Figure, FigureChart, INK, LineStyle, PointPanel, PointSeries,
@@ -63,7 +63,7 @@ pub(crate) fn count_figure(panels: &[CountPanel]) -> Result<String> {
 }
 
 fn look(width: f64) -> Look {
-    Look { width, font_size: FONT_SIZE, palette: Palette::Colour }
+    Look { width, font_size: FONT_SIZE, palette: FigureColours::Colour }
 }
 
 /// SVG of a sheet without images, on a white background.
@@ -212,7 +212,7 @@ const MAX_STEPS: f64 = 6.0;
 /// Draws a panel, with its legend below.
 pub(crate) fn points(panel: &PointPanel, look: &Look) -> Sheet {
     let (font_size, small) = (look.font_size, look.tick_font_size());
-    let [horizontal, vertical] = [0, 1].map(|axis| Scale::new(panel.range(axis)));
+    let [horizontal, vertical] = [0, 1].map(|axis| AxisScale::new(panel.range(axis)));
     let font = Font::bundled();
     let numbers = vertical.ticks().map(|(_, text)| font.width(&text, small)).fold(0.0, f64::max);
     let left = numbers + 0.55 * small + 1.35 * font_size;
@@ -251,7 +251,7 @@ struct Area {
     /// Width and height.
     size: [f64; 2],
     /// Scales of the horizontal and the vertical axis.
-    scales: [Scale; 2],
+    scales: [AxisScale; 2],
 }
 
 impl Area {
@@ -294,13 +294,13 @@ impl Area {
 }
 
 /// Range of an axis, and distance between its ticks.
-struct Scale {
+struct AxisScale {
     low: f64,
     high: f64,
     step: f64,
 }
 
-impl Scale {
+impl AxisScale {
     /// Scale of a range with margins; from 0 to 1 with margins if there is no range. The ticks are at multiples of 1, 2
     /// or 5 times a power of ten.
     fn new(range: Option<[f64; 2]>) -> Self {
@@ -519,14 +519,14 @@ pub(crate) fn thresholds(chart: &ThresholdChart, look: &Look) -> Sheet {
 mod tests {
     use super::*;
     use crate::report::charts::chart::{LineStyle, ReliabilityLine};
-    use crate::report::charts::paper::Palette;
+    use crate::report::charts::paper::FigureColours;
     use crate::report::charts::paper::look::column_look as look;
     use crate::report::charts::paper::sheet::Shape;
     use darkqa_score::estimate::Estimate;
 
     #[test]
     fn bar_lengths_are_proportional_to_counts() {
-        let look = Look { width: 510.0, font_size: 8.5, palette: Palette::Colour };
+        let look = Look { width: 510.0, font_size: 8.5, palette: FigureColours::Colour };
         let many = (0..40_u64).map(|number| (format!("class {number:02}"), number + 1));
         let panels = [
             CountPanel::from_counts("two", [("a".to_owned(), 3), ("b".to_owned(), 1)].into_iter()),
@@ -602,7 +602,7 @@ mod tests {
             (Some([-7.0, 0.0]), &["−6", "−4", "−2", "0"]),
             (Some([0.001, 0.002]), &["0.0010", "0.0012", "0.0014", "0.0016", "0.0018", "0.0020"]),
         ] {
-            let ticks: Vec<String> = Scale::new(range).ticks().map(|(_, text)| text).collect();
+            let ticks: Vec<String> = AxisScale::new(range).ticks().map(|(_, text)| text).collect();
             assert_eq!(ticks, texts, "{range:?}");
         }
     }
@@ -631,7 +631,7 @@ mod tests {
             panels: vec![ReliabilityPanel { title: "a model".to_owned(), lines }],
             note: String::new(),
         };
-        let look = Look { width: 252.0, font_size: 8.0, palette: Palette::Colour };
+        let look = Look { width: 252.0, font_size: 8.0, palette: FigureColours::Colour };
         let sheet = reliability(&chart, &look);
         let curves: Vec<&Vec<Point>> = sheet
             .shapes

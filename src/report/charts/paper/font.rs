@@ -16,7 +16,7 @@ pub(super) const FAMILIES: &str = "Arimo, 'Liberation Sans', Arial, Helvetica, s
 pub(super) struct Font(Face<'static>);
 
 /// Glyph of one character of a text.
-pub(super) struct Letter {
+pub(super) struct FontGlyph {
     pub glyph: GlyphId,
     /// Advance width in em.
     pub advance: f32,
@@ -44,13 +44,13 @@ impl Font {
     }
 
     /// Glyphs of a text. A character that the font lacks gets the glyph for missing characters.
-    pub(super) fn letters(&self, text: &str) -> Vec<Letter> {
+    pub(super) fn letters(&self, text: &str) -> Vec<FontGlyph> {
         let units = f32::from(self.0.units_per_em());
         text.chars()
             .map(|letter| {
                 let glyph = self.0.glyph_index(letter).unwrap_or(GlyphId(0));
                 let advance = self.0.glyph_hor_advance(glyph).unwrap_or(0);
-                Letter { glyph, advance: f32::from(advance) / units }
+                FontGlyph { glyph, advance: f32::from(advance) / units }
             })
             .collect()
     }
@@ -127,7 +127,7 @@ struct AffixWidths {
 }
 
 impl AffixWidths {
-    fn new(characters: &[char], letters: &[Letter]) -> Self {
+    fn new(characters: &[char], letters: &[FontGlyph]) -> Self {
         let letters = characters.iter().zip(letters);
         Self { prefixes: trimmed_widths(letters.clone()), suffixes: trimmed_widths(letters.rev()) }
     }
@@ -139,7 +139,7 @@ impl AffixWidths {
 }
 
 /// Cumulative widths, from none of the characters to all. White space counts only if another character follows.
-fn trimmed_widths<'a>(letters: impl Iterator<Item = (&'a char, &'a Letter)>) -> Vec<f64> {
+fn trimmed_widths<'a>(letters: impl Iterator<Item = (&'a char, &'a FontGlyph)>) -> Vec<f64> {
     let (mut sum, mut trimmed) = (0.0, 0.0);
     let mut widths = vec![0.0];
     for (character, letter) in letters {

@@ -5,7 +5,7 @@ use crate::report::charts::chart::{COLOURS, INK, LineStyle};
 
 /// The colours of figures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Palette {
+pub(crate) enum FigureColours {
     /// Six colours that can be distinguished with any colour vision
     #[value(name = "colour", alias = "color")]
     Colour,
@@ -31,18 +31,18 @@ pub(crate) struct Look {
     pub width: f64,
     /// Font size in points; tick labels are smaller.
     pub font_size: f64,
-    pub palette: Palette,
+    pub palette: FigureColours,
 }
 
 /// Style of a figure as wide as a column of a paper.
 #[cfg(test)]
 pub(super) fn column_look() -> Look {
-    Look { width: 252.0, font_size: 8.0, palette: Palette::Colour }
+    Look { width: 252.0, font_size: 8.0, palette: FigureColours::Colour }
 }
 
 /// Marker at each point of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Marker {
+pub(super) enum LineMarker {
     Disc,
     Square,
     Triangle,
@@ -51,14 +51,20 @@ pub(super) enum Marker {
     Ring,
 }
 
-const MARKERS: [Marker; 6] =
-    [Marker::Disc, Marker::Square, Marker::Triangle, Marker::Diamond, Marker::Cross, Marker::Ring];
+const MARKERS: [LineMarker; 6] = [
+    LineMarker::Disc,
+    LineMarker::Square,
+    LineMarker::Triangle,
+    LineMarker::Diamond,
+    LineMarker::Cross,
+    LineMarker::Ring,
+];
 
 /// Stroke and marker of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Pen {
     pub stroke: Stroke,
-    pub marker: Marker,
+    pub marker: LineMarker,
 }
 
 impl Look {
@@ -75,9 +81,9 @@ impl Look {
     pub(super) fn colour(&self, style: LineStyle) -> Colour {
         let LineStyle(number) = style;
         match self.palette {
-            Palette::Colour => style.rgb(),
+            FigureColours::Colour => style.rgb(),
             _ if style.is_ink() => style.rgb(),
-            Palette::Grey => [GREYS[number % GREYS.len()]; 3],
+            FigureColours::Grey => [GREYS[number % GREYS.len()]; 3],
         }
     }
 
@@ -85,11 +91,11 @@ impl Look {
     pub(super) fn pen(&self, style: LineStyle) -> Pen {
         let LineStyle(number) = style;
         let colours = match self.palette {
-            Palette::Colour => COLOURS.len(),
-            Palette::Grey => GREYS.len(),
+            FigureColours::Colour => COLOURS.len(),
+            FigureColours::Grey => GREYS.len(),
         };
         let (dash, marker) = if style == LineStyle::BLACK {
-            (DASHES[0], Marker::Ring)
+            (DASHES[0], LineMarker::Ring)
         } else {
             let repeat = number / colours;
             (DASHES[(number + repeat) % DASHES.len()], MARKERS[(number + 3 * repeat) % MARKERS.len()])
@@ -121,12 +127,12 @@ impl Look {
     /// Name of a pen's marker in pgfplots.
     pub(super) fn pgf_mark(pen: &Pen) -> &'static str {
         match pen.marker {
-            Marker::Disc => "*",
-            Marker::Square => "square*",
-            Marker::Triangle => "triangle*",
-            Marker::Diamond => "diamond*",
-            Marker::Cross => "x",
-            Marker::Ring => "o",
+            LineMarker::Disc => "*",
+            LineMarker::Square => "square*",
+            LineMarker::Triangle => "triangle*",
+            LineMarker::Diamond => "diamond*",
+            LineMarker::Cross => "x",
+            LineMarker::Ring => "o",
         }
     }
 
@@ -136,28 +142,28 @@ impl Look {
         let fill = pen.stroke.colour;
         let edge = Stroke::solid(fill, 0.8 * self.line_scale());
         match pen.marker {
-            Marker::Disc => {
+            LineMarker::Disc => {
                 sheet.shapes.push(Shape::Disc { centre: [x, y], radius: reach, fill: Some(fill), edge: None });
             }
-            Marker::Ring => {
+            LineMarker::Ring => {
                 sheet.shapes.push(Shape::Disc { centre: [x, y], radius: reach, fill: Some(PAPER), edge: Some(edge) });
             }
-            Marker::Square => {
+            LineMarker::Square => {
                 let side = reach * 0.9;
                 let corners = [[x - side, y - side], [x + side, y - side], [x + side, y + side], [x - side, y + side]];
                 sheet.area(corners.to_vec(), fill, 1.0);
             }
-            Marker::Triangle => {
+            LineMarker::Triangle => {
                 let high = reach * 1.25;
                 let corners = [[x, y - high], [x + high, y + reach * 0.8], [x - high, y + reach * 0.8]];
                 sheet.area(corners.to_vec(), fill, 1.0);
             }
-            Marker::Diamond => {
+            LineMarker::Diamond => {
                 let long = reach * 1.3;
                 let corners = [[x, y - long], [x + long, y], [x, y + long], [x - long, y]];
                 sheet.area(corners.to_vec(), fill, 1.0);
             }
-            Marker::Cross => {
+            LineMarker::Cross => {
                 sheet.line(&[[x - reach, y - reach], [x + reach, y + reach]], &edge);
                 sheet.line(&[[x - reach, y + reach], [x + reach, y - reach]], &edge);
             }
@@ -182,7 +188,7 @@ mod tests {
 
     #[test]
     fn lines_contrast_with_white_and_differ() {
-        for palette in [Palette::Colour, Palette::Grey] {
+        for palette in [FigureColours::Colour, FigureColours::Grey] {
             let look = Look { width: 252.0, font_size: 8.0, palette };
             let mut seen = BTreeSet::new();
             for number in 0..12 {

@@ -19,7 +19,7 @@ mod title;
 use super::chart::FigureChart;
 
 pub(crate) use figure::{count_figure, figure, point_figure};
-pub(crate) use look::{Look, Palette};
+pub(crate) use look::{FigureColours, Look};
 pub(crate) use overview::{OverviewSheet, overview_sheet};
 pub(crate) use pdf::pdf;
 pub(crate) use sheet::Sheet;

@@ -39,7 +39,7 @@ pub(crate) fn overview_sheet(
     panels: &OverviewPanels,
     thumbnails: &[Thumbnail],
     look: &Look,
-    pixels: Pixels,
+    pixels: DecodePixels,
 ) -> Result<OverviewSheet> {
     let half = column_look(COLUMNS, look);
     let mut parts: Vec<(Sheet, String)> = Vec::new();
@@ -82,7 +82,7 @@ const LEVELS: [&str; 4] = ["L0", "L1", "L3", "L5"];
 const GAP: f64 = 2.0;
 
 /// Decoder of an image in a `data:` URL.
-pub(crate) type Pixels<'a> = &'a dyn Fn(&str) -> Result<Rgb>;
+pub(crate) type DecodePixels<'a> = &'a dyn Fn(&str) -> Result<Rgb>;
 
 /// Sheet of one frame with its caption, or the reason why there is none.
 type Samples = std::result::Result<(Sheet, String), &'static str>;
@@ -97,7 +97,7 @@ pub(super) fn samples(
     thumbnails: &[Thumbnail],
     look: &Look,
     letter: char,
-    pixels: Pixels,
+    pixels: DecodePixels,
 ) -> Result<Samples> {
     let Some(variant) = &panels.variant else {
         return Ok(Err("no dark image was asked"));
@@ -205,7 +205,13 @@ fn select_levels(levels: &BTreeSet<AxisLevel>) -> Vec<AxisLevel> {
     (0..LEVELS.len()).map(|index| all[index * (all.len() - 1) / last]).collect()
 }
 
-fn draw_rows(rows: &[TileRow<'_>], levels: &[AxisLevel], look: &Look, pixels: Pixels, title: &str) -> Result<Sheet> {
+fn draw_rows(
+    rows: &[TileRow<'_>],
+    levels: &[AxisLevel],
+    look: &Look,
+    pixels: DecodePixels,
+    title: &str,
+) -> Result<Sheet> {
     let (font_size, small) = (look.font_size, look.tick_font_size());
     let left = 1.3 * small;
     let width = (look.width - left + GAP) / levels.len() as f64 - GAP;
@@ -243,7 +249,7 @@ fn draw_rows(rows: &[TileRow<'_>], levels: &[AxisLevel], look: &Look, pixels: Pi
 
 /// Draws a tile `width` points wide and returns its height. A tile with a gain is split: the left half of the image,
 /// and its brightened middle.
-fn draw_tile(sheet: &mut Sheet, tile: &Thumbnail, pixels: Pixels, [x, y]: Point, width: f64) -> Result<f64> {
+fn draw_tile(sheet: &mut Sheet, tile: &Thumbnail, pixels: DecodePixels, [x, y]: Point, width: f64) -> Result<f64> {
     let whole = decode(tile, &tile.small, pixels)?;
     let height = width * whole.height() as f64 / whole.width() as f64;
     if tile.stops <= 0.0 {
@@ -283,7 +289,7 @@ fn crop_image(image: &Rgb, [left, top]: [usize; 2], [width, height]: [usize; 2])
 }
 
 /// Decodes an image of a thumbnail.
-fn decode(tile: &Thumbnail, url: &str, pixels: Pixels) -> Result<Rgb> {
+fn decode(tile: &Thumbnail, url: &str, pixels: DecodePixels) -> Result<Rgb> {
     pixels(url).map_err(|problem| {
         let position = format!("small copy of {} at {}", tile.frame, tile.condition);
         Error::data(position, problem)

@@ -15,7 +15,7 @@ use pdf_writer::{Content, Filter, Finish as _, Name, Pdf, Rect, Ref, Str, TextSt
 use subsetter::GlyphRemapper;
 
 use super::font::{FONT_FILE, Font};
-use super::sheet::{Colour, Label, Point, Shape, Sheet, Stroke, TextDirection};
+use super::sheet::{Colour, Point, Shape, Sheet, Stroke, TextDirection, TextLabel};
 use crate::error::{Error, Result};
 use crate::report::charts::chart::INK;
 use crate::types::Rgb;
@@ -36,7 +36,7 @@ pub(crate) fn pdf(sheet: &Sheet, title: &str) -> Result<Vec<u8>> {
     if !(width > 0.0 && height > 0.0) {
         return Err(Error::data("figure as PDF", format!("a figure of {width} × {height} points has no area")));
     }
-    let mut page = Page::new(height);
+    let mut page = PdfPage::new(height);
     for shape in &sheet.shapes {
         page.draw(shape);
     }
@@ -44,7 +44,7 @@ pub(crate) fn pdf(sheet: &Sheet, title: &str) -> Result<Vec<u8>> {
 }
 
 /// The content of the page, with the fonts, opacities and pictures it refers to.
-struct Page<'a> {
+struct PdfPage<'a> {
     content: Content,
     font: EmbeddedFont,
     /// Names of graphics states by opacity in thousandths.
@@ -52,7 +52,7 @@ struct Page<'a> {
     pictures: Vec<&'a Rgb>,
 }
 
-impl<'a> Page<'a> {
+impl<'a> PdfPage<'a> {
     /// Empty page whose y axis points down, as on a sheet.
     fn new(height: f32) -> Self {
         let mut content = Content::new();
@@ -155,7 +155,7 @@ impl<'a> Page<'a> {
         self.content.set_parameters(Name(name.as_bytes()));
     }
 
-    fn write_label(&mut self, label: &Label) {
+    fn write_label(&mut self, label: &TextLabel) {
         let [x, y] = label.start.map(|part| part as f32);
         // Flip the text, because the y axis of the page points down.
         let matrix = match label.direction {

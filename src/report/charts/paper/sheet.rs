@@ -65,7 +65,7 @@ pub(crate) enum Shape {
         fill: Option<Colour>,
         edge: Option<Stroke>,
     },
-    Label(Label),
+    Label(TextLabel),
     /// A bitmap image.
     Picture {
         /// Upper left corner.
@@ -78,7 +78,7 @@ pub(crate) enum Shape {
 
 /// Text on one line.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Label {
+pub(crate) struct TextLabel {
     pub text: String,
     /// Start of the baseline: its left end, or its lower end if the text runs upwards.
     pub start: Point,
@@ -155,7 +155,7 @@ impl Sheet {
             TextDirection::Right => [x - offset, y],
             TextDirection::Up => [x, y + offset],
         };
-        self.shapes.push(Shape::Label(Label { text: text.to_owned(), start, size, direction }));
+        self.shapes.push(Shape::Label(TextLabel { text: text.to_owned(), start, size, direction }));
     }
 
     /// Adds a white background, for viewers with a dark one.
@@ -179,7 +179,7 @@ impl Sheet {
                 Shape::Area { corners: corners.into_iter().map(moved).collect(), fill, opacity }
             }
             Shape::Disc { centre, radius, fill, edge } => Shape::Disc { centre: moved(centre), radius, fill, edge },
-            Shape::Label(label) => Shape::Label(Label { start: moved(label.start), ..label }),
+            Shape::Label(label) => Shape::Label(TextLabel { start: moved(label.start), ..label }),
             Shape::Picture { corner, size, image } => Shape::Picture { corner: moved(corner), size, image },
         }));
     }
@@ -191,7 +191,7 @@ impl Sheet {
     pub(crate) fn check_characters(&self) -> Result<()> {
         let font = Font::bundled();
         for shape in &self.shapes {
-            let Shape::Label(Label { text, .. }) = shape else {
+            let Shape::Label(TextLabel { text, .. }) = shape else {
                 continue;
             };
             if let Some(letter) = text.chars().find(|letter| !font.has(*letter)) {

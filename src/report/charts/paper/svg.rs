@@ -6,7 +6,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
 use super::font::{FAMILIES, Font};
-use super::sheet::{Colour, Label, Point, Shape, Sheet, Stroke, TextDirection};
+use super::sheet::{Colour, Point, Shape, Sheet, Stroke, TextDirection, TextLabel};
 use crate::error::Result;
 use crate::report::charts::chart::INK;
 use crate::types::Rgb;
@@ -98,7 +98,7 @@ fn element(shape: &Shape, png: Png) -> Result<String> {
     })
 }
 
-fn text_element(label: &Label) -> String {
+fn text_element(label: &TextLabel) -> String {
     let [x, y] = label.start.map(number);
     let rotation = match label.direction {
         TextDirection::Right => String::new(),

@@ -47,7 +47,7 @@ enum Precision {
 
 /// Layout of a table.
 #[derive(Debug, Clone, PartialEq)]
-struct Layout {
+struct TableLayout {
     precision: Precision,
     /// Width of the column of names in points.
     name_width: f64,
@@ -144,7 +144,7 @@ fn width_for_names(table: &Table, width: f64, precision: Precision, columns: &Ra
 }
 
 /// Selects the first layout in which the table is at most `width` points wide.
-fn layout(table: &Table, width: f64) -> Layout {
+fn layout(table: &Table, width: f64) -> TableLayout {
     let columns = table.columns.len();
     let names = names_width(table);
     // Prefer breaking a long name over dropping the decimals of all intervals.
@@ -154,7 +154,7 @@ fn layout(table: &Table, width: f64) -> Layout {
         let all = 1..columns;
         let available = width_for_names(table, width, precision, &all);
         if available >= min_width {
-            return Layout { precision, name_width: available.min(names), parts: vec![all] };
+            return TableLayout { precision, name_width: available.min(names), parts: vec![all] };
         }
     }
     let min_width = names.min(MIN_NAME_WIDTH);
@@ -167,14 +167,14 @@ fn layout(table: &Table, width: f64) -> Layout {
             .map(|part| width_for_names(table, width, Precision::Whole, part))
             .fold(f64::INFINITY, f64::min);
         if available >= min_width || part_columns == 1 {
-            return Layout {
+            return TableLayout {
                 precision: Precision::Whole,
                 name_width: available.min(names).max(min_width.min(available)),
                 parts,
             };
         }
     }
-    Layout { precision: Precision::Whole, name_width: min_width, parts: std::iter::once(1..columns).collect() }
+    TableLayout { precision: Precision::Whole, name_width: min_width, parts: std::iter::once(1..columns).collect() }
 }
 
 /// True if a text, without white space at its end, is at most `width` points wide.
@@ -240,7 +240,7 @@ fn cell_latex(cell: &TableCell, precision: Precision) -> String {
 }
 
 /// LaTeX of the heads and rows of a part, with rules between groups of rows. `after_heads` is written after the heads.
-fn body(table: &Table, layout: &Layout, part: &Range<usize>, after_heads: &str) -> String {
+fn body(table: &Table, layout: &TableLayout, part: &Range<usize>, after_heads: &str) -> String {
     let mut body = String::from("    \\toprule\n   ");
     for column in &table.columns[part.clone()] {
         let lines: Vec<String> = head_lines(column).into_iter().map(latex).collect();
@@ -312,7 +312,7 @@ fn long_table(table: &Table, width: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::paper::Palette;
+    use crate::report::charts::paper::FigureColours;
     use crate::report::text::table::ColumnHeads;
 
     fn table(names: &[&str], columns: usize) -> Table {
@@ -339,7 +339,7 @@ mod tests {
     }
 
     /// Width of a part in points.
-    fn width(table: &Table, layout: &Layout, part: &Range<usize>) -> f64 {
+    fn width(table: &Table, layout: &TableLayout, part: &Range<usize>) -> f64 {
         let font = Font::bundled();
         let names = table
             .rows
@@ -379,7 +379,7 @@ mod tests {
     }
 
     fn look(width: f64) -> Look {
-        Look { width, font_size: 8.0, palette: Palette::Colour }
+        Look { width, font_size: 8.0, palette: FigureColours::Colour }
     }
 
     #[test]

@@ -141,7 +141,7 @@ pub(super) fn draw_percent_grid(sheet: &mut Sheet, look: &Look, [left, right]: [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::paper::Palette;
+    use crate::report::charts::paper::FigureColours;
     use crate::types::Severity;
     use crate::types::degradations::Kind;
 
@@ -159,7 +159,7 @@ mod tests {
             levels,
             title: String::new(),
         };
-        let look = Look { width: 252.0, font_size: 8.0, palette: Palette::Colour };
+        let look = Look { width: 252.0, font_size: 8.0, palette: FigureColours::Colour };
         axes.labelled_levels(&look).iter().map(ToString::to_string).collect()
     }
 

@@ -69,7 +69,7 @@ pub(crate) struct Story {
 /// Draws the image. Images of the item are scaled down by averaging pixels.
 #[must_use]
 pub(crate) fn story(story: &Story) -> Rgb {
-    let layout = Layout::new(story);
+    let layout = StorySizes::new(story);
     let mut sheet = SheetCanvas::new(layout.height, layout.width);
     let mut top = GAP;
     for line in &story.question {
@@ -101,7 +101,7 @@ pub(crate) fn story(story: &Story) -> Rgb {
 }
 
 /// Sizes in pixels.
-struct Layout {
+struct StorySizes {
     /// Space to the left and to the right of the images.
     margins: [usize; 2],
     /// Height and width of an image.
@@ -119,7 +119,7 @@ fn max_letters<'a>(names: impl Iterator<Item = &'a String>) -> usize {
     names.map(|name| name.chars().count()).max().unwrap_or(0)
 }
 
-impl Layout {
+impl StorySizes {
     fn new(story: &Story) -> Self {
         let left = max_letters(story.rows.iter().map(|row| &row.name)).max(4);
         let right = max_letters(story.lines.iter().map(|line| &line.name));
@@ -149,7 +149,7 @@ impl Layout {
     }
 }
 
-fn draw_cell(sheet: &mut SheetCanvas, layout: &Layout, [top, left]: [usize; 2], cell: &StoryCell) {
+fn draw_cell(sheet: &mut SheetCanvas, layout: &StorySizes, [top, left]: [usize; 2], cell: &StoryCell) {
     sheet.fill([top, left], layout.cell, |row, column| mean_colour(&cell.image, layout.cell, row, column));
     for (index, (model, mark)) in cell.marks.iter().enumerate() {
         let top = top + layout.cell[0] + index * LINE;
@@ -163,7 +163,7 @@ fn draw_cell(sheet: &mut SheetCanvas, layout: &Layout, [top, left]: [usize; 2], 
 }
 
 /// Draws the curves below the images. Each level is at the middle of its column.
-fn draw_curves(sheet: &mut SheetCanvas, layout: &Layout, top: usize, story: &Story) {
+fn draw_curves(sheet: &mut SheetCanvas, layout: &StorySizes, top: usize, story: &Story) {
     let ends = [layout.margins[0], layout.width - layout.margins[1]].map(|x| x as f64);
     let y = |share: f64| (top + LINE / 2) as f64 + (AXES as f64) * (1.0 - share.clamp(0.0, 1.0));
     for step in 0..=5 {
@@ -217,7 +217,7 @@ fn dashes(LineStyle(number): LineStyle) -> Option<[f64; 2]> {
 
 /// Writes the name of each line right of its end. Labels are vertical position, name and colour; they are moved down if
 /// they would overlap.
-fn write_labels(sheet: &mut SheetCanvas, layout: &Layout, mut labels: Vec<(f64, &String, [u8; 3])>) {
+fn write_labels(sheet: &mut SheetCanvas, layout: &StorySizes, mut labels: Vec<(f64, &String, [u8; 3])>) {
     labels.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut next_free = 0;
     for (y, name, colour) in labels {

@@ -14,7 +14,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use serde_json::Value;
 
 use crate::ask::{ChangedSetting, ImageDetail, ImageTokenCheck, scaling_image_tokens};
-use crate::report::joined::combine::Combined;
+use crate::report::joined::combine::CombinedRuns;
 use crate::report::joined::join::{Joined, JoinedRun};
 use crate::report::joined::settings::joined_with_and;
 use crate::report::text::alert::{Alert, AlertKind};
@@ -30,7 +30,7 @@ use darkqa_score::model_in_condition::without_run;
 
 /// One alert for each model at an endpoint whose replies about untouched images do not depend on the image. Returns
 /// none for photographs taken in the dark, where a model may see nothing.
-pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
+pub(super) fn image_alerts(combined: &CombinedRuns) -> Vec<Alert> {
     if combined.photographed_set().light == SetLight::Dark {
         return Vec::new();
     }
@@ -58,7 +58,7 @@ pub(super) fn image_alerts(combined: &Combined) -> Vec<Alert> {
 }
 
 /// One alert for each model whose server counts far fewer tokens an image than the rule of the model's family.
-pub(super) fn shrunk_alerts(combined: &Combined) -> Vec<Alert> {
+pub(super) fn shrunk_alerts(combined: &CombinedRuns) -> Vec<Alert> {
     let questions: HashMap<&QuestionId, usize> =
         combined.questions.iter().map(|question| (&question.id, question.text.chars().count())).collect();
     let mut settings = HashMap::new();
@@ -86,7 +86,7 @@ pub(super) fn shrunk_alerts(combined: &Combined) -> Vec<Alert> {
 }
 
 /// The name of a model at its endpoint, the image detail of its requests, and the characters of its system message.
-fn asked_as(combined: &Combined, model: &str) -> (String, Option<ImageDetail>, usize) {
+fn asked_as(combined: &CombinedRuns, model: &str) -> (String, Option<ImageDetail>, usize) {
     let name = combined.model_names.original_name(model);
     let column = combined.runs.iter().find_map(|run| {
         let models = run.manifest.columns.get("model")?;
@@ -101,7 +101,7 @@ fn asked_as(combined: &Combined, model: &str) -> (String, Option<ImageDetail>, u
 }
 
 /// Names of the models that need no endpoint.
-fn built_in_models(combined: &Combined) -> BTreeSet<&str> {
+fn built_in_models(combined: &CombinedRuns) -> BTreeSet<&str> {
     combined
         .trials
         .asked()

@@ -8,7 +8,7 @@ mod replies;
 
 use std::collections::BTreeMap;
 
-use super::combine::Combined;
+use super::combine::CombinedRuns;
 use super::enhancers::enhancer_alerts;
 use super::join::{Joined, JoinedRun};
 use crate::report::text::alert::{Alert, AlertKind};
@@ -25,7 +25,7 @@ use darkqa_score::photographs::{PairDarkness, PhotographedSet};
 pub(super) use replies::{empty_answer_alerts, missing_alerts};
 
 /// All alerts of a report on multiple-choice questions, ordered by kind.
-pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert> {
+pub(super) fn alerts(combined: &CombinedRuns, findings: &Findings<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
     alerts.extend(missing_alerts(&replies::counts(&findings.health), "Replies"));
@@ -55,7 +55,7 @@ pub(super) fn alerts(combined: &Combined, findings: &Findings<'_>) -> Vec<Alert>
 
 /// All alerts of a report on questions without ground-truth answers, ordered by kind. Such a report measures
 /// self-agreement.
-pub(super) fn alerts_without_truths(combined: &Combined, agreement: &SelfAgreement<'_>) -> Vec<Alert> {
+pub(super) fn alerts_without_truths(combined: &CombinedRuns, agreement: &SelfAgreement<'_>) -> Vec<Alert> {
     let mut alerts = run_alerts(combined);
     alerts.extend(joining_alerts(combined));
     alerts.extend(missing_alerts(&replies::counts(&agreement.health), "Replies"));
@@ -72,7 +72,7 @@ pub(super) fn alerts_without_truths(combined: &Combined, agreement: &SelfAgreeme
 }
 
 /// Alerts about replies that the server ended early, and that have no answer in the strict parsing.
-fn unread_early_ends(combined: &Combined, unread_as: &str) -> Vec<Alert> {
+fn unread_early_ends(combined: &CombinedRuns, unread_as: &str) -> Vec<Alert> {
     let is_unread = |trial: TrialRef<'_>| trial.strict().is_none_or(|strict| strict.why.is_some());
     replies::ended_early_alerts(combined.trials.iter(), is_unread, unread_as)
 }

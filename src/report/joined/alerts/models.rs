@@ -21,7 +21,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use crate::report::joined::join::{Joined, JoinedRun};
 use crate::report::joined::model_names::SplitModel;
 use crate::report::joined::settings::{
-    ENCODING, Setting, Settings, base_url, differing_settings, has_human_answers, identity_fields, joined_with_and,
+    ENCODING, FlagValues, Setting, base_url, differing_settings, has_human_answers, identity_fields, joined_with_and,
     light_settings, remote_model_settings, without_explained,
 };
 use crate::report::text::alert::{Alert, AlertKind};
@@ -229,12 +229,12 @@ pub(super) fn server_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let models: BTreeSet<&String> =
         joined.runs.iter().filter_map(|run| run.manifest.columns.get("model")).flat_map(BTreeMap::keys).collect();
     for model in models {
-        let base_urls: Vec<Option<Settings>> = joined
+        let base_urls: Vec<Option<FlagValues>> = joined
             .runs
             .iter()
             .map(|run| {
                 let base_url = base_url(&run.manifest, model)?;
-                Some(Settings::from([("--base-url".to_owned(), base_url)]))
+                Some(FlagValues::from([("--base-url".to_owned(), base_url)]))
             })
             .collect();
         let differences = differing_settings(&base_urls);
@@ -274,7 +274,7 @@ const ORDERS: [&str; 2] = ["--shuffle-options", "--circular"];
 pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
     let names = run_names(&joined.runs);
     let manifests: Vec<&RunManifest> = joined.runs.iter().map(|run| &run.manifest).collect();
-    let differing = |settings_of: &dyn Fn(&RunManifest) -> Option<Settings>| {
+    let differing = |settings_of: &dyn Fn(&RunManifest) -> Option<FlagValues>| {
         let settings: Vec<_> = manifests.iter().map(|run| settings_of(run)).collect();
         differing_settings(&settings)
     };
@@ -284,7 +284,7 @@ pub(super) fn setting_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
         .partition::<Vec<Setting>, _>(|setting| setting.flag == "--constrain");
     let version = differing(&|run| {
         let version = ("the version".to_owned(), run.version.clone());
-        Some(Settings::from([version]))
+        Some(FlagValues::from([version]))
     });
     let rows = [
         (AlertKind::Data, "The data differ", flags(&["--data"])),

@@ -7,7 +7,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 
-use crate::report::joined::combine::{Combined, frame_ties};
+use crate::report::joined::combine::{CombinedRuns, frame_ties};
 use crate::report::joined::join::Joined;
 use crate::report::joined::settings::{has_human_answers, joined_with_and};
 use crate::report::text::alert::{Alert, AlertKind};
@@ -90,7 +90,7 @@ pub(super) fn question_alerts<D: Detail>(joined: &Joined<D>) -> Vec<Alert> {
 }
 
 /// The alert about runs that asked the same questions a different number of times.
-pub(super) fn repeat_alert(combined: &Combined) -> Option<Alert> {
+pub(super) fn repeat_alert(combined: &CombinedRuns) -> Option<Alert> {
     let times: Vec<(&String, u32)> = combined
         .runs
         .iter()
@@ -174,7 +174,7 @@ const ENOUGH_FOR_RARE: usize = 30;
 
 /// Alerts about few clusters, copies of a picture, a single frame or scene, missing scenes, and a large one. Without
 /// replies, the number of clusters is 0 and gets no alert.
-pub(super) fn cluster_alerts(combined: &Combined, clusters: usize, unit: ClusterUnit) -> Vec<Alert> {
+pub(super) fn cluster_alerts(combined: &CombinedRuns, clusters: usize, unit: ClusterUnit) -> Vec<Alert> {
     let frames: BTreeSet<&FrameId> = combined.questions.iter().map(|one| &one.frame).collect();
     let few_clusters = if clusters == 0 {
         None
@@ -200,7 +200,7 @@ pub(super) fn cluster_alerts(combined: &Combined, clusters: usize, unit: Cluster
 
 /// Sentence about frames that show the same picture; `None` if all pictures differ. A frame without a known digest
 /// counts as a picture.
-fn copies(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
+fn copies(combined: &CombinedRuns, frames: &BTreeSet<&FrameId>) -> Option<String> {
     let digests = frame_ties(&combined.questions).digests;
     let pictures: BTreeSet<&Digest> = digests.values().collect();
     let pictures = pictures.len() + frames.len() - digests.len();
@@ -215,7 +215,7 @@ fn copies(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
 
 /// Sentence about scenes: if no question has one, but the frame names suggest some; if only some frames have one; or if
 /// all frames have the same one.
-fn named_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<String> {
+fn named_scenes(combined: &CombinedRuns, frames: &BTreeSet<&FrameId>) -> Option<String> {
     let scenes: BTreeMap<&FrameId, &String> =
         combined.questions.iter().filter(|one| !one.scene.is_empty()).map(|one| (&one.frame, &one.scene)).collect();
     if scenes.is_empty() {
@@ -243,7 +243,7 @@ fn named_scenes(combined: &Combined, frames: &BTreeSet<&FrameId>) -> Option<Stri
 }
 
 /// Sentence about a scene with at least [`LARGE_SHARE`] of the questions, if there are others.
-fn largest_scene(combined: &Combined) -> Option<String> {
+fn largest_scene(combined: &CombinedRuns) -> Option<String> {
     let mut sizes = BTreeMap::<&str, usize>::new();
     let scenes = combined.questions.iter().map(|one| one.scene.as_str());
     for scene in scenes.filter(|scene| !scene.is_empty()) {

@@ -13,7 +13,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde_json::Value;
 
 use crate::ask::is_context_full;
-use crate::report::joined::combine::Combined;
+use crate::report::joined::combine::CombinedRuns;
 use crate::report::joined::enhancers::LenientChange;
 use crate::report::joined::join::JoinedRun;
 use crate::report::joined::settings::has_human_answers;
@@ -176,7 +176,7 @@ fn early_end_remedies(words: &BTreeMap<&str, ByLevel>) -> String {
 }
 
 /// The alert about generations that broke off, with the number for each `finish_reason` of the server.
-pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
+pub(super) fn broken_off_alert(combined: &CombinedRuns) -> Option<Alert> {
     let mut counts = BTreeMap::<&str, usize>::new();
     for word in combined.trials.iter().filter_map(TrialRef::broken_off) {
         *counts.entry(word).or_default() += 1;
@@ -191,7 +191,7 @@ pub(super) fn broken_off_alert(combined: &Combined) -> Option<Alert> {
 }
 
 /// One alert for each model of a multiple-choice run with empty replies ([`empty_alerts`]).
-pub(super) fn empty_choice_alerts(combined: &Combined) -> Vec<Alert> {
+pub(super) fn empty_choice_alerts(combined: &CombinedRuns) -> Vec<Alert> {
     empty_alerts(combined.trials.iter().filter(|trial| !trial.failed()).map(|trial| {
         let why = trial.strict().and_then(|strict| strict.why);
         let is_empty = why == Some(UnreadReason::Empty);
@@ -237,7 +237,7 @@ fn is_charged(usage: Option<Usage>) -> bool {
 }
 
 /// One alert for each run with human answers that are not a choice of their question.
-pub(super) fn people_alerts(combined: &Combined) -> Vec<Alert> {
+pub(super) fn people_alerts(combined: &CombinedRuns) -> Vec<Alert> {
     combined
         .runs
         .iter()
@@ -321,7 +321,7 @@ fn share([missing, all]: [usize; 2]) -> f64 {
 }
 
 /// One alert for each run whose lenient parsing would change under the rules of this version.
-pub(super) fn parsing_alerts(combined: &Combined) -> Vec<Alert> {
+pub(super) fn parsing_alerts(combined: &CombinedRuns) -> Vec<Alert> {
     combined
         .runs
         .iter()

@@ -18,14 +18,14 @@ const COMMON: f64 = 0.81;
 
 /// A model that sees up to a level, and answers with the first room in the dark and without images.
 #[derive(Debug, Clone, Copy)]
-struct Design {
+struct HabitDesign {
     /// The darkest level at which it sees.
     sees_to: usize,
     /// True if it is asked without images, too.
     is_asked_blind: bool,
 }
 
-impl Design {
+impl HabitDesign {
     fn records(self, random: &mut StdRng) -> Vec<Record> {
         let truths: Vec<usize> = (0..FRAMES * QUESTIONS)
             .map(|_| if random.random_bool(COMMON) { 0 } else { random.random_range(1..4) })
@@ -57,7 +57,7 @@ impl Design {
 
 /// What simulated reports say.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Counts {
+struct HabitCounts {
     /// Reports with a threshold beyond the darkest level.
     beyond: usize,
     /// Reports with a threshold before L1, where the model stops seeing.
@@ -68,9 +68,9 @@ struct Counts {
     named: usize,
 }
 
-fn simulate(design: Design, runs: usize) -> Counts {
+fn simulate(design: HabitDesign, runs: usize) -> HabitCounts {
     let mut random = StdRng::seed_from_u64(81);
-    let mut counts = Counts::default();
+    let mut counts = HabitCounts::default();
     for _ in 0..runs {
         let trials = design.records(&mut random).into_iter().collect();
         let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
@@ -85,17 +85,17 @@ fn simulate(design: Design, runs: usize) -> Counts {
     counts
 }
 
-const HABIT: Design = Design { sees_to: 0, is_asked_blind: true };
+const HABIT: HabitDesign = HabitDesign { sees_to: 0, is_asked_blind: true };
 
 #[test]
 fn a_habit_that_is_often_right_is_no_sight() {
     for is_asked_blind in [true, false] {
-        let counts = simulate(Design { is_asked_blind, ..HABIT }, 40);
+        let counts = simulate(HabitDesign { is_asked_blind, ..HABIT }, 40);
         assert_eq!((counts.beyond, counts.named), (0, 40), "{counts:?}");
         assert!(counts.early > 35, "{counts:?}");
     }
     // Control: a model that sees to the end.
-    let seeing = Design { sees_to: 5, ..HABIT };
+    let seeing = HabitDesign { sees_to: 5, ..HABIT };
     let counts = simulate(seeing, 20);
     assert_eq!((counts.beyond, counts.early), (20, 0), "{counts:?}");
 }
@@ -107,7 +107,7 @@ fn habits_are_no_sight() {
     println!("| sees to | asked without images | beyond 9 EV | before L1 | no loss | habit named |");
     for sees_to in [0, 2, 5] {
         for is_asked_blind in [true, false] {
-            let counts = simulate(Design { sees_to, is_asked_blind }, runs());
+            let counts = simulate(HabitDesign { sees_to, is_asked_blind }, runs());
             let cells = [counts.beyond, counts.early, counts.no_loss, counts.named];
             let [beyond, early, no_loss, named] = cells.map(|count| percent(count, runs()));
             println!("| L{sees_to} | {is_asked_blind} | {beyond} | {early} | {no_loss} | {named} |");

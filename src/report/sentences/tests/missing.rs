@@ -5,7 +5,7 @@ use rand::{RngExt as _, SeedableRng as _};
 
 use super::records::{answer, record, unanswered};
 use super::simulation::{percent, runs};
-use crate::report::sentences::{Tone, sentences};
+use crate::report::sentences::{EffectDirection, sentences};
 use crate::types::{Condition, Family, Record, TrialOutcome};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::comparisons::PooledKind;
@@ -14,7 +14,7 @@ use darkqa_score::threshold::NoThreshold;
 
 /// Which replies of a model are missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Missing {
+enum MissingReplies {
     /// Replies that would be wrong, as far as the share allows.
     Wrong,
     /// Replies that would be right.
@@ -25,8 +25,8 @@ enum Missing {
 
 /// A run of one model over the exposure drop alone.
 #[derive(Debug, Clone, Copy)]
-struct Design {
-    missing: Missing,
+struct MissingDesign {
+    missing: MissingReplies,
     /// Share of right answers at L0 to L5, if all questions were answered.
     right: [f64; 6],
     /// Share of missing replies at L0 to L5.
@@ -37,17 +37,17 @@ const FRAMES: usize = 32;
 const QUESTIONS: usize = 6;
 
 /// Refuses nearly all that it would get wrong in the dark.
-const REFUSING: Design = Design {
-    missing: Missing::Wrong,
+const REFUSING: MissingDesign = MissingDesign {
+    missing: MissingReplies::Wrong,
     right: [0.9, 0.9, 0.85, 0.8, 0.7, 0.55],
     missing_shares: [0.0, 0.0, 0.1, 0.2, 0.3, 0.45],
 };
 
 /// Refuses in the dark what it would get right; darkness costs nothing.
-const REFUSING_RIGHT: Design =
-    Design { missing: Missing::Right, right: [0.8; 6], missing_shares: [0.0, 0.0, 0.0, 0.0, 0.2, 0.4] };
+const REFUSING_RIGHT: MissingDesign =
+    MissingDesign { missing: MissingReplies::Right, right: [0.8; 6], missing_shares: [0.0, 0.0, 0.0, 0.0, 0.2, 0.4] };
 
-impl Design {
+impl MissingDesign {
     fn records(&self, random: &mut StdRng) -> Vec<Record> {
         let mut records = Vec::new();
         for level in 0..6 {
@@ -59,9 +59,9 @@ impl Design {
                 let mut detail = unanswered(frame, Family::Color, &["a", "b", "c", "d"]);
                 let is_right = random.random_bool(right);
                 let share_of_outcome = match (self.missing, is_right) {
-                    (Missing::Random, _) => missing,
-                    (Missing::Wrong, false) => missing / (1.0 - right),
-                    (Missing::Right, true) => missing / right,
+                    (MissingReplies::Random, _) => missing,
+                    (MissingReplies::Wrong, false) => missing / (1.0 - right),
+                    (MissingReplies::Right, true) => missing / right,
                     _ => 0.0,
                 };
                 if random.random_bool(share_of_outcome.min(1.0)) {
@@ -78,7 +78,7 @@ impl Design {
 
 /// What simulated reports say about darkness.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-struct Counts {
+struct DarkCounts {
     /// Reports that call darkness better, or say that no loss was detected.
     misleading: usize,
     /// Reports with a threshold beyond the darkest level.
@@ -89,18 +89,19 @@ struct Counts {
     lost: usize,
 }
 
-fn simulate(design: &Design, runs: usize) -> Counts {
+fn simulate(design: &MissingDesign, runs: usize) -> DarkCounts {
     let mut random = StdRng::seed_from_u64(74);
-    let mut counts = Counts::default();
+    let mut counts = DarkCounts::default();
     let truth = design.right[5] - design.right[0];
     for _ in 0..runs {
         let trials = design.records(&mut random).into_iter().collect();
         let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
         let said = sentences(&findings);
         let darkness: Vec<_> = said.iter().filter(|one| one.kind == "darkness").collect();
-        counts.misleading +=
-            usize::from(darkness.iter().any(|one| one.tone == Tone::Better || one.text.starts_with("No loss")));
-        counts.lost += usize::from(darkness.iter().any(|one| one.tone == Tone::Worse));
+        counts.misleading += usize::from(
+            darkness.iter().any(|one| one.tone == EffectDirection::Better || one.text.starts_with("No loss")),
+        );
+        counts.lost += usize::from(darkness.iter().any(|one| one.tone == EffectDirection::Worse));
         let whole = &findings.curves[0].summary;
         counts.beyond += usize::from(whole.threshold.is_ok_and(|one| one.value.is_infinite()));
         let darkest =
@@ -117,7 +118,7 @@ fn refusals_of_wrong_answers_are_no_sight() {
     assert_eq!((counts.misleading, counts.beyond), (0, 0), "{counts:?}");
     assert!(counts.covered >= 55, "{counts:?}");
     // Control: with all replies, the same model shows its loss.
-    let whole = Design { missing_shares: [0.0; 6], ..REFUSING };
+    let whole = MissingDesign { missing_shares: [0.0; 6], ..REFUSING };
     let counts = simulate(&whole, 20);
     assert_eq!((counts.misleading, counts.lost), (0, 20), "{counts:?}");
 }
@@ -131,7 +132,11 @@ fn refusals_of_right_answers_are_no_loss() {
 
 #[test]
 fn a_level_without_replies_has_no_verdict() {
-    let design = Design { missing_shares: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0], missing: Missing::Random, right: [0.9; 6] };
+    let design = MissingDesign {
+        missing_shares: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
+        missing: MissingReplies::Random,
+        right: [0.9; 6],
+    };
     let mut random = StdRng::seed_from_u64(3);
     let trials = design.records(&mut random).into_iter().collect();
     let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
@@ -158,8 +163,8 @@ fn undecided_thresholds_name_their_lower_end() {
 #[expect(clippy::print_stdout, reason = "the table")]
 fn missing_replies_neither_hide_nor_make_a_loss() {
     println!("| missing | misleading | threshold beyond 9 EV | interval holds the truth | loss detected |");
-    let none = Design { missing: Missing::Random, right: [0.9; 6], missing_shares: [0.0; 6] };
-    let at_random = |loss: f64, missing: f64| Design {
+    let none = MissingDesign { missing: MissingReplies::Random, right: [0.9; 6], missing_shares: [0.0; 6] };
+    let at_random = |loss: f64, missing: f64| MissingDesign {
         right: [0.9, 0.9, 0.9, 0.9, 0.9 - loss, 0.9 - loss],
         missing_shares: [missing; 6],
         ..none

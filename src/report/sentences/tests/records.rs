@@ -1,7 +1,7 @@
 //! Sentences about synthetic records: which models and levels they name, count and leave out.
 
 use super::checked;
-use crate::report::sentences::{Sentence, Tone, sentences};
+use crate::report::sentences::{EffectDirection, Sentence, sentences};
 use crate::types::{
     ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId, Record, RunGroup,
     TrialOutcome, UnreadReason,
@@ -399,7 +399,9 @@ pub(super) const SEEING: [(&str, usize); 7] = [
 /// The sentences with a sign, except the one about the gain from images.
 fn signed(said: &[Sentence]) -> Vec<String> {
     said.iter()
-        .filter(|sentence| matches!(sentence.tone, Tone::Better | Tone::Worse) && sentence.kind != "images")
+        .filter(|sentence| {
+            matches!(sentence.tone, EffectDirection::Better | EffectDirection::Worse) && sentence.kind != "images"
+        })
         .map(checked)
         .collect()
 }

@@ -7,7 +7,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::records::{answer, record, unanswered};
-use crate::report::sentences::{Sentence, Tone, sentences};
+use crate::report::sentences::{EffectDirection, Sentence, sentences};
 use crate::types::{ChoiceDetail, Condition, Family, FrameId, OptionProbabilities, QuestionId, Record};
 use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::{Clusters, FrameTies};
@@ -19,7 +19,7 @@ use darkqa_score::significance::Verdict;
 
 /// The design of a simulated run, and its true effects.
 #[derive(Debug, Clone, Copy)]
-struct Design {
+struct SimulationDesign {
     models: usize,
     profiles: usize,
     enhancers: usize,
@@ -44,7 +44,7 @@ const QUESTIONS: [(Family, &[&str]); 4] = [
     (Family::RoomType, &["kitchen", "bedroom", "bathroom", "hall"]),
 ];
 
-impl Design {
+impl SimulationDesign {
     /// The conditions of each model; the empty name stands for no images.
     fn conditions(&self) -> Vec<String> {
         let mut all = vec![String::new(), "L0".to_owned()];
@@ -87,7 +87,7 @@ impl Design {
 
     /// Draws new answers for all records. Items, frames and models have random difficulties. Conditions differ by a
     /// random effect of each frame and by a new draw for 30 % of the answers, and on average only by
-    /// [`Design::effect`]. The confidence of a reply is the true probability that it is right.
+    /// [`SimulationDesign::effect`]. The confidence of a reply is the true probability that it is right.
     fn answer(&self, random: &mut StdRng, records: &mut [Record]) {
         let items = 4 * self.frames;
         let frames = normals(random, self.frames, 0.5);
@@ -141,14 +141,14 @@ pub(super) fn set_answer(detail: &mut ChoiceDetail, p: f64, drawn: f64) {
 
 /// True if a sentence claims an effect: by its sign, or in words.
 fn is_claim(sentence: &Sentence) -> bool {
-    matches!(sentence.tone, Tone::Better | Tone::Worse)
+    matches!(sentence.tone, EffectDirection::Better | EffectDirection::Worse)
         || ["collapse", "families"].contains(&sentence.kind)
-        || sentence.kind == "best" && sentence.tone == Tone::Note
+        || sentence.kind == "best" && sentence.tone == EffectDirection::Note
 }
 
 /// Outcomes of the runs of a design.
 #[derive(Debug, Default)]
-struct Counts {
+struct OutcomeCounts {
     runs: usize,
     /// Runs with any signed sentence.
     signed: usize,
@@ -164,10 +164,10 @@ struct Counts {
     kinds: std::collections::BTreeMap<&'static str, usize>,
 }
 
-fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
+fn simulate(design: &SimulationDesign, runs: usize, seed: u64) -> OutcomeCounts {
     let mut random = StdRng::seed_from_u64(seed);
     let mut records = design.records();
-    let mut counts = Counts::default();
+    let mut counts = OutcomeCounts::default();
     for _ in 0..runs {
         design.answer(&mut random, &mut records);
         let trials = records.iter().cloned().collect();
@@ -187,7 +187,7 @@ fn simulate(design: &Design, runs: usize, seed: u64) -> Counts {
             (PooledKind::Enhancer, Verdict::Better, "enhancer", &mut counts.helped),
             (PooledKind::Darkness, Verdict::Worse, "darkness", &mut counts.lost),
         ] {
-            let sign = Tone::from(verdict);
+            let sign = EffectDirection::from(verdict);
             found[0] += usize::from(claims.iter().any(|claim| claim.kind == name && claim.tone == sign));
             found[1] +=
                 usize::from(whole.clone().any(|finding| finding.kind == kind && finding.strict.verdict == verdict));
@@ -225,7 +225,8 @@ fn null_reports_have_no_sign() {
     for models in model_counts(&[1, 3, 6, 12]) {
         for profiles in [1, 4] {
             for enhancers in [0, 1, 4] {
-                let design = Design { models, profiles, enhancers, frames: 42, gain: 0.0, loss: 0.0, twins: false };
+                let design =
+                    SimulationDesign { models, profiles, enhancers, frames: 42, gain: 0.0, loss: 0.0, twins: false };
                 let counts = simulate(&design, runs(), (100 * models + 10 * profiles + enhancers) as u64);
                 all += counts.runs;
                 signed += counts.signed;
@@ -253,10 +254,11 @@ fn effects_are_found() {
     for models in model_counts(&[1, 6]) {
         for (profiles, enhancers) in [(1, 1), (1, 4), (4, 1)] {
             for effect in [0.05, 0.1] {
-                let design = Design { models, profiles, enhancers, frames: 42, gain: effect, loss: 0.0, twins: false };
+                let design =
+                    SimulationDesign { models, profiles, enhancers, frames: 42, gain: effect, loss: 0.0, twins: false };
                 let seed = (100 * models + 10 * profiles + enhancers) as u64;
                 let helped = simulate(&design, runs(), seed).helped;
-                let design = Design { gain: 0.0, loss: effect, ..design };
+                let design = SimulationDesign { gain: 0.0, loss: effect, ..design };
                 let lost = simulate(&design, runs(), seed).lost;
                 let mut cells = String::new();
                 for count in helped.into_iter().chain(lost) {
@@ -270,8 +272,15 @@ fn effects_are_found() {
 
 /// Number of simulated comparisons of unchanged models in which a model is called worse than in the old run.
 fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
-    let design =
-        Design { models: 2 * models, profiles: 1, enhancers: 4, frames: 42, gain: 0.0, loss: 0.0, twins: true };
+    let design = SimulationDesign {
+        models: 2 * models,
+        profiles: 1,
+        enhancers: 4,
+        frames: 42,
+        gain: 0.0,
+        loss: 0.0,
+        twins: true,
+    };
     let mut random = StdRng::seed_from_u64((100 * models + conditions) as u64);
     let mut records = design.records();
     let kept: Vec<Option<Condition>> =

@@ -158,7 +158,7 @@ const UNKNOWN: char = '☒';
 
 /// Meaning of a mark for the item next to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Mark {
+enum ItemMark {
     Yes,
     No,
 }
@@ -222,8 +222,8 @@ pub(super) fn ticked(tidy: &str, read: impl Fn(&str) -> Answer) -> Option<Ticks>
                 continue;
             };
             match mark {
-                Mark::Yes => ticks.ticked.push(index),
-                Mark::No => ticks.crossed.push(index),
+                ItemMark::Yes => ticks.ticked.push(index),
+                ItemMark::No => ticks.crossed.push(index),
             }
         }
     }
@@ -231,12 +231,12 @@ pub(super) fn ticked(tidy: &str, read: impl Fn(&str) -> Answer) -> Option<Ticks>
 }
 
 /// The items of a line, each with its mark.
-fn items(line: &str) -> Vec<(Mark, &str)> {
-    let marks: Vec<(Mark, usize, usize)> = MARK
+fn items(line: &str) -> Vec<(ItemMark, &str)> {
+    let marks: Vec<(ItemMark, usize, usize)> = MARK
         .captures_iter(line)
         .filter_map(|found| {
             let whole = found.get(0)?;
-            let mark = if found.name("yes").is_some() { Mark::Yes } else { Mark::No };
+            let mark = if found.name("yes").is_some() { ItemMark::Yes } else { ItemMark::No };
             Some((mark, whole.start(), whole.end()))
         })
         .collect();

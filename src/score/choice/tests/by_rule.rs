@@ -9,7 +9,7 @@ use darkqa_base::types::questions::{Answer, Choices};
 
 /// One line of the table: the rule, the set of choices, the reply, and the choice that a person finds in it.
 #[derive(Deserialize)]
-struct Case {
+struct RuleCase {
     rule: String,
     of: String,
     reply: String,
@@ -45,7 +45,7 @@ fn rules_agree_with_a_person() {
     let mut wrong = Vec::new();
     let mut counts = BTreeMap::<String, [usize; 2]>::new();
     for line in include_str!("../../../../tests/data/replies_by_rule.jsonl").lines() {
-        let case: Case = serde_json::from_str(line).unwrap();
+        let case: RuleCase = serde_json::from_str(line).unwrap();
         let found = match read(&case.reply, &choices(&case.of), ParsingMode::Lenient) {
             Answer::Chosen(index) => Some(index),
             Answer::Unparsed(_) => None,

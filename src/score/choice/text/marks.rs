@@ -59,7 +59,7 @@ pub(super) enum Form {
 
 /// Whether a mark begins or ends a part of the reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Role {
+pub(super) enum MarkRole {
     /// The name says that a part begins: `<|x_start|>`, `[BEGIN X]`, `<|x>`.
     Begin,
     /// A slash or the name says that a part ends.
@@ -70,7 +70,7 @@ pub(super) enum Role {
 
 /// What a mark encloses, by the words of its name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Meaning {
+pub(super) enum MarkMeaning {
     Thought,
     Answer,
     /// A turn, a role, an image.
@@ -87,8 +87,8 @@ pub(super) struct Mark<'t> {
     pub(super) start: usize,
     pub(super) end: usize,
     pub(super) form: Form,
-    pub(super) role: Role,
-    pub(super) meaning: Meaning,
+    pub(super) role: MarkRole,
+    pub(super) meaning: MarkMeaning,
     /// The name without brackets and slash.
     pub(super) name: &'t str,
     /// The words of the name without those of the role.
@@ -100,12 +100,12 @@ pub(super) struct Mark<'t> {
 impl Mark<'_> {
     /// True if this mark ends what `begin` begins, by its name.
     pub(super) fn ends(&self, begin: &Self) -> bool {
-        self.role == Role::End && self.core == begin.core
+        self.role == MarkRole::End && self.core == begin.core
     }
 
     /// True for a token of a tokenizer, which is no part of the answer.
     pub(super) fn is_token(&self) -> bool {
-        let is_end_of_answer = self.meaning == Meaning::Answer && self.role == Role::End;
+        let is_end_of_answer = self.meaning == MarkMeaning::Answer && self.role == MarkRole::End;
         self.form == Form::Special || (self.form == Form::Bracket && is_end_of_answer && self.core.contains(' '))
     }
 }
@@ -132,20 +132,20 @@ fn mark<'t>(text: &'t str, found: &Captures<'t>, words: &MarkWords) -> Option<Ma
     let begins = matches!(group, "left" | "signs") || parts.iter().any(|word| BEGIN_WORDS.contains(&&**word));
     let ends = has_slash || group == "right" || parts.iter().any(|word| END_WORDS.contains(&&**word));
     let role = match (begins, ends) {
-        (_, true) => Role::End,
-        (true, false) => Role::Begin,
-        (false, false) => Role::Single,
+        (_, true) => MarkRole::End,
+        (true, false) => MarkRole::Begin,
+        (false, false) => MarkRole::Single,
     };
     let core: Vec<&str> = parts
         .iter()
         .map(|word| &**word)
         .filter(|word| !BEGIN_WORDS.contains(word) && !END_WORDS.contains(word) && !FILLERS.contains(word))
         .collect();
-    let has_role_word = core.len() < parts.len() && role != Role::Single;
+    let has_role_word = core.len() < parts.len() && role != MarkRole::Single;
     let lower = bare.to_lowercase();
     let (form, meaning) = match group {
-        "tag" if words.bare.contains(&lower) => (Form::Special, Meaning::Template),
-        "tag" if words.html.contains(&lower) => (Form::Tag, Meaning::Layout),
+        "tag" if words.bare.contains(&lower) => (Form::Special, MarkMeaning::Template),
+        "tag" if words.html.contains(&lower) => (Form::Tag, MarkMeaning::Layout),
         "tag" if is_numbered || (has_role_word && bare.contains('_')) => (Form::Special, words.meaning(&core)),
         "tag" => (Form::Tag, words.meaning(&core)),
         "bracket" => (Form::Bracket, words.meaning(&core)),
@@ -169,15 +169,15 @@ fn mark<'t>(text: &'t str, found: &Captures<'t>, words: &MarkWords) -> Option<Ma
 
 /// Adds the name of a channel or role to a token that begins a turn: `<|im_start|>think`.
 fn with_turn_name<'t>(mark: Mark<'t>, after: &'t str, words: &MarkWords) -> Mark<'t> {
-    if mark.form != Form::Special || mark.meaning != Meaning::Template || mark.role == Role::End {
+    if mark.form != Form::Special || mark.meaning != MarkMeaning::Template || mark.role == MarkRole::End {
         return mark;
     }
     let Some(name) = TURN_NAME.captures(after).and_then(|found| found.get(1)) else {
         return mark;
     };
     match words.meaning(&[&*name.as_str().to_lowercase()]) {
-        meaning @ (Meaning::Thought | Meaning::Answer) => {
-            Mark { end: mark.end + name.end(), role: Role::Begin, meaning, ..mark }
+        meaning @ (MarkMeaning::Thought | MarkMeaning::Answer) => {
+            Mark { end: mark.end + name.end(), role: MarkRole::Begin, meaning, ..mark }
         }
         _ => mark,
     }
@@ -210,15 +210,15 @@ fn name_words(name: &str) -> Vec<String> {
 
 impl MarkWords {
     /// The meaning of a mark with these words in its name. Without any word it belongs to the template: `<|end|>`.
-    pub(super) fn meaning(&self, words: &[&str]) -> Meaning {
+    pub(super) fn meaning(&self, words: &[&str]) -> MarkMeaning {
         if words.iter().any(|word| self.is_thought(word)) {
-            Meaning::Thought
+            MarkMeaning::Thought
         } else if words.iter().any(|word| self.answer.contains(*word)) {
-            Meaning::Answer
+            MarkMeaning::Answer
         } else if words.iter().all(|word| self.template.contains(*word)) {
-            Meaning::Template
+            MarkMeaning::Template
         } else {
-            Meaning::Other
+            MarkMeaning::Other
         }
     }
 
@@ -227,14 +227,14 @@ impl MarkWords {
     }
 
     /// The meaning of the title of a section: `Thought process`, `Final answer`.
-    pub(super) fn title_meaning(&self, title: &str) -> Meaning {
+    pub(super) fn title_meaning(&self, title: &str) -> MarkMeaning {
         let words = name_words(title);
         if words.iter().any(|word| self.is_thought(word)) {
-            Meaning::Thought
+            MarkMeaning::Thought
         } else if words.iter().any(|word| self.title.contains(word)) {
-            Meaning::Answer
+            MarkMeaning::Answer
         } else {
-            Meaning::Other
+            MarkMeaning::Other
         }
     }
 }

@@ -13,7 +13,7 @@ use std::sync::LazyLock;
 use regex::Regex;
 use serde::Deserialize;
 
-use super::marks::{Form, Mark, MarkWords, Meaning, Role, marks};
+use super::marks::{Form, Mark, MarkMeaning, MarkRole, MarkWords, marks};
 use super::plain::{compiled, is_blank};
 use darkqa_base::types::questions::UnreadReason;
 
@@ -167,7 +167,7 @@ pub fn open_answer(reply: &str) -> Result<Cow<'_, str>, UnreadReason> {
     let whole = if text.len() == reply.trim_matches(is_blank).len() { reply } else { text };
     let tokens: Vec<Mark<'_>> = marks(whole, words())
         .into_iter()
-        .filter(|mark| mark.form == Form::Special && mark.meaning != Meaning::Other)
+        .filter(|mark| mark.form == Form::Special && mark.meaning != MarkMeaning::Other)
         .collect();
     if tokens.is_empty() {
         return Ok(Cow::Borrowed(whole));
@@ -194,7 +194,7 @@ fn remove(text: &str, tokens: &[Mark<'_>]) -> String {
     for token in tokens {
         without.push_str(&text[from..token.start]);
         from = token.end;
-        let ends_turn = token.meaning == Meaning::Template && token.role == Role::End;
+        let ends_turn = token.meaning == MarkMeaning::Template && token.role == MarkRole::End;
         if ends_turn && !without.trim_matches(is_blank).is_empty() {
             return without;
         }
@@ -206,8 +206,10 @@ fn remove(text: &str, tokens: &[Mark<'_>]) -> String {
 fn tagged_answer(text: &str) -> Option<&str> {
     let marks = marks(text, words());
     let end = marks.last().filter(|mark| mark.end == text.len())?;
-    let begin =
-        marks.iter().rev().find(|mark| mark.meaning == Meaning::Answer && mark.role != Role::End && end.ends(mark))?;
+    let begin = marks
+        .iter()
+        .rev()
+        .find(|mark| mark.meaning == MarkMeaning::Answer && mark.role != MarkRole::End && end.ends(mark))?;
     let inner = text[begin.end..end.start].trim_matches(is_blank);
     (!inner.is_empty()).then_some(inner)
 }
@@ -258,8 +260,8 @@ impl<'t, 'a> Marked<'t, 'a> {
         }
         if thoughts.is_some() && self.is_void(from) {
             // The answer may stand before the thoughts.
-            let before = self.marks.iter().find(|mark| mark.meaning == Meaning::Thought);
-            let before = before.filter(|mark| mark.role != Role::End);
+            let before = self.marks.iter().find(|mark| mark.meaning == MarkMeaning::Thought);
+            let before = before.filter(|mark| mark.role != MarkRole::End);
             let before = before.map_or("", |mark| without_tokens_around(&self.text[..mark.start]));
             return match before {
                 "" => Err(UnreadReason::Empty),
@@ -288,10 +290,10 @@ impl<'t, 'a> Marked<'t, 'a> {
 
     /// The end of the last mark that closes thoughts, by the words of its name.
     fn end_of_thoughts(&self) -> Option<usize> {
-        let thoughts = || self.marks.iter().filter(|mark| mark.meaning == Meaning::Thought);
-        let closing = thoughts().rfind(|mark| mark.role == Role::End);
+        let thoughts = || self.marks.iter().filter(|mark| mark.meaning == MarkMeaning::Thought);
+        let closing = thoughts().rfind(|mark| mark.role == MarkRole::End);
         let singles: Vec<&Mark<'_>> =
-            thoughts().filter(|mark| mark.form == Form::Special && mark.role == Role::Single).collect();
+            thoughts().filter(|mark| mark.form == Form::Special && mark.role == MarkRole::Single).collect();
         // The same token before and after the thoughts.
         let repeated = singles.last().filter(|_| closing.is_none() && singles.len().is_multiple_of(2));
         closing.or(repeated.copied()).map(|mark| mark.end)
@@ -302,9 +304,9 @@ impl<'t, 'a> Marked<'t, 'a> {
     fn has_unended_thoughts(&self, from: usize) -> bool {
         self.marks.iter().any(|mark| {
             mark.start >= from
-                && mark.meaning == Meaning::Thought
-                && mark.role != Role::End
-                && (mark.form != Form::Bracket || mark.role == Role::Begin)
+                && mark.meaning == MarkMeaning::Thought
+                && mark.role != MarkRole::End
+                && (mark.form != Form::Bracket || mark.role == MarkRole::Begin)
         })
     }
 
@@ -313,10 +315,10 @@ impl<'t, 'a> Marked<'t, 'a> {
     fn marked_answer(&self, from: usize) -> Result<Option<Separated<'t>>, UnreadReason> {
         let begin = self.marks.iter().rposition(|mark| {
             mark.start >= from
-                && mark.meaning == Meaning::Answer
-                && mark.role != Role::End
+                && mark.meaning == MarkMeaning::Answer
+                && mark.role != MarkRole::End
                 && !mark.core.contains("box")
-                && (mark.form == Form::Special || (mark.form == Form::Bracket && mark.role == Role::Begin))
+                && (mark.form == Form::Special || (mark.form == Form::Bracket && mark.role == MarkRole::Begin))
         });
         let Some(begin) = begin else {
             return Ok(None);
@@ -327,7 +329,7 @@ impl<'t, 'a> Marked<'t, 'a> {
             return Ok(None);
         }
         let after = &self.marks[begin + 1..];
-        let end = after.iter().find(|mark| mark.meaning == Meaning::Answer && mark.role == Role::End);
+        let end = after.iter().find(|mark| mark.meaning == MarkMeaning::Answer && mark.role == MarkRole::End);
         let end = end.map_or(self.text.len(), |mark| mark.start);
         match without_tokens_around(&self.text[mark.end..end]) {
             "" => Err(UnreadReason::Truncated),
@@ -378,13 +380,13 @@ impl<'t, 'a> Marked<'t, 'a> {
                 return None;
             }
             match mark.meaning {
-                Meaning::Template if mark.form == Form::Special => {
+                MarkMeaning::Template if mark.form == Form::Special => {
                     at = mark.end;
                     if let Some(role) = ROLE_NAME.find(&self.text[at..]) {
                         at += role.end();
                     }
                 }
-                Meaning::Other if mark.role != Role::End && !self.asked.is_answer(mark.name) => {
+                MarkMeaning::Other if mark.role != MarkRole::End && !self.asked.is_answer(mark.name) => {
                     return Some(index);
                 }
                 _ => return None,
@@ -400,10 +402,10 @@ impl<'t, 'a> Marked<'t, 'a> {
         let named = later().find(|(_, mark)| mark.ends(begin));
         let of_form = || {
             later().find(|(_, mark)| {
-                let is_open_name = matches!(mark.meaning, Meaning::Other | Meaning::Thought);
+                let is_open_name = matches!(mark.meaning, MarkMeaning::Other | MarkMeaning::Thought);
                 let is_pair = match begin.role {
-                    Role::Begin => mark.role == Role::End,
-                    _ => mark.role != Role::Begin,
+                    MarkRole::Begin => mark.role == MarkRole::End,
+                    _ => mark.role != MarkRole::Begin,
                 };
                 mark.form == Form::Special && is_open_name && is_pair
             })
@@ -417,8 +419,8 @@ impl<'t, 'a> Marked<'t, 'a> {
         let mark = &self.marks[open];
         let begins = match mark.form {
             Form::Tag => true,
-            Form::Special => mark.role == Role::Begin || mark.is_numbered,
-            Form::Bracket => mark.role == Role::Begin,
+            Form::Special => mark.role == MarkRole::Begin || mark.is_numbered,
+            Form::Bracket => mark.role == MarkRole::Begin,
         };
         begins && !matches!(self.asked, Asked::Mark(_)) && !self.is_void(mark.end)
     }
@@ -429,10 +431,10 @@ impl<'t, 'a> Marked<'t, 'a> {
         let mut last = None;
         for mark in self.after(from) {
             let is_end = match mark.role {
-                Role::End => !opened.contains(&*mark.core),
+                MarkRole::End => !opened.contains(&*mark.core),
                 _ => mark.is_numbered && mark.form == Form::Special,
             };
-            if mark.meaning == Meaning::Other && is_end {
+            if mark.meaning == MarkMeaning::Other && is_end {
                 last = Some(mark);
             }
             opened.insert(&*mark.core);
@@ -459,8 +461,8 @@ fn without_tokens_around(text: &str) -> &str {
         end = start + inner.len();
         let front = marks[first..last].first().filter(|mark| mark.start == start);
         let back = marks[first..last].last().filter(|mark| mark.end == end);
-        let is_answer = |mark: &&Mark<'_>| mark.meaning == Meaning::Answer;
-        let has_end = || marks[first..last].iter().any(|mark| is_answer(&mark) && mark.role == Role::End);
+        let is_answer = |mark: &&Mark<'_>| mark.meaning == MarkMeaning::Answer;
+        let has_end = || marks[first..last].iter().any(|mark| is_answer(&mark) && mark.role == MarkRole::End);
         if let Some(mark) = front.filter(|mark| is_around(mark, has_tags) && !is_answer(mark)) {
             start = mark.end;
             if let Some(role) = ROLE_NAME.find(&text[start..end]) {
@@ -476,7 +478,7 @@ fn without_tokens_around(text: &str) -> &str {
             start = mark.end;
             first += 1;
         } else if let Some(mark) =
-            back.filter(|mark| mark.is_token() && mark.role == Role::End && !begins_answer(&marks[first..last]))
+            back.filter(|mark| mark.is_token() && mark.role == MarkRole::End && !begins_answer(&marks[first..last]))
         {
             end = mark.start;
             last -= 1;
@@ -488,7 +490,7 @@ fn without_tokens_around(text: &str) -> &str {
 
 /// True if a mark begins an answer.
 fn begins_answer(marks: &[Mark<'_>]) -> bool {
-    marks.iter().any(|mark| mark.meaning == Meaning::Answer && mark.role != Role::End)
+    marks.iter().any(|mark| mark.meaning == MarkMeaning::Answer && mark.role != MarkRole::End)
 }
 
 /// True for a mark at an end of a text that belongs to a template: a token, or a tag such as `<zork_plugh>` in a text
@@ -509,10 +511,10 @@ static HEADING: LazyLock<Regex> = LazyLock::new(|| {
 });
 
 /// A heading with the place of its section.
-struct Heading {
+struct ReasoningHeading {
     start: usize,
     content: usize,
-    meaning: Meaning,
+    meaning: MarkMeaning,
     /// True for `**Title**`, which may also be an emphasized answer.
     is_bold: bool,
 }
@@ -533,15 +535,15 @@ fn last_section<'t>(
     let [first, .., _] = &headings[..] else {
         return Ok(None);
     };
-    let is_thought = first.meaning == Meaning::Thought;
-    if first.start > 0 || first.meaning == Meaning::Answer || (first.is_bold && !is_thought) {
+    let is_thought = first.meaning == MarkMeaning::Thought;
+    if first.start > 0 || first.meaning == MarkMeaning::Answer || (first.is_bold && !is_thought) {
         return Ok(None);
     }
     let section = |index: usize| {
         let end = headings.get(index + 1).map_or(text.len(), |next| next.start);
         text[headings[index].content..end].trim_matches(is_blank)
     };
-    let titled = headings.iter().rposition(|heading| heading.meaning == Meaning::Answer);
+    let titled = headings.iter().rposition(|heading| heading.meaning == MarkMeaning::Answer);
     if let Some(titled) = titled {
         return match section(titled) {
             "" => Err(UnreadReason::Truncated),
@@ -555,7 +557,7 @@ fn last_section<'t>(
     Ok(is_thought.then(|| text[headings[1].start..].trim_matches(is_blank)))
 }
 
-fn headings(text: &str, words: &MarkWords) -> Vec<Heading> {
+fn headings(text: &str, words: &MarkWords) -> Vec<ReasoningHeading> {
     // Every heading has one of these.
     if !text.contains(['#', '*', '[']) {
         return Vec::new();
@@ -568,8 +570,8 @@ fn headings(text: &str, words: &MarkWords) -> Vec<Heading> {
             let title = found.name("hash").or(bold).or(found.name("bracket"))?;
             let meaning = words.title_meaning(title.as_str());
             let is_bold = bold.is_some();
-            let heading = Heading { start: whole.start(), content: whole.end(), meaning, is_bold };
-            (!is_bold || meaning != Meaning::Other).then_some(heading)
+            let heading = ReasoningHeading { start: whole.start(), content: whole.end(), meaning, is_bold };
+            (!is_bold || meaning != MarkMeaning::Other).then_some(heading)
         })
         .collect()
 }

@@ -1,6 +1,6 @@
 //! Difference between the losses of two question families: [`FamilyContrast`].
 
-use super::{PooledFinding, PooledItem, PooledSet, PooledState, SideCounts, items};
+use super::{PooledFamily, PooledFinding, PooledItem, PooledState, SideCounts, items};
 use crate::choice::ParsingMode;
 use crate::comparisons::paired::bounded;
 use crate::comparisons::pooled_kind::PooledKind;
@@ -93,7 +93,7 @@ pub(crate) fn family_contrasts(grid: &Grid<'_>, pooled: &[PooledFinding]) -> Vec
 
 /// Tests the difference between the losses of two families, which are one of `pairs` pairs.
 fn contrast(grid: &Grid<'_>, [most, least]: [&PooledFinding; 2], pairs: usize) -> Option<FamilyContrast> {
-    let set = PooledSet { kind: PooledKind::Darkness, variant: most.variant.clone(), enhancer: None, against: None };
+    let set = PooledFamily { kind: PooledKind::Darkness, variant: most.variant.clone(), enhancer: None, against: None };
     let models: Vec<[&str; 2]> = most.models.iter().map(|model| [&**model; 2]).collect();
     let items = items(grid, &set, &models, most.level)?;
     let [strict, lenient]: [fn(&SideCounts) -> u32; 2] = [|side| side.strict, |side| side.lenient];

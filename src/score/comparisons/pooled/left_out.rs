@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::PooledSet;
+use super::PooledFamily;
 use crate::comparisons::pooled_kind::PooledKind;
 use crate::grid::Grid;
 use darkqa_base::types::{AxisLevel, EnhancerName, Variant};
@@ -31,7 +31,7 @@ pub struct ModelsLeftOut {
 pub(crate) fn models_left_out(grid: &Grid<'_>) -> Vec<ModelsLeftOut> {
     let mut all = Vec::new();
     // Two enhancers leave out the models that one of them leaves out.
-    for set in PooledSet::of_enhancers_and_raw(grid) {
+    for set in PooledFamily::of_enhancers_and_raw(grid) {
         let levels = set.levels(grid);
         let models = set.models(grid, &levels);
         let asked: Vec<AxisLevel> = levels

@@ -185,7 +185,7 @@ impl CellItems<'_, '_> {
 
 /// Counts of answers to one question of the bank, over the items with an answer at L0 and a reply in the condition.
 #[derive(Debug, Clone, Default)]
-pub(super) struct AnswerCounts<'g> {
+pub(super) struct ItemAnswerCounts<'g> {
     /// Number of items.
     pub(super) items: usize,
     /// Number of items with an answer at L0 and in the condition, by answer. Unreadable replies are not counted.
@@ -196,9 +196,9 @@ pub(super) struct AnswerCounts<'g> {
 
 /// Counts of the answers of a subject, for all clusters together and for each cluster.
 pub(super) struct BankCounts<'g> {
-    pub(super) whole: BTreeMap<usize, AnswerCounts<'g>>,
+    pub(super) whole: BTreeMap<usize, ItemAnswerCounts<'g>>,
     /// Counts by cluster and question.
-    pub(super) by_cluster: BTreeMap<(u32, usize), AnswerCounts<'g>>,
+    pub(super) by_cluster: BTreeMap<(u32, usize), ItemAnswerCounts<'g>>,
 }
 
 impl<'g> BankCounts<'g> {
@@ -308,12 +308,12 @@ pub(super) fn kappa(counts: &BankCounts<'_>, by_cluster: &[ClusterCount], agreem
 }
 
 /// Number of items of a question that are expected to agree by the answer frequencies.
-fn expected(counts: &AnswerCounts<'_>) -> f64 {
+fn expected(counts: &ItemAnswerCounts<'_>) -> f64 {
     counts.answers.values().map(|[light, here]| *light as f64 * *here as f64).sum::<f64>() / counts.items as f64
 }
 
 /// Derivative of the expected number of agreeing items of a question in the direction of the counts of a cluster.
-fn expected_change(whole: &AnswerCounts<'_>, own: &AnswerCounts<'_>) -> f64 {
+fn expected_change(whole: &ItemAnswerCounts<'_>, own: &ItemAnswerCounts<'_>) -> f64 {
     let items = whole.items as f64;
     own.answers
         .iter()

@@ -56,7 +56,7 @@ pub struct SpreadCurve {
 }
 
 /// A block of the image in normal light that is a candidate for a smooth block.
-struct Candidate {
+struct CandidateBlock {
     index: usize,
     /// Mean green code after the exposure drop.
     clean_code: f64,
@@ -69,18 +69,18 @@ impl SmoothBlocks {
     #[must_use]
     pub fn new(normal: &Rgb, drop_ev: f64) -> Self {
         let code_factor = libm::exp2(-drop_ev / 2.2);
-        let blocks: Vec<Candidate> = (0..block_count(normal))
+        let blocks: Vec<CandidateBlock> = (0..block_count(normal))
             .filter_map(|index| {
                 let block = Block::new(normal, index);
                 let clean_code = block.mean() * code_factor;
                 let is_used = block.brightest() < f64::from(CLIPPING_CODE) && clean_code > MIN_CLEAN_CODE;
-                is_used.then(|| Candidate { index, clean_code, spread: block.spread() })
+                is_used.then(|| CandidateBlock { index, clean_code, spread: block.spread() })
             })
             .collect();
         let mut codes: Vec<f64> = blocks.iter().map(|block| block.clean_code).collect();
         codes.sort_by(f64::total_cmp);
         let edges: Vec<f64> = (1..BINS).filter_map(|edge| quantile(&codes, edge as f64 / BINS as f64)).collect();
-        let mut bins: [Vec<&Candidate>; BINS] = Default::default();
+        let mut bins: [Vec<&CandidateBlock>; BINS] = Default::default();
         for block in &blocks {
             // A code on the edge of two bins belongs to the upper bin.
             let bin = edges.iter().filter(|edge| **edge <= block.clean_code).count();
@@ -103,7 +103,7 @@ impl SmoothBlocks {
 }
 
 /// Indices of the blocks of a bin with the smallest spreads; empty if the bin has too few blocks.
-fn smoothest(blocks: &[&Candidate]) -> Vec<usize> {
+fn smoothest(blocks: &[&CandidateBlock]) -> Vec<usize> {
     if blocks.len() < MIN_BLOCKS {
         return Vec::new();
     }

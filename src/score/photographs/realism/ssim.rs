@@ -14,7 +14,7 @@ const RADIUS: usize = 5;
 const TAPS: usize = 2 * RADIUS + 1;
 
 /// Weights along one side of the window.
-type Window = [f32; TAPS];
+type WindowWeights = [f32; TAPS];
 
 /// Number of local means: of x, y, x² + y² and xy.
 const MOMENTS: usize = 4;
@@ -81,7 +81,7 @@ fn mean_similarity(a: &Rgb, b: &Rgb, isa: Isa) -> f64 {
 }
 
 /// Gaussian weights of standard deviation 1.5 pixels; their sum is 1.
-fn window() -> Window {
+fn window() -> WindowWeights {
     let weights: [f64; TAPS] = std::array::from_fn(|tap| {
         let distance = tap as f64 - RADIUS as f64;
         libm::exp(-0.5 * distance * distance / (1.5 * 1.5))
@@ -93,7 +93,7 @@ fn window() -> Window {
 /// Row of numbers, aligned to a cache line: loading a vector that crosses two lines takes two accesses.
 #[repr(align(64))]
 #[derive(Clone, Copy)]
-struct Row<const N: usize>([f32; N]);
+struct AlignedRow<const N: usize>([f32; N]);
 
 /// Codes of both images in one image row, as far as the windows of a tile cover it.
 type Codes = [[u8; COVERED]; 2];
@@ -103,7 +103,7 @@ struct Band<'a> {
     images: [&'a Rgb; 2],
     /// Index of the first row of windows.
     first: usize,
-    window: &'a Window,
+    window: &'a WindowWeights,
     /// Output: the sum of similarities of each row of windows.
     sums: &'a mut [f64],
 }
@@ -137,10 +137,10 @@ impl Kernel for Band<'_> {
     #[inline(always)]
     fn run(self) {
         let windows = 3 * (self.images[0].width() - (TAPS - 1));
-        let mut moments = [Row([0.0; COVERED]); MOMENTS];
+        let mut moments = [AlignedRow([0.0; COVERED]); MOMENTS];
         // Ring buffer of the weighted means along the last `TAPS` image rows.
-        let mut recent = vec![[Row([0.0; TILE]); MOMENTS]; TAPS];
-        let mut means = [Row([0.0; TILE]); MOMENTS];
+        let mut recent = vec![[AlignedRow([0.0; TILE]); MOMENTS]; TAPS];
+        let mut means = [AlignedRow([0.0; TILE]); MOMENTS];
         for (tile, begin) in self.tiled().chunks_exact(self.lines()).zip((0..).step_by(TILE)) {
             for (line, codes) in tile.iter().enumerate() {
                 set_moments(&mut moments, codes);
@@ -163,7 +163,7 @@ impl Kernel for Band<'_> {
 
 /// Computes x, y, x² + y² and xy of samples minus [`MIDDLE`].
 #[inline(always)]
-fn set_moments(moments: &mut [Row<COVERED>; MOMENTS], codes: &Codes) {
+fn set_moments(moments: &mut [AlignedRow<COVERED>; MOMENTS], codes: &Codes) {
     let [xs, ys, squares, products] = moments;
     let [x_codes, y_codes] = codes;
     for i in 0..COVERED {
@@ -178,7 +178,7 @@ fn set_moments(moments: &mut [Row<COVERED>; MOMENTS], codes: &Codes) {
 /// Computes the weighted mean along a row for each window. The window is symmetric: two samples share one
 /// multiplication.
 #[inline(always)]
-fn filter_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERED>) {
+fn filter_along_row(means: &mut AlignedRow<TILE>, window: &WindowWeights, samples: &AlignedRow<COVERED>) {
     for i in 0..TILE {
         let mut mean = window[RADIUS] * samples.0[i + 3 * RADIUS];
         for (tap, weight) in window[..RADIUS].iter().enumerate() {
@@ -190,7 +190,7 @@ fn filter_along_row(means: &mut Row<TILE>, window: &Window, samples: &Row<COVERE
 
 /// Computes the weighted mean over the rows of each window.
 #[inline(always)]
-fn filter_over_rows(means: &mut Row<TILE>, window: &Window, rows: [&Row<TILE>; TAPS]) {
+fn filter_over_rows(means: &mut AlignedRow<TILE>, window: &WindowWeights, rows: [&AlignedRow<TILE>; TAPS]) {
     for i in 0..TILE {
         let mut mean = window[RADIUS] * rows[RADIUS].0[i];
         for (tap, weight) in window[..RADIUS].iter().enumerate() {
@@ -202,7 +202,7 @@ fn filter_over_rows(means: &mut Row<TILE>, window: &Window, rows: [&Row<TILE>; T
 
 /// Similarity of each window, from the means of x, y, x² + y² and xy.
 #[inline(always)]
-fn similarities([x, y, squares, product]: &[Row<TILE>; MOMENTS]) -> [f32; TILE] {
+fn similarities([x, y, squares, product]: &[AlignedRow<TILE>; MOMENTS]) -> [f32; TILE] {
     std::array::from_fn(|i| similarity(x.0[i], y.0[i], squares.0[i], product.0[i]))
 }
 

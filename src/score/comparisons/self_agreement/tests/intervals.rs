@@ -1,6 +1,6 @@
 //! How often the intervals hold the truth.
 
-use super::simulated::{Draws, cell, record};
+use super::simulated::{RandomNumbers, cell, record};
 use crate::comparisons::self_agreement::evidence::NoEvidence;
 use crate::statistics::bootstrap::SplitMix;
 use darkqa_base::types::Record;
@@ -8,7 +8,7 @@ use darkqa_base::types::Record;
 /// Records of 30 images with eight questions each. The share of its answers that a model keeps differs from image to
 /// image, evenly from 0 to 1, so that items of an image are far from independent; asked again it keeps 95 %.
 fn clustered(seed: u64) -> Vec<Record> {
-    let mut draws = Draws(SplitMix(seed));
+    let mut draws = RandomNumbers(SplitMix(seed));
     let mut records = Vec::new();
     for image in 0..30 {
         let kept = draws.next();

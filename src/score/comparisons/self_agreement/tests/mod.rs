@@ -4,7 +4,7 @@ mod intervals;
 mod models;
 mod simulated;
 
-use self::simulated::{Answer, IMAGES, QUESTIONS, Simulated, at, found, keep, record};
+use self::simulated::{IMAGES, QUESTIONS, Simulated, SimulatedAnswer, at, found, keep, record};
 use super::evidence::NoEvidence;
 use crate::choice::ParsingMode;
 use crate::cluster::FrameTies;
@@ -68,10 +68,10 @@ fn only_questions_with_an_answer_in_the_light_are_references_and_an_unread_reply
 #[test]
 fn the_threshold_is_where_half_of_the_evidence_is_lost() {
     // Without an image: guesses. Kept at L1: all; at L3: half of it; at L5: nothing.
-    let half: Answer = |light, d| {
+    let half: SimulatedAnswer = |light, d| {
         if d.next() < 0.5 { light } else { d.yes(0.4) }
     };
-    let guess: Answer = |_, d| d.yes(0.4);
+    let guess: SimulatedAnswer = |_, d| d.yes(0.4);
     let model = Simulated { yes: 0.4, blind: guess, again: keep, dark: guess };
     let records = model.records(&[("L1-noise", keep), ("L3-noise", half)]);
     found(&records, |found| {
@@ -84,7 +84,7 @@ fn the_threshold_is_where_half_of_the_evidence_is_lost() {
 
 #[test]
 fn dark_and_enhanced_images_are_compared_pair_by_pair() {
-    let half: Answer = |light, d| {
+    let half: SimulatedAnswer = |light, d| {
         if d.next() < 0.5 { light } else { d.yes(0.4) }
     };
     let model = Simulated { yes: 0.4, blind: |_, d| d.yes(0.4), again: keep, dark: half };

@@ -1,14 +1,14 @@
 //! Models that look better than they are, and what tells them apart.
 
-use super::simulated::{Answer, IMAGES, QUESTIONS, Simulated, cell, found, keep, record};
+use super::simulated::{IMAGES, QUESTIONS, Simulated, SimulatedAnswer, cell, found, keep, record};
 use crate::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use crate::comparisons::self_agreement::evidence::{NoEvidence, NoHalf};
 
 /// A row of the table of models: name, share of yes, blind, dark, and G in %, κ and the entropies that are expected.
-type Row = (&'static str, f64, Answer, Answer, f64, Option<f64>, [f64; 2]);
+type ModelRow = (&'static str, f64, SimulatedAnswer, SimulatedAnswer, f64, Option<f64>, [f64; 2]);
 
 /// Models with two choices; 40 % of answers are yes unless the name states another share.
-const MODELS: [Row; 6] = [
+const MODELS: [ModelRow; 6] = [
     (
         "keeps 90 %",
         0.4,
@@ -79,10 +79,10 @@ fn pooled_questions_would_make_kappa_too_large() {
 
 #[test]
 fn evidence_is_the_way_from_the_floor_to_the_ceiling() {
-    let slips: Answer = |light, d| {
+    let slips: SimulatedAnswer = |light, d| {
         if d.next() < 0.9 { light } else { 1 - light }
     };
-    let half: Answer = |light, d| {
+    let half: SimulatedAnswer = |light, d| {
         if d.next() < 0.5 { light } else { d.yes(0.4) }
     };
     let model = Simulated { yes: 0.4, blind: |_, d| d.yes(0.4), again: slips, dark: half };

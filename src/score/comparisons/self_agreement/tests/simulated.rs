@@ -17,9 +17,9 @@ pub(super) const IMAGES: usize = 72;
 pub(super) const QUESTIONS: usize = 25;
 
 /// Random numbers from 0 to 1.
-pub(super) struct Draws(pub(super) SplitMix);
+pub(super) struct RandomNumbers(pub(super) SplitMix);
 
-impl Draws {
+impl RandomNumbers {
     pub(super) fn next(&mut self) -> f64 {
         (self.0.bits() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -31,18 +31,18 @@ impl Draws {
 }
 
 /// The answer of a model: its answer in the light, and random numbers.
-pub(super) type Answer = fn(usize, &mut Draws) -> usize;
+pub(super) type SimulatedAnswer = fn(usize, &mut RandomNumbers) -> usize;
 
 /// A simulated model: its share of “yes” in the light, and its answers without an image, asked again in the light, and
 /// in the dark.
 pub(super) struct Simulated {
     pub(super) yes: f64,
-    pub(super) blind: Answer,
-    pub(super) again: Answer,
-    pub(super) dark: Answer,
+    pub(super) blind: SimulatedAnswer,
+    pub(super) again: SimulatedAnswer,
+    pub(super) dark: SimulatedAnswer,
 }
 
-pub(super) fn keep(light: usize, _: &mut Draws) -> usize {
+pub(super) fn keep(light: usize, _: &mut RandomNumbers) -> usize {
     light
 }
 
@@ -93,8 +93,8 @@ pub(super) fn questions() -> Vec<RunQuestion> {
 
 impl Simulated {
     /// The records: without an image, twice at L0, and at each level.
-    pub(super) fn records(&self, levels: &[(&str, Answer)]) -> Vec<Record> {
-        let mut draws = Draws(SplitMix(7));
+    pub(super) fn records(&self, levels: &[(&str, SimulatedAnswer)]) -> Vec<Record> {
+        let mut draws = RandomNumbers(SplitMix(7));
         let mut records = Vec::new();
         for image in 0..IMAGES {
             for question in 0..QUESTIONS {
