@@ -28,16 +28,16 @@
 //!
 //! Accuracy of probabilities averaged over the orders of the choices: [`accuracy_over_rotations`].
 //!
-//! Difference between confidence and accuracy, with its test: [`TestedConfidence`].
+//! Difference between confidence and accuracy, with its test: [`Tested`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::grid::Grid;
 use super::model_in_condition::ModelInCondition;
 use crate::bootstrap::Resamples;
+use crate::comparisons::Tested;
 use crate::comparisons::paired::tested_difference;
 use crate::estimate::{ClusterCount, Estimate};
-use crate::significance::ALPHA;
 use crate::statistics::auc::{Auc, PairCounts, RankedReply};
 use darkqa_base::types::{AxisLevel, OptionProbabilities, QuestionId, TrialOutcome, TrialRef, View};
 
@@ -63,10 +63,10 @@ pub struct Calibration {
     /// Accuracy of the same replies.
     pub accuracy: Estimate,
     /// Confidence minus accuracy, with its test; above 0 the model is overconfident.
-    pub overconfidence: TestedConfidence,
+    pub overconfidence: Tested,
     /// Overconfidence minus overconfidence at L0, on the items of both; for raw degraded images of a model that was
     /// asked at L0.
-    pub growth: Option<TestedConfidence>,
+    pub growth: Option<Tested>,
     /// Expected calibration error (`expected_error`); `None` below 100 replies.
     pub error: Option<Estimate>,
     /// Mean Brier score over all choices, from 0 to 2 (Brier 1950, Mon. Weather Rev. 78:1).
@@ -113,10 +113,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
         unstated: sorted.unstated,
         confidence: mean(draws, replies, |reply| reply.confidence),
         accuracy: clustered_accuracy(grid.clusters, replies)?,
-        overconfidence: TestedConfidence::new(
-            grid.clusters,
-            replies.iter().map(|reply| (reply.cluster, reply.excess())),
-        )?,
+        overconfidence: test_mean(grid.clusters, replies.iter().map(|reply| (reply.cluster, reply.excess())))?,
         growth: growth(grid, subject, replies),
         error,
         brier: mean(draws, replies, |reply| reply.brier),
@@ -132,7 +129,7 @@ fn calibration(grid: &Grid<'_>, draws: &Resamples, subject: usize) -> Option<Cal
 }
 
 /// Growth of the overconfidence since L0, on the items of both levels.
-fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option<TestedConfidence> {
+fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option<Tested> {
     let dark = &grid.subjects[subject];
     if dark.enhancer.is_some() || !dark.variant.is_degraded() {
         return None;
@@ -144,7 +141,7 @@ fn growth(grid: &Grid<'_>, subject: usize, replies: &[ConfidentReply]) -> Option
         let change = reply.excess() - clean.get(&reply.item)?;
         Some((reply.cluster, change))
     });
-    TestedConfidence::new(grid.clusters, changes)
+    test_mean(grid.clusters, changes)
 }
 
 /// Mean distance to the probabilities without an image; `None` if the model was not asked without images.
@@ -575,41 +572,23 @@ fn accuracy_over_rotations(grid: &Grid<'_>, subject: usize) -> Option<Estimate> 
     Estimate::clustered(&counts)
 }
 
-/// Mean of confidence minus accuracy, or of its change, with the test against 0 by Student's t that matches its
-/// interval.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TestedConfidence {
-    pub estimate: Estimate,
-    /// p-value of a mean of 0.
-    pub p: f64,
-    /// p-value after the correction over all tests behind sentences; `None` if no sentence is about it.
-    pub p_report: Option<f64>,
-}
-
-impl TestedConfidence {
-    /// Tests the mean of numbers, each given with its cluster; `None` without numbers.
-    fn new(clusters: usize, numbers: impl Iterator<Item = (u32, f64)>) -> Option<Self> {
-        let mut sums = vec![(0.0, 0.0); clusters];
-        let (mut squares, mut n) = (0.0, 0);
-        for (cluster, number) in numbers {
-            let (sum, count) = &mut sums[cluster as usize];
-            *sum += number;
-            *count += 1.0;
-            squares += number * number;
-            n += 1;
-        }
-        sums.retain(|(_, count)| *count > 0.0);
-        (n > 0).then(|| {
-            let (estimate, p) = tested_difference(&sums, squares, n);
-            Self { estimate, p, p_report: None }
-        })
+/// Tests the mean of numbers against 0 by Student's t, which matches its interval. Each number is given with its
+/// cluster; `None` without numbers.
+fn test_mean(clusters: usize, numbers: impl Iterator<Item = (u32, f64)>) -> Option<Tested> {
+    let mut sums = vec![(0.0, 0.0); clusters];
+    let (mut squares, mut n) = (0.0, 0);
+    for (cluster, number) in numbers {
+        let (sum, count) = &mut sums[cluster as usize];
+        *sum += number;
+        *count += 1.0;
+        squares += number * number;
+        n += 1;
     }
-
-    /// True if the mean is shown to be above 0 after the correction over all sentences.
-    #[must_use]
-    pub fn is_above(&self) -> bool {
-        self.estimate.value > 0.0 && self.p_report.is_some_and(|value| value < ALPHA)
-    }
+    sums.retain(|(_, count)| *count > 0.0);
+    (n > 0).then(|| {
+        let (estimate, p) = tested_difference(&sums, squares, n);
+        Tested::new(estimate, p)
+    })
 }
 
 #[cfg(test)]

@@ -189,7 +189,7 @@ mod tests {
                         ClusterNet { net: nets.sum(), items: *items as u32 }
                     })
                     .collect();
-                PairedTest::new(&clusters, sample.models as f64, squares).p < sample.level
+                PairedTest::new(&clusters, sample.models as f64, squares).tested.p < sample.level
             })
             .count() as f64
             / f64::from(runs)

@@ -20,7 +20,7 @@ use super::answers::confusion::{AgainstClean, Confusion, FalseAnswer};
 use super::calibration::MIN_CONFIDENT_REPLIES;
 use super::choice::ParsingMode;
 use super::cluster::MIN_CLUSTERS;
-use super::comparisons::{BestInTheDark, ComparisonKind, PooledFinding, PooledKind};
+use super::comparisons::{ComparisonKind, PooledFinding, PooledKind};
 use super::findings::Findings;
 use super::grid::Grid;
 use super::model_in_condition::{ModelInCondition, models_under_test};
@@ -104,8 +104,10 @@ impl Findings<'_> {
     pub(super) fn correct_sentences(&mut self) {
         let tree = report_tests(self);
         for mode in ParsingMode::ALL {
-            for (test, p) in adjust_p_values(&tree, |test| test.p(self, mode)) {
-                test.set_p_report(self, mode, p);
+            for (test, corrected) in adjust_p_values(&tree, |test| test.p(self, mode).map_or(1.0, |(p, _)| p)) {
+                if let Some((_, p_report)) = test.p(self, mode).filter(|_| test.is_in(mode)) {
+                    *p_report = Some(corrected);
+                }
             }
         }
         self.tests = tree.count();
@@ -131,7 +133,7 @@ impl Findings<'_> {
             };
             if finding.family.is_none() {
                 let sides = (kind, &**model, finding.level, &finding.variant, &finding.enhancer);
-                let p = [finding.strict.p_report, finding.lenient.p_report];
+                let p = [finding.strict.tested.p_report, finding.lenient.tested.p_report];
                 corrected.insert(sides, p);
             }
         }
@@ -143,8 +145,8 @@ impl Findings<'_> {
             let is_own = comparison.second.model == first.model && comparison.family.is_none();
             let sides = (comparison.kind, &*first.model, level, &first.variant, &first.enhancer);
             if let Some([strict, lenient]) = corrected.get(&sides).filter(|_| is_own) {
-                comparison.strict.p_report = *strict;
-                comparison.lenient.p_report = *lenient;
+                comparison.strict.tested.p_report = *strict;
+                comparison.lenient.tested.p_report = *lenient;
             }
         }
     }
@@ -234,7 +236,7 @@ fn pooled_sets<'f>(findings: &'f Findings<'_>) -> Vec<PooledSet<'f>> {
     sets.retain(|set| {
         let mut levels = set.levels.iter();
         (set.kind == PooledKind::Darkness || is_main(&findings.grid, set.variant))
-            && levels.any(|(_, finding)| finding.strict.verdict.is_possible())
+            && levels.any(|(_, finding)| finding.strict.tested.verdict.is_possible())
     });
     sets
 }
@@ -289,7 +291,7 @@ fn below_blind(findings: &Findings<'_>) -> Tests {
         let (first, second) = (&comparison.first, &comparison.second);
         if findings.is_tested_against_blind(comparison)
             && is_main(&findings.grid, &first.variant)
-            && comparison.strict.verdict.is_possible()
+            && comparison.strict.tested.verdict.is_possible()
         {
             let key = (&first.model, &second.model, &comparison.family, &first.variant);
             chains.entry(key).or_default().push(Test::Comparison(index));
@@ -316,7 +318,7 @@ fn photographs(findings: &Findings<'_>) -> Vec<Tests> {
                             && first.variant.photograph().is_some()
                             && (first.enhancer.is_none() || kind == ComparisonKind::RealEnhanced)
                             && models.contains(&*first.model)
-                            && comparison.strict.verdict.is_possible()
+                            && comparison.strict.tested.verdict.is_possible()
                     })
                     .map(|(index, _)| TestTree::leaf(Test::Comparison(index))),
             )
@@ -384,83 +386,40 @@ fn confidence(findings: &Findings<'_>) -> Tests {
 }
 
 impl Test {
-    /// p-value before correction in a parsing; 1 if the test was not computed. Confidence and fidelity exist only in
-    /// strict parsing.
-    fn p(self, findings: &Findings<'_>, mode: ParsingMode) -> f64 {
-        let best = match mode {
-            ParsingMode::Strict => findings.best.as_ref(),
-            ParsingMode::Lenient => findings.lenient_best.as_ref(),
-        };
-        let found = match self {
-            Self::Pooled(index) => Some(findings.pooled[index].parsed(mode).p),
-            Self::Averaged(index) => Some(findings.averaged[index].parsed(mode).p),
-            Self::Comparison(index) => Some(findings.comparisons[index].parsed(mode).paired.p),
-            Self::Best => best.map(BestInTheDark::p_leader),
-            Self::Sees => best.map(|best| best.gain.p),
-            Self::Lead(level) => best.and_then(|best| Some(best.crossing.as_ref()?.levels.get(level)?.p)),
-            Self::Families(index) => Some(findings.contrasts[index].parsed(mode).p),
-            Self::Collapse(index) => against_clean(&findings.confusions[index]).map(|clean| clean.p(mode)),
-            Self::Overconfident(index) => Some(findings.calibrations[index].overconfidence.p),
-            Self::Growth(index) => findings.calibrations[index].growth.map(|growth| growth.p),
-            Self::Fidelity => findings.fidelity.as_ref().and_then(|found| Some(found.within[0]?.p)),
-        };
-        found.unwrap_or(1.0)
-    }
-
-    /// Stores the corrected p-value.
-    fn set_p_report(self, findings: &mut Findings<'_>, mode: ParsingMode, p: f64) {
-        let p = Some(p);
-        let best = match mode {
-            ParsingMode::Strict => findings.best.as_mut(),
-            ParsingMode::Lenient => findings.lenient_best.as_mut(),
-        };
-        match self {
-            Self::Pooled(index) => findings.pooled[index].set_p_report(mode, p),
-            Self::Averaged(index) => findings.averaged[index].set_p_report(mode, p),
-            Self::Comparison(index) => {
-                let comparison = &mut findings.comparisons[index];
-                match mode {
-                    ParsingMode::Strict => comparison.strict.p_report = p,
-                    ParsingMode::Lenient => comparison.lenient.p_report = p,
-                }
-            }
+    /// p-value before correction in a parsing, and the place for the corrected one; `None` if the test was not computed.
+    /// Confidence and fidelity exist only in strict parsing.
+    fn p<'f>(self, findings: &'f mut Findings<'_>, mode: ParsingMode) -> Option<(f64, &'f mut Option<f64>)> {
+        let is_strict = mode == ParsingMode::Strict;
+        let best = if is_strict { findings.best.as_mut() } else { findings.lenient_best.as_mut() };
+        let tested = match self {
+            Self::Pooled(index) => &mut findings.pooled[index].parsed_mut(mode).tested,
+            Self::Averaged(index) => &mut findings.averaged[index].parsed_mut(mode).tested,
+            Self::Comparison(index) => &mut findings.comparisons[index].parsed_mut(mode).tested,
+            Self::Sees => &mut best?.gain.tested,
+            Self::Lead(level) => &mut best?.crossing.as_mut()?.levels.get_mut(level)?.tested,
+            Self::Families(index) => findings.contrasts[index].parsed_mut(mode),
+            Self::Overconfident(index) => &mut findings.calibrations[index].overconfidence,
+            Self::Growth(index) => findings.calibrations[index].growth.as_mut()?,
+            // The largest p-value of several pairs, the p-value of an AUC, and that of an answer which the data chose.
             Self::Best => {
-                if let Some(best) = best {
-                    best.p_report = p;
-                }
-            }
-            Self::Sees => {
-                if let Some(best) = best {
-                    best.gain.p_report = p;
-                }
-            }
-            Self::Lead(level) => {
-                let crossing = best.and_then(|best| best.crossing.as_mut());
-                if let Some(lead) = crossing.and_then(|crossing| crossing.levels.get_mut(level)) {
-                    lead.p_report = p;
-                }
-            }
-            Self::Families(index) => findings.contrasts[index].parsed_mut(mode).p_report = p,
-            Self::Collapse(index) => {
-                let found = &mut findings.confusions[index].collapse;
-                if let Some(clean) = found.as_mut().and_then(|found| found.clean.as_mut()) {
-                    clean.p_report[mode as usize] = p;
-                }
-            }
-            // Confidence and fidelity have one p-value, from strict parsing.
-            Self::Overconfident(_) | Self::Growth(_) | Self::Fidelity if mode == ParsingMode::Lenient => {}
-            Self::Overconfident(index) => findings.calibrations[index].overconfidence.p_report = p,
-            Self::Growth(index) => {
-                if let Some(growth) = findings.calibrations[index].growth.as_mut() {
-                    growth.p_report = p;
-                }
+                let best = best?;
+                return Some((best.p_leader(), &mut best.p_report));
             }
             Self::Fidelity => {
-                if let Some(found) = findings.fidelity.as_mut() {
-                    found.p_report = p;
-                }
+                let fidelity = findings.fidelity.as_mut()?;
+                return Some((fidelity.within[0]?.p, &mut fidelity.p_report));
             }
-        }
+            Self::Collapse(index) => {
+                let clean = findings.confusions[index].collapse.as_mut()?.clean.as_mut()?;
+                return Some((clean.p(mode), &mut clean.parsed_mut(mode).tested.p_report));
+            }
+        };
+        Some((tested.p, &mut tested.p_report))
+    }
+
+    /// True if the test exists in a parsing. The p-value of one that exists in the strict parsing alone counts in both.
+    fn is_in(self, mode: ParsingMode) -> bool {
+        mode == ParsingMode::Strict || !matches!(self, Self::Overconfident(_) | Self::Growth(_) | Self::Fidelity)
     }
 }
 
@@ -528,7 +487,7 @@ struct Branch<T> {
 }
 
 impl<T: Copy> Branch<T> {
-    fn new(tree: &TestTree<T>, p: &impl Fn(T) -> f64) -> Self {
+    fn new(tree: &TestTree<T>, p: &mut impl FnMut(T) -> f64) -> Self {
         Self {
             test: tree.test.map(|test| (test, p(test))),
             rejected: None,
@@ -587,8 +546,8 @@ impl<T: Copy> Branch<T> {
 /// Returns all tests with their corrected p-values; `p` gives the p-value of a test. Tests with a corrected p-value
 /// below 0.05 are rejected.
 #[must_use]
-pub(super) fn adjust_p_values<T: Copy>(tree: &TestTree<T>, p: impl Fn(T) -> f64) -> Vec<(T, f64)> {
-    let mut root = Branch::new(tree, &p);
+pub(super) fn adjust_p_values<T: Copy>(tree: &TestTree<T>, mut p: impl FnMut(T) -> f64) -> Vec<(T, f64)> {
+    let mut root = Branch::new(tree, &mut p);
     let mut highest = 0.0_f64;
     let mut path = Vec::new();
     while let Some(ratio) = root.next(1.0, &mut path) {

@@ -85,14 +85,14 @@ fn one_model_pooled_is_its_own_comparison() {
         // The subjects are sorted: L0, L3-noise, L5-noise of the model, then the observer.
         let own = PairedComparison::new(grid, 1, 0, None, ParsingMode::Strict).unwrap();
         assert_eq!(dark.models, ["m"]);
-        assert_eq!(dark.strict.difference, own.difference);
-        assert!((dark.strict.p - own.p).abs() < 1e-15);
+        assert_eq!(dark.strict.tested.difference, own.tested.difference);
+        assert!((dark.strict.tested.p - own.tested.p).abs() < 1e-15);
         assert!((dark.strict.first - own.first).abs() < 1e-12);
         assert_eq!((dark.items, dark.dropped, dark.clusters), (23, 1, 12));
         // Two levels: the smaller p counts twice.
         let darkest = find(&findings, PooledKind::Darkness, "L5-noise")[0];
-        assert!((darkest.strict.holm - 2.0 * darkest.strict.p).abs() < 1e-15 && darkest.levels == 2);
-        assert_eq!(darkest.strict.verdict, Verdict::Worse);
+        assert!((darkest.strict.tested.holm - 2.0 * darkest.strict.tested.p).abs() < 1e-15 && darkest.levels == 2);
+        assert_eq!(darkest.strict.tested.verdict, Verdict::Worse);
         // By family the clusters are the same, and the sets are corrected apart.
         let by_family = findings.iter().filter(|finding| finding.family.is_some()).count();
         assert_eq!(by_family, 4);
@@ -118,12 +118,12 @@ fn items_are_those_that_every_model_answered_on_both_sides() {
         let noise = find(&findings, PooledKind::Noise, "L3-noise")[0];
         assert_eq!((noise.items, noise.dropped), (22, 2));
         assert_eq!(noise.models, ["a", "b", "c"]);
-        assert!((noise.strict.difference.value + 10.0 / 22.0).abs() < 1e-12);
+        assert!((noise.strict.tested.difference.value + 10.0 / 22.0).abs() < 1e-12);
         assert!((noise.strict.second - 1.0).abs() < 1e-12);
         // Frames 1 to 5 lose all, frame 0 has no item: 5 of 11 clusters differ, all in one direction. The swaps do not
         // reject 0, so that the interval holds it.
-        assert!((noise.strict.p - 2.0 / 32.0).abs() < 1e-12 && noise.clusters == 11);
-        assert!(noise.strict.difference.high.abs() < 1e-12);
+        assert!((noise.strict.tested.p - 2.0 / 32.0).abs() < 1e-12 && noise.clusters == 11);
+        assert!(noise.strict.tested.difference.high.abs() < 1e-12);
         assert!(find(&findings, PooledKind::Noise, "L5-noise").is_empty());
     });
 }
@@ -137,7 +137,7 @@ fn models_are_compared_with_their_own_words_if_some_were_asked() {
         let (findings, _) = pooled(grid);
         let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
         assert_eq!((&*blind.models, &*blind.blind_models), (&["a".to_owned()][..], &["a".to_owned()][..]));
-        assert_eq!(blind.strict.verdict, Verdict::Worse);
+        assert_eq!(blind.strict.tested.verdict, Verdict::Worse);
     });
     let other = [base, records("c", "", right), records("random", "", right)].concat();
     with_grid(&other, |grid| {
@@ -145,7 +145,7 @@ fn models_are_compared_with_their_own_words_if_some_were_asked() {
         let blind = find(&findings, PooledKind::Blind, "L3-noise")[0];
         assert_eq!(blind.models, ["a", "b"]);
         assert_eq!(blind.blind_models, ["c"]);
-        assert!((blind.strict.difference.value + 0.25).abs() < 1e-12);
+        assert!((blind.strict.tested.difference.value + 0.25).abs() < 1e-12);
     });
 }
 
@@ -157,8 +157,8 @@ fn few_clusters_give_no_verdict() {
     with_grid(&all, |grid| {
         let (findings, _) = pooled(grid);
         let dark = find(&findings, PooledKind::Darkness, "L3-noise")[0];
-        assert_eq!(dark.strict.verdict, Verdict::TooFewClusters);
-        assert!((dark.strict.p - 0.0625).abs() < 1e-12 && (dark.least_p - 0.0625).abs() < 1e-15);
+        assert_eq!(dark.strict.tested.verdict, Verdict::TooFewClusters);
+        assert!((dark.strict.tested.p - 0.0625).abs() < 1e-12 && (dark.least_p - 0.0625).abs() < 1e-15);
     });
 }
 
@@ -195,7 +195,7 @@ fn the_best_is_shown_better_than_every_other() {
         assert_eq!(best.not_shown_better_than, ["same"]);
         assert!(!best.is_shown() && best.pairs.len() == 3);
         assert_eq!(best.leader().model, "good");
-        assert_eq!(best.pairs[1].verdict, Verdict::Better);
+        assert_eq!(best.pairs[1].tested.verdict, Verdict::Better);
     });
     all.retain(|record| record.model != "same");
     with_grid(&all, |grid| {
@@ -230,7 +230,7 @@ fn crossing_p(records: &[Record]) -> f64 {
         let crossing = best.crossing.unwrap();
         assert_eq!((&*crossing.light, &*crossing.dark), ("bright", "steady"));
         assert_eq!(crossing.levels.len(), 2);
-        crossing.levels[0].p
+        crossing.levels[0].tested.p
     })
 }
 
@@ -249,13 +249,13 @@ fn leader_is_compared_with_its_own_replies_without_images() {
         let gain = best_in_the_dark(grid, ParsingMode::Strict).unwrap().gain;
         let choices = grid.items[0].asked.choices.len() as f64;
         assert!(!gain.is_against_blind);
-        assert!((gain.difference.value - (0.75 - 1.0 / choices)).abs() < 1e-12);
+        assert!((gain.tested.difference.value - (0.75 - 1.0 / choices)).abs() < 1e-12);
     });
     all.extend(records("a", "", dark));
     with_grid(&all, |grid| {
         let gain = best_in_the_dark(grid, ParsingMode::Strict).unwrap().gain;
         assert!(gain.is_against_blind);
-        assert!(gain.difference.value.abs() < 1e-12 && gain.p > 0.99, "{gain:?}");
+        assert!(gain.tested.difference.value.abs() < 1e-12 && gain.tested.p > 0.99, "{gain:?}");
     });
 }
 
@@ -316,10 +316,10 @@ fn enhancers_are_compared_with_each_other() {
         .collect();
     let pairs: Vec<String> = pooled.iter().map(|finding| names(finding)).collect();
     assert_eq!(pairs, ["a-b", "a-c", "b-c"]);
-    assert!((pooled[1].strict.difference.value - 1.0).abs() < 1e-12);
+    assert!((pooled[1].strict.tested.difference.value - 1.0).abs() < 1e-12);
     // Holm's correction is over the three pairs, and no sentence is about them.
-    assert!((pooled[1].strict.holm - 3.0 * pooled[1].strict.p).abs() < 1e-12);
-    assert!(pooled.iter().all(|finding| finding.strict.p_report.is_none()));
+    assert!((pooled[1].strict.tested.holm - 3.0 * pooled[1].strict.tested.p).abs() < 1e-12);
+    assert!(pooled.iter().all(|finding| finding.strict.tested.p_report.is_none()));
     let single: Vec<&Comparison> = findings
         .comparisons
         .iter()
@@ -388,15 +388,15 @@ fn false_answers_are_the_other_word_and_not_a_missing_one() {
         assert!((dark.strict.second - 1.0 / 12.0).abs() < 1e-12, "{dark:?}");
         // Ten frames change, all in one direction, and frame 0 does not; two levels.
         let (dark, darkest) = (&dark.strict, &darkest.strict);
-        assert!((dark.p - 2.0 / 1024.0).abs() < 1e-12 && (dark.holm - 2.0 * dark.p).abs() < 1e-12);
-        assert_eq!(dark.verdict, Verdict::Worse);
-        assert!((darkest.first - 0.0).abs() < 1e-12 && darkest.verdict == Verdict::NotShown);
+        assert!((dark.tested.p - 2.0 / 1024.0).abs() < 1e-12 && (dark.tested.holm - 2.0 * dark.tested.p).abs() < 1e-12);
+        assert_eq!(dark.tested.verdict, Verdict::Worse);
+        assert!((darkest.first - 0.0).abs() < 1e-12 && darkest.tested.verdict == Verdict::NotShown);
         let said_yes = &said_yes[0].strict;
         assert!((said_yes.first - 1.0 / 12.0).abs() < 1e-12 && said_yes.second < 1e-12);
-        assert_eq!(said_yes.verdict, Verdict::NotShown);
+        assert_eq!(said_yes.tested.verdict, Verdict::NotShown);
         // Accuracy counts what cannot be read as wrong.
         let accuracy = find(&findings, PooledKind::Darkness, "L5-noise")[0];
-        assert_eq!(accuracy.strict.verdict, Verdict::Worse);
+        assert_eq!(accuracy.strict.tested.verdict, Verdict::Worse);
     });
     with_grid(&all[6 * FRAMES..], |grid| {
         let (findings, _) = pooled(grid);

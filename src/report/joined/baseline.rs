@@ -199,7 +199,7 @@ impl Baseline {
     pub(super) fn is_worse(&self, unit: ClusterUnit) -> Result<bool> {
         let models: Vec<&BaselineRow> = self.rows.iter().filter(|row| !row.subject.is_reference()).collect();
         let old = &self.old;
-        if models.iter().any(|row| row.verdict == Verdict::Worse) {
+        if models.iter().any(|row| row.paired.tested.verdict == Verdict::Worse) {
             return Ok(true);
         }
         if let Some(missing) = self.missing_sentence() {
@@ -211,7 +211,8 @@ impl Baseline {
                  observer do not count)"
             ));
         }
-        let undecided: Vec<&BaselineRow> = models.into_iter().filter(|row| !row.verdict.is_decided()).collect();
+        let undecided: Vec<&BaselineRow> =
+            models.into_iter().filter(|row| !row.paired.tested.verdict.is_decided()).collect();
         if !undecided.is_empty() {
             let conditions: Vec<String> = undecided.iter().map(|row| name(&row.subject)).collect();
             return refuse(&format!(

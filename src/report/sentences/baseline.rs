@@ -19,7 +19,8 @@ pub(crate) fn against_baseline(rows: &[BaselineRow], old: &str, unit: ClusterUni
     let mut sentences = Vec::new();
     for model_rows in rows.chunk_by(|one, other| one.subject.model == other.subject.model) {
         for verdict in [Verdict::Worse, Verdict::Better] {
-            let detected: Vec<&BaselineRow> = model_rows.iter().copied().filter(|row| row.verdict == verdict).collect();
+            let detected: Vec<&BaselineRow> =
+                model_rows.iter().copied().filter(|row| row.paired.tested.verdict == verdict).collect();
             sentences.extend(detected_difference(&detected, old, unit));
         }
     }
@@ -37,17 +38,19 @@ pub(crate) fn no_verdict(rows: &[&BaselineRow], unit: ClusterUnit) -> String {
 /// The reason why no verdict is possible: missing replies, too few shared questions, or too few clusters for a small
 /// p-value.
 fn too_few(rows: &[&BaselineRow], numbers: &mut NamedNumbers) -> String {
-    let shared = rows.iter().map(|row| row.paired.difference.n).max().unwrap_or(0);
+    let shared = rows.iter().map(|row| row.paired.tested.difference.n).max().unwrap_or(0);
     let most_missing = rows
         .iter()
-        .filter(|row| row.verdict == Verdict::Missing || row.paired.missing > row.paired.difference.n)
+        .filter(|row| {
+            row.paired.tested.verdict == Verdict::Missing || row.paired.missing > row.paired.tested.difference.n
+        })
         .max_by_key(|row| row.paired.missing);
     if let Some(row) = most_missing {
         format!(
             "at {} {} of {} questions lack a reply in one of the runs, and their replies decide",
             row.subject.condition(),
             numbers.count("missing", row.paired.missing),
-            numbers.count("asked", row.paired.missing + row.paired.difference.n)
+            numbers.count("asked", row.paired.missing + row.paired.tested.difference.n)
         )
     } else if shared < MIN_PAIRS {
         format!(
@@ -66,16 +69,16 @@ fn too_few(rows: &[&BaselineRow], numbers: &mut NamedNumbers) -> String {
 
 /// The sentence about the conditions of a model that share a verdict; `None` without conditions.
 fn detected_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Option<Sentence> {
-    let largest = largest(rows, |row| row.paired.difference)?;
+    let largest = largest(rows, |row| row.paired.tested.difference)?;
     let mut numbers = NamedNumbers::new(unit);
-    let verdict = largest.verdict;
+    let verdict = largest.paired.tested.verdict;
     let word = if verdict == Verdict::Worse { "worse" } else { "better" };
     let up_to = if rows.len() > 1 { "up to " } else { "" };
     let text = format!(
         "{} is {word} than in {old} at {}, by {up_to}{} points.",
         largest.subject.model,
         conditions(rows, &mut numbers),
-        numbers.size("effect", largest.paired.difference.value)
+        numbers.size("effect", largest.paired.tested.difference.value)
     );
     let detail = detail(largest, &mut numbers) + &detectable(rows, &mut numbers);
     Some(numbers.sentence("baseline", verdict.into(), text, detail))
@@ -90,8 +93,9 @@ fn no_difference(rows: &[&BaselineRow], old: &str, unit: ClusterUnit) -> Sentenc
         let detail = "no model answered the same question about the same image in both".to_owned();
         return numbers.sentence("baseline", EffectDirection::Note, text, detail);
     }
-    let possible: Vec<&BaselineRow> = rows.iter().copied().filter(|row| row.verdict.is_decided()).collect();
-    let Some(largest) = largest(&possible, |row| row.paired.difference) else {
+    let possible: Vec<&BaselineRow> =
+        rows.iter().copied().filter(|row| row.paired.tested.verdict.is_decided()).collect();
+    let Some(largest) = largest(&possible, |row| row.paired.tested.difference) else {
         let text = format!("No verdict against {old} is possible.");
         let detail = too_few(rows, &mut numbers);
         return numbers.sentence("baseline", EffectDirection::Note, text, detail);
@@ -138,9 +142,9 @@ fn conditions(rows: &[&BaselineRow], numbers: &mut NamedNumbers) -> String {
 
 /// Effect, interval, p and n of a row.
 fn detail(row: &BaselineRow, numbers: &mut NamedNumbers) -> String {
-    let difference = numbers.difference("", row.paired.difference);
-    let p = numbers.p("p", row.holm);
-    let items = numbers.count("n", row.paired.difference.n);
+    let difference = numbers.difference("", row.paired.tested.difference);
+    let p = numbers.p("p", row.paired.tested.holm);
+    let items = numbers.count("n", row.paired.tested.difference.n);
     let clusters = numbers.clusters(row.paired.clusters);
     format!("{difference}, {p}; n = {items} in {clusters}")
 }

@@ -10,7 +10,7 @@ use crate::report::text::words::family as family_name;
 use crate::types::{Axis, AxisLevel, Variant};
 use darkqa_score::calibration::{Calibration, MIN_CONFIDENT_REPLIES};
 use darkqa_score::cluster::{ClusterUnit, MIN_CLUSTERS};
-use darkqa_score::comparisons::{Claim, Comparison, PooledFinding, PooledKind};
+use darkqa_score::comparisons::{Claim, Comparison, PooledFinding, PooledKind, Tested};
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Verdict;
@@ -77,19 +77,19 @@ pub(super) fn untouched(findings: &Findings<'_>) -> Option<Sentence> {
     let text = match finding.claim() {
         Claim::Detected(Verdict::Better) => format!(
             "At L0 images add {} points{}: {with} % with them, {without} % without.",
-            numbers.size("gain", finding.strict.difference.value),
+            numbers.size("gain", finding.strict.tested.difference.value),
             against(finding)
         ),
         Claim::Detected(_) => format!(
             "At L0 images cost {} points{}: {with} % with them, {without} % without.",
-            numbers.size("cost", finding.strict.difference.value),
+            numbers.size("cost", finding.strict.tested.difference.value),
             against(finding)
         ),
         // One sentence for all topics reports that no verdict is possible.
         Claim::Impossible | Claim::Missing => return None,
         _ => {
-            if let Some(unconfirmed) = unconfirmed(finding.claim(), finding.strict.difference) {
-                let difference = finding.strict.difference.value;
+            if let Some(unconfirmed) = unconfirmed(finding.claim(), finding.strict.tested.difference) {
+                let difference = finding.strict.tested.difference.value;
                 let verb = if difference < 0.0 { "cost" } else { "add" };
                 format!(
                     "At L0 images {verb} {} points{}{unconfirmed}: {with} % with them, {without} % without.",
@@ -120,7 +120,7 @@ pub(super) fn by_family<'f>(findings: &'f Findings<'_>, variant: &Variant) -> Ve
 /// all families (`pooled`) already report a loss of this model alone.
 pub(super) fn in_a_family(all: &[&Comparison], pooled: &[&PooledFinding], unit: ClusterUnit) -> Option<Sentence> {
     let worst = all.iter().copied().filter(|comparison| is_below(comparison)).min_by(|a, b| {
-        let [a, b] = [a, b].map(|comparison| comparison.strict.paired.difference.value);
+        let [a, b] = [a, b].map(|comparison| comparison.strict.tested.difference.value);
         a.total_cmp(&b)
     })?;
     let model = &worst.first.model;
@@ -190,12 +190,11 @@ fn levels(comparisons: &[&Comparison]) -> Vec<AxisLevel> {
 fn comparison_detail(comparison: &Comparison, numbers: &mut NamedNumbers) -> Option<String> {
     let (model, level) = (&comparison.first.model, comparison.first.level?);
     let against = if is_own(comparison) { String::new() } else { format!(" against {}", comparison.second.model) };
-    let tested = &comparison.strict;
-    let paired = &tested.paired;
+    let paired = &comparison.strict;
     numbers.at(&level);
-    let difference = numbers.difference("", paired.difference);
-    let p = numbers.p("p", tested.p_report.unwrap_or(tested.holm));
-    let n = numbers.count("n", paired.difference.n);
+    let difference = numbers.difference("", paired.tested.difference);
+    let p = numbers.p("p", paired.tested.stated_p());
+    let n = numbers.count("n", paired.tested.difference.n);
     let clusters = numbers.clusters(paired.clusters);
     Some(format!("{model} at {level}{against}: {difference}, {p}; n = {n} in {clusters}"))
 }
@@ -237,20 +236,25 @@ impl<'f> Confidence<'f> {
 
     /// True if the confidence is detected to be above the accuracy.
     fn is_overconfident(&self) -> bool {
-        self.dark.overconfidence.is_above()
+        is_above(self.dark.overconfidence)
     }
 
     /// True if the overconfidence is detected to be larger than at L0.
     fn has_grown(&self) -> bool {
-        self.dark.growth.is_some_and(|growth| growth.is_above())
+        self.dark.growth.is_some_and(is_above)
     }
+}
+
+/// True if a mean is detected to be above 0.
+fn is_above(tested: Tested) -> bool {
+    tested.difference.value > 0.0 && tested.is_detected()
 }
 
 /// The sentence about the model whose confidence is furthest above its accuracy. Both tests, of overconfidence and of
 /// its growth since L0, are corrected over all sentences.
 pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Sentence> {
     let most = all.iter().copied().max_by(|a, b| {
-        let [value, other] = [a, b].map(|one| one.dark.overconfidence.estimate.value);
+        let [value, other] = [a, b].map(|one| one.dark.overconfidence.difference.value);
         a.is_overconfident().cmp(&b.is_overconfident()).then(value.total_cmp(&other))
     })?;
     let mut numbers = NamedNumbers::new(unit);
@@ -275,11 +279,10 @@ pub(super) fn confidence(all: &[Confidence<'_>], unit: ClusterUnit) -> Option<Se
         );
         (EffectDirection::NotShown, text)
     };
-    let difference = numbers.difference("", most.dark.overconfidence.estimate);
-    let tested = most.dark.overconfidence;
-    let p = numbers.p("p", tested.p_report.unwrap_or(tested.p));
+    let difference = numbers.difference("", most.dark.overconfidence.difference);
+    let p = numbers.p("p", most.dark.overconfidence.stated_p());
     let clean = most.clean.map(|clean| {
-        let difference = numbers.difference("_L0", clean.overconfidence.estimate);
+        let difference = numbers.difference("_L0", clean.overconfidence.difference);
         format!(", {difference} at L0")
     });
     let replies = numbers.count("n", most.dark.replies);

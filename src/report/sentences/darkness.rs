@@ -144,7 +144,7 @@ pub(super) fn with_variant(
     let verdict = verdict?;
     let found = with_verdict(levels, verdict);
     let darkest = found.last()?;
-    let size = darkest.strict.difference.value;
+    let size = darkest.strict.tested.difference.value;
     let (text, more) = match verdict {
         Verdict::Worse => (
             format!(
@@ -163,7 +163,7 @@ pub(super) fn with_variant(
             if let Some(format) = format_alone(levels, unit) {
                 return Some(format);
             }
-            let text = if let Some(unconfirmed) = unconfirmed(darkest.claim(), darkest.strict.difference) {
+            let text = if let Some(unconfirmed) = unconfirmed(darkest.claim(), darkest.strict.tested.difference) {
                 format!(
                     "at {} accuracy is {} points {} than at L0{unconfirmed}.",
                     darkest.level,
@@ -203,7 +203,7 @@ fn over_levels(
     name: Option<&str>,
     mut numbers: NamedNumbers,
 ) -> Sentence {
-    let size = mean.strict.difference.value;
+    let size = mean.strict.tested.difference.value;
     let cause = mean.level.axis().unwrap_or(Axis::LIGHT).cause;
     let at = mean_levels(mean, levels);
     let text = if verdict == Verdict::Worse {
@@ -224,12 +224,12 @@ fn over_levels(
 /// night vision.
 fn possible_loss(levels: &[&PooledFinding], numbers: &mut NamedNumbers) -> String {
     let Some(finding) = levels.iter().min_by(|a, b| {
-        let [a, b] = [a, b].map(|finding| finding.strict.difference.low);
+        let [a, b] = [a, b].map(|finding| finding.strict.tested.difference.low);
         a.total_cmp(&b)
     }) else {
         return String::new();
     };
-    let largest = -finding.strict.difference.low;
+    let largest = -finding.strict.tested.difference.low;
     if largest <= WIDE {
         return String::new();
     }

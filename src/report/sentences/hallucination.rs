@@ -117,8 +117,8 @@ fn collapse_detail(answer: &TopAnswer<'_>, numbers: &mut NamedNumbers) -> String
     let ends = numbers.share_ends("", share);
     let clean = answer.collapse.clean.as_ref().map(|clean| {
         let share = numbers.percent("L0", clean.strict.second);
-        let difference = numbers.difference("_from_L0", clean.strict.difference);
-        let p = numbers.p("p", clean.p_report[0].unwrap_or(1.0));
+        let difference = numbers.difference("_from_L0", clean.strict.tested.difference);
+        let p = numbers.p("p", clean.strict.tested.p_report.unwrap_or(1.0));
         format!(", {share} % at L0 ({difference} points, {p})")
     });
     let limit = numbers.number("limit", 100.0 * MIN_EXCESS, 0);

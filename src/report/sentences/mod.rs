@@ -235,7 +235,7 @@ fn example_text(gain: &Gain<'_>, numbers: &mut NamedNumbers) -> String {
         return String::new();
     };
     let (before, after) = (numbers.number("psnr_raw", before, 1), numbers.number("psnr_enhanced", after, 1));
-    let difference = numbers.difference("_answers", answers.strict.difference);
+    let difference = numbers.difference("_answers", answers.strict.tested.difference);
     let note = match answers.claim() {
         Claim::Detected(_) => "",
         _ => ", not detected",

@@ -37,7 +37,7 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
     let blind = if best.gain.is_against_blind { "its own replies without images" } else { "chance" };
     let (tone, text) = if let Some(crossing) = &crossing {
         (EffectDirection::Note, crossing.text())
-    } else if is_best && best.gain.is_detected() && lenient.gain.is_detected() {
+    } else if is_best && best.gain.tested.is_detected() && lenient.gain.tested.is_detected() {
         let text = format!("{} sees best {place} ({over}).", leader.model);
         (EffectDirection::Better, text)
     } else if is_best {
@@ -71,12 +71,12 @@ pub(super) fn best(findings: &Findings<'_>) -> Option<Sentence> {
         crossing.detail(&mut numbers)
     } else {
         let pair = best.pairs.iter().find(|pair| pair.first == leader.model && pair.second == second.model)?;
-        let difference = numbers.difference("", pair.difference);
-        let p = numbers.p("p", best.p_report.unwrap_or(pair.holm));
+        let difference = numbers.difference("", pair.tested.difference);
+        let p = numbers.p("p", best.p_report.unwrap_or(pair.tested.holm));
         let parsing = if best.is_detected() && !is_best { ", detected in the strict parsing alone" } else { "" };
         let gain = if is_best {
-            let gain = numbers.difference("_gain", best.gain.difference);
-            let p = numbers.p("p_gain", best.gain.p_report.unwrap_or(best.gain.p));
+            let gain = numbers.difference("_gain", best.gain.tested.difference);
+            let p = numbers.p("p_gain", best.gain.tested.stated_p());
             format!("; {gain} against {blind}, {p}")
         } else {
             String::new()
@@ -130,11 +130,12 @@ impl<'b> DetectedCrossing<'b> {
             .iter()
             .zip(&other.levels)
             .filter(|(one, other)| {
-                let is_same_direction = one.lead.value * other.lead.value > 0.0;
+                let [one, other] = [one.tested, other.tested];
+                let is_same_direction = one.difference.value * other.difference.value > 0.0;
                 one.is_detected() && other.is_detected() && is_same_direction
             })
             .map(|(level, _)| level);
-        let (light, dark): (Vec<_>, Vec<_>) = detected.partition(|level| level.lead.value > 0.0);
+        let (light, dark): (Vec<_>, Vec<_>) = detected.partition(|level| level.tested.difference.value > 0.0);
         (!light.is_empty() && !dark.is_empty()).then_some(Self { crossing, light, dark })
     }
 
@@ -157,9 +158,9 @@ impl<'b> DetectedCrossing<'b> {
         let differences: Vec<String> = ends
             .into_iter()
             .filter_map(|(levels, name)| {
-                let largest = largest(levels, |one| one.lead)?;
-                p = p.max(largest.p_report.unwrap_or(largest.p));
-                let lead = numbers.difference(name, largest.lead);
+                let largest = largest(levels, |one| one.tested.difference)?;
+                p = p.max(largest.tested.stated_p());
+                let lead = numbers.difference(name, largest.tested.difference);
                 Some(format!("{lead} at {}", largest.level))
             })
             .collect();
@@ -192,7 +193,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
     };
     let whole = at_darkest(None)?;
     let (most, least) = (at_darkest(Some(&contrast.most))?, at_darkest(Some(&contrast.least))?);
-    let (of_most, of_least) = (most.strict.difference, least.strict.difference);
+    let (of_most, of_least) = (most.strict.tested.difference, least.strict.tested.difference);
     if whole.claim() != Claim::Detected(Verdict::Worse) || of_most.value >= 0.0 {
         return None;
     }
@@ -208,7 +209,7 @@ pub(super) fn families(findings: &Findings<'_>, variant: &Variant) -> Option<Sen
     );
     let test = contrast.strict;
     let difference = numbers.difference("", test.difference);
-    let p = numbers.p("p", test.p_report.unwrap_or(test.p));
+    let p = numbers.p("p", test.stated_p());
     let pairs = numbers.count("pairs", contrast.pairs);
     let [of_most, of_least] =
         [("_most", of_most), ("_least", of_least)].map(|(at, difference)| numbers.difference(at, difference));

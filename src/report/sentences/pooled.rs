@@ -46,7 +46,7 @@ impl<'f> DetectedEffect<'f> {
 
     /// The size in words: `up to 5.0 points`, `5.0 points` for one level, or `5.0 points on average`.
     fn size(&self, numbers: &mut NamedNumbers) -> String {
-        let size = numbers.size("effect", self.largest.strict.difference.value);
+        let size = numbers.size("effect", self.largest.strict.tested.difference.value);
         if self.is_mean() {
             format!("{size} points on average")
         } else if self.has_several_levels {
@@ -120,8 +120,8 @@ pub(super) fn noise(levels: &[&PooledFinding], means: &[&PooledFinding], unit: C
         return vec![format];
     }
     let mut numbers = NamedNumbers::new(unit);
-    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
-        let difference = largest.strict.difference.value;
+    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.tested.difference) {
+        let difference = largest.strict.tested.difference.value;
         format!(
             "With noise, accuracy is {} points {} than by the exposure drop alone ({}){unconfirmed}.",
             numbers.size("effect", difference),
@@ -195,8 +195,8 @@ fn no_effect(undetected: &[&PooledFinding], levels: &[&PooledFinding], unit: Clu
     let mut numbers = NamedNumbers::new(unit);
     numbers.about(name);
     let at = runs(undetected, levels);
-    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.difference) {
-        let difference = largest.strict.difference.value;
+    let text = if let Some(unconfirmed) = unconfirmed(largest.claim(), largest.strict.tested.difference) {
+        let difference = largest.strict.tested.difference.value;
         let up_to = if undetected.len() > 1 { "up to " } else { "" };
         let size = numbers.size("effect", difference);
         let word = lower_or_higher(difference);
@@ -239,16 +239,16 @@ pub(super) fn unconfirmed(claim: Claim, difference: Estimate) -> Option<&'static
 /// other findings.
 pub(super) fn reservation(finding: &PooledFinding, numbers: &mut NamedNumbers) -> String {
     let strict = &finding.strict;
-    let difference = strict.difference;
+    let difference = strict.tested.difference;
     match finding.claim() {
         Claim::Detected(_) | Claim::Impossible | Claim::Missing => String::new(),
         Claim::StrictOnly(_) => ", detected in the strict parsing alone".to_owned(),
         Claim::InOwnSet => {
-            format!(", detected only if no other finding is counted ({})", numbers.p("own_p", strict.holm))
+            format!(", detected only if no other finding is counted ({})", numbers.p("own_p", strict.tested.holm))
         }
         Claim::Open if difference.low <= 0.0 && difference.high >= 0.0 => String::new(),
         Claim::Open => {
-            format!(", not detected after correction (uncorrected {})", numbers.p("uncorrected_p", strict.p))
+            format!(", not detected after correction (uncorrected {})", numbers.p("uncorrected_p", strict.tested.p))
         }
     }
 }
@@ -285,7 +285,7 @@ pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut NamedNumbers) -> St
         .iter()
         .map(|finding| {
             let name = format!("difference_{}", finding.level);
-            numbers.points(&name, finding.strict.difference.value)
+            numbers.points(&name, finding.strict.tested.difference.value)
         })
         .collect();
     format!("; at {}: {}", level_runs(&all, &all), differences.join(", "))
@@ -295,12 +295,12 @@ pub(super) fn curve(levels: &[&PooledFinding], numbers: &mut NamedNumbers) -> St
 pub(super) fn detail(finding: &PooledFinding, numbers: &mut NamedNumbers, more: &str) -> String {
     let who = models(&finding.models, numbers);
     let strict = &finding.strict;
-    let difference = numbers.difference("", strict.difference);
+    let difference = numbers.difference("", strict.tested.difference);
     match &finding.mean_over[..] {
         [] => numbers.at(&finding.level),
         over => numbers.at(&level_runs(over, over)),
     }
-    let p = numbers.p("p", strict.p_report.unwrap_or(strict.holm));
+    let p = numbers.p("p", strict.tested.stated_p());
     let sample = numbers.sample(finding);
     format!("{who}: {difference}, {p}{more}; {sample}")
 }

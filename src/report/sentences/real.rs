@@ -52,7 +52,7 @@ fn cost(row: &Comparison, pair: &PairDarkness, unit: ClusterUnit) -> Sentence {
     let text = match verdict(row) {
         Verdict::Worse | Verdict::Better => {
             let does = if verdict(row) == Verdict::Worse { "loses" } else { "gains" };
-            let size = numbers.size("effect", row.strict.paired.difference.value);
+            let size = numbers.size("effect", row.strict.tested.difference.value);
             format!("{place}, {model} {does} {size} points against the light.")
         }
         _ => match unconfirmed_size(row, &mut numbers) {
@@ -70,7 +70,7 @@ fn against_synthetic(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let mut numbers = NamedNumbers::new(unit);
     let (model, synthetic) = (&row.first.model, light(&row.second.variant, None));
     let level = row.second.condition();
-    let (name, size) = (row.first.condition(), row.strict.paired.difference.value);
+    let (name, size) = (row.first.condition(), row.strict.tested.difference.value);
     let text = match verdict(row) {
         Verdict::Worse | Verdict::Better => {
             let harder = if verdict(row) == Verdict::Worse { "harder" } else { "easier" };
@@ -96,7 +96,7 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
     let text = match verdict(row) {
         Verdict::Worse | Verdict::Better => {
             let does = if verdict(row) == Verdict::Worse { "harms" } else { "helps" };
-            let size = numbers.size("effect", row.strict.paired.difference.value);
+            let size = numbers.size("effect", row.strict.tested.difference.value);
             format!("{name} {does} {model} with {raw}, by {size} points.")
         }
         _ => match unconfirmed_size(row, &mut numbers) {
@@ -111,7 +111,7 @@ fn enhanced(row: &Comparison, unit: ClusterUnit) -> Sentence {
 
 /// An effect that is not detected although its interval excludes 0, as `5.0 points lower`, and the end of its sentence.
 fn unconfirmed_size(row: &Comparison, numbers: &mut NamedNumbers) -> Option<(String, &'static str)> {
-    let difference = row.strict.paired.difference;
+    let difference = row.strict.tested.difference;
     let end = unconfirmed(row.claim(), difference)?;
     let size = numbers.size("effect", difference.value);
     let word = lower_or_higher(difference.value);
@@ -128,10 +128,10 @@ fn verdict(row: &Comparison) -> Verdict {
 
 /// A sentence with the difference, its interval, its test and its sample.
 fn sentence(kind: &'static str, row: &Comparison, mut numbers: NamedNumbers, text: String) -> Sentence {
-    let paired = &row.strict.paired;
-    let difference = numbers.difference("", paired.difference);
-    let p = numbers.p("p", row.strict.p_report.unwrap_or(row.strict.holm));
-    let n = numbers.count("n", paired.difference.n);
+    let paired = &row.strict;
+    let difference = numbers.difference("", paired.tested.difference);
+    let p = numbers.p("p", row.strict.tested.stated_p());
+    let n = numbers.count("n", paired.tested.difference.n);
     let clusters = numbers.clusters(paired.clusters);
     let detail = format!("{difference}, {p}, n = {n} in {clusters}");
     let tone =

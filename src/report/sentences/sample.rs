@@ -34,7 +34,7 @@ pub(super) fn topic_in_light(kind: PooledKind, variant: &Variant, enhancer: Opti
 
 /// True if no finding of a set can have a verdict, because there are too few clusters for a small corrected p-value.
 pub(super) fn is_impossible(set: &[&PooledFinding]) -> bool {
-    set.iter().all(|finding| !finding.strict.verdict.is_possible())
+    set.iter().all(|finding| !finding.strict.tested.verdict.is_possible())
 }
 
 /// The topics without a possible verdict because of too few clusters; `None` if every topic can have one. If the same
@@ -90,14 +90,14 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
     let whole = all.iter().filter(|finding| {
         finding.family.is_none()
             && finding.kind != PooledKind::EnhancerPair
-            && finding.strict.verdict != Verdict::Missing
+            && finding.strict.tested.verdict != Verdict::Missing
     });
-    let which = if whole.clone().all(|finding| finding.strict.verdict.is_possible()) {
+    let which = if whole.clone().all(|finding| finding.strict.tested.verdict.is_possible()) {
         "the findings"
     } else {
         "the findings that may have a verdict"
     };
-    let whole = whole.filter(|finding| finding.strict.verdict.is_possible());
+    let whole = whole.filter(|finding| finding.strict.tested.verdict.is_possible());
     let narrowest = whole.clone().min_by(|a, b| half_width(a).total_cmp(&half_width(b)))?;
     let widest = whole.max_by(|a, b| half_width(a).total_cmp(&half_width(b)))?;
     if half_width(widest) <= WIDE {
@@ -117,7 +117,7 @@ pub(super) fn power(all: &[PooledFinding], unit: ClusterUnit) -> Option<Sentence
 
 /// Half the width of a finding's interval, as a share.
 fn half_width(finding: &PooledFinding) -> f64 {
-    (finding.strict.difference.high - finding.strict.difference.low) / 2.0
+    (finding.strict.tested.difference.high - finding.strict.tested.difference.low) / 2.0
 }
 
 /// The models that are left out of findings, because they answered fewer questions than others. Findings with the same
@@ -235,7 +235,7 @@ impl<'f> Undecided<'f> {
             let share = numbers.percent("missing", missing_share(worst));
             reasons.push(format!("{share} % of the questions lack a reply at {}", worst.level));
             let who = models(&worst.models, &mut numbers);
-            let difference = numbers.difference("", worst.strict.difference);
+            let difference = numbers.difference("", worst.strict.tested.difference);
             details.push(format!(
                 "{who}: {difference} at {}, with an interval for all values of the missing replies",
                 worst.level

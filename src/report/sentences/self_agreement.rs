@@ -203,8 +203,8 @@ fn darkness_detail(
         parts.push(format!("entropy of its answers {clean} at L0, {here} at {level}"));
     }
     if let Some(test) = test {
-        let difference = numbers.difference("", test.strict.paired.difference);
-        let p = numbers.p("p", test.strict.p_report.unwrap_or(test.strict.holm));
+        let difference = numbers.difference("", test.strict.tested.difference);
+        let p = numbers.p("p", test.strict.tested.stated_p());
         parts.push(format!("{difference} points against L0 asked again, {p}"));
     }
     if let Some(read) = found.light_of(model).and_then(|light| light.read) {
@@ -234,7 +234,7 @@ fn enhanced(found: &SelfAgreement<'_>, model: &str, variant: &Variant, enhancer:
         (!detected.is_empty()).then(|| level_runs(&detected, &levels))
     });
     let strongest = own.iter().max_by(|one, other| {
-        let [one, other] = [one, other].map(|c| c.strict.paired.difference.value.abs());
+        let [one, other] = [one, other].map(|c| c.strict.tested.difference.value.abs());
         one.total_cmp(&other)
     })?;
     let (tone, text) = if found.set.light == SetLight::Dark && *variant == Variant::NONE {
@@ -245,8 +245,8 @@ fn enhanced(found: &SelfAgreement<'_>, model: &str, variant: &Variant, enhancer:
     let mut numbers = NamedNumbers::new(found.unit);
     numbers.about(enhancer);
     let level = strongest.first.level?;
-    let difference = numbers.difference("", strongest.strict.paired.difference);
-    let p = numbers.p("p", strongest.strict.p_report.unwrap_or(strongest.strict.holm));
+    let difference = numbers.difference("", strongest.strict.tested.difference);
+    let p = numbers.p("p", strongest.strict.tested.stated_p());
     let against = if level == AxisLevel::L0 { "L0 asked again" } else { "raw" };
     let detail = format!("largest at {level}: {difference} points of agreement against {against}, {p}");
     Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))

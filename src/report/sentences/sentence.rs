@@ -229,13 +229,13 @@ impl NamedNumbers {
             let dropped = self.count("dropped", finding.dropped);
             parts.push(format!("{dropped} left out because a model has no reply"));
         }
-        match finding.strict.p_by {
-            SwapMethod::Counted => {}
-            SwapMethod::Drawn(draws) => {
+        match finding.strict.tested.p_by {
+            None | Some(SwapMethod::Counted) => {}
+            Some(SwapMethod::Drawn(draws)) => {
                 let draws = self.count("draws", draws);
                 parts.push(format!("p by {draws} random swaps"));
             }
-            SwapMethod::Normal => parts.push("p by the normal distribution".to_owned()),
+            Some(SwapMethod::Normal) => parts.push("p by the normal distribution".to_owned()),
         }
         parts.join(", ")
     }
@@ -292,7 +292,7 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
         .copied()
         .filter(|finding| {
             let readable = finding.format[0] - finding.format[1];
-            let difference = finding.strict.difference.value;
+            let difference = finding.strict.tested.difference.value;
             matches!(finding.claim(), Claim::StrictOnly(_)) && readable / difference >= 0.5
         })
         .collect();
@@ -310,14 +310,14 @@ pub(super) fn format_alone(levels: &[&PooledFinding], unit: ClusterUnit) -> Opti
     };
     let mut numbers = NamedNumbers::new(unit);
     let readable = numbers.size("format", largest.format[0] - largest.format[1]);
-    let lenient = numbers.difference("_lenient", largest.lenient.difference);
+    let lenient = numbers.difference("_lenient", largest.lenient.tested.difference);
     let text = format!(
         "{place}, {readable} % {more} replies keep to the answer format; no {effect} of accuracy was detected ({lenient})."
     );
     let who = models(&largest.models, &mut numbers);
     let [here, there] = [("kept", 0), ("kept_else", 1)].map(|(name, side)| numbers.percent(name, largest.format[side]));
-    let strict = numbers.difference("", largest.strict.difference);
-    let p = numbers.p("p", largest.strict.p_report.unwrap_or(1.0));
+    let strict = numbers.difference("", largest.strict.tested.difference);
+    let p = numbers.p("p", largest.strict.tested.p_report.unwrap_or(1.0));
     let sample = numbers.sample(largest);
     let detail = format!("{who}: {here} % keep to it, {there} % without; strict parsing {strict}, {p}; {sample}");
     Some(numbers.sentence("format", EffectDirection::Note, text, detail))

@@ -100,7 +100,7 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
         .iter()
         .find(|comparison| comparison.kind == ComparisonKind::Level && comparison.first.level == darkest);
     let gain = comparisons.iter().filter(|comparison| comparison.kind == ComparisonKind::Enhancer).max_by(|a, b| {
-        let [a, b] = [a, b].map(|gain| gain.strict.paired.difference.value);
+        let [a, b] = [a, b].map(|gain| gain.strict.tested.difference.value);
         a.total_cmp(&b)
     });
     let below = grid.subjects.iter().filter(|subject| {
@@ -117,11 +117,11 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
         clean,
         area: curve.and_then(|curve| curve.summary.area),
         darkest,
-        change: change.map(|change| (change.strict.paired.difference, change.verdict())),
+        change: change.map(|change| (change.strict.tested.difference, change.verdict())),
         threshold: curve.map(|curve| curve.summary.threshold),
         gain: gain.and_then(|gain| {
             let enhancer = gain.first.enhancer.as_ref()?.to_string();
-            let difference = gain.strict.paired.difference;
+            let difference = gain.strict.tested.difference;
             Some((enhancer, gain.first.level?, difference, gain.verdict()))
         }),
         below: below.filter_map(|subject| subject.level).collect(),

@@ -9,7 +9,7 @@ use crate::types::degradations::Kind;
 use crate::types::text::counted;
 use crate::types::{AxisLevel, ProfileName};
 use darkqa_score::accuracies::Curve;
-use darkqa_score::comparisons::{ClaimVerdict, FindingByProfile, NoiseHypothesis, Robustness, TestedEffect};
+use darkqa_score::comparisons::{ClaimVerdict, EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness};
 use darkqa_score::findings::Findings;
 
 /// Two tables: the file has a row for each finding and profile; the report has a row for each finding and a column for
@@ -37,7 +37,7 @@ fn file_table(found: &[FindingByProfile]) -> Table {
         .column(Number, "csv effect low high n", |(_, effect)| effect.effect.map(|effect| effect.difference))
         .column(P, "csv p", |(_, effect)| effect.effect.map(|effect| effect.p))
         .column(P, "csv p_holm", |(_, effect)| effect.effect.map(|effect| effect.holm))
-        .column(Text, "csv verdict", |(_, effect)| effect.effect.map_or("not asked", |effect| effect.verdict.word()))
+        .column(Text, "csv verdict", |(_, effect)| effect.effect.map_or("not asked", |_| effect.verdict.word()))
         .column(Text, "csv holds", |(finding, _)| finding.robustness.word())
         .column(Count, "csv dropped", |(finding, _)| finding.dropped)
         .build()
@@ -80,7 +80,7 @@ fn report_table(findings: &Findings<'_>, profiles: &[&ProfileName]) -> Table {
             ..ColumnHeads::default()
         };
         table = table.column(Text, heads, |row| match row {
-            ProfileRow::Finding(finding) => effect(finding.effects[index].effect.as_ref()),
+            ProfileRow::Finding(finding) => effect(&finding.effects[index]),
             ProfileRow::Thresholds(_, curves) => threshold(curves, profile),
         });
     }
@@ -145,13 +145,13 @@ fn subject(finding: &FindingByProfile) -> String {
 }
 
 /// Effect with its interval and its verdict for the finding, as in `+12.3 [8.1, 16.2] holds`.
-fn effect(effect: Option<&TestedEffect>) -> String {
-    effect.map_or_else(
+fn effect(in_profile: &EffectInProfile) -> String {
+    in_profile.effect.map_or_else(
         || "not asked".to_owned(),
         |effect| {
             let value = points(effect.difference.value);
             let ends = ends_in_points(effect.difference);
-            format!("{value} [{ends}] {}", effect.verdict.word())
+            format!("{value} [{ends}] {}", in_profile.verdict.word())
         },
     )
 }
@@ -223,8 +223,8 @@ fn profiles_with_verdict(finding: &FindingByProfile, verdict: ClaimVerdict) -> V
     finding
         .effects
         .iter()
+        .filter(|in_profile| in_profile.verdict == verdict)
         .filter_map(|in_profile| Some((&in_profile.profile, in_profile.effect.as_ref()?)))
-        .filter(|(_, effect)| effect.verdict == verdict)
         .map(|(profile, effect)| match verdict {
             ClaimVerdict::Holds => profile.to_string(),
             ClaimVerdict::Opposite | ClaimVerdict::Open => {
@@ -285,18 +285,14 @@ fn notes(found: &[FindingByProfile]) -> Vec<String> {
 mod tests {
     use super::*;
     use crate::types::Severity;
-    use darkqa_score::comparisons::EffectInProfile;
+    use darkqa_score::comparisons::Tested;
     use darkqa_score::estimate::Estimate;
 
     fn effect_in(profile: &str, low: f64, high: f64, verdict: ClaimVerdict) -> EffectInProfile {
         EffectInProfile {
             profile: ProfileName::new(profile).unwrap(),
-            effect: Some(TestedEffect {
-                difference: Estimate { value: f64::midpoint(low, high), low, high, n: 9 },
-                verdict,
-                p: 0.01,
-                holm: 0.02,
-            }),
+            effect: Some(Tested::new(Estimate { value: f64::midpoint(low, high), low, high, n: 9 }, 0.01)),
+            verdict,
         }
     }
 
@@ -321,7 +317,7 @@ mod tests {
             sentence(&finding),
             "Noise compounds the drop: holds under paper, eld; open under physical (−1.2 to +5.0 points)."
         );
-        assert_eq!(effect(finding.effects[2].effect.as_ref()), "+1.9 [−1.2, +5.0] open");
+        assert_eq!(effect(&finding.effects[2]), "+1.9 [−1.2, +5.0] open");
         finding.effects[1] = effect_in("eld", -0.4, -0.2, ClaimVerdict::Opposite);
         finding.effects[2].effect = None;
         finding.claim = NoiseHypothesis::EnhancerHarms(crate::types::EnhancerName::new("ruas").unwrap());

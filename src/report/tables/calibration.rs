@@ -47,7 +47,7 @@ fn confidence(findings: &Findings<'_>, all: &[Calibration]) -> Table {
         .column(
             Points,
             "csv overconfidence overconfidence_low overconfidence_high | terminal overconfidence, interval | page overconfidence [95 %]",
-            |row| row.overconfidence.estimate,
+            |row| row.overconfidence.difference,
         );
     let ratio_columns: [(&str, ColumnValue); 6] = [
         ("csv ece ece_low ece_high | terminal calibration error | page calibration error [95 %]", |row| row.error),

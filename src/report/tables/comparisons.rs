@@ -78,8 +78,7 @@ fn tables_by_kind(
             .filter(|comparison| comparison.kind == kind)
             .partition(|comparison| comparison.family.is_none());
         let (caption, heading) = titles(kind);
-        let least_p_values =
-            overall.iter().map(|comparison| (comparison.least_holm, comparison.strict.paired.clusters));
+        let least_p_values = overall.iter().map(|comparison| (comparison.least_holm, comparison.strict.clusters));
         let clusters_note = too_few_clusters(least_p_values, &unit.to_string());
         let mut overall_table = table(kind, caption, &overall, ParsingMode::Strict);
         overall_table.is_folded =
@@ -266,25 +265,25 @@ fn number_columns(builder: TableBuilder<&Comparison>, mode: ParsingMode) -> Tabl
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %] \
                       | latex Difference [95\\,\\%]";
     builder
-        .column(Count, "csv n | terminal n", |comparison| comparison.parsed(mode).paired.difference.n)
-        .column(Number, "csv first", |comparison| comparison.parsed(mode).paired.first)
-        .column(Percent, "csv second | latex Raw", |comparison| comparison.parsed(mode).paired.second)
-        .column(Percent, "latex Enhanced", |comparison| comparison.parsed(mode).paired.first)
-        .column(Points, difference, |comparison| comparison.parsed(mode).paired.difference)
+        .column(Count, "csv n | terminal n", |comparison| comparison.parsed(mode).tested.difference.n)
+        .column(Number, "csv first", |comparison| comparison.parsed(mode).first)
+        .column(Percent, "csv second | latex Raw", |comparison| comparison.parsed(mode).second)
+        .column(Percent, "latex Enhanced", |comparison| comparison.parsed(mode).first)
+        .column(Points, difference, |comparison| comparison.parsed(mode).tested.difference)
         .column(Count, "latex Rescued / harmed", |comparison| {
-            format!("{} / {}", comparison.parsed(mode).paired.gained, comparison.parsed(mode).paired.lost)
+            format!("{} / {}", comparison.parsed(mode).gained, comparison.parsed(mode).lost)
         })
         .column(Count, "csv only_first | terminal only first | page only first", |comparison| {
-            comparison.parsed(mode).paired.gained
+            comparison.parsed(mode).gained
         })
         .column(Count, "csv only_second | terminal only second | page only second", |comparison| {
-            comparison.parsed(mode).paired.lost
+            comparison.parsed(mode).lost
         })
-        .column(Count, "page n", |comparison| comparison.parsed(mode).paired.difference.n)
-        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| comparison.parsed(mode).paired.mcnemar)
-        .column(P, "csv p | page p", |comparison| comparison.parsed(mode).paired.p)
+        .column(Count, "page n", |comparison| comparison.parsed(mode).tested.difference.n)
+        .column(P, "csv p_mcnemar | page p (McNemar)", |comparison| comparison.parsed(mode).mcnemar)
+        .column(P, "csv p | page p", |comparison| comparison.parsed(mode).tested.p)
         .column(P, "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)", |comparison| {
-            comparison.parsed(mode).holm
+            comparison.parsed(mode).tested.holm
         })
 }
 

@@ -71,7 +71,7 @@ fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: Parsing
         })
         .column(Text, "csv names", |finding| finding.models.join(";"))
         .column(Text, "csv mode", |_| mode.name())
-        .column(P, "csv p_report", |finding| finding.parsed(mode).p_report)
+        .column(P, "csv p_report", |finding| finding.parsed(mode).tested.p_report)
         .build()
 }
 
@@ -88,11 +88,11 @@ fn number_columns(builder: TableBuilder<&PooledFinding>, mode: ParsingMode) -> T
         .column(
             Points,
             "csv difference low high | terminal difference, 95 % interval | page difference [95 %]",
-            |finding| finding.parsed(mode).difference,
+            |finding| finding.parsed(mode).tested.difference,
         )
-        .column(P, "csv p | page p", |finding| finding.parsed(mode).p)
-        .column(Text, "csv p_by", |finding| finding.parsed(mode).p_by.to_string())
-        .column(P, "csv p_holm | terminal p (Holm) | page p (Holm)", |finding| finding.parsed(mode).holm)
+        .column(P, "csv p | page p", |finding| finding.parsed(mode).tested.p)
+        .column(Text, "csv p_by", |finding| finding.parsed(mode).tested.p_by.map(|method| method.to_string()))
+        .column(P, "csv p_holm | terminal p (Holm) | page p (Holm)", |finding| finding.parsed(mode).tested.holm)
         .column(Number, "csv p_least", |finding| finding.least_p)
 }
 
@@ -157,7 +157,7 @@ fn notes(findings: &[&PooledFinding], unit: &str) -> Vec<String> {
 fn random_swaps_note(findings: &[&PooledFinding]) -> Option<String> {
     let methods: BTreeSet<String> = findings
         .iter()
-        .map(|finding| finding.strict.p_by)
+        .filter_map(|finding| finding.strict.tested.p_by)
         .filter(|method| *method != SwapMethod::Counted)
         .map(|method| method.to_string())
         .collect();
@@ -228,10 +228,10 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
         .column(Percent, "page second", |row| row.second().map(|model| model.mean.value))
         .column(Text, "page first less L0", |row| loss(row.first()))
         .column(Text, "page second less L0", |row| loss(row.second()))
-        .column(Points, "csv difference low high n | page difference [95 %]", |row| row.pair.difference)
-        .column(P, "csv p | page p", |row| row.pair.p)
-        .column(Text, "csv p_by", |row| row.pair.p_by.to_string())
-        .column(P, "csv p_holm | page p (Holm)", |row| row.pair.holm)
+        .column(Points, "csv difference low high n | page difference [95 %]", |row| row.pair.tested.difference)
+        .column(P, "csv p | page p", |row| row.pair.tested.p)
+        .column(Text, "csv p_by", |row| row.pair.tested.p_by.map(|method| method.to_string()))
+        .column(P, "csv p_holm | page p (Holm)", |row| row.pair.tested.holm)
         .column(ColumnKind::Verdict, "page", |row| TableCell::verdict(row.best.verdict(row.pair, is_detected)))
         .column(Text, "csv verdict", |row| {
             let verdict = row.best.verdict(row.pair, is_detected);
@@ -261,21 +261,21 @@ pub(crate) fn baseline(rows: &[BaselineRow], old: &str) -> Table {
         .column(Text, "csv condition | terminal condition | page condition | latex Condition", |row| {
             row.subject.condition()
         })
-        .column(Count, "csv n | terminal n | page n | latex $n$", |row| row.paired.difference.n)
+        .column(Count, "csv n | terminal n | page n | latex $n$", |row| row.paired.tested.difference.n)
         .column(Count, "csv other_images", |row| row.other_images)
         .column(Percent, "csv old | page old in %", |row| row.paired.second)
         .column(Percent, "csv new | page new in %", |row| row.paired.first)
-        .column(Points, difference, |row| row.paired.difference)
+        .column(Points, difference, |row| row.paired.tested.difference)
         .column(Count, "csv only_new | terminal only new | page only new | latex Only new", |row| row.paired.gained)
         .column(Count, "csv only_old | terminal only old | page only old | latex Only old", |row| row.paired.lost)
-        .column(P, "csv p", |row| row.paired.p)
-        .column(P, "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)", |row| row.holm);
+        .column(P, "csv p", |row| row.paired.tested.p)
+        .column(P, "csv p_holm | terminal p (Holm) | page p (Holm) | latex $p$ (Holm)", |row| row.paired.tested.holm);
     let mut table = reply_columns(builder)
-        .column(ColumnKind::Verdict, "csv verdict | terminal | page | latex", |row| row.verdict)
+        .column(ColumnKind::Verdict, "csv verdict | terminal | page | latex", |row| row.paired.tested.verdict)
         .build();
     table.heading = Some(format!("New less {old}, paired by question and image"));
     table.latex = Some(format!("New less {}, paired by question, in percentage points.", escape(old)));
-    let too_few = rows.iter().filter(|row| row.verdict == Verdict::TooFew).count();
+    let too_few = rows.iter().filter(|row| row.paired.tested.verdict == Verdict::TooFew).count();
     if too_few > 0 {
         let line = format!("too few: fewer than {MIN_PAIRS} items are shared, so no verdict is given");
         table.notes.push(line);

@@ -244,7 +244,7 @@ fn families(findings: &Findings<'_>) -> Table {
             losses.get(family).map_or_else(
                 || "no level".to_owned(),
                 |loss| {
-                    let difference = loss.strict.difference;
+                    let difference = loss.strict.tested.difference;
                     let [value, low, high] = [difference.value, difference.low, difference.high].map(points);
                     format!("{}: {value} [{low}, {high}]", loss.level)
                 },
@@ -272,10 +272,10 @@ fn first_losses<'f>(findings: &'f Findings<'_>, variant: &Variant) -> BTreeMap<&
         .filter(|finding| finding.kind == PooledKind::Darkness && finding.variant == *variant)
         .filter_map(|finding| Some((finding.family.as_ref()?, finding)))
         .collect();
-    let p_values: Vec<f64> = tested.iter().map(|(_, finding)| finding.strict.p).collect();
+    let p_values: Vec<f64> = tested.iter().map(|(_, finding)| finding.strict.tested.p).collect();
     let mut losses = BTreeMap::new();
     for ((family, finding), p_holm) in tested.into_iter().zip(holm(&p_values)) {
-        if p_holm < ALPHA && finding.strict.verdict == Verdict::Worse {
+        if p_holm < ALPHA && finding.strict.tested.verdict == Verdict::Worse {
             let first = losses.entry(family).or_insert(finding);
             if finding.level < first.level {
                 *first = finding;

@@ -7,7 +7,6 @@ use crate::comparisons::paired::PairedComparison;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::grid::{Grid, GridItem};
 use crate::model_in_condition::ModelInCondition;
-use crate::significance::ALPHA;
 use darkqa_base::types::{AxisLevel, Family};
 
 /// Maximum number of different answers of a family that gets a confusion table.
@@ -125,9 +124,6 @@ pub struct AgainstClean {
     pub lenient: PairedComparison,
     /// True if the answer is the most common one of both sides together.
     pub is_commonest: bool,
-    /// p-values after the correction over all tests behind sentences, by parsing; `None` if no sentence is about the
-    /// answer.
-    pub p_report: [Option<f64>; 2],
 }
 
 impl AgainstClean {
@@ -164,28 +160,29 @@ impl AgainstClean {
                 },
             )
         });
-        Some(Self {
-            strict: strict?,
-            lenient: lenient?,
-            is_commonest: times.values().all(|times| *times <= own),
-            p_report: [None; 2],
-        })
+        Some(Self { strict: strict?, lenient: lenient?, is_commonest: times.values().all(|times| *times <= own) })
     }
 
     /// p-value of no difference in a parsing; 1 if another answer is more common.
     pub(crate) fn p(&self, mode: ParsingMode) -> f64 {
         match mode {
             _ if !self.is_commonest => 1.0,
-            ParsingMode::Strict => self.strict.p,
-            ParsingMode::Lenient => self.lenient.p,
+            ParsingMode::Strict => self.strict.tested.p,
+            ParsingMode::Lenient => self.lenient.tested.p,
+        }
+    }
+
+    pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut PairedComparison {
+        match mode {
+            ParsingMode::Strict => &mut self.strict,
+            ParsingMode::Lenient => &mut self.lenient,
         }
     }
 
     /// True if the answer is shown to be more common than at L0, in both parsings and after the correction over all
     /// sentences.
     fn is_detected(&self) -> bool {
-        let is_more_frequent = [&self.strict, &self.lenient].iter().all(|paired| paired.difference.value > 0.0);
-        is_more_frequent && self.p_report.iter().all(|p| p.is_some_and(|p| p < ALPHA))
+        [self.strict.tested, self.lenient.tested].iter().all(|one| one.difference.value > 0.0 && one.is_detected())
     }
 }
 

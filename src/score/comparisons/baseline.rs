@@ -13,12 +13,9 @@ use crate::significance::{ALPHA, PValues, Verdict};
 pub struct BaselineRow {
     /// Model and condition in the new runs.
     pub subject: ModelInCondition,
-    /// New minus old, on the items that both answered about the same image.
+    /// New minus old, on the items that both answered about the same image. Holm's correction is over all conditions of
+    /// all models under test. Reference models (`random`, the observer) are corrected among themselves.
     pub paired: PairedComparison,
-    /// p-value after Holm's correction over all conditions of all models under test. Reference models (`random`, the
-    /// observer) are corrected among themselves.
-    pub holm: f64,
-    pub verdict: Verdict,
     /// Smallest difference that the test would detect in 80 % of runs like these, at the level after Bonferroni's
     /// correction.
     pub detectable: f64,
@@ -63,8 +60,6 @@ pub fn baseline_rows(
             Some(BaselineRow {
                 subject: grid.subjects[new].clone(),
                 paired: PairedComparison::on_items(grid, new, old, mode, |item, _| !has_other_image[item])?,
-                holm: 1.0,
-                verdict: Verdict::TooFew,
                 detectable: f64::INFINITY,
                 other_images: has_other_image.iter().filter(|is_other| **is_other).count(),
                 sides: [new, old].map(|subject| BaselineSide {
@@ -87,10 +82,11 @@ fn correct(mut rows: Vec<&mut BaselineRow>) {
     let tests: Vec<PValues> = rows.iter().map(|row| row.paired.p_values()).collect();
     let level = ALPHA / rows.len() as f64;
     for (row, corrected) in rows.iter_mut().zip(PValues::corrected(&tests)) {
-        row.holm = corrected.p;
         row.detectable = row.paired.spread.detectable(level);
-        if row.paired.difference.n >= MIN_PAIRS {
-            row.verdict = Verdict::new(row.paired.difference.value, corrected);
+        let tested = &mut row.paired.tested;
+        tested.correct(tested.difference.value, corrected);
+        if tested.difference.n < MIN_PAIRS {
+            tested.verdict = Verdict::TooFew;
         }
     }
 }

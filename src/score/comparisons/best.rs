@@ -10,12 +10,13 @@ use std::ops::Range;
 use super::comparison::compares_models;
 use super::paired::{BoundedSums, PairedTest, net_bounds};
 use super::pooled::pool;
+use super::tested::Tested;
 use crate::accuracies::{LevelCoverage, shared};
 use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use crate::model_in_condition::ModelInCondition;
-use crate::significance::{ALPHA, PValues, SwapMethod, Verdict, least_p};
+use crate::significance::{ALPHA, PValues, Verdict, least_p};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{AxisLevel, Variant};
 
@@ -68,7 +69,7 @@ impl BestInTheDark {
     /// True if there are enough clusters for at least one pair to be significant.
     #[must_use]
     pub fn is_possible(&self) -> bool {
-        self.pairs.iter().any(|pair| pair.verdict.is_possible())
+        self.pairs.iter().any(|pair| pair.tested.verdict.is_possible())
     }
 
     /// True if the leader is significantly better than every other model. Only the correction over all pairs is
@@ -82,7 +83,7 @@ impl BestInTheDark {
     /// sentence is about. `is_detected` is true if the leader is detected to be the best.
     #[must_use]
     pub fn verdict(&self, pair: &DarkPair, is_detected: bool) -> Option<Verdict> {
-        match pair.verdict {
+        match pair.tested.verdict {
             own if !own.is_possible() => Some(own),
             _ if pair.first != self.leader().model => None,
             _ if is_detected => Some(Verdict::Better),
@@ -101,7 +102,11 @@ impl BestInTheDark {
     /// all pairs.
     #[must_use]
     pub(crate) fn p_leader(&self) -> f64 {
-        self.pairs.iter().filter(|pair| pair.first == self.leader().model).map(|pair| pair.holm).fold(0.0, f64::max)
+        self.pairs
+            .iter()
+            .filter(|pair| pair.first == self.leader().model)
+            .map(|pair| pair.tested.holm)
+            .fold(0.0, f64::max)
     }
 }
 
@@ -165,7 +170,7 @@ pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheD
     Some(BestInTheDark {
         not_shown_better_than: pairs
             .iter()
-            .filter(|pair| pair.first == *leader && pair.verdict != Verdict::Better)
+            .filter(|pair| pair.first == *leader && pair.tested.verdict != Verdict::Better)
             .map(|pair| pair.second.clone())
             .collect(),
         gain: scores.gain(*leader_index, split)?,
@@ -251,17 +256,8 @@ pub struct DarkAccuracy {
 pub struct DarkPair {
     pub first: String,
     pub second: String,
-    /// Mean accuracy of `first` minus mean accuracy of `second`.
-    pub difference: Estimate,
-    /// p-value of the null hypothesis of no difference.
-    pub p: f64,
-    /// Smallest p-value that any values of the missing replies could give.
-    pub p_if_answered: f64,
-    /// Method that computed `p`.
-    pub p_by: SwapMethod,
-    /// p-value after Holm's correction over all pairs of models.
-    pub holm: f64,
-    pub verdict: Verdict,
+    /// Mean accuracy of `first` minus mean accuracy of `second`. Holm's correction is over all pairs of models.
+    pub tested: Tested,
 }
 
 /// Mean accuracy of the leader over the dark levels minus what it reaches without seeing.
@@ -270,20 +266,9 @@ pub struct DarkGain {
     /// True if the leader is compared with its own replies without images; false if it was not asked so, and is
     /// compared with chance.
     pub is_against_blind: bool,
-    /// Difference on the items that have a reply without images, or on all items.
-    pub difference: Estimate,
-    /// p-value of the null hypothesis that the leader is not above; 1 if it is below.
-    pub p: f64,
-    /// `p` after the correction over all tests that the report's sentences use; `None` before that correction.
-    pub p_report: Option<f64>,
-}
-
-impl DarkGain {
-    /// True if the leader is detected to be above what it reaches without seeing.
-    #[must_use]
-    pub fn is_detected(&self) -> bool {
-        self.p_report.is_some_and(|value| value < ALPHA)
-    }
+    /// Difference on the items that have a reply without images, or on all items. p is that of the null hypothesis that
+    /// the leader is not above; 1 if it is below.
+    pub tested: Tested,
 }
 
 /// Leader at the lighter levels against the leader in the dark, at each level.
@@ -301,21 +286,9 @@ pub struct Crossing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelLead {
     pub level: AxisLevel,
-    /// Accuracy of the leader at the lighter levels minus that of the leader in the dark.
-    pub lead: Estimate,
-    /// p-value of the null hypothesis of no difference, times the number of pairs of models (Bonferroni over the pairs
-    /// that could have led).
-    pub p: f64,
-    /// `p` after the correction over all tests that the report's sentences use; `None` before that correction.
-    pub p_report: Option<f64>,
-}
-
-impl LevelLead {
-    /// True if a difference is detected.
-    #[must_use]
-    pub fn is_detected(&self) -> bool {
-        self.p_report.is_some_and(|value| value < ALPHA)
-    }
+    /// Accuracy of the leader at the lighter levels minus that of the leader in the dark. p is times the number of pairs
+    /// of models (Bonferroni over the pairs that could have led).
+    pub tested: Tested,
 }
 
 /// Scores of all models on one item.
@@ -493,12 +466,9 @@ impl CommonScores {
                 Some(right(item).map(|right| right * multiple as i64 - guessed))
             })
         }?;
-        Some(DarkGain {
-            is_against_blind,
-            difference: tested.difference,
-            p: if tested.difference.value > 0.0 { tested.p } else { 1.0 },
-            p_report: None,
-        })
+        let Tested { difference, p, .. } = tested.tested;
+        let p = if difference.value > 0.0 { p } else { 1.0 };
+        Some(DarkGain { is_against_blind, tested: Tested::new(difference, p) })
     }
 
     /// Tests the mean accuracy of the first model minus that of the second over a range of levels.
@@ -528,7 +498,7 @@ impl CommonScores {
                 })
             })
             .flatten()
-            .map(|tested| tested.difference);
+            .map(|tested| tested.tested.difference);
         Some(DarkAccuracy {
             model: name.to_owned(),
             mean: self.mean(model, &dark)?,
@@ -550,21 +520,15 @@ impl CommonScores {
                 pairs.push(DarkPair {
                     first: first.model.clone(),
                     second: second.model.clone(),
-                    difference: tested.difference,
-                    p: tested.p,
-                    p_if_answered: tested.p_if_answered,
-                    p_by: tested.by,
-                    holm: 1.0,
-                    verdict: Verdict::NotShown,
+                    tested: tested.tested,
                 });
             }
         }
         let least = least_p(self.clusters());
-        let tests = pairs.iter().map(|pair| PValues { p: pair.p, if_answered: pair.p_if_answered, least });
+        let tests = pairs.iter().map(|pair| pair.tested.p_values(least));
         let corrected = PValues::corrected(&tests.collect::<Vec<PValues>>());
         for (pair, corrected) in pairs.iter_mut().zip(corrected) {
-            pair.holm = corrected.p;
-            pair.verdict = Verdict::new(pair.difference.value, corrected);
+            pair.tested.correct(pair.tested.difference.value, corrected);
         }
         pairs
     }
@@ -581,13 +545,8 @@ impl CommonScores {
         }
         let pairs = models.len() * (models.len() - 1) / 2;
         let levels = levels.iter().enumerate().filter_map(|(index, level)| {
-            let tested = self.test_pair([*light_index, *dark_index], index..index + 1)?;
-            Some(LevelLead {
-                level: *level,
-                lead: tested.difference,
-                p: (pairs as f64 * tested.p).min(1.0),
-                p_report: None,
-            })
+            let Tested { difference, p, .. } = self.test_pair([*light_index, *dark_index], index..index + 1)?.tested;
+            Some(LevelLead { level: *level, tested: Tested::new(difference, (pairs as f64 * p).min(1.0)) })
         });
         Some(Crossing { light: light.model.clone(), dark: dark.model.clone(), levels: levels.collect() })
     }
@@ -619,7 +578,7 @@ pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
             let (mut better, mut worse) = (0, 0);
             for pair in &best.pairs {
                 let (is_first, is_second) = (pair.first == model.model, pair.second == model.model);
-                match pair.verdict {
+                match pair.tested.verdict {
                     Verdict::Better if is_second => better += 1,
                     Verdict::Worse if is_first => better += 1,
                     Verdict::Better if is_first => worse += 1,
@@ -636,7 +595,6 @@ pub fn rank_ranges(best: &BestInTheDark) -> Vec<RankRange> {
 mod tests {
     use super::{DarkAccuracy, DarkGain, DarkPair, *};
     use crate::estimate::Estimate;
-    use crate::significance::SwapMethod;
     use darkqa_base::types::Variant;
 
     fn best(names: &[&str], shown: &[(&str, &str, Verdict)]) -> BestInTheDark {
@@ -652,18 +610,13 @@ mod tests {
         let pairs = shown.iter().map(|(first, second, verdict)| DarkPair {
             first: (*first).to_owned(),
             second: (*second).to_owned(),
-            difference: share,
-            p: 0.01,
-            p_if_answered: 0.01,
-            p_by: SwapMethod::Counted,
-            holm: 0.01,
-            verdict: *verdict,
+            tested: Tested { verdict: *verdict, ..Tested::new(share, 0.01) },
         });
         BestInTheDark {
             variant: Variant::NONE,
             levels: Vec::new(),
             lighter: Vec::new(),
-            gain: DarkGain { is_against_blind: false, difference: share, p: 1.0, p_report: None },
+            gain: DarkGain { is_against_blind: false, tested: Tested::new(share, 1.0) },
             crossing: None,
             p_report: None,
             asked: Vec::new(),

@@ -11,8 +11,8 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 
 use super::paired::{BoundedSums, net_bounds};
+use super::tested::Tested;
 use crate::choice::ParsingMode;
-use crate::estimate::Estimate;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::ModelInCondition;
 use crate::significance::{ALPHA, holm};
@@ -147,20 +147,10 @@ pub struct EffectInProfile {
     pub profile: ProfileName,
     /// Accuracy of the first side minus that of the second, averaged over the levels; `n` is the number of items.
     /// `None` if a side was not asked.
-    pub effect: Option<TestedEffect>,
-}
-
-/// An effect and its significance test.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TestedEffect {
-    /// Difference in accuracy with its clustered 95 % interval.
-    pub difference: Estimate,
-    /// Test result of the claim.
+    /// Holm's correction is over all claims and profiles.
+    pub effect: Option<Tested>,
+    /// Result of the claim; [`ClaimVerdict::Open`] without an effect.
     pub verdict: ClaimVerdict,
-    /// p-value of no difference.
-    pub p: f64,
-    /// p-value after Holm's correction over all claims and profiles.
-    pub holm: f64,
 }
 
 /// Test results of a claim about one model under every noise profile, on the same items.
@@ -306,7 +296,7 @@ fn finding(lookup: &SideLookup<'_, '_>, claim: NoiseHypothesis, profiles: &[&Pro
         })
         .collect();
     let shared = SharedItems::new(lookup.grid, &pairs, claim.family());
-    let effects: Vec<Option<TestedEffect>> = pairs.iter().map(|pairs| shared.effect(lookup.grid, pairs)).collect();
+    let effects: Vec<Option<Tested>> = pairs.iter().map(|pairs| shared.effect(lookup.grid, pairs)).collect();
     if effects.iter().all(Option::is_none) {
         return None;
     }
@@ -324,7 +314,11 @@ fn finding(lookup: &SideLookup<'_, '_>, claim: NoiseHypothesis, profiles: &[&Pro
         effects: profiles
             .iter()
             .zip(effects)
-            .map(|(profile, effect)| EffectInProfile { profile: (*profile).clone(), effect })
+            .map(|(profile, effect)| EffectInProfile {
+                profile: (*profile).clone(),
+                effect,
+                verdict: ClaimVerdict::Open,
+            })
             .collect(),
         dropped: shared.dropped,
     })
@@ -368,7 +362,7 @@ impl SharedItems {
 
     /// Tests the accuracy of the first sides minus that of the second sides, averaged over the pairs. `None` without
     /// pairs or answered items.
-    fn effect(&self, grid: &Grid<'_>, pairs: &[(usize, usize)]) -> Option<TestedEffect> {
+    fn effect(&self, grid: &Grid<'_>, pairs: &[(usize, usize)]) -> Option<Tested> {
         if pairs.is_empty() {
             return None;
         }
@@ -389,8 +383,7 @@ impl SharedItems {
             let [lowest, highest] = bounds(index);
             sums.add_missing(grid.items[index].cluster, lowest, highest);
         }
-        let tested = sums.test(pairs.len() as f64)?;
-        Some(TestedEffect { verdict: ClaimVerdict::Open, difference: tested.difference, p: tested.p, holm: tested.p })
+        Some(sums.test(pairs.len() as f64)?.tested)
     }
 }
 
@@ -405,11 +398,11 @@ fn with_holm_correction(mut findings: Vec<FindingByProfile>) -> Vec<FindingByPro
     let mut corrected = holm(&p_values).into_iter();
     for finding in &mut findings {
         let expects_gain = finding.claim.expects_gain();
-        for (effect, holm) in
-            finding.effects.iter_mut().filter_map(|in_profile| in_profile.effect.as_mut()).zip(&mut corrected)
-        {
-            effect.holm = holm;
-            effect.verdict = claim_verdict(effect, expects_gain);
+        for EffectInProfile { effect, verdict, .. } in &mut finding.effects {
+            if let Some(effect) = effect {
+                effect.holm = corrected.next().unwrap_or(1.0);
+                *verdict = claim_verdict(effect, expects_gain);
+            }
         }
         finding.robustness = robustness(&finding.effects);
     }
@@ -417,7 +410,7 @@ fn with_holm_correction(mut findings: Vec<FindingByProfile>) -> Vec<FindingByPro
 }
 
 /// Test result of a claim with this effect, by its corrected p-value and the sign of the difference.
-fn claim_verdict(effect: &TestedEffect, expects_gain: bool) -> ClaimVerdict {
+fn claim_verdict(effect: &Tested, expects_gain: bool) -> ClaimVerdict {
     if effect.holm >= ALPHA {
         ClaimVerdict::Open
     } else if (effect.difference.value > 0.0) == expects_gain {
@@ -430,9 +423,8 @@ fn claim_verdict(effect: &TestedEffect, expects_gain: bool) -> ClaimVerdict {
 /// Summarizes a claim over the profiles. A profile that was not asked has no effect, so the claim then cannot hold
 /// under all.
 fn robustness(effects: &[EffectInProfile]) -> Robustness {
-    let [holding, opposite] = [ClaimVerdict::Holds, ClaimVerdict::Opposite].map(|verdict| {
-        effects.iter().filter_map(|effect| effect.effect).filter(|effect| effect.verdict == verdict).count()
-    });
+    let [holding, opposite] = [ClaimVerdict::Holds, ClaimVerdict::Opposite]
+        .map(|verdict| effects.iter().filter(|effect| effect.verdict == verdict).count());
     match (holding, opposite) {
         (0, 0) => Robustness::Open,
         (0, _) => Robustness::None,

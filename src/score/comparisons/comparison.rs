@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::claim::{Claim, ParsedFinding};
 use super::paired::PairedComparison;
+use super::tested::Claim;
 use crate::choice::ParsingMode;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, models_under_test};
@@ -85,29 +85,14 @@ pub struct Comparison {
     /// Question family; `None` for all families together.
     pub family: Option<Family>,
     /// Comparison in the strict parsing, which is the main result.
-    pub strict: TestedComparison,
+    ///
+    /// Holm's correction is over all comparisons of this kind and these models, so that another model in the report
+    /// changes no result. Comparisons by family are corrected separately.
+    pub strict: PairedComparison,
     /// Comparison in the lenient parsing.
-    pub lenient: TestedComparison,
+    pub lenient: PairedComparison,
     /// Smallest corrected p-value that the clusters of this comparison allow, however large the difference is.
     pub least_holm: f64,
-}
-
-/// A comparison in one parsing of the replies.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TestedComparison {
-    pub paired: PairedComparison,
-    /// p-value after Holm's correction over all comparisons of this kind and these models, so that another model in the
-    /// report changes no result. Comparisons by family are corrected separately.
-    pub holm: f64,
-    pub verdict: Verdict,
-    /// p-value after the correction over all tests behind sentences; `None` if no sentence is about the comparison.
-    pub p_report: Option<f64>,
-}
-
-impl TestedComparison {
-    fn new(paired: PairedComparison) -> Self {
-        Self { paired, holm: 1.0, verdict: Verdict::NotShown, p_report: None }
-    }
 }
 
 impl Comparison {
@@ -115,29 +100,31 @@ impl Comparison {
     #[must_use]
     pub fn is_too_small(&self) -> bool {
         let may_cross_runs = matches!(self.kind, ComparisonKind::Model | ComparisonKind::Light);
-        may_cross_runs && self.strict.paired.difference.n < MIN_PAIRS
+        may_cross_runs && self.strict.tested.difference.n < MIN_PAIRS
     }
 
     /// Statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
-        let [strict, lenient] = [&self.strict, &self.lenient].map(|tested| ParsedFinding {
-            gain: tested.paired.difference.value,
-            verdict: tested.verdict,
-            p_report: tested.p_report,
-        });
-        Claim::new(strict, lenient)
+        Claim::new([&self.strict.tested, &self.lenient.tested], |gain| gain)
     }
 
     /// Verdict in tables, the same as in sentences; `None` if no sentence is about the comparison.
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
-        self.claim().verdict(self.strict.verdict, self.strict.p_report)
+        self.claim().verdict(&self.strict.tested)
+    }
+
+    pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut PairedComparison {
+        match mode {
+            ParsingMode::Strict => &mut self.strict,
+            ParsingMode::Lenient => &mut self.lenient,
+        }
     }
 
     /// Comparison in a parsing.
     #[must_use]
-    pub fn parsed(&self, mode: ParsingMode) -> &TestedComparison {
+    pub fn parsed(&self, mode: ParsingMode) -> &PairedComparison {
         match mode {
             ParsingMode::Strict => &self.strict,
             ParsingMode::Lenient => &self.lenient,
@@ -200,8 +187,8 @@ fn uncorrected(grid: &Grid<'_>, jobs: Vec<Pairing<'_>>) -> Vec<Comparison> {
                 first: grid.subjects[first].clone(),
                 second: grid.subjects[second].clone(),
                 family: family.cloned(),
-                strict: TestedComparison::new(strict),
-                lenient: TestedComparison::new(lenient),
+                strict,
+                lenient,
                 least_holm: 1.0,
             })
         })
@@ -241,7 +228,7 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
     for set in sets.into_values() {
         let own = set.iter().map(|index| &all[*index]);
         let [strict, lenient] = ParsingMode::ALL.map(|mode| {
-            let paired = own.clone().map(|found| &found.parsed(mode).paired);
+            let paired = own.clone().map(|found| found.parsed(mode));
             let tests: Vec<PValues> = paired.map(PairedComparison::p_values).collect();
             PValues::corrected(&tests)
         });
@@ -249,12 +236,14 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
             let comparison = &mut all[index];
             let is_too_small = comparison.is_too_small();
             comparison.least_holm = strict[position].least;
-            for (tested, corrected) in
+            for (paired, corrected) in
                 [(&mut comparison.strict, strict[position]), (&mut comparison.lenient, lenient[position])]
             {
-                let difference = tested.paired.difference.value;
-                tested.holm = corrected.p;
-                tested.verdict = if is_too_small { Verdict::TooFew } else { Verdict::new(difference, corrected) };
+                let tested = &mut paired.tested;
+                tested.correct(tested.difference.value, corrected);
+                if is_too_small {
+                    tested.verdict = Verdict::TooFew;
+                }
             }
         }
     }

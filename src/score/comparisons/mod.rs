@@ -4,23 +4,23 @@ mod agreement;
 mod baseline;
 pub(crate) mod best;
 mod by_profile;
-mod claim;
 pub(crate) mod comparison;
 pub mod paired;
 pub(crate) mod pooled;
 mod pooled_kind;
 pub mod self_agreement;
+mod tested;
 
 pub use agreement::{Agreement, AgreementCounts, clustered_kappa};
 pub use baseline::{BaselineRow, BaselineSide, baseline_rows};
 pub use best::{
     BestInTheDark, Crossing, DarkAccuracy, DarkGain, DarkPair, LevelLead, RankRange, best_in_the_dark, rank_ranges,
 };
-pub use by_profile::{ClaimVerdict, EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness, TestedEffect};
-pub use claim::Claim;
-pub use comparison::{Comparison, ComparisonKind, MIN_PAIRS, TestedComparison, compares_enhancers, compares_models};
-pub use pooled::{ContrastTest, FamilyContrast, ModelsLeftOut, PooledDifference, PooledFinding, pool, pooled};
+pub use by_profile::{ClaimVerdict, EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness};
+pub use comparison::{Comparison, ComparisonKind, MIN_PAIRS, compares_enhancers, compares_models};
+pub use pooled::{FamilyContrast, ModelsLeftOut, PooledDifference, PooledFinding, pool, pooled};
 pub use pooled_kind::PooledKind;
+pub use tested::{Claim, Tested};
 
 pub(super) use agreement::{agreements, kappa, light_agreements};
 pub(super) use by_profile::by_profile;

@@ -1,9 +1,10 @@
 //! Comparison of two subjects on the same items: [`PairedComparison`].
 
+use super::tested::Tested;
 use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use crate::grid::{Grid, GridItem};
-use crate::significance::{ALPHA, PValues, SwapMethod, least_p, mcnemar, swap_test};
+use crate::significance::{ALPHA, PValues, least_p, mcnemar, swap_test};
 use crate::statistics::estimate::{
     degrees_of_freedom, quantile, residuals, two_sided_tail, unknown_design_effect, variance_of_few,
 };
@@ -16,8 +17,8 @@ pub struct PairedComparison {
     pub first: f64,
     /// Accuracy of the second subject.
     pub second: f64,
-    /// Accuracy of the first minus that of the second. Its `n` is the number of pairs.
-    pub difference: Estimate,
+    /// Accuracy of the first minus that of the second, with its tests ([`PairedTest`]). Its `n` is the number of pairs.
+    pub tested: Tested,
     /// Number of items that only the first subject got right.
     pub gained: usize,
     /// Number of items that only the second subject got right.
@@ -26,10 +27,6 @@ pub struct PairedComparison {
     pub clusters: usize,
     /// McNemar's exact p-value, which treats items as independent.
     pub mcnemar: f64,
-    /// p-value of no difference ([`PairedTest`]).
-    pub p: f64,
-    /// Smallest p-value that any values of the missing replies could give ([`PairedTest`]).
-    pub p_if_answered: f64,
     /// Number of items that both subjects were asked, and of which one has no reply.
     pub missing: usize,
     /// Standard error of the difference, and its degrees of freedom.
@@ -51,7 +48,7 @@ impl PairedComparison {
 
     /// p-values before correction.
     pub(super) fn p_values(&self) -> PValues {
-        PValues { p: self.p, if_answered: self.p_if_answered, least: least_p(self.clusters) }
+        self.tested.p_values(least_p(self.clusters))
     }
 
     /// Compares two subjects on the items for which `has` is true; it takes the index of an item and the item.
@@ -107,13 +104,11 @@ impl PairedComparison {
         Some(Self {
             first: counted[0] as f64 / n as f64,
             second: counted[1] as f64 / n as f64,
-            difference: tested.difference,
+            tested: tested.tested,
             gained,
             lost,
             clusters: sums.clusters(),
             mcnemar: mcnemar(gained, lost),
-            p: tested.p,
-            p_if_answered: tested.p_if_answered,
             missing: sums.missing.len(),
             spread: tested.spread,
         })
@@ -241,13 +236,9 @@ pub(crate) struct ClusterNet {
 /// detected only if none of these values undoes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PairedTest {
-    pub(super) difference: Estimate,
-    pub(crate) p: f64,
-    /// Smallest p-value of the two bounds; `p` if no reply is missing. If it is small and `p` is not, the missing
-    /// replies decide.
-    pub(super) p_if_answered: f64,
-    /// How the swaps were counted.
-    pub(super) by: SwapMethod,
+    /// The difference, not corrected yet. `p_if_answered` is the smallest p-value of the two bounds: if it is small and
+    /// `p` is not, the missing replies decide.
+    pub(crate) tested: Tested,
     pub(super) spread: Spread,
 }
 
@@ -262,20 +253,17 @@ impl PairedTest {
         let nets: Vec<i64> = clusters.iter().map(|cluster| cluster.net).collect();
         let swapped = swap_test(&nets);
         let p = spread.p(estimate.value * n as f64 / (n as f64 + ADDED)).max(swapped.p);
-        Self {
-            difference: if p < ALPHA { estimate } else { extended_to_zero(estimate) },
-            p,
-            p_if_answered: p,
-            by: swapped.by,
-            spread,
-        }
+        let difference = if p < ALPHA { estimate } else { extended_to_zero(estimate) };
+        Self { tested: Tested { p_by: Some(swapped.by), ..Tested::new(difference, p) }, spread }
     }
 
     /// The test with the bounds of its missing replies, the lowest difference first.
     fn bounded(self, [lowest, highest]: [Self; 2]) -> Self {
-        let (difference, p) =
-            bounded((self.difference, self.p), [lowest, highest].map(|bound| (bound.difference, bound.p)));
-        Self { difference, p, p_if_answered: self.p.min(lowest.p).min(highest.p), ..self }
+        let [replied, lowest, highest] = [self, lowest, highest].map(|test| (test.tested.difference, test.tested.p));
+        let (difference, p) = bounded(replied, [lowest, highest]);
+        let p_if_answered = replied.1.min(lowest.1).min(highest.1);
+        let tested = Tested { p_if_answered, p_by: self.tested.p_by, ..Tested::new(difference, p) };
+        Self { tested, ..self }
     }
 }
 
@@ -394,7 +382,7 @@ mod tests {
         let (mut detected, mut extended) = (0, 0);
         for clusters in designs() {
             let squares = clusters.iter().map(|cluster| cluster.net.abs()).sum::<i64>() as f64;
-            let tested = PairedTest::new(&clusters, 1.0, squares);
+            let tested = PairedTest::new(&clusters, 1.0, squares).tested;
             let Estimate { value, low, high, n } = tested.difference;
             assert_eq!(tested.p < 0.05, low > 0.0 || high < 0.0, "{clusters:?}");
             assert!(low <= value && value <= high && n > 0);

@@ -20,7 +20,7 @@ use crate::accuracies::{Lacking, LevelCoverage, shared};
 use crate::choice::ParsingMode;
 use crate::grid::{Grid, TrialResult};
 use crate::model_in_condition::{ModelInCondition, pooled_models};
-use crate::significance::{PValues, Verdict, least_p};
+use crate::significance::{PValues, least_p};
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant, View};
 use finding::is_severe;
@@ -28,7 +28,7 @@ use finding::is_severe;
 pub(crate) use contrast::family_contrasts;
 pub(crate) use left_out::models_left_out;
 
-pub use contrast::{ContrastTest, FamilyContrast};
+pub use contrast::FamilyContrast;
 pub use finding::{PooledDifference, PooledFinding};
 pub use left_out::ModelsLeftOut;
 
@@ -419,29 +419,15 @@ fn difference(
             nets.add_missing(*cluster, lowest, highest);
         }
     }
-    let tested = nets.test(each as f64)?;
+    let tested = nets.test(each as f64)?.tested;
     let [first, second] = sums.map(|count| count as f64 / each as f64 / f64::from(answered));
-    Some(PooledDifference {
-        first,
-        second,
-        difference: tested.difference,
-        p: tested.p,
-        p_if_answered: tested.p_if_answered,
-        p_by: tested.by,
-        holm: 1.0,
-        verdict: Verdict::NotShown,
-        p_report: None,
-    })
+    Some(PooledDifference { first, second, tested })
 }
 
 /// Fills in the verdicts of the findings of one set, after Holm's correction.
 fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
     let [strict, lenient] = ParsingMode::ALL.map(|mode| {
-        let tests = set.iter().map(|finding| PValues {
-            p: finding.parsed(mode).p,
-            if_answered: finding.parsed(mode).p_if_answered,
-            least: finding.least_p,
-        });
+        let tests = set.iter().map(|finding| finding.parsed(mode).tested.p_values(finding.least_p));
         PValues::corrected(&tests.collect::<Vec<PValues>>())
     });
     let levels = set.len();
@@ -450,9 +436,8 @@ fn corrected(mut set: Vec<PooledFinding>) -> Vec<PooledFinding> {
         finding.least_holm = strict[index].least;
         let kind = finding.kind;
         for (parsed, corrected) in [(&mut finding.strict, strict[index]), (&mut finding.lenient, lenient[index])] {
-            parsed.holm = corrected.p;
-            let gain = kind.gain(parsed.difference.value);
-            parsed.verdict = Verdict::new(gain, corrected);
+            let tested = &mut parsed.tested;
+            tested.correct(kind.gain(tested.difference.value), corrected);
         }
     }
     set

@@ -100,7 +100,7 @@ fn perfect_model_is_calibrated() {
         let found = simulated(3, 100, (frames, size), calibrated);
         let error = mean(&found, |row| row.error.unwrap().value);
         let (zero, gap) =
-            (held(&found, 0.0, |row| row.error), held(&found, 0.0, |row| Some(row.overconfidence.estimate)));
+            (held(&found, 0.0, |row| row.error), held(&found, 0.0, |row| Some(row.overconfidence.difference)));
         println!("{} replies: error {error:.4}, 0 held {zero} %, gap {gap} %", frames * size);
         assert!(error < most, "{error}");
         assert!(zero >= 93.0, "{zero}");
@@ -130,7 +130,7 @@ fn intervals_hold_truth_of_overconfident_model() {
         let found = simulated(4, 200, (frames, size), overconfident);
         let rates = [
             held(&found, error, |row| row.error),
-            held(&found, gap, |row| Some(row.overconfidence.estimate)),
+            held(&found, gap, |row| Some(row.overconfidence.difference)),
             held(&found, 0.625, |row| Some(row.confidence)),
             held(&found, brier, |row| Some(row.brier)),
         ];

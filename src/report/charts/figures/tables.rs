@@ -233,7 +233,7 @@ impl FigureBuilder<'_> {
             let finding = pooled.iter().find(|finding| finding.level == *level);
             finding.map_or(TableCell::Blank, |finding| {
                 let verdict = finding.verdict().unwrap_or(Verdict::NotShown);
-                TableCell::Effect(finding.strict.difference, verdict)
+                TableCell::Effect(finding.strict.tested.difference, verdict)
             })
         });
         let effect_row = row(name, None, effects);

@@ -6,7 +6,7 @@ use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, Severity, Variant};
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::paired::{PairedComparison, Spread};
-use darkqa_score::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, TestedComparison};
+use darkqa_score::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, Tested};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::significance::Verdict::{self, Better, NotShown, Worse};
@@ -33,24 +33,23 @@ fn against_blind(
     }
 }
 
-fn tested(difference: f64, verdict: Verdict) -> TestedComparison {
-    TestedComparison {
-        paired: PairedComparison {
-            first: 0.3,
-            second: 0.3 - difference,
-            difference: Estimate { value: difference, low: difference - 0.1, high: difference + 0.1, n: 45 },
-            gained: 1,
-            lost: 9,
-            clusters: 24,
-            mcnemar: 0.02,
-            p: 0.001,
-            p_if_answered: 0.001,
-            missing: 0,
-            spread: Spread { error: 0.05, degrees: 23.0 },
+fn tested(value: f64, verdict: Verdict) -> PairedComparison {
+    let difference = Estimate { value, low: value - 0.1, high: value + 0.1, n: 45 };
+    PairedComparison {
+        first: 0.3,
+        second: 0.3 - value,
+        tested: Tested {
+            holm: 0.0123,
+            verdict,
+            p_report: Some(if verdict.is_shown() { 0.0123 } else { 0.3 }),
+            ..Tested::new(difference, 0.001)
         },
-        holm: 0.0123,
-        verdict,
-        p_report: Some(if verdict.is_shown() { 0.0123 } else { 0.3 }),
+        gained: 1,
+        lost: 9,
+        clusters: 24,
+        mcnemar: 0.02,
+        missing: 0,
+        spread: Spread { error: 0.05, degrees: 23.0 },
     }
 }
 
@@ -89,7 +88,7 @@ fn family_below_blind_is_reported_once() {
     assert!(family_sentence(&one, &[&pooled]).is_some());
     pooled.models = vec!["sim-F".to_owned()];
     assert_eq!(family_sentence(&one, &[&pooled]), None);
-    pooled.strict.p_report = Some(0.2);
+    pooled.strict.tested.p_report = Some(0.2);
     assert!(family_sentence(&one, &[&pooled]).is_some());
 }
 

@@ -4,8 +4,9 @@ use super::checked;
 use crate::report::sentences::below_blind::{Confidence, confidence};
 use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Severity, Variant};
-use darkqa_score::calibration::{Calibration, RiskCoverage, TestedConfidence};
+use darkqa_score::calibration::{Calibration, RiskCoverage};
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::Tested;
 use darkqa_score::estimate::Estimate;
 use darkqa_score::model_in_condition::ModelInCondition;
 
@@ -14,12 +15,9 @@ fn around(value: f64) -> Estimate {
 }
 
 /// A tested number, detected if it is more than 5 points from 0.
-fn tested(value: f64) -> TestedConfidence {
-    TestedConfidence {
-        estimate: around(value),
-        p: 0.0004,
-        p_report: Some(if value.abs() > 0.05 { 0.0004 } else { 0.3 }),
-    }
+fn tested(value: f64) -> Tested {
+    let p_report = Some(if value.abs() > 0.05 { 0.0004 } else { 0.3 });
+    Tested { p_report, ..Tested::new(around(value), 0.0004) }
 }
 
 /// The calibration of a model with this confidence and accuracy.

@@ -6,6 +6,7 @@ use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, Family, Severity};
 use darkqa_score::answers::confusion::{AgainstClean, Collapse, FalseAnswer};
 use darkqa_score::cluster::ClusterUnit;
+use darkqa_score::comparisons::Tested;
 use darkqa_score::comparisons::paired::{PairedComparison, Spread};
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::estimate::Estimate;
@@ -34,7 +35,7 @@ fn false_answer_sentence(answer: FalseAnswer, levels: &[(f64, Verdict)]) -> Opti
     let mut all = findings(PooledKind::Hallucination(answer), levels);
     for finding in &mut all {
         let strict = &mut finding.strict;
-        (strict.first, strict.second) = (0.05 + strict.difference.value, 0.05);
+        (strict.first, strict.second) = (0.05 + strict.tested.difference.value, 0.05);
         finding.family = Some(Family::Presence);
     }
     let all: Vec<&PooledFinding> = all.iter().collect();
@@ -52,28 +53,22 @@ fn collapse(share: f64, truth: f64, guess: f64) -> Collapse {
         entropy: 1.0,
         true_entropy: 2.0,
         clusters: 24,
-        clean: Some(AgainstClean {
-            strict: at_clean(share),
-            lenient: at_clean(share),
-            is_commonest: true,
-            p_report: [Some(0.0012); 2],
-        }),
+        clean: Some(AgainstClean { strict: at_clean(share), lenient: at_clean(share), is_commonest: true }),
     }
 }
 
 /// The share of the same answer at L0.
 fn at_clean(share: f64) -> PairedComparison {
-    let difference = share - 0.305;
+    let value = share - 0.305;
+    let difference = Estimate { value, low: value - 0.1, high: value + 0.1, n: 45 };
     PairedComparison {
         first: share,
         second: 0.305,
-        difference: Estimate { value: difference, low: difference - 0.1, high: difference + 0.1, n: 45 },
+        tested: Tested { p_report: Some(0.0012), ..Tested::new(difference, 0.001) },
         gained: 20,
         lost: 3,
         clusters: 24,
         mcnemar: 0.001,
-        p: 0.001,
-        p_if_answered: 0.001,
         missing: 0,
         spread: Spread { error: 0.05, degrees: 23.0 },
     }
@@ -83,7 +78,7 @@ fn at_clean(share: f64) -> PairedComparison {
 fn collapse_needs_an_increase_since_l0() {
     let mut found = collapse(0.67, 0.32, 0.25);
     assert!(found.is_shown());
-    found.clean.as_mut().unwrap().p_report[1] = Some(0.2);
+    found.clean.as_mut().unwrap().lenient.tested.p_report = Some(0.2);
     assert!(!found.is_shown(), "only the strict parsing shows it");
     found.clean = None;
     assert!(!found.is_shown(), "there is no L0");

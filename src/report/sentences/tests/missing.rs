@@ -106,7 +106,7 @@ fn simulate(design: &MissingDesign, runs: usize) -> DarkCounts {
         counts.beyond += usize::from(whole.threshold.is_ok_and(|one| one.value.is_infinite()));
         let darkest =
             findings.pooled.iter().rfind(|finding| finding.kind == PooledKind::Darkness && finding.family.is_none());
-        let difference = darkest.unwrap().strict.difference;
+        let difference = darkest.unwrap().strict.tested.difference;
         counts.covered += usize::from((difference.low..=difference.high).contains(&truth));
     }
     counts

@@ -17,7 +17,7 @@ use crate::types::degradations::Kind;
 use crate::types::{AxisLevel, EnhancerName, Severity, Variant};
 use darkqa_score::auc::Auc;
 use darkqa_score::cluster::{ClusterUnit, FrameTies};
-use darkqa_score::comparisons::{PooledDifference, PooledFinding, PooledKind};
+use darkqa_score::comparisons::{PooledDifference, PooledFinding, PooledKind, Tested};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::FidelityFindings;
@@ -59,13 +59,16 @@ fn parsed(kind: PooledKind, difference: f64, verdict: Verdict) -> PooledDifferen
     PooledDifference {
         first: 0.5,
         second: 0.8637,
-        difference: Estimate { value: difference, low: difference - 0.04, high: difference + 0.04, n: 1237 },
-        p: 0.0124,
-        p_if_answered: 0.0124,
-        p_by: SwapMethod::Counted,
-        holm,
-        verdict,
-        p_report: Some(holm),
+        tested: Tested {
+            p_by: Some(SwapMethod::Counted),
+            holm,
+            verdict,
+            p_report: Some(holm),
+            ..Tested::new(
+                Estimate { value: difference, low: difference - 0.04, high: difference + 0.04, n: 1237 },
+                0.0124,
+            )
+        },
     }
 }
 
@@ -318,7 +321,7 @@ fn interval_widths_are_a_range() {
 fn power_sentence(half_widths: &[f64]) -> Option<String> {
     let mut all = findings(PooledKind::Darkness, &vec![(-0.129, Worse); half_widths.len()]);
     for (finding, half) in all.iter_mut().zip(half_widths) {
-        let difference = &mut finding.strict.difference;
+        let difference = &mut finding.strict.tested.difference;
         (difference.low, difference.high) = (-0.129 - half, -0.129 + half);
     }
     let sentence = sample::power(&all, ClusterUnit::Scene);
@@ -329,7 +332,7 @@ fn power_sentence(half_widths: &[f64]) -> Option<String> {
 fn one_model_and_lost_items_are_named() {
     let mut one = finding(PooledKind::Darkness, 5, -0.3, Worse);
     one.models = vec!["gpt-4o".to_owned()];
-    (one.dropped, one.strict.p_by, one.clusters) = (100, SwapMethod::Drawn(100_000), 1);
+    (one.dropped, one.strict.tested.p_by, one.clusters) = (100, Some(SwapMethod::Drawn(100_000)), 1);
     let said = checked(&darkness::with_variant(&[&one], None, &[], None, ClusterUnit::Frame).unwrap());
     assert!(
         said.ends_with(

@@ -180,7 +180,7 @@ fn simulate(design: &SimulationDesign, runs: usize, seed: u64) -> OutcomeCounts 
             *counts.kinds.entry(claim.kind).or_default() += 1;
         }
         let whole = findings.pooled.iter().filter(|finding| finding.family.as_ref() == finding.kind.only_family());
-        counts.own += usize::from(whole.clone().any(|finding| finding.strict.verdict.is_shown()));
+        counts.own += usize::from(whole.clone().any(|finding| finding.strict.tested.verdict.is_shown()));
         let is_decided = findings.by_profile.iter().any(|finding| finding.robustness.word() != "open");
         counts.decided += usize::from(is_decided);
         for (kind, verdict, name, found) in [
@@ -189,8 +189,9 @@ fn simulate(design: &SimulationDesign, runs: usize, seed: u64) -> OutcomeCounts 
         ] {
             let sign = EffectDirection::from(verdict);
             found[0] += usize::from(claims.iter().any(|claim| claim.kind == name && claim.tone == sign));
-            found[1] +=
-                usize::from(whole.clone().any(|finding| finding.kind == kind && finding.strict.verdict == verdict));
+            found[1] += usize::from(
+                whole.clone().any(|finding| finding.kind == kind && finding.strict.tested.verdict == verdict),
+            );
         }
     }
     counts
@@ -297,7 +298,7 @@ fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
                 Some((index, grid.find(&old)?))
             });
             let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), |_| None);
-            rows.iter().any(|row| row.verdict == Verdict::Worse)
+            rows.iter().any(|row| row.paired.tested.verdict == Verdict::Worse)
         })
         .count()
 }

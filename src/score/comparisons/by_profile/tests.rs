@@ -9,7 +9,7 @@ fn find<'f>(found: &'f [FindingByProfile], claim: &NoiseHypothesis) -> &'f Findi
 }
 
 fn standings(finding: &FindingByProfile) -> Vec<Option<ClaimVerdict>> {
-    finding.effects.iter().map(|one| one.effect.map(|effect| effect.verdict)).collect()
+    finding.effects.iter().map(|one| one.effect.map(|_| one.verdict)).collect()
 }
 
 /// Replies that are right by exposure drop and at L0, and follow the two functions with noise.

@@ -4,9 +4,9 @@ use super::{PooledFamily, PooledFinding, PooledItem, PooledState, SideCounts, it
 use crate::choice::ParsingMode;
 use crate::comparisons::paired::bounded;
 use crate::comparisons::pooled_kind::PooledKind;
+use crate::comparisons::tested::Tested;
 use crate::estimate::Estimate;
 use crate::grid::Grid;
-use crate::significance::ALPHA;
 use crate::statistics::estimate::{degrees_of_freedom, residuals, student, two_sided_tail, unknown_design_effect};
 use darkqa_base::types::{AxisLevel, Family, Variant};
 
@@ -22,33 +22,21 @@ pub struct FamilyContrast {
     pub least: Family,
     /// Number of pairs of families that could have been furthest apart.
     pub pairs: usize,
-    /// Test in the strict parsing, which is the main result.
-    pub strict: ContrastTest,
+    /// Difference from L0 of `most` minus that of `least`, in the strict parsing, which is the main result. p is times
+    /// the number of pairs of families (Bonferroni, because the data chose the pair).
+    pub strict: Tested,
     /// Test in the lenient parsing.
-    pub lenient: ContrastTest,
-}
-
-/// Test of a contrast in one parsing of the replies.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ContrastTest {
-    /// Difference from L0 of `most` minus that of `least`.
-    pub difference: Estimate,
-    /// p-value of no difference, times the number of pairs of families (Bonferroni, because the data chose the pair).
-    pub p: f64,
-    /// p-value after the correction over all tests behind sentences; `None` before that correction.
-    pub p_report: Option<f64>,
+    pub lenient: Tested,
 }
 
 impl FamilyContrast {
     /// True if `most` is detected to lose more than `least`, in both parsings.
     #[must_use]
     pub fn is_detected(&self) -> bool {
-        [self.strict, self.lenient]
-            .iter()
-            .all(|test| test.difference.value < 0.0 && test.p_report.is_some_and(|value| value < ALPHA))
+        [self.strict, self.lenient].iter().all(|test| test.difference.value < 0.0 && test.is_detected())
     }
 
-    pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut ContrastTest {
+    pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut Tested {
         match mode {
             ParsingMode::Strict => &mut self.strict,
             ParsingMode::Lenient => &mut self.lenient,
@@ -57,7 +45,7 @@ impl FamilyContrast {
 
     /// Test in a parsing.
     #[must_use]
-    pub fn parsed(&self, mode: ParsingMode) -> &ContrastTest {
+    pub fn parsed(&self, mode: ParsingMode) -> &Tested {
         match mode {
             ParsingMode::Strict => &self.strict,
             ParsingMode::Lenient => &self.lenient,
@@ -78,12 +66,12 @@ pub(crate) fn family_contrasts(grid: &Grid<'_>, pooled: &[PooledFinding]) -> Vec
             let level = losses.clone().map(|finding| finding.level).max()?;
             let losses: Vec<&PooledFinding> = losses.filter(|finding| finding.level == level).collect();
             let most = losses.iter().min_by(|a, b| {
-                let [a, b] = [a, b].map(|loss| loss.strict.difference.high);
+                let [a, b] = [a, b].map(|loss| loss.strict.tested.difference.high);
                 a.total_cmp(&b)
             })?;
             let others = losses.iter().filter(|other| other.family != most.family);
             let least = others.max_by(|a, b| {
-                let [a, b] = [a, b].map(|loss| loss.strict.difference.low);
+                let [a, b] = [a, b].map(|loss| loss.strict.tested.difference.low);
                 a.total_cmp(&b)
             })?;
             contrast(grid, [most, least], losses.len() * (losses.len() - 1) / 2)
@@ -114,7 +102,7 @@ fn contrast(grid: &Grid<'_>, [most, least]: [&PooledFinding; 2], pairs: usize) -
         let bounds = [[Missing::Lowest, Missing::Highest], [Missing::Highest, Missing::Lowest]];
         let tests = bounds.map(|missing| test(Some(missing)));
         let (difference, p) = bounded((replied.difference, replied.p), tests.map(|bound| (bound.difference, bound.p)));
-        ContrastTest { difference, p, ..replied }
+        Tested::new(difference, p)
     });
     Some(FamilyContrast {
         variant: most.variant.clone(),
@@ -188,7 +176,7 @@ impl FamilyLoss {
 
     /// Tests the difference of two losses by Student's t, with the variance between clusters. A cluster with items of
     /// both families counts once, with the difference of its residuals.
-    fn test([most, least]: &[Self; 2], pairs: usize) -> ContrastTest {
+    fn test([most, least]: &[Self; 2], pairs: usize) -> Tested {
         let together: Vec<f64> = most
             .residuals
             .iter()
@@ -204,14 +192,13 @@ impl FamilyLoss {
         });
         let n = most.n + least.n;
         if !error.is_finite() || together.len() < 2 {
-            return ContrastTest { difference: Estimate::around(value, [-2.0, 2.0], n), p: 1.0, p_report: None };
+            return Tested::new(Estimate::around(value, [-2.0, 2.0], n), 1.0);
         }
         let degrees = degrees_of_freedom(&together);
         let half = student(degrees) * error;
-        ContrastTest {
-            difference: Estimate::around(value, [center - half, center + half], n),
-            p: (pairs as f64 * two_sided_tail(center.abs() / error, degrees)).min(1.0),
-            p_report: None,
-        }
+        Tested::new(
+            Estimate::around(value, [center - half, center + half], n),
+            (pairs as f64 * two_sided_tail(center.abs() / error, degrees)).min(1.0),
+        )
     }
 }

@@ -1,10 +1,10 @@
 //! One pooled difference and its tests: [`PooledFinding`].
 
 use crate::choice::ParsingMode;
-use crate::comparisons::claim::{Claim, ParsedFinding};
 use crate::comparisons::pooled_kind::PooledKind;
-use crate::estimate::{Estimate, largest};
-use crate::significance::{SwapMethod, Verdict};
+use crate::comparisons::tested::{Claim, Tested};
+use crate::estimate::largest;
+use crate::significance::Verdict;
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{AxisLevel, EnhancerName, Family, Variant};
 
@@ -61,21 +61,9 @@ pub struct PooledDifference {
     pub first: f64,
     /// Accuracy or rate of false answers of the second side.
     pub second: f64,
-    /// `first` minus `second`. Its `n` is the number of items.
-    pub difference: Estimate,
-    /// p-value of no difference, for all models at once: the larger one of Student's t and of swapping the two sides in
-    /// whole clusters.
-    pub p: f64,
-    /// Smallest p-value that any values of the missing replies could give; `p` if no reply is missing.
-    pub p_if_answered: f64,
-    /// How the swaps were counted.
-    pub p_by: SwapMethod,
-    /// p-value after Holm's correction over the levels of its set: the same kind, variant, enhancer and family.
-    pub holm: f64,
-    /// Result of the test after Holm's correction. A detected increase of false answers is `Worse`.
-    pub verdict: Verdict,
-    /// p-value after the correction over all tests behind sentences; `None` if no sentence is about the finding.
-    pub p_report: Option<f64>,
+    /// `first` minus `second`, for all models at once; its `n` is the number of items. Holm's correction is over the
+    /// levels of its set: the same kind, variant, enhancer and family.
+    pub tested: Tested,
 }
 
 impl PooledFinding {
@@ -83,24 +71,19 @@ impl PooledFinding {
     /// findings.
     #[must_use]
     pub fn largest<'f>(levels: &[&'f Self]) -> Option<&'f Self> {
-        largest(levels, |finding| finding.strict.difference)
+        largest(levels, |finding| finding.strict.tested.difference)
     }
 
     /// The statement that sentences may make.
     #[must_use]
     pub fn claim(&self) -> Claim {
-        let [strict, lenient] = [&self.strict, &self.lenient].map(|parsed| ParsedFinding {
-            gain: self.kind.gain(parsed.difference.value),
-            verdict: parsed.verdict,
-            p_report: parsed.p_report,
-        });
-        Claim::new(strict, lenient)
+        Claim::new([&self.strict.tested, &self.lenient.tested], |difference| self.kind.gain(difference))
     }
 
     /// Verdict in tables and figures, which is that of the sentences; `None` if no sentence is about the finding.
     #[must_use]
     pub fn verdict(&self) -> Option<Verdict> {
-        self.claim().verdict(self.strict.verdict, self.strict.p_report)
+        self.claim().verdict(&self.strict.tested)
     }
 
     /// True if the level, or every level of a mean, is in the darker part of the ladder: L4 (7.5 EV) and darker, or for
@@ -111,10 +94,10 @@ impl PooledFinding {
         is_severe(self.level, self.variant.kind)
     }
 
-    pub(crate) fn set_p_report(&mut self, mode: ParsingMode, p: Option<f64>) {
+    pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut PooledDifference {
         match mode {
-            ParsingMode::Strict => self.strict.p_report = p,
-            ParsingMode::Lenient => self.lenient.p_report = p,
+            ParsingMode::Strict => &mut self.strict,
+            ParsingMode::Lenient => &mut self.lenient,
         }
     }
 

@@ -175,7 +175,7 @@ fn adjust_comparisons(comparisons: &mut [Comparison]) {
     let mut enhanced = BTreeMap::<_, Vec<usize>>::new();
     for (index, comparison) in comparisons.iter().enumerate() {
         let first = &comparison.first;
-        if comparison.family.is_some() || !comparison.strict.verdict.is_possible() {
+        if comparison.family.is_some() || !comparison.strict.tested.verdict.is_possible() {
             continue;
         }
         match comparison.kind {
@@ -195,11 +195,11 @@ fn adjust_comparisons(comparisons: &mut [Comparison]) {
         .filter(|tests: &Vec<usize>| !tests.is_empty())
         .collect();
     let tests = TestTree::group(groups.iter().map(|tests| TestTree::group(tests.iter().copied().map(TestTree::leaf))));
-    let corrected = adjust_p_values(&tests, |index: usize| comparisons[index].strict.paired.p);
+    let corrected = adjust_p_values(&tests, |index: usize| comparisons[index].strict.tested.p);
     for (index, p) in corrected {
         // The reference answers are from the strict parsing, so a lenient comparison is not available.
         let comparison = &mut comparisons[index];
-        comparison.strict.p_report = Some(p);
+        comparison.strict.tested.p_report = Some(p);
         comparison.lenient = comparison.strict.clone();
     }
 }

@@ -83,11 +83,11 @@ fn pooled_rates(design: &PooledDesign, runs: usize) -> PooledRates {
         let finding = findings.iter().find(all).unwrap();
         // The subjects are sorted: exposure drop of the first model, then its noise.
         let one = PairedComparison::new(&grid, 1, 0, None, ParsingMode::Strict).unwrap();
-        rates.rejected += f64::from(u8::from(finding.strict.p < 0.05));
-        rates.rejected_by_one += f64::from(u8::from(one.p < 0.05));
-        rates.held += f64::from(u8::from(holds(finding.strict.difference, -design.effect)));
-        assert_eq!(finding.strict.verdict.is_shown(), finding.strict.p < 0.05);
-        assert_ne!(finding.strict.verdict, Verdict::TooFewClusters);
+        rates.rejected += f64::from(u8::from(finding.strict.tested.p < 0.05));
+        rates.rejected_by_one += f64::from(u8::from(one.tested.p < 0.05));
+        rates.held += f64::from(u8::from(holds(finding.strict.tested.difference, -design.effect)));
+        assert_eq!(finding.strict.tested.verdict.is_shown(), finding.strict.tested.p < 0.05);
+        assert_ne!(finding.strict.tested.verdict, Verdict::TooFewClusters);
     }
     let percent = 100.0 / runs as f64;
     for rate in [&mut rates.rejected, &mut rates.rejected_by_one, &mut rates.held] {

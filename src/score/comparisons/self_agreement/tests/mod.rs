@@ -103,11 +103,11 @@ fn dark_and_enhanced_images_are_compared_pair_by_pair() {
                 .find(|c| c.kind == kind && c.family.is_none() && c.first.condition() == condition)
                 .unwrap()
         });
-        assert_eq!((dark.second.condition(), dark.strict.verdict), ("L0".into(), Verdict::Worse));
-        assert_eq!((dark.strict.paired.second, dark.strict.paired.gained), (1.0, 0));
-        assert_eq!((lifted.strict.verdict, lifted.strict.paired.lost), (Verdict::Better, 0));
-        assert!(lifted.strict.holm < 0.001 && lifted.strict.paired.mcnemar < 0.001);
-        assert_eq!(harmed.strict.verdict, Verdict::Worse);
+        assert_eq!((dark.second.condition(), dark.strict.tested.verdict), ("L0".into(), Verdict::Worse));
+        assert_eq!((dark.strict.second, dark.strict.gained), (1.0, 0));
+        assert_eq!((lifted.strict.tested.verdict, lifted.strict.lost), (Verdict::Better, 0));
+        assert!(lifted.strict.tested.holm < 0.001 && lifted.strict.mcnemar < 0.001);
+        assert_eq!(harmed.strict.tested.verdict, Verdict::Worse);
         assert!(found.comparisons.iter().all(|c| c.kind != ComparisonKind::Model));
     });
 }
