@@ -162,8 +162,12 @@ fn unsupported_tiff(properties: &TiffProperties<'_>) -> Option<String> {
             "a TIFF of floating-point samples; 8 or 16 bits expected, or OpenEXR for linear light: convert it first";
         return Some(problem.to_owned());
     }
-    let colours = properties.colours?;
-    Some(format!("{colours}; convert it to RGB first"))
+    // The crate `tiff` 0.11.3 takes the bits of 32-bit integers for floats.
+    if properties.bits > 16 {
+        return Some(format!("a TIFF of {}-bit integers; 8 or 16 bits expected: convert it first", properties.bits));
+    }
+    let layout = properties.unread_layout.map(|layout| format!("a TIFF {layout}, which is not read; save it again"));
+    layout.or_else(|| Some(format!("{}; convert it to RGB first", properties.colours?)))
 }
 
 /// The first fault of a truncated or damaged file; `None` for a complete one.
@@ -210,6 +214,7 @@ const NEW_SUBFILE_TYPE: u16 = 254;
 const BITS_PER_SAMPLE: u16 = 258;
 const COMPRESSION: u16 = 259;
 const PHOTOMETRIC: u16 = 262;
+const FILL_ORDER: u16 = 266;
 const STRIP_OFFSETS: u16 = 273;
 const ORIENTATION: u16 = 274;
 const SAMPLES_PER_PIXEL: u16 = 277;
@@ -247,6 +252,8 @@ pub(super) struct TiffProperties<'a> {
     pub(super) bits: u64,
     /// True if the samples are floats.
     pub(super) is_float: bool,
+    /// Description of an arrangement of the pixels that is not read; `None` for one that is.
+    pub(super) unread_layout: Option<&'static str>,
     /// Name of a compression that is not read; `None` for one that is.
     pub(super) unread_compression: Option<String>,
     /// Byte offset at which the last strip or tile of the first image ends.
@@ -279,6 +286,13 @@ impl<'a> TiffProperties<'a> {
         let is_preview = value(NEW_SUBFILE_TYPE).is_some_and(is_reduced);
         properties.is_raw = is_preview || directory.iter().any(|entry| entry.tag == DNG_VERSION);
         properties.is_float = value(SAMPLE_FORMAT) == Some(FLOAT);
+        let has_planes_in_tiles = value(PLANAR_CONFIGURATION) == Some(2) && value(TILE_OFFSETS).is_some();
+        // The crate `tiff` 0.11.3 ignores the order of bits, and fails on tiles with separate planes.
+        properties.unread_layout = if value(FILL_ORDER) == Some(2) {
+            Some("whose bytes begin with their lowest bit (FillOrder 2)")
+        } else {
+            has_planes_in_tiles.then_some("of tiles with separate colour planes")
+        };
         properties.unread_compression = value(COMPRESSION).and_then(unread_compression);
         for (offsets, counts) in [(STRIP_OFFSETS, STRIP_BYTE_COUNTS), (TILE_OFFSETS, TILE_BYTE_COUNTS)] {
             let end = reader

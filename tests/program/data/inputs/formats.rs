@@ -173,6 +173,12 @@ fn unsupported_images_are_refused_by_name() {
         (rgb(50706, 1), "a camera's RAW file: only its preview"),
         (rgb(262, 32803), "a camera's RAW file"),
         (rgb(339, 3), "floating-point samples"),
+        (rgb(258, 32), "a TIFF of 32-bit integers; 8 or 16 bits expected"),
+        (rgb(266, 2), "whose bytes begin with their lowest bit (FillOrder 2)"),
+        (
+            tiff(Order::Little, &[Page::rgb(&image()).with(284, 2).with(324, 8)]),
+            "a TIFF of tiles with separate colour planes",
+        ),
         (transparent.into_inner(), "transparent in places; flatten it"),
         (b"\0\0\0\x18ftypheic\0\0\0\0".to_vec(), "a HEIC image, which is not read; convert it to PNG"),
         (b"\0\0\0\x1cftypavif\0\0\0\0".to_vec(), "an AVIF image, which is not read; convert it to PNG"),
