@@ -15,6 +15,7 @@ use serde_json::Value;
 use crate::data::inputs::Inputs;
 use crate::data::{FolderArgs, Picture};
 use crate::engine::images::enhancement::enhancers::{EnhancerModels, EnhancerRunArgs};
+use crate::engine::images::enhancement::latency::Latency;
 use crate::engine::images::enhancement::{dark_or_darkened, evenly_spaced_indices};
 use crate::engine::images::frames::InputTally;
 use crate::engine::images::progress::Progress;
@@ -180,7 +181,21 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
     let dark = dark_or_darkened(&sample);
     let (model, n) = (args.enhancer.model.display(), dark.len());
     progress.print_on_terminal(&format!("{model}: enhancing {n} dark images with each value range and colour order"));
-    doctor(&args.files, image, &mut enhancer, &dark, &sample)
+    let mut outcome = doctor(&args.files, image, &mut enhancer, &dark, &sample)?;
+    if outcome.status == Status::Complete {
+        outcome.output += &latency_of(&mut enhancer, &dark, args.enhancer.loading.threads.count()).to_string();
+    }
+    Ok(outcome)
+}
+
+/// The time that the enhancer takes for each of these images; without those that it cannot enhance.
+fn latency_of(enhancer: &mut Enhancer, images: &[Rgb], threads: usize) -> Latency {
+    let mut latency = Latency::new(threads);
+    for image in images {
+        // The examination has reported images that cannot be enhanced.
+        let _ = latency.time((image.width(), image.height()), || enhancer.enhance(image));
+    }
+    latency
 }
 
 /// A sample of the images. Unreadable ones are skipped here, and reported when they are enhanced.
@@ -212,6 +227,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let mut counts = ImageCounts::default();
     let refusals = ImageRefusals::default();
     let mut burnt = Vec::new();
+    let mut latency = Latency::new(loading.threads.count());
     for entry in &images.entries {
         let picture = images.picture(entry);
         let outcome = picture.and_then(|picture| {
@@ -221,8 +237,9 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
                 OutputImage::new(out, &entry.stem, args.force).with_overruled_problem(overruled_problem.clone());
             place.write_unless_present(&origin, || {
                 let degraded = picture.decode()?;
-                let enhanced =
-                    enhancer.enhance(&degraded).map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))?;
+                let enhanced = latency
+                    .time((degraded.width(), degraded.height()), || enhancer.enhance(&degraded))
+                    .map_err(|e| Error::data(format_args!("image {:?}", entry.id.0), e))?;
                 burnt.extend(burnt_out([&degraded, &enhanced]).map(|share| (&entry.id, share)));
                 Ok(enhanced)
             })
@@ -250,7 +267,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
         out,
         Outcome::complete_if(counts.failed == 0),
         format!(
-            "{}: {} made by {}{}{}\n{sizes}",
+            "{}: {} made by {}{}{}\n{sizes}{latency}",
             out.display(),
             counts.written,
             enhancer.name(),

@@ -3,6 +3,7 @@
 mod dark_frames;
 mod enhanced_images;
 pub(crate) mod enhancers;
+pub(crate) mod latency;
 
 pub(super) use dark_frames::{DarkFrames, dark_frames};
 pub(super) use enhanced_images::{DarkImage, EnhancedImages};
