@@ -86,6 +86,41 @@ fn evaluation_words_show_correct_form() {
 }
 
 #[test]
+fn guessed_commands_show_their_name_here_and_it_works() {
+    let bench = Bench::new();
+    for run in ["one", "two"] {
+        bench.complete(&words(&format!("--model random --data rooms:frames=2,size=64x48 --levels L0,L3 --out {run}")));
+    }
+    let lines = ["compare one two", "summary one", "share one", "one", "one/nowhere"];
+    insta::assert_snapshot!(each(lines.map(str::to_owned).to_vec(), |line| refused(&bench, line)), @"
+    compare one two
+      error: no command compare: to compare runs: darkqa-eval report RUN RUN
+    summary one
+      error: no command summary: to read a run: darkqa-eval report RUN
+    share one
+      error: no command share: to share a run: darkqa-eval bundle RUN --out NAME.zip
+    one
+      error: no command one: it is a run; to read it: darkqa-eval report one
+    one/nowhere
+      error: unrecognized subcommand 'one/nowhere'
+    ");
+    bench.complete(&words("rooms --out photos --frames 1 --size 64x48"));
+    insta::assert_snapshot!(
+        refused(&bench, "photos"),
+        @"error: no command photos: it is a file or folder; to ask about it: darkqa-eval --model NAME --data photos"
+    );
+    for line in [
+        "report one two",
+        "report one",
+        "bundle one --out one.zip",
+        "--model random --data photos",
+        "synthesize photos --out dark",
+    ] {
+        bench.complete(&words(line));
+    }
+}
+
+#[test]
 fn wrong_words_name_their_flag() {
     let bench = Bench::new();
     let lines = [

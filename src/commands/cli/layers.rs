@@ -31,6 +31,7 @@ use crate::ask::OPENAI_KEY;
 use crate::engine::models::{RunDefault, run_defaults};
 use crate::error::{Error, Result};
 use crate::files;
+use crate::types::shell_word;
 use crate::types::text::{TomlFault, did_you_mean, nearest, suggestion};
 use expansion::{LayeredValue, text_of};
 
@@ -430,13 +431,41 @@ fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result
 /// Words that people type as the command of an evaluation, which has none.
 const NO_COMMAND: [&str; 3] = ["run", "evaluate", "eval"];
 
+/// Words that people type as a command which has another name here, with what to type.
+const OTHER_NAMES: [(&str, &str); 7] = [
+    ("compare", "to compare runs: darkqa-eval report RUN RUN"),
+    ("diff", "to compare runs: darkqa-eval report RUN RUN"),
+    ("summary", "to read a run: darkqa-eval report RUN"),
+    ("view", "to read a run: darkqa-eval report RUN"),
+    ("share", "to share a run: darkqa-eval bundle RUN --out NAME.zip"),
+    ("pack", "to share a run: darkqa-eval bundle RUN --out NAME.zip"),
+    ("degrade", "to make dark images: darkqa-eval synthesize IMAGES --out DIR"),
+];
+
+/// What to type in place of a word that is no command; `None` if that is not known.
+fn guessed_word(word: &str) -> Option<String> {
+    if NO_COMMAND.contains(&word) {
+        return Some("an evaluation has none; leave the word out: darkqa-eval --model NAME [OPTIONS]".to_owned());
+    }
+    if let Some((_, advice)) = OTHER_NAMES.iter().find(|(other, _)| *other == word) {
+        return Some((*advice).to_owned());
+    }
+    let path = Path::new(word);
+    let place = shell_word(word);
+    if path.join("manifest.json").is_file() {
+        Some(format!("it is a run; to read it: darkqa-eval report {place}"))
+    } else if path.exists() {
+        Some(format!("it is a file or folder; to ask about it: darkqa-eval --model NAME --data {place}"))
+    } else {
+        None
+    }
+}
+
 fn with_origin(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error {
     if let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidSubcommand)
-        && NO_COMMAND.contains(&&**word)
+        && let Some(advice) = guessed_word(word)
     {
-        return Error::CommandLine(format!(
-            "no command {word}: an evaluation has none; leave the word out: darkqa-eval --model NAME [OPTIONS]"
-        ));
+        return Error::CommandLine(format!("no command {word}: {advice}"));
     }
     let flag = match error.get(ContextKind::InvalidArg) {
         Some(ContextValue::String(flag)) => flag.trim_start_matches("--"),
