@@ -16,8 +16,9 @@ struct GroupKinds {
 }
 
 /// All groups in order. Sentences of any other kind are in the last group.
-const GROUPS: [GroupKinds; 7] = [
+const GROUPS: [GroupKinds; 8] = [
     GroupKinds { title: "Baseline", leading: &["baseline"], further: &[] },
+    GroupKinds { title: "Threshold", leading: &["threshold"], further: &[] },
     GroupKinds {
         title: "Darkness",
         leading: &["darkness", "real darkness", "agreement_in_the_dark"],
@@ -51,7 +52,7 @@ const GROUPS: [GroupKinds; 7] = [
 ];
 
 /// Maximum number of main findings at the start of a report (chosen to fit one screen).
-const MAX_FIRST: usize = 5;
+const MAX_FIRST: usize = 6;
 /// Maximum number of enhancers in the summary (chosen).
 const MAX_ENHANCERS: usize = 3;
 /// Maximum number of sentences in the text of a finding (chosen).
@@ -119,26 +120,25 @@ impl<'a> FindingGroups<'a> {
         self.0.iter().find(|group| group.title == title)
     }
 
-    /// Summary of the report in one sentence: the effect of darkness, and the detected effects of enhancers. Without
-    /// either, it is the first main finding; without any finding, it is empty. A sentence about the training data of
-    /// each enhancer with an effect follows.
+    /// Summary of the report: the comparison with a baseline, how dark it may be, then one sentence with the effect of darkness and the detected effects
+    /// of enhancers. Without any of them, it is the first main finding; without any finding, it is empty. A sentence
+    /// about the training data of each enhancer with an effect follows.
     pub(super) fn summary(&self) -> String {
-        let darkness = self.group("Darkness").and_then(FindingGroup::main_finding).map(GroupedFinding::claims);
+        let [baseline, threshold, darkness] = ["Baseline", "Threshold", "Darkness"]
+            .map(|title| self.group(title).and_then(FindingGroup::main_finding).map(GroupedFinding::claims));
+        let first: Vec<String> = baseline.into_iter().chain(threshold).map(|claims| self.sentence(&[claims])).collect();
         let enhancers = self.group("Enhancers");
         let clauses: Vec<String> = darkness
             .into_iter()
             .chain(enhancers.map(FindingGroup::enhancer_effects))
             .filter(|clause| !clause.is_empty())
             .collect();
-        match (&clauses[..], self.main_findings().first()) {
-            ([], Some((_, first))) => self.sentence(&[first.text()]),
-            ([], None) => String::new(),
-            _ => {
-                let trainings = enhancers.map_or_else(Vec::new, FindingGroup::trainings);
-                let sentences = std::iter::once(self.sentence(&clauses)).chain(trainings);
-                sentences.collect::<Vec<String>>().join(" ")
-            }
+        if let ([], [], Some((_, main))) = (&clauses[..], &first[..], self.main_findings().first()) {
+            return self.sentence(&[main.text()]);
         }
+        let effects = (!clauses.is_empty()).then(|| self.sentence(&clauses));
+        let trainings = enhancers.map_or_else(Vec::new, FindingGroup::trainings);
+        first.into_iter().chain(effects).chain(trainings).collect::<Vec<String>>().join(" ")
     }
 
     /// Joins clauses to one sentence. A variant at the start of the first clause is not repeated in the others.

@@ -19,4 +19,4 @@ pub(crate) mod sharded_run;
 pub(crate) mod stored;
 pub(crate) mod training;
 
-pub(crate) use outcome::{Outcome, PrintArgs, StdoutFormat, Syntax};
+pub(crate) use outcome::{LUX_AT_L0, LuxArgs, Outcome, PrintArgs, StdoutFormat, Syntax};

@@ -9,9 +9,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use crate::types::Decides;
+use crate::types::flags::positive;
 use crate::types::manifests::{RunManifest, Status};
 use crate::types::text::money;
 
@@ -69,6 +70,26 @@ pub(crate) struct PrintArgs {
     /// Files written beside the report.
     #[command(flatten)]
     pub written: WrittenArgs,
+}
+
+/// The light where the images of a run were taken.
+#[derive(Debug, Clone, Copy, Default, Args)]
+#[command(next_help_heading = "Output")]
+pub(crate) struct LuxArgs {
+    /// Light where the images were taken (L0), measured in lux: the report then states thresholds in lux, too, and keeps
+    /// it with the run; default: not known
+    #[arg(long, alias = "lux-at-L0", value_name = "LUX", value_parser = positive, add = Decides::Nothing)]
+    pub lux_at_l0: Option<f64>,
+}
+
+/// Key of the light at L0 in the settings of a manifest.
+pub(crate) const LUX_AT_L0: &str = "--lux-at-l0";
+
+impl LuxArgs {
+    /// The setting for a manifest; `None` if the light is not stated.
+    pub(crate) fn setting(self) -> Option<(&'static str, Value)> {
+        self.lux_at_l0.map(|lux| (LUX_AT_L0, json!(lux)))
+    }
 }
 
 /// Flags that say what is written beside a report.

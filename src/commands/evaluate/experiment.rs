@@ -126,7 +126,7 @@ impl Experiment for ChoiceSetup<'_> {
             let note = json!({"mean": mean, "frames": frames});
             ("brightness", note)
         });
-        [bank, reading, light, brightness].into_iter().flatten().collect()
+        [bank, reading, light, brightness, self.config.lux.setting()].into_iter().flatten().collect()
     }
 
     fn columns(&self) -> Columns {

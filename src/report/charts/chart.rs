@@ -22,7 +22,7 @@ use serde::Serialize;
 
 use crate::error::Result;
 use crate::report::text::terminal::to_script_json;
-use crate::report::text::words::{light, percent, with_interval};
+use crate::report::text::words::{self, light, percent, with_interval};
 use crate::types::degradations::Axis;
 use crate::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::estimate::Estimate;
@@ -155,6 +155,8 @@ pub(crate) struct Panel {
     pub lines: Vec<PlotLine>,
     /// The model of all lines; `None` if there are several.
     pub model: Option<String>,
+    /// Light at L0 in lux, for the title of the axis; `None` if it is not known.
+    pub lux: Option<f64>,
 }
 
 impl PlotLine {
@@ -200,8 +202,11 @@ impl Panel {
     /// Title of the horizontal axis.
     pub(crate) fn axis_title(&self) -> String {
         let axis = self.levels().into_iter().find_map(AxisLevel::axis);
-        let Axis { title, unit, .. } = axis.unwrap_or(Axis::LIGHT);
-        format!("level; {title} in {unit}")
+        let axis = axis.unwrap_or(Axis::LIGHT);
+        let Axis { title, unit, .. } = axis;
+        let light = self.lux.filter(|_| axis == Axis::LIGHT);
+        let light = light.map(|lux| format!(" ({} lux at L0, half at each EV)", words::lux(lux, 0.0)));
+        format!("level; {title} in {unit}{}", light.unwrap_or_default())
     }
 }
 

@@ -115,7 +115,7 @@ fn panel(lights: &BTreeMap<LightView<'_>, Vec<&ConditionFidelity>>, axis: Axis, 
         model: None,
         items: None,
     }));
-    Panel { title: spec.title.to_owned(), lines, model: None }
+    Panel { title: spec.title.to_owned(), lines, model: None, lux: None }
 }
 
 /// A number without an interval.

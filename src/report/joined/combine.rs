@@ -3,12 +3,13 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::path::Path;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::join::{Joined, JoinedRun, join};
 use super::listing::listing;
 use crate::error::{Error, Result};
 use crate::report::page::{self, PageInputs};
+use crate::runs::LUX_AT_L0;
 use crate::runs::stored::StoredRun;
 use crate::types::manifests::RunManifest;
 use crate::types::{ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word};
@@ -42,17 +43,20 @@ impl CombinedRuns {
     }
 
     /// The light in which the data set was photographed: dark if all runs state so, with the brightness of the first
-    /// run that measured it.
+    /// run that measured it; and in lux, if all runs state the same.
     pub(super) fn photographed_set(&self) -> PhotographedSet {
         let is_dark = |run: &JoinedRun| run.manifest.settings.get("--light") == Some(&json!(SetLight::Dark));
+        let stated = |run: &JoinedRun| run.manifest.settings.get(LUX_AT_L0).and_then(Value::as_f64);
+        let lux =
+            self.runs.first().and_then(stated).filter(|lux| self.runs.iter().all(|run| stated(run) == Some(*lux)));
         if self.runs.is_empty() || !self.runs.iter().all(is_dark) {
-            return PhotographedSet::default();
+            return PhotographedSet { lux, ..PhotographedSet::default() };
         }
         let brightness = self.runs.iter().find_map(|run| {
             let measured = run.manifest.settings.get("brightness")?;
             Some((measured.get("mean")?.as_f64()?, measured.get("frames")?.as_u64()? as usize))
         });
-        PhotographedSet { light: SetLight::Dark, brightness }
+        PhotographedSet { light: SetLight::Dark, brightness, lux }
     }
 
     /// Whether true answers are known. [`combine`] checks that they are known for all questions or for none.

@@ -28,7 +28,7 @@ use crate::report::products::PAGE;
 use crate::report::text::alert::Alert;
 use crate::runs::sharded_run::{open_any_run, open_choice_run};
 use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
-use crate::runs::{Outcome, PrintArgs, StdoutFormat, Syntax, record_table};
+use crate::runs::{LUX_AT_L0, LuxArgs, Outcome, PrintArgs, StdoutFormat, Syntax, record_table};
 use crate::store::{AddressChange, Store, now};
 use crate::types::manifests::{Counts, Status};
 use crate::types::{AskedItem, ChoiceDetail, Decides, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
@@ -61,6 +61,9 @@ pub(crate) struct ReportArgs {
     /// An old run to compare with.
     #[command(flatten)]
     pub baseline: BaselineArgs,
+    /// The light where the images were taken.
+    #[command(flatten)]
+    pub lux: LuxArgs,
     /// How the report is printed.
     #[command(flatten)]
     pub show: ReportShowArgs,
@@ -173,6 +176,7 @@ fn report_choices(
             run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
         }
         run.leave_out(args.shown_models());
+        run.manifest.settings.extend(args.lux.setting().map(|(key, value)| (key.to_owned(), value)));
     }
     if args.format().is_document() {
         rescore_text.clear();
@@ -303,6 +307,9 @@ fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicat
         let problem =
             "compares runs of questions with choices; marks of open questions have no such test: leave it out";
         return Err(Error::usage(*flag, problem));
+    }
+    if args.lux.lux_at_l0.is_some() {
+        return Err(Error::usage(LUX_AT_L0, "a report on open questions has no threshold: leave it out"));
     }
     if let Some(run) = runs.iter().find(|run| run.trials.is_empty()) {
         return Err(no_records(run.folder.clone()));

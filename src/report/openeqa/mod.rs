@@ -181,7 +181,7 @@ fn panel(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>, l
         .iter()
         .enumerate()
         .filter_map(|(index, (subject, cell))| flat_line(subject, cell, LineStyle(series_count + index)));
-    Panel { title: title(report, group), lines: curves.chain(flat_lines).collect(), model: None }
+    Panel { title: title(report, group), lines: curves.chain(flat_lines).collect(), model: None, lux: None }
 }
 
 /// Scores of a series over the levels. L0 is the start of the series in the ladder.

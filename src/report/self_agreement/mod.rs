@@ -326,7 +326,7 @@ fn panels(
         .into_iter()
         .map(|(title, mut lines)| {
             add(&mut lines);
-            Panel { title: format!("{title}, n {}", found.items()), lines, model: None }
+            Panel { title: format!("{title}, n {}", found.items()), lines, model: None, lux: found.set.lux }
         })
         .collect()
 }

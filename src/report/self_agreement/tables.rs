@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 use crate::report::sentences::{Sentence, self_agreement};
 use crate::report::tables::{
-    EnhancerRow, agreement_comparisons, commonest_answers, counted_answers, enhancers, health,
+    EnhancerRow, agreement_comparisons, commonest_answers, counted_answers, enhancers, health, in_lux,
     missing_threshold_reason, with_training,
 };
 use crate::report::text::alert::Alert;
@@ -162,7 +162,7 @@ fn no_half_reason(reason: &NoHalf) -> String {
 /// Table of the exposure drops at which models keep half of their evidence.
 fn thresholds(found: &SelfAgreement<'_>) -> Table {
     let columns = "csv threshold low high | terminal half kept down to, interval | page half kept down to [95 %]";
-    let mut table = TableBuilder::new("evidence_thresholds", &found.curves)
+    let builder = TableBuilder::new("evidence_thresholds", &found.curves)
         .page("thresholds", "Where half of the evidence is lost")
         .column(Text, "csv model | terminal model | page model", |curve| curve.model.clone())
         .column(Text, "csv variant", |curve| curve.variant.to_string())
@@ -172,10 +172,13 @@ fn thresholds(found: &SelfAgreement<'_>) -> Table {
         .column(ColumnKind::Threshold, columns, |curve| match &curve.threshold {
             Ok(threshold) => TableCell::Threshold(*threshold, curve.darkest.value()),
             Err(reason) => TableCell::Unknown(no_half_reason(reason)),
-        })
-        .column(Text, "csv unit | terminal unit | page unit", |curve| curve.darkest.axis().map(|axis| axis.unit))
-        .column(Text, "csv reason", |curve| curve.threshold.as_ref().err().map(no_half_reason))
-        .build();
+        });
+    let lux = found.set.lux.filter(|_| found.curves.iter().all(|curve| curve.darkest.axis() == Some(Axis::LIGHT)));
+    let mut table =
+        in_lux(builder, lux, |curve| Some((curve.threshold.as_ref().ok().copied()?, curve.darkest.value())))
+            .column(Text, "csv unit | terminal unit | page unit", |curve| curve.darkest.axis().map(|axis| axis.unit))
+            .column(Text, "csv reason", |curve| curve.threshold.as_ref().err().map(no_half_reason))
+            .build();
     if !found.curves.is_empty() {
         table.heading = Some(format!("Where half of the evidence is lost, with 95 % intervals by {}", found.unit));
     }

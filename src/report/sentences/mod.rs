@@ -26,6 +26,7 @@ mod self_agreement;
 mod sentence;
 #[cfg(test)]
 pub(crate) mod tests;
+mod threshold;
 
 use std::collections::BTreeSet;
 
@@ -70,6 +71,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(sample::impossible(findings));
     sentences.extend(sample::left_out(findings));
     sentences.extend(readings(&findings.by_profile, findings.unit));
+    sentences.extend(in_each_light(findings, threshold::seen_down_to));
     sentences.extend(darkness::darkness(findings));
     sentences.extend(real::real(findings));
     sentences.extend(in_each_light(findings, about_light));

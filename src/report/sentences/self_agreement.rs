@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, level_runs};
+use super::threshold::evidence_down_to;
 use crate::report::text::words::light;
 use crate::types::{AxisLevel, EnhancerName, SetLight, Variant};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
@@ -27,6 +28,7 @@ pub(crate) fn self_agreement(found: &SelfAgreement<'_>) -> Vec<Sentence> {
             continue;
         }
         for variant in variants(found, model) {
+            sentences.extend(evidence_down_to(found, model, &variant));
             sentences.extend(darkness(found, model, &variant));
             for enhancer in enhancers(found, model) {
                 sentences.extend(enhanced(found, model, &variant, &enhancer));
@@ -150,32 +152,13 @@ fn darkness(found: &SelfAgreement<'_>, model: &str, variant: &Variant) -> Option
     }
     let references = if references.is_empty() { String::new() } else { format!("; {}", references.join(", ")) };
     let text = format!(
-        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{references}{}.",
-        light(variant, None),
-        half_lost(found, dark, &mut numbers)
+        "At {level} ({}) {model} gives its answer at L0 to {share} % of the questions{references}.",
+        light(variant, None)
     );
     let test = compared(found, ComparisonKind::Level, model).find(|comparison| comparison.first == dark.subject);
     let detail = darkness_detail(found, dark, level, test, &mut numbers);
     let tone = test.map_or(EffectDirection::Note, |test| test.claim().into());
     Some(numbers.sentence("agreement_in_the_dark", tone, text, detail))
-}
-
-/// The end of the sentence: where half of the evidence is lost; empty if that is unknown or beyond the darkest level.
-fn half_lost(found: &SelfAgreement<'_>, dark: &AgreementCell, numbers: &mut NamedNumbers) -> String {
-    let subject = &dark.subject;
-    let curve = found
-        .curves
-        .iter()
-        .find(|curve| curve.model == subject.model && curve.variant == subject.variant && curve.enhancer.is_none());
-    match curve.and_then(|curve| curve.threshold.as_ref().ok()) {
-        Some(threshold) if threshold.value.is_finite() => {
-            let axis = subject.level.and_then(AxisLevel::axis);
-            let unit = axis.map_or("EV", |axis| axis.unit);
-            let value = numbers.number("threshold", threshold.value, 1);
-            format!("; half of the evidence is lost at {value} {unit}")
-        }
-        _ => String::new(),
-    }
 }
 
 /// The detail of the sentence about the agreement at the darkest level.

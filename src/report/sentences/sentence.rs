@@ -170,6 +170,11 @@ impl NamedNumbers {
         format!("{rounded:.*}", usize::from(decimals)).replace('-', "−")
     }
 
+    /// Records a number that is written already.
+    pub(super) fn record(&mut self, name: &str, text: &str) {
+        self.values.insert(name.to_owned(), text.parse().unwrap_or(f64::NAN));
+    }
+
     /// A share in percent, without the sign.
     pub(super) fn percent(&mut self, name: &str, share: f64) -> String {
         self.number(name, 100.0 * share, 1)

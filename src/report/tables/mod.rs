@@ -40,7 +40,7 @@ pub(crate) use observer::{control_text, notes as observer_notes};
 pub(crate) use pooled::{BASELINE, baseline};
 pub(crate) use sections::{ENHANCERS, SECTIONS, Section, with_training};
 pub(crate) use strict_groups::strict_groups;
-pub(crate) use thresholds::missing_threshold_reason;
+pub(crate) use thresholds::{in_lux, missing_threshold_reason};
 
 /// All tables of an evaluation; the first is the summary. A hidden observer is only in the files.
 #[must_use]

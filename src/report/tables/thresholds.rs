@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::report::text::table::ColumnKind::{Count, Number, Percent, Share, Text, Threshold};
 use crate::report::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
-use crate::report::text::words::{family as family_name, light, points};
+use crate::report::text::words::{family as family_name, light, lux, points};
 use crate::types::degradations::Axis;
 use crate::types::text::{counted, plural};
 use crate::types::{AxisLevel, Family, FrameId, Variant};
@@ -17,7 +17,7 @@ use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{PooledFinding, PooledKind};
 use darkqa_score::findings::Findings;
 use darkqa_score::significance::{ALPHA, Verdict, holm};
-use darkqa_score::threshold::{CurveSummary, NoThreshold, SparseLevel};
+use darkqa_score::threshold::{CurveSummary, NoThreshold, SparseLevel, Threshold as DropThreshold};
 
 pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = Vec::new();
@@ -34,22 +34,23 @@ pub(super) fn thresholds(findings: &Findings<'_>) -> Vec<Table> {
 /// Tables of the curves on one axis: all families together, by family, and both with lenient parsing (in files only).
 fn axis_tables(findings: &Findings<'_>, axis: Axis, curves: Vec<&Curve>) -> [Table; 3] {
     let titles = Titles::new(axis);
+    let lux = findings.set.lux.filter(|_| axis == Axis::LIGHT);
     let notes = notes(&curves);
-    let lenient = table(&titles, "", &curves, ParsingMode::Lenient).in_files_only();
+    let lenient = table(&titles, "", &curves, ParsingMode::Lenient, lux).in_files_only();
     let (all_families, by_family): (Vec<&Curve>, Vec<&Curve>) =
         curves.into_iter().partition(|curve| curve.family.is_none());
     let heading = format!(
         "{} in {} (half-way from L0 to the floor) and mean accuracy in %, with 95 % intervals by {}",
         titles.quantity, axis.unit, findings.unit
     );
-    let mut all_families = table(&titles, titles.caption, &all_families, ParsingMode::Strict);
+    let mut all_families = table(&titles, titles.caption, &all_families, ParsingMode::Strict, lux);
     all_families.heading = (!all_families.rows.is_empty()).then_some(heading);
     all_families.notes = notes;
     if axis == Axis::LIGHT {
         all_families.notes.extend(finer_levels_note(findings));
     }
     let caption = format!("{} by family", titles.caption);
-    let mut by_family = table(&titles, &caption, &by_family, ParsingMode::Strict);
+    let mut by_family = table(&titles, &caption, &by_family, ParsingMode::Strict, lux);
     by_family.is_folded = true;
     [all_families, by_family, lenient]
 }
@@ -93,8 +94,8 @@ impl Titles {
 }
 
 /// Builds the table of some curves. A threshold is `inf` beyond the darkest level, and empty if unknown.
-fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -> Table {
-    TableBuilder::new(titles.file, curves)
+fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode, lux: Option<f64>) -> Table {
+    let builder = TableBuilder::new(titles.file, curves)
         .page("thresholds", caption)
         .curve(|curve| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
         .column(Text, "terminal light | page light", |curve| light(&curve.variant, curve.enhancer.as_ref()))
@@ -106,16 +107,53 @@ fn table(titles: &Titles, caption: &str, curves: &[&Curve], mode: ParsingMode) -
                 Ok(threshold) => TableCell::Threshold(*threshold, darkest),
                 Err(reason) => TableCell::Unknown(missing_threshold_reason(reason)),
             }
+        });
+    in_lux(builder, lux, |curve| {
+        let summary = curve.parsed(mode);
+        Some((summary.threshold.as_ref().ok().copied()?, summary.darkest.value()))
+    })
+    .column(Share, "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]", |curve| {
+        curve.parsed(mode).area
+    })
+    .column(Percent, "csv floor | terminal floor | page floor in %", |curve| curve.parsed(mode).floor)
+    .column(Text, "csv floor_of | terminal of | page of", |curve| curve.floor.name())
+    .column(Text, titles.range_column, |curve| format!("0–{}", curve.parsed(mode).darkest.value()))
+    .column(Text, "csv reason", |curve| csv_reason(curve.parsed(mode)))
+    .column(Text, "csv mode", |_| mode.name())
+    .build()
+}
+
+/// Adds the light at a threshold, in lux, with its interval; no column if the light at L0, `at_l0`, is not known.
+/// `threshold` also gives the darkest level, in EV: the light at a threshold beyond it is not known.
+pub(crate) fn in_lux<T>(
+    builder: TableBuilder<T>,
+    at_l0: Option<f64>,
+    threshold: impl Fn(&T) -> Option<(DropThreshold, f64)>,
+) -> TableBuilder<T> {
+    let Some(at_l0) = at_l0 else {
+        return builder;
+    };
+    let light = |drop: f64| at_l0 * (-drop).exp2();
+    builder
+        .column(Number, "csv lux lux_low lux_high", |item| match threshold(item) {
+            Some((DropThreshold { value, low, high }, darkest)) if value.is_finite() => {
+                let ends = DropThreshold { value: light(value), low: light(high), high: light(low) };
+                TableCell::Threshold(ends, darkest)
+            }
+            _ => TableCell::Blank,
         })
-        .column(Share, "csv area area_low area_high n | terminal mean accuracy | page area in % [95 %]", |curve| {
-            curve.parsed(mode).area
+        .column(Text, "terminal lux | page lux", |item| match threshold(item) {
+            None => TableCell::Blank,
+            Some((found, darkest)) if found.value.is_infinite() => format!("< {}", lux(at_l0, darkest)).into(),
+            Some((found, darkest)) => {
+                let low = if found.high.is_infinite() {
+                    format!("< {}", lux(at_l0, darkest))
+                } else {
+                    lux(at_l0, found.high)
+                };
+                format!("{} [{low}, {}]", lux(at_l0, found.value), lux(at_l0, found.low)).into()
+            }
         })
-        .column(Percent, "csv floor | terminal floor | page floor in %", |curve| curve.parsed(mode).floor)
-        .column(Text, "csv floor_of | terminal of | page of", |curve| curve.floor.name())
-        .column(Text, titles.range_column, |curve| format!("0–{}", curve.parsed(mode).darkest.value()))
-        .column(Text, "csv reason", |curve| csv_reason(curve.parsed(mode)))
-        .column(Text, "csv mode", |_| mode.name())
-        .build()
 }
 
 /// Text for the reason why a curve has no threshold.

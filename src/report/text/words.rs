@@ -143,6 +143,14 @@ pub(crate) fn stops(value: f64, darkest: f64) -> String {
     if value.is_infinite() { format!("> {darkest}") } else { format!("{value:.1}") }
 }
 
+/// Light in lux at an exposure drop in EV below `at_l0`, to two significant digits: `180`, `5.4`, `0.39`.
+pub(crate) fn lux(at_l0: f64, drop: f64) -> String {
+    let light = at_l0 * (-drop).exp2();
+    let digits = 1 - light.log10().floor() as i32;
+    let step = 10_f64.powi(-digits);
+    format!("{:.*}", digits.max(0) as usize, (light / step).round() * step)
+}
+
 /// A share in percent with its interval, such as `96.4 [93.0, 98.2]`; without an interval if the share is known
 /// exactly.
 pub(crate) fn with_interval(share: Estimate) -> String {

@@ -425,6 +425,8 @@ pub struct PhotographedSet {
     /// Mean linear luminance of a sample of the photographs, from 0 to 1, and size of the sample; `None` if it was not
     /// measured.
     pub brightness: Option<(f64, usize)>,
+    /// Light where the photographs were taken, in lux; `None` if it is not known.
+    pub lux: Option<f64>,
 }
 
 impl PhotographedSet {

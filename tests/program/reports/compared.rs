@@ -324,6 +324,7 @@ fn new_run_is_held_against_baseline() {
     assert_eq!(finding["verdict"], "worse");
     insta::assert_snapshot!(worse.lines_with("worse"), @"
     exit code: 0
+     script:m.jsonl is worse than in old at L0, L3-ev, L3-noise, by up to 50.0
      Baseline       −  script:m.jsonl is worse than in old at L0, L3-ev, L3-noise,
     run: worse
     ");
@@ -383,4 +384,10 @@ fn marks_of_different_judges_stay_apart() {
     error: --baseline: compares runs of questions with choices; marks of open questions have no such test: leave
         it out
     ");
+    let lux = house.0.call(&words("report one --lux-at-L0 200"));
+    insta::assert_snapshot!(lux.messages(), @"
+    exit code: 2
+    error: --lux-at-l0: a report on open questions has no threshold: leave it out
+    ");
+    assert_eq!(house.0.call(&words("report one")).code, Some(0));
 }

@@ -319,7 +319,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// Settings that change no answer: on a run's folder they ask nothing.
-const NOTHING: [&str; 42] = [
+const NOTHING: [&str; 43] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -359,6 +359,7 @@ const NOTHING: [&str; 42] = [
     "--findings",
     "--json",
     "--no-parquet",
+    "--lux-at-l0 200",
     "--quiet",
     "--color never",
     "--config other.toml",

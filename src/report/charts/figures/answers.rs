@@ -45,7 +45,7 @@ impl FigureBuilder<'_> {
             LineContent::Curve(points) => points.first().map(|(_, rate)| rate.n),
             LineContent::Flat(_) | LineContent::Marks(_) => None,
         });
-        Panel { title: format!("{title}, n {}", n.unwrap_or(0)), lines, model: None }
+        Panel { title: format!("{title}, n {}", n.unwrap_or(0)), lines, model: None, lux: None }
     }
 
     /// Share of the most frequent answer by level, against the share of the most frequent true answer.
@@ -90,6 +90,7 @@ impl FigureBuilder<'_> {
             title: format!("{}, n {n}", self.names.display_name(family_name(Some(family)))),
             lines,
             model: None,
+            lux: None,
         })
     }
 }
@@ -132,7 +133,7 @@ impl FigureBuilder<'_> {
                 if !lines.is_empty() {
                     let name = self.names.display_name(model);
                     let title = format!("{name}, {}", self.condition_text(&variant, None));
-                    panels.push(Panel { title, lines, model: Some((*model).to_owned()) });
+                    panels.push(Panel { title, lines, model: Some((*model).to_owned()), lux: None });
                 }
             }
         }
@@ -168,7 +169,7 @@ impl FigureBuilder<'_> {
                 if lines.len() > 1 {
                     let (name, light) = (self.curve_name(model), self.condition_text(&variant, None));
                     let title = format!("{name}, {light}, n {}", self.item_count(None));
-                    panels.push(Panel { title, lines, model: Some((*model).to_owned()) });
+                    panels.push(Panel { title, lines, model: Some((*model).to_owned()), lux: None });
                 }
             }
         }

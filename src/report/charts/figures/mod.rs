@@ -365,6 +365,7 @@ impl<'a> FigureBuilder<'a> {
                     title: format!("{}, n {}", self.condition_text(variant, None), self.item_count(None)),
                     lines,
                     model: None,
+                    lux: None,
                 }
             })
             .collect();
@@ -373,7 +374,7 @@ impl<'a> FigureBuilder<'a> {
             let mut lines = self.accuracy_lines(&Variant::NONE, None);
             lines.append(&mut marks);
             let title = format!("photographed in the dark, n {}", self.item_count(None));
-            panels.push(Panel { title, lines, model: None });
+            panels.push(Panel { title, lines, model: None, lux: None });
         }
         let mut caption = format!(
             "Accuracy of each model by level, without enhancement.{}",
@@ -400,7 +401,12 @@ impl<'a> FigureBuilder<'a> {
             let variants: Vec<&Variant> =
                 all.iter().filter(|variant| variant.kind.map(Kind::axis) == Some(axis)).collect();
             if variants.len() > 1 {
-                panels.push(Panel { title: title.clone(), lines: self.variant_lines(&variants, &models), model: None });
+                panels.push(Panel {
+                    title: title.clone(),
+                    lines: self.variant_lines(&variants, &models),
+                    model: None,
+                    lux: None,
+                });
             }
         }
         let is_auto = all.iter().any(|variant| variant.kind == Some(Kind::Auto));
@@ -476,6 +482,7 @@ impl<'a> FigureBuilder<'a> {
                     title: format!("{}, n {n}", self.names.display_name(family_name(Some(family)))),
                     lines: self.accuracy_lines(variant, Some(family)),
                     model: None,
+                    lux: None,
                 }
             })
             .collect();
@@ -498,7 +505,10 @@ impl<'a> FigureBuilder<'a> {
         if panels.is_empty() || self.models.is_empty() {
             return None;
         }
-        let chart = Chart { measure, note: self.note() + &self.training_note(&panels), panels: split(panels), columns };
+        let note = self.note() + &self.training_note(&panels);
+        let lux = self.findings.set.lux;
+        let panels = panels.into_iter().map(|panel| Panel { lux, ..panel }).collect();
+        let chart = Chart { measure, note, panels: split(panels), columns };
         Some((caption.to_owned(), chart))
     }
 }

@@ -70,7 +70,12 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &DisplayNames) -> Overvie
 
 impl FigureBuilder<'_> {
     fn single_panel_chart(title: String, lines: Vec<PlotLine>) -> Chart {
-        Chart { measure: ACCURACY, panels: vec![Panel { title, lines, model: None }], columns: 1, note: String::new() }
+        Chart {
+            measure: ACCURACY,
+            panels: vec![Panel { title, lines, model: None, lux: None }],
+            columns: 1,
+            note: String::new(),
+        }
     }
 
     /// Title of a mean: "mean of 6 models", or the name of a single model.

@@ -26,6 +26,7 @@ fn split_panel(panel: Panel) -> Vec<Panel> {
         .map(|(part, part_curves)| Panel {
             title: format!("{} ({} of {parts})", panel.title, part + 1),
             model: panel.model.clone(),
+            lux: panel.lux,
             lines: part_curves
                 .iter()
                 .chain(other_lines.iter().filter(|line| share_model(part_curves, line) || !share_model(&curves, line)))
@@ -60,7 +61,7 @@ mod tests {
             line("m0 without images", LineContent::Flat(0.4), Some("m0")),
             line("chance", LineContent::Flat(0.3), None),
         ];
-        Panel { title: "t".to_owned(), lines: curves.chain(others).collect(), model: None }
+        Panel { title: "t".to_owned(), lines: curves.chain(others).collect(), model: None, lux: None }
     }
 
     fn line_names(panel: &Panel) -> Vec<&str> {

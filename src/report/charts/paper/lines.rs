@@ -199,7 +199,7 @@ mod tests {
         });
         Chart {
             measure: "accuracy in %",
-            panels: vec![Panel { title: "a panel".to_owned(), lines, model: None }],
+            panels: vec![Panel { title: "a panel".to_owned(), lines, model: None, lux: None }],
             columns: 1,
             note: "a note".to_owned(),
         }

@@ -10,6 +10,7 @@ mod missing;
 mod real;
 pub(crate) mod records;
 mod simulation;
+mod threshold;
 
 use super::sentence::{Sentence, level_runs};
 use super::{below_blind as below, darkness, pooled, sample};

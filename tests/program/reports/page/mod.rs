@@ -80,7 +80,7 @@ fn first_screen(browser: &mut Browser) {
     assert_eq!(browser.evaluate("document.querySelector('h1').textContent"), format!("{SAID} in the dark"));
     let texts = |selector: &str| format!("[...document.querySelectorAll('{selector}')].map(e => e.textContent)");
     let groups = browser.evaluate(&texts(".first-findings th"));
-    assert_eq!(groups, json!(["Darkness", "Noise", "Without images", "Sample"]));
+    assert_eq!(groups, json!(["Threshold", "Darkness", "Noise", "Without images", "Sample"]));
     assert_eq!(browser.evaluate("document.querySelectorAll('#figure-head .panel svg').length"), 1);
     let levels = browser.evaluate(&texts(".strip thead th"));
     assert_eq!(levels, json!(["treatment", "L0", "L1", "L2", "L3", "L4", "L5"]));
