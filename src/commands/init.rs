@@ -1,9 +1,10 @@
-//! `init`: creates a runnable example data set, to be filled with the user's own images and questions.
+//! `init`: creates a runnable example data set, to be filled with the user's own images and questions; with `--ci`, a
+//! workflow that compares a model with an earlier run.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::json;
 
 use crate::data::{DataSource, SceneArgs, SelectionArgs, SetArgs, open_images};
@@ -23,12 +24,26 @@ use darkqa_questions::rules::Rules;
 #[derive(Debug, Args)]
 pub(crate) struct InitArgs {
     /// The folder to make
-    #[arg(value_name = "DIR", add = Decides::Nothing)]
-    pub folder: PathBuf,
+    #[arg(value_name = "DIR", required_unless_present = "ci", add = Decides::Nothing)]
+    pub folder: Option<PathBuf>,
     /// Copy the first three images of this folder, and write lines about them; default: pictures of built-in rooms
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub frames: Option<PathBuf>,
+    /// Write only a workflow into DIR, or here, that fails if a model sees less in the dark than in an earlier run;
+    /// default: none
+    #[arg(long, value_name = "SERVICE", value_enum, conflicts_with = "frames", add = Decides::Nothing)]
+    pub ci: Option<CiService>,
 }
+
+/// A service that runs workflows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum CiService {
+    /// GitHub Actions.
+    Github,
+}
+
+/// The workflow for GitHub Actions, and its place in a repository.
+const GITHUB: (&str, &str) = (include_str!("github.yml"), ".github/workflows/darkqa.yml");
 
 /// The built-in rooms whose images are written.
 const ROOMS: &str = "frames=3,seed=20,size=480x360";
@@ -69,7 +84,10 @@ Replace the images and the lines with your own, then run the check again.
 /// # Errors
 /// If a file exists already, or cannot be read or written.
 pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
-    let folder = &args.folder;
+    let folder = args.folder.as_deref().unwrap_or(Path::new("."));
+    if let Some(CiService::Github) = args.ci {
+        return workflow(folder);
+    }
     let mut files = vec!["README.txt", "questions.csv", "dataset.json"];
     if args.frames.is_none() {
         files.extend(ROOM_FILES);
@@ -78,8 +96,8 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
         return Err(Error::data(exists.display(), EXISTS));
     }
     let rows = match &args.frames {
-        Some(frames) => image_rows(frames, &args.folder)?,
-        None => room_rows(&args.folder, progress)?,
+        Some(frames) => image_rows(frames, folder)?,
+        None => room_rows(folder, progress)?,
     };
     let mut table = csv::Writer::from_writer(Vec::new());
     let header = ["image", "question", "A", "B", "C", "D", "answer", "category"];
@@ -89,19 +107,37 @@ pub(crate) fn init(args: &InitArgs, progress: &Progress) -> Result<Outcome> {
     }
     let table = table.into_inner().map_err(|e| Error::data("questions.csv", e))?;
     write(&folder.join("questions.csv"), &table)?;
-    let name = args.folder.file_name().unwrap_or_default().to_string_lossy();
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
     let info = json!({"schema": "darkqa.dataset/1", "name": name});
     write(&folder.join("dataset.json"), format!("{info:#}\n").as_bytes())?;
     write(&folder.join("README.txt"), README.as_bytes())?;
-    let folder = args.folder.display().to_string();
-    let data = shell_word(&folder);
+    let place = folder.display().to_string();
+    let data = shell_word(&place);
     Ok(Outcome::wrote(
-        &args.folder,
+        folder,
         Status::Complete,
         format!(
             "{}: {}\n\nnext:\n  darkqa-eval check {data}\n  darkqa-eval --data {data} --model gpt-4o --dry-run\n  darkqa-eval --data {data} --model gpt-4o\n",
-            folder,
+            place,
             counted(rows.len(), "question")
+        ),
+    ))
+}
+
+/// Writes the workflow into a repository.
+fn workflow(repository: &Path) -> Result<Outcome> {
+    let (text, place) = GITHUB;
+    let file = repository.join(place);
+    if file.exists() {
+        return Err(Error::data(file.display(), EXISTS));
+    }
+    write(&file, text.as_bytes())?;
+    Ok(Outcome::wrote(
+        &file,
+        Status::Complete,
+        format!(
+            "{}\n\nnext, then commit data and baseline:\n  darkqa-eval init data\n  darkqa-eval --data data --model gpt-4o --out baseline\n",
+            file.display()
         ),
     ))
 }

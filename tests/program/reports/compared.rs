@@ -6,7 +6,7 @@ use std::fs;
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
 use crate::support::onnx;
-use crate::support::run::{Bench, words};
+use crate::support::run::{Bench, called, words};
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
 
@@ -390,4 +390,50 @@ fn marks_of_different_judges_stay_apart() {
     error: --lux-at-l0: a report on open questions has no threshold: leave it out
     ");
     assert_eq!(house.0.call(&words("report one")).code, Some(0));
+}
+
+#[cfg(unix)]
+#[test]
+fn the_written_workflow_fails_if_a_model_is_worse() {
+    let scene = Scene::new();
+    let bench = &scene.bench;
+    let made = bench.complete(&words("init --ci github"));
+    assert!(made.starts_with("./.github/workflows/darkqa.yml\n"), "{made}");
+    let again = bench.call(&words("init --ci github"));
+    assert!(again.code == Some(2) && again.stderr.contains("exists already"), "{again:?}");
+    let workflow = fs::read_to_string(bench.path(".github/workflows/darkqa.yml")).unwrap();
+    bench.program("darkqa-eval", &format!("exec '{}' \"$@\"", env!("CARGO_BIN_EXE_darkqa-eval")));
+    // A step as the service runs it, with the variables of the workflow set for the data here.
+    let step = |name: &str| {
+        let (_, after) = workflow.split_once(&format!("- name: {name}\n")).unwrap();
+        let line = after.lines().find_map(|line| line.trim().strip_prefix("run: ")).unwrap();
+        let variables = [
+            ("MODEL", "script:m.jsonl"),
+            ("DATA", "frames"),
+            ("BASELINE", "baseline"),
+            ("MAX_COST", "5"),
+            ("GITHUB_STEP_SUMMARY", "summary.md"),
+        ];
+        for (variable, _) in &variables[..4] {
+            assert!(workflow.contains(&format!("\n      {variable}: ")), "{variable}");
+        }
+        let mut shell = std::process::Command::new("bash");
+        shell.args(["-eo", "pipefail", "-c", line]).current_dir(bench.path("")).envs(variables);
+        called(shell.env("PATH", bench.search_path()))
+    };
+    let run = |answers: &str| {
+        let _ = fs::remove_dir_all(bench.path("run"));
+        bench.file("m.jsonl", answers);
+        let asked = step("Ask");
+        assert_eq!(asked.code, Some(0), "{asked:?}");
+        step("Compare")
+    };
+    bench.file("m.jsonl", "{\"default\": \"red\"}");
+    bench.complete(&words("--model script:m.jsonl --data frames --out baseline"));
+    let same = run("{\"default\": \"red\"}");
+    assert_eq!(same.code, Some(0), "{same:?}");
+    let worse = run("{\"default\": \"blue\"}");
+    assert_eq!(worse.code, Some(1), "{worse:?}");
+    let summary = fs::read_to_string(bench.path("summary.md")).unwrap();
+    assert!(summary.contains("is worse than in baseline"), "{summary}");
 }

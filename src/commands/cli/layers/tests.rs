@@ -103,7 +103,8 @@ fn required(command: &Command, without: &Arg) -> Vec<String> {
         let conflicts = hides(command, without, arg);
         // Needed unless another flag is set.
         let id = arg.get_id().as_str();
-        let unless = ["inputs", "pairs", "out", "src"].contains(&id) || id == "model" && arg.is_positional();
+        let unless =
+            ["inputs", "pairs", "out", "src"].contains(&id) || ["folder", "model"].contains(&id) && arg.is_positional();
         if conflicts || !arg.is_required_set() && !unless {
             continue;
         }
