@@ -329,17 +329,41 @@ fn column_facts(manifest: &RunManifest) -> Vec<(String, String)> {
     rows
 }
 
-/// Text for the value of a setting: an object with a name is given by its name.
+/// Text for the value of a setting, as a person writes it: the values of a list with commas, and the fields of an object
+/// with commas after its name. The camera of a profile, an object outside a list, is given by its name alone.
 fn setting_text(value: &Value) -> String {
+    let named = |fields: &serde_json::Map<String, Value>| fields.get("name").and_then(Value::as_str).map(str::to_owned);
     match value {
         Value::String(text) => text.clone(),
         Value::Null => "not set".to_owned(),
-        Value::Object(fields) => match fields.get("name") {
-            Some(Value::String(name)) => name.clone(),
-            _ => value.to_string(),
-        },
-        other => other.to_string(),
+        Value::Object(fields) => named(fields).unwrap_or_else(|| field_texts(fields)),
+        Value::Array(values) if values.is_empty() => "none".to_owned(),
+        Value::Array(values) => {
+            let texts = values.iter().map(|value| match value {
+                Value::Object(fields) => match named(fields) {
+                    Some(name) => format!("{name}: {}", field_texts(fields)),
+                    None => field_texts(fields),
+                },
+                other => setting_text(other),
+            });
+            let separator = if values.iter().any(Value::is_object) { "; " } else { ", " };
+            texts.collect::<Vec<String>>().join(separator)
+        }
+        Value::Number(number) => {
+            number.as_f64().filter(|_| number.is_f64()).map_or(number.to_string(), |n| n.to_string())
+        }
+        other @ Value::Bool(_) => other.to_string(),
     }
+}
+
+/// The fields of an object but its name, each with its value; unset ones are left out.
+fn field_texts(fields: &serde_json::Map<String, Value>) -> String {
+    let texts =
+        fields.iter().filter(|(field, value)| *field != "name" && !value.is_null()).map(|(field, value)| match value {
+            Value::Object(_) => format!("{} ({})", field.replace('_', " "), setting_text(value)),
+            value => format!("{} {}", field.replace('_', " "), setting_text(value)),
+        });
+    texts.collect::<Vec<String>>().join(", ")
 }
 
 /// Status, version and dates of a run: names and values.
@@ -533,4 +557,29 @@ fn page_cell(kind: ColumnKind, cell: &TableCell) -> PageCell {
         _ => "",
     };
     PageCell { text: words(kind, cell), ends: interval(kind, cell).map(ends).unwrap_or_default(), class }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_are_written_without_signs_of_json() {
+        for (value, text) in [
+            (json!([1, 2]), "1, 2"),
+            (json!([]), "none"),
+            (json!({"random": 0}), "random 0"),
+            (json!(200.0), "200"),
+            (json!(0.7), "0.7"),
+            (json!(true), "true"),
+            (json!(null), "not set"),
+            (json!({"name": "eld-canon", "gain": [1, 2]}), "eld-canon"),
+            (
+                json!([{"name": "m", "endpoints": ["http://127.0.0.1/v1"], "pace": {"rpm": null, "max-wait": 120.0}, "headers": []}]),
+                "m: endpoints http://127.0.0.1/v1, headers none, pace (max-wait 120)",
+            ),
+        ] {
+            assert_eq!(setting_text(&value), text);
+        }
+    }
 }

@@ -5,6 +5,7 @@
 use std::collections::{BTreeSet, HashMap, HashSet};
 
 use crate::error::Result;
+use crate::report::sentences::with_separators;
 use crate::types::manifests::RunManifest;
 use crate::types::text::counted;
 use crate::types::{ChoiceDetail, QuestionId, RunQuestion, TextPlace, Thumbnail, TrialRef, Usage};
@@ -77,13 +78,25 @@ impl RunUsage {
                     ),
                 },
             ),
-            ("tokens", format!("{} of prompts, {} of replies", self.prompt_tokens, self.completion_tokens)),
-            ("image bytes", self.image_bytes.to_string()),
+            (
+                "tokens",
+                format!(
+                    "{} of prompts, {} of replies",
+                    separated(self.prompt_tokens),
+                    separated(self.completion_tokens)
+                ),
+            ),
+            ("image bytes", separated(self.image_bytes)),
             ("latency", format!("median {median}, 95 % within {quantile_95}")),
             ("served as", served.join(", ")),
         ];
         rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
+}
+
+/// A large number with thousands separators.
+fn separated(number: u64) -> String {
+    with_separators(usize::try_from(number).unwrap_or(usize::MAX))
 }
 
 /// Median and 95 % quantile by nearest rank; `None` without values. The values are reordered.

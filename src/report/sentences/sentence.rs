@@ -247,7 +247,7 @@ impl NamedNumbers {
 }
 
 /// A whole number with thousands separators, as `26,781`.
-fn with_separators(number: usize) -> String {
+pub(crate) fn with_separators(number: usize) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {

@@ -69,10 +69,10 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &DisplayNames) -> Overvie
 }
 
 impl FigureBuilder<'_> {
-    fn single_panel_chart(title: String, lines: Vec<PlotLine>) -> Chart {
+    fn single_panel_chart(&self, title: String, lines: Vec<PlotLine>) -> Chart {
         Chart {
             measure: ACCURACY,
-            panels: vec![Panel { title, lines, model: None, lux: None }],
+            panels: vec![Panel { title, lines, model: None, lux: self.findings.set.lux }],
             columns: 1,
             note: String::new(),
         }
@@ -106,7 +106,7 @@ impl FigureBuilder<'_> {
         if !not_asked.is_empty() {
             let _ = write!(caption, " Not asked in this light: {}.", not_asked.join(", "));
         }
-        (caption, Self::single_panel_chart(format!("each model, {light}"), lines))
+        (caption, self.single_panel_chart(format!("each model, {light}"), lines))
     }
 
     /// Mean over the models by variant; `None` unless all of them were asked in two variants.
@@ -127,7 +127,7 @@ impl FigureBuilder<'_> {
         if !not_asked.is_empty() {
             let _ = write!(caption, " Not asked of all of them: {}.", not_asked.join(", "));
         }
-        Some((caption, Self::single_panel_chart(format!("{who}, raw"), lines)))
+        Some((caption, self.single_panel_chart(format!("{who}, raw"), lines)))
     }
 
     /// Lines to compare a mean with, other than chance: each model without images, and the black model on raw images.
@@ -172,7 +172,7 @@ impl FigureBuilder<'_> {
             self.bands_note(models),
             horizontal_lines_note(&lines)
         );
-        Some((caption, Self::single_panel_chart(format!("{who}, {light}"), lines)))
+        Some((caption, self.single_panel_chart(format!("{who}, {light}"), lines)))
     }
 }
 

@@ -295,11 +295,14 @@ class Chart {
     });
   }
 
-  // A name in fewer letters. That of the only model without images goes without the model.
+  // A name in fewer letters. That of the only model without images goes without the model; of several, the model is cut.
   shortened(name, ends, letters) {
-    const blind = "without images", blinds = ends.filter((end) => end.name.endsWith(blind));
-    if (name.endsWith(blind) && blinds.length === 1 && blind.length <= letters) return blind;
-    return name.slice(0, Math.max(letters - 1, 1)) + "…";
+    const cut = (text, room) => text.length > room ? text.slice(0, Math.max(room - 1, 1)) + "…" : text;
+    const blind = " without images", brief = ", no image";
+    if (!name.endsWith(blind)) return cut(name, letters);
+    const blinds = ends.filter((end) => end.name.endsWith(blind));
+    if (blinds.length === 1 && blind.length <= letters) return blind.trim();
+    return cut(name.slice(0, -blind.length), letters - brief.length) + brief;
   }
 
   // The values at the cursor: a row for each line, a column for each panel.
