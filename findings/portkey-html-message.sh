@@ -9,7 +9,8 @@ set -eu
 folder=$(mktemp -d)
 trap 'kill "${gateway:-}" 2>/dev/null || true; rm -rf "$folder"' EXIT
 cd "$folder"
-npm install --silent --no-audit --no-fund --ignore-scripts @portkey-ai/gateway@1.15.2 >/dev/null
+npm install --silent --no-audit --no-fund --ignore-scripts @portkey-ai/gateway@1.15.2 \
+  hono@4.13.19 @hono/node-server@1.19.19 >/dev/null
 port=$(python3 -c 'import socket; s = socket.socket(); s.bind(("127.0.0.1", 0)); print(s.getsockname()[1])')
 node node_modules/@portkey-ai/gateway/build/start-server.js --port="$port" --headless >/dev/null 2>&1 &
 gateway=$!

@@ -97,7 +97,7 @@ impl Rules {
                 if missing.is_empty() {
                     return Err(with_line(e));
                 }
-                // The missing tables stand last, so that the lines of faults are those of the text.
+                // Missing tables are appended, so that the line numbers in errors are those of the text.
                 let whole = format!("{text}\n{}", built_in_tables(&missing)?);
                 (toml::from_str(&whole).map_err(with_line)?, missing)
             }

@@ -71,6 +71,12 @@ pub struct ModelInCondition {
 }
 
 impl ModelInCondition {
+    /// Name of the runs that showed these images; `None` if all runs of the report showed the same.
+    #[must_use]
+    pub fn run_group(&self) -> Option<&str> {
+        self.variant.group.as_ref().map(RunGroup::name)
+    }
+
     /// Model and condition of a trial.
     #[must_use]
     pub fn from_trial(trial: TrialRef<'_>) -> Self {

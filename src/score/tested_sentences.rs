@@ -104,8 +104,8 @@ impl Findings<'_> {
     pub(super) fn correct_sentences(&mut self) {
         let tree = report_tests(self);
         for mode in ParsingMode::ALL {
-            for (test, corrected) in adjust_p_values(&tree, |test| test.p(self, mode).map_or(1.0, |(p, _)| p)) {
-                if let Some((_, p_report)) = test.p(self, mode).filter(|_| test.is_in(mode)) {
+            for (test, corrected) in adjust_p_values(&tree, |test| test.p_values(self, mode).map_or(1.0, |(p, _)| p)) {
+                if let Some((_, p_report)) = test.p_values(self, mode).filter(|_| test.is_in(mode)) {
                     *p_report = Some(corrected);
                 }
             }
@@ -388,9 +388,8 @@ fn confidence(findings: &Findings<'_>) -> Tests {
 impl Test {
     /// p-value before correction in a parsing, and the place for the corrected one; `None` if the test was not computed.
     /// Confidence and fidelity exist only in strict parsing.
-    fn p<'f>(self, findings: &'f mut Findings<'_>, mode: ParsingMode) -> Option<(f64, &'f mut Option<f64>)> {
-        let is_strict = mode == ParsingMode::Strict;
-        let best = if is_strict { findings.best.as_mut() } else { findings.lenient_best.as_mut() };
+    fn p_values<'f>(self, findings: &'f mut Findings<'_>, mode: ParsingMode) -> Option<(f64, &'f mut Option<f64>)> {
+        let best = mode.of([&mut findings.best, &mut findings.lenient_best]).as_mut();
         let tested = match self {
             Self::Pooled(index) => &mut findings.pooled[index].parsed_mut(mode).tested,
             Self::Averaged(index) => &mut findings.averaged[index].parsed_mut(mode).tested,
@@ -400,7 +399,7 @@ impl Test {
             Self::Families(index) => findings.contrasts[index].parsed_mut(mode),
             Self::Overconfident(index) => &mut findings.calibrations[index].overconfidence,
             Self::Growth(index) => findings.calibrations[index].growth.as_mut()?,
-            // The largest p-value of several pairs, the p-value of an AUC, and that of an answer which the data chose.
+            // The largest p-value of the leader's pairs, that of an AUC, and that of the most common answer.
             Self::Best => {
                 let best = best?;
                 return Some((best.p_leader(), &mut best.p_report));

@@ -23,7 +23,7 @@ enum SecondTry {
     BrokenOff,
 }
 
-/// What the second try of a reply with one word showed; locked while its first reply is asked again. `None` before.
+/// Result of the second try for one finish reason; `None` before it. Locked while the first reply is asked again.
 type Word = Arc<tokio::sync::Mutex<Option<SecondTry>>>;
 
 /// What second tries showed about the unknown finish reasons of one model.

@@ -126,7 +126,7 @@ impl Family {
         FAMILIES.iter().find(|row| row.family == *self)
     }
 
-    /// The name in files and tables: that of [`FAMILIES`], or a ready-made set's name.
+    /// Name in files and tables, from [`FAMILIES`] or from the ready-made set.
     #[must_use]
     pub fn name(&self) -> &str {
         match self {

@@ -431,23 +431,20 @@ fn check_flags_before_command(command: &Command, matches: &ArgMatches) -> Result
 /// Words that people type as the command of an evaluation, which has none.
 const NO_COMMAND: [&str; 3] = ["run", "evaluate", "eval"];
 
-/// Words that people type as a command which has another name here, with what to type.
-const OTHER_NAMES: [(&str, &str); 7] = [
-    ("compare", "to compare runs: darkqa-eval report RUN RUN"),
-    ("diff", "to compare runs: darkqa-eval report RUN RUN"),
-    ("summary", "to read a run: darkqa-eval report RUN"),
-    ("view", "to read a run: darkqa-eval report RUN"),
-    ("share", "to share a run: darkqa-eval bundle RUN --out NAME.zip"),
-    ("pack", "to share a run: darkqa-eval bundle RUN --out NAME.zip"),
-    ("degrade", "to make dark images: darkqa-eval synthesize IMAGES --out DIR"),
+/// Names that other tools have for a command, with the command here.
+const OTHER_NAMES: [(&[&str], &str); 4] = [
+    (&["compare", "diff"], "to compare runs: darkqa-eval report RUN RUN"),
+    (&["summary", "view"], "to read a run: darkqa-eval report RUN"),
+    (&["share", "pack"], "to share a run: darkqa-eval bundle RUN --out NAME.zip"),
+    (&["degrade"], "to make dark images: darkqa-eval synthesize IMAGES --out DIR"),
 ];
 
-/// What to type in place of a word that is no command; `None` if that is not known.
+/// Command to type in place of a word that is not a command; `None` if it is not known.
 fn guessed_word(word: &str) -> Option<String> {
     if NO_COMMAND.contains(&word) {
         return Some("an evaluation has none; leave the word out: darkqa-eval --model NAME [OPTIONS]".to_owned());
     }
-    if let Some((_, advice)) = OTHER_NAMES.iter().find(|(other, _)| *other == word) {
+    if let Some((_, advice)) = OTHER_NAMES.iter().find(|(names, _)| names.contains(&word)) {
         return Some((*advice).to_owned());
     }
     let path = Path::new(word);

@@ -82,21 +82,16 @@ impl RunUsage {
                 "tokens",
                 format!(
                     "{} of prompts, {} of replies",
-                    separated(self.prompt_tokens),
-                    separated(self.completion_tokens)
+                    with_separators(self.prompt_tokens),
+                    with_separators(self.completion_tokens)
                 ),
             ),
-            ("image bytes", separated(self.image_bytes)),
+            ("image bytes", with_separators(self.image_bytes)),
             ("latency", format!("median {median}, 95 % within {quantile_95}")),
             ("served as", served.join(", ")),
         ];
         rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
     }
-}
-
-/// A large number with thousands separators.
-fn separated(number: u64) -> String {
-    with_separators(usize::try_from(number).unwrap_or(usize::MAX))
 }
 
 /// Median and 95 % quantile by nearest rank; `None` without values. The values are reordered.

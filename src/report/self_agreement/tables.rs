@@ -19,9 +19,8 @@ use crate::report::text::table::ColumnKind::{self, Accuracy, Count, Number, Perc
 use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell, TableFormat};
 use crate::report::text::words::{light, percent, with_interval};
 use crate::types::text::counted;
-use crate::types::{Axis, AxisLevel, RunGroup};
+use crate::types::{Axis, AxisLevel};
 use darkqa_score::answers::confusion::{Confusion, Hallucination};
-use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::comparisons::self_agreement::evidence::{MIN_DISTANCE, NoEvidence, NoHalf};
@@ -56,7 +55,7 @@ pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
     let builder = TableBuilder::new(SUMMARY, &found.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .family(|cell| cell.family.as_ref())
-        .column(Text, "csv mode", |cell| mode(cell.mode))
+        .column(Text, "csv mode", |cell| cell.mode.name())
         .column(Count, "csv n", |cell| cell.replies())
         .column(Count, "csv right", |_| None::<usize>)
         .column(Count, "csv unparsed", |cell| unread(cell))
@@ -64,21 +63,9 @@ pub(super) fn summary(found: &SelfAgreement<'_>) -> Table {
         .column(Share, "csv value low high", |cell| cell.agreement)
         .column(Text, "csv reading", |cell| TableCell::profile(&cell.subject))
         .model_facts(&found.grid.listing, |cell| &cell.subject);
-    let has_groups = found.cells.iter().any(|cell| run_group(cell).is_some());
-    let builder = if has_groups { builder.column(Text, "csv light", |cell| run_group(cell)) } else { builder };
+    let has_groups = found.cells.iter().any(|cell| cell.subject.run_group().is_some());
+    let builder = if has_groups { builder.column(Text, "csv light", |cell| cell.subject.run_group()) } else { builder };
     builder.column(Text, "csv measure", |_| AGREEMENT).build()
-}
-
-fn mode(mode: ParsingMode) -> &'static str {
-    match mode {
-        ParsingMode::Strict => "strict",
-        ParsingMode::Lenient => "lenient",
-    }
-}
-
-/// Name of a cell's run group; `None` if it has none.
-fn run_group(cell: &AgreementCell) -> Option<&str> {
-    cell.subject.variant.group.as_ref().map(RunGroup::name)
 }
 
 /// Number of replies that could not be parsed.
@@ -110,7 +97,7 @@ fn own_answers(found: &SelfAgreement<'_>) -> Table {
     TableBuilder::new(OWN_ANSWERS, &found.cells)
         .subject(|cell| &cell.subject, ToString::to_string)
         .family(|cell| cell.family.as_ref())
-        .column(Text, "csv mode", |cell| mode(cell.mode))
+        .column(Text, "csv mode", |cell| cell.mode.name())
         .column(Text, "csv role", |cell| role(cell))
         .column(Share, "csv agreement low high n", |cell| cell.agreement)
         .column(Share, "csv informative informative_low informative_high informative_n", |cell| cell.informative)

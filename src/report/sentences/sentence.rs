@@ -158,7 +158,7 @@ impl NamedNumbers {
     /// A count, with thousands separators.
     pub(super) fn count(&mut self, name: &str, count: usize) -> String {
         self.values.insert(name.to_owned(), count as f64);
-        with_separators(count)
+        with_separators(count as u64)
     }
 
     /// A plain number. Zero has no sign.
@@ -247,7 +247,7 @@ impl NamedNumbers {
 }
 
 /// A whole number with thousands separators, as `26,781`.
-pub(crate) fn with_separators(number: usize) -> String {
+pub(crate) fn with_separators(number: u64) -> String {
     let digits = number.to_string();
     let mut text = String::new();
     for (place, digit) in digits.chars().enumerate() {

@@ -90,7 +90,7 @@ struct Writer<'f, 'a> {
     variant: &'f Variant,
     /// Light at L0, in lux.
     lux: Option<f64>,
-    /// What is half lost at the threshold.
+    /// Quantity of which half is lost at the threshold.
     what: &'static str,
     /// The light in words, if the sentence names it.
     light: Option<String>,
@@ -137,7 +137,7 @@ impl Writer<'_, '_> {
         text + "."
     }
 
-    /// The thresholds of several models, of which `asked` were asked.
+    /// The thresholds of several models; `asked` is the number of models asked, also of those without a threshold.
     fn several_models(&mut self, raw: &[KnownThreshold<'_>], asked: usize) -> String {
         let shown: Vec<String> = raw
             .iter()

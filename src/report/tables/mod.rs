@@ -22,10 +22,9 @@ mod thresholds;
 use crate::report::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Share, Text};
 use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell};
 use crate::report::text::words::{family, light, name};
-use crate::types::{EnhancerName, Family, ModelListing, RunGroup, Variant, View};
-use darkqa_score::accuracies::{AccuracyCell, AccuracySummary};
+use crate::types::{EnhancerName, Family, ModelListing, Variant, View};
+use darkqa_score::accuracies::AccuracySummary;
 use darkqa_score::auc::Auc;
-use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::Agreement;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
@@ -139,10 +138,7 @@ pub(crate) fn summary_rows(summary: &AccuracySummary, listing: &ModelListing) ->
     let builder = TableBuilder::new(SUMMARY, &summary.cells)
         .subject(|cell| &cell.subject, |variant| variant.word().into_owned())
         .family(|cell| cell.family.as_ref())
-        .column(Text, "csv mode", |cell| match cell.mode {
-            ParsingMode::Strict => "strict",
-            ParsingMode::Lenient => "lenient",
-        })
+        .column(Text, "csv mode", |cell| cell.mode.name())
         .column(Count, "csv n", |cell| cell.replies())
         .column(Count, "csv right", |cell| cell.subject.view.map(|_| cell.right))
         .column(Count, "csv unparsed", |cell| cell.unparsed)
@@ -168,16 +164,11 @@ pub(crate) fn summary_rows(summary: &AccuracySummary, listing: &ModelListing) ->
     let builder = builder
         .column(Text, "csv reading", |cell| TableCell::profile(&cell.subject))
         .model_facts(listing, |cell| &cell.subject);
-    if summary.cells.iter().any(|cell| run_group(cell).is_some()) {
+    if summary.cells.iter().any(|cell| cell.subject.run_group().is_some()) {
         // Runs have different images of the same condition, so each row states its run group.
-        return builder.column(Text, "csv light", |cell| run_group(cell)).build();
+        return builder.column(Text, "csv light", |cell| cell.subject.run_group()).build();
     }
     builder.build()
-}
-
-/// Name of a cell's run group; `None` if it has none.
-fn run_group(cell: &AccuracyCell) -> Option<&str> {
-    cell.subject.variant.group.as_ref().map(RunGroup::name)
 }
 
 fn agreement(agreements: &[Agreement]) -> Table {

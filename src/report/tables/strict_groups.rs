@@ -3,7 +3,7 @@
 use crate::report::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::report::text::table::{Table, TableBuilder, TableCell, TableFormat};
 use crate::types::text::counted;
-use crate::types::{Family, RunGroup, Variant};
+use crate::types::{Family, Variant};
 use darkqa_score::accuracies::{GroupCell, GroupChance, StrictScore};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
@@ -89,9 +89,12 @@ fn table(
     let builder = number_columns(builder, findings, score)
         .column(Text, "csv reading", |line| TableCell::profile(line.subject()))
         .model_facts(&findings.grid.listing, GroupRow::subject);
-    let has_light = score.cells.iter().any(|cell| run_group(&cell.subject).is_some());
-    let mut builder =
-        if has_light { builder.column(Text, "csv light", |line| run_group(line.subject())) } else { builder };
+    let has_light = score.cells.iter().any(|cell| cell.subject.run_group().is_some());
+    let mut builder = if has_light {
+        builder.column(Text, "csv light", |line| line.subject().run_group().map(str::to_owned))
+    } else {
+        builder
+    };
     for format in [TableFormat::Terminal, TableFormat::Page, TableFormat::Latex] {
         builder =
             builder.hide(format, |line| matches!(line, GroupRow::Cell(cell) if cell.mode == ParsingMode::Lenient));
@@ -171,10 +174,6 @@ impl GroupRow<'_> {
 }
 
 /// Name of a subject's run group; `None` if it has none.
-fn run_group(subject: &ModelInCondition) -> Option<String> {
-    subject.variant.group.as_ref().map(RunGroup::name).map(str::to_owned)
-}
-
 /// Subject that stands for guessing.
 fn chance_subject() -> ModelInCondition {
     ModelInCondition { model: CHANCE.to_owned(), view: None, level: None, variant: Variant::NONE, enhancer: None }

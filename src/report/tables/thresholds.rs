@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use crate::report::text::table::ColumnKind::{Count, Number, Percent, Share, Text, Threshold};
 use crate::report::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
-use crate::report::text::words::{family as family_name, light, lux, points};
+use crate::report::text::words::{family as family_name, light, lux, lux_at, points};
 use crate::types::degradations::Axis;
 use crate::types::text::{counted, plural};
 use crate::types::{AxisLevel, Family, FrameId, Variant};
@@ -133,7 +133,7 @@ pub(crate) fn in_lux<T>(
     let Some(at_l0) = at_l0 else {
         return builder;
     };
-    let light = |drop: f64| at_l0 * (-drop).exp2();
+    let light = |drop: f64| lux_at(at_l0, drop);
     builder
         .column(Number, "csv lux lux_low lux_high", |item| match threshold(item) {
             Some((DropThreshold { value, low, high }, darkest)) if value.is_finite() => {

@@ -143,9 +143,14 @@ pub(crate) fn stops(value: f64, darkest: f64) -> String {
     if value.is_infinite() { format!("> {darkest}") } else { format!("{value:.1}") }
 }
 
-/// Light in lux at an exposure drop in EV below `at_l0`, to two significant digits: `180`, `5.4`, `0.39`.
+/// Light in lux at an exposure drop in EV below `at_l0`: each EV halves it.
+pub(crate) fn lux_at(at_l0: f64, drop: f64) -> f64 {
+    at_l0 * (-drop).exp2()
+}
+
+/// Light as from [`lux_at`], to two significant digits: `180`, `5.4`, `0.39`.
 pub(crate) fn lux(at_l0: f64, drop: f64) -> String {
-    let light = at_l0 * (-drop).exp2();
+    let light = lux_at(at_l0, drop);
     let digits = 1 - light.log10().floor() as i32;
     let step = 10_f64.powi(-digits);
     format!("{:.*}", digits.max(0) as usize, (light / step).round() * step)

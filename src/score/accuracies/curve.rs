@@ -64,10 +64,7 @@ impl Curve {
     /// Threshold and area in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ParsingMode) -> &CurveSummary {
-        match mode {
-            ParsingMode::Strict => &self.summary,
-            ParsingMode::Lenient => &self.lenient,
-        }
+        mode.of([&self.summary, &self.lenient])
     }
 }
 

@@ -165,18 +165,11 @@ impl AgainstClean {
 
     /// p-value of no difference in a parsing; 1 if another answer is more common.
     pub(crate) fn p(&self, mode: ParsingMode) -> f64 {
-        match mode {
-            _ if !self.is_commonest => 1.0,
-            ParsingMode::Strict => self.strict.tested.p,
-            ParsingMode::Lenient => self.lenient.tested.p,
-        }
+        if self.is_commonest { mode.of([&self.strict, &self.lenient]).tested.p } else { 1.0 }
     }
 
     pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut PairedComparison {
-        match mode {
-            ParsingMode::Strict => &mut self.strict,
-            ParsingMode::Lenient => &mut self.lenient,
-        }
+        mode.of([&mut self.strict, &mut self.lenient])
     }
 
     /// True if the answer is shown to be more common than at L0, in both parsings and after the correction over all

@@ -60,6 +60,15 @@ impl ParsingMode {
             Self::Lenient => "lenient",
         }
     }
+
+    /// Selects the value of this parsing from those of both, in the order of [`Self::ALL`].
+    #[must_use]
+    pub fn of<T>(self, [strict, lenient]: [T; 2]) -> T {
+        match self {
+            Self::Strict => strict,
+            Self::Lenient => lenient,
+        }
+    }
 }
 
 /// The choice in a reply, as an index in the order shown, or the reason why none could be read.

@@ -286,7 +286,7 @@ pub struct Crossing {
 #[derive(Debug, Clone, PartialEq)]
 pub struct LevelLead {
     pub level: AxisLevel,
-    /// Accuracy of the leader at the lighter levels minus that of the leader in the dark. p is times the number of pairs
+    /// Accuracy of the leader at the lighter levels minus that of the leader in the dark. p is multiplied by the number of pairs
     /// of models (Bonferroni over the pairs that could have led).
     pub tested: Tested,
 }

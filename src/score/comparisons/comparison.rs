@@ -116,19 +116,13 @@ impl Comparison {
     }
 
     pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut PairedComparison {
-        match mode {
-            ParsingMode::Strict => &mut self.strict,
-            ParsingMode::Lenient => &mut self.lenient,
-        }
+        mode.of([&mut self.strict, &mut self.lenient])
     }
 
     /// Comparison in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ParsingMode) -> &PairedComparison {
-        match mode {
-            ParsingMode::Strict => &self.strict,
-            ParsingMode::Lenient => &self.lenient,
-        }
+        mode.of([&self.strict, &self.lenient])
     }
 }
 

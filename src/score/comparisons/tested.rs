@@ -93,7 +93,7 @@ impl Claim {
         }
     }
 
-    /// Verdict of a difference in tables, which is that of the sentences; `strict` is its test in the strict parsing.
+    /// Verdict of a difference in tables, the same as in sentences; `strict` is its test in the strict parsing.
     /// `None` if no sentence is about the difference.
     pub(super) fn verdict(self, strict: &Tested) -> Option<Verdict> {
         match self {

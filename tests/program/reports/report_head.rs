@@ -123,3 +123,22 @@ fn open_page_opens_with_scores() {
     has_in_order(&page, &[summary, "3 questions about 2 walks. "]);
     assert!(!page.contains("Broken lines"));
 }
+
+#[test]
+fn light_at_l0_stays_with_the_run() {
+    let bench = Bench::new();
+    bench.complete(&words("--model observer --data rooms:frames=6,size=96x72 --levels L0,L3 --out run"));
+    let heads = || fs::read_to_string(bench.path("run/thresholds.csv")).unwrap().lines().next().unwrap().to_owned();
+    let stored = || -> Value {
+        let text = fs::read(bench.path("run/manifest.json")).unwrap();
+        serde_json::from_slice::<Value>(&text).unwrap()["settings"]["--lux-at-l0"].clone()
+    };
+    assert!(!heads().contains("lux") && stored().is_null(), "{}", heads());
+    bench.complete(&words("report run --lux-at-L0 200"));
+    assert!(heads().contains(",lux,lux_low,lux_high,"), "{}", heads());
+    bench.complete(&words("report run"));
+    assert!(heads().contains(",lux,lux_low,lux_high,"), "{}", heads());
+    assert_eq!(stored(), 200.0);
+    let refused = bench.call(&words("report run --lux-at-l0 0"));
+    assert!(refused.code == Some(2) && refused.stderr.contains("a number above 0 expected"), "{refused:?}");
+}

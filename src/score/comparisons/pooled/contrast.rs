@@ -22,8 +22,8 @@ pub struct FamilyContrast {
     pub least: Family,
     /// Number of pairs of families that could have been furthest apart.
     pub pairs: usize,
-    /// Difference from L0 of `most` minus that of `least`, in the strict parsing, which is the main result. p is times
-    /// the number of pairs of families (Bonferroni, because the data chose the pair).
+    /// Difference from L0 of `most` minus that of `least`, in the strict parsing, which is the main result. p is
+    /// multiplied by the number of pairs of families (Bonferroni, because the data chose the pair).
     pub strict: Tested,
     /// Test in the lenient parsing.
     pub lenient: Tested,
@@ -37,19 +37,13 @@ impl FamilyContrast {
     }
 
     pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut Tested {
-        match mode {
-            ParsingMode::Strict => &mut self.strict,
-            ParsingMode::Lenient => &mut self.lenient,
-        }
+        mode.of([&mut self.strict, &mut self.lenient])
     }
 
     /// Test in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ParsingMode) -> &Tested {
-        match mode {
-            ParsingMode::Strict => &self.strict,
-            ParsingMode::Lenient => &self.lenient,
-        }
+        mode.of([&self.strict, &self.lenient])
     }
 }
 

@@ -95,19 +95,13 @@ impl PooledFinding {
     }
 
     pub(crate) fn parsed_mut(&mut self, mode: ParsingMode) -> &mut PooledDifference {
-        match mode {
-            ParsingMode::Strict => &mut self.strict,
-            ParsingMode::Lenient => &mut self.lenient,
-        }
+        mode.of([&mut self.strict, &mut self.lenient])
     }
 
     /// Difference in a parsing.
     #[must_use]
     pub fn parsed(&self, mode: ParsingMode) -> &PooledDifference {
-        match mode {
-            ParsingMode::Strict => &self.strict,
-            ParsingMode::Lenient => &self.lenient,
-        }
+        mode.of([&self.strict, &self.lenient])
     }
 }
 
