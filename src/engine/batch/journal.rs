@@ -84,10 +84,16 @@ impl Journal {
             parts: Vec::new(),
             limits: BTreeMap::new(),
         };
-        let path = journal.path();
+        journal.read()?;
+        Ok(journal)
+    }
+
+    /// Applies the events in the file, if there is one.
+    fn read(&mut self) -> Result<()> {
+        let path = self.path();
         let text = match files::read(&path) {
             Ok(text) => text,
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(journal),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(()),
             Err(e) => return Err(Error::file(path, "read", e)),
         };
         for (index, line) in text.split_inclusive(|byte| *byte == b'\n').enumerate() {
@@ -97,9 +103,9 @@ impl Journal {
             }
             let line: JournalLine = serde_json::from_slice(line).map_err(|e| Error::json_line(&path, index + 1, &e))?;
             line.check_names().map_err(|problem| Error::line(&path, index + 1, problem))?;
-            journal.apply(&line.file, &line.event, &line.at);
+            self.apply(&line.file, &line.event, &line.at);
         }
-        Ok(journal)
+        Ok(())
     }
 
     /// The batch folder of the run.
@@ -516,4 +522,195 @@ impl BatchPart {
 /// replaced.
 pub(super) fn file_name(text: &str) -> String {
     text.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_.".contains(c)), "_")
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// Facts of a part of ten requests.
+    pub(crate) fn facts() -> PartFacts {
+        PartFacts {
+            sha256: "0".repeat(64),
+            bytes: 1000,
+            requests: 10,
+            model: "gpt".to_owned(),
+            name: String::new(),
+            account: String::new(),
+            base: "https://example.org/v1".to_owned(),
+            url: "/v1/chat/completions".to_owned(),
+            tokens: 500.0,
+            dollars: Some(1.0),
+            most_dollars: Some(2.0),
+            most_dollars_each: Some(0.25),
+        }
+    }
+
+    fn created() -> Vec<PartEvent> {
+        vec![
+            PartEvent::Uploading,
+            PartEvent::Uploaded { id: "file-1".to_owned() },
+            PartEvent::Creating { attempt: 1 },
+            PartEvent::Created { id: "batch-1".to_owned() },
+        ]
+    }
+
+    fn refused() -> PartEvent {
+        PartEvent::Refused { why: "no".to_owned() }
+    }
+
+    fn fetched() -> PartEvent {
+        PartEvent::Fetched { state: "completed".to_owned(), files: vec!["file-2".to_owned()] }
+    }
+
+    fn after(events: &[PartEvent]) -> BatchPart {
+        let mut part = BatchPart::new("part-1-m-001.jsonl", facts());
+        for event in events {
+            part.apply(event, "2026-01-02T03:04:05Z");
+        }
+        part
+    }
+
+    #[test]
+    fn a_stage_tells_whether_a_batch_may_exist_and_cost() {
+        // Stage, then: still to be submitted, at the server or perhaps, may have costs that are not in the records.
+        let check = |events: &[PartEvent], stage: Stage, expected: [bool; 3]| {
+            let part = after(events);
+            assert_eq!(part.stage, stage, "{events:?}");
+            assert_eq!([part.is_unsubmitted(), part.is_out(), part.may_cost()], expected, "{events:?}");
+        };
+        let all = created();
+        check(&[], Stage::Written, [true, false, false]);
+        check(&all[..1], Stage::Uploading, [true, false, false]);
+        check(&all[..2], Stage::Uploaded, [true, false, false]);
+        check(&all[..3], Stage::Creating, [false, true, true]);
+        check(&all, Stage::Created, [false, true, true]);
+        let with = |further: &[PartEvent]| [&all, further].concat();
+        check(&with(&[PartEvent::Seen { state: "in_progress".to_owned() }]), Stage::Created, [false, true, true]);
+        check(&with(&[PartEvent::Cancelled]), Stage::Created, [false, true, true]);
+        let done = Stage::Fetched { state: "completed".to_owned() };
+        check(&with(&[fetched()]), done, [false, false, true]);
+        let taken = PartEvent::TakenOver { answered: 9, failed: 1 };
+        check(&with(&[fetched(), taken.clone()]), Stage::Imported, [false, false, false]);
+        for end in [PartEvent::Deleted, PartEvent::Kept] {
+            check(&with(&[fetched(), taken.clone(), end]), Stage::Ended, [false, false, false]);
+        }
+        check(&with(&[PartEvent::GaveUp { why: "gone".to_owned() }]), Stage::Ended, [false, false, false]);
+        check(&with(&[PartEvent::Split { into: Vec::new() }]), Stage::Ended, [false, false, false]);
+        check(&with(&[PartEvent::QuotaReached { limit: None }]), Stage::Uploaded, [true, false, false]);
+    }
+
+    #[test]
+    fn a_refused_creation_leaves_doubt_and_a_refused_upload_none() {
+        let all = created();
+        let part = after(&[&all[..3], &[refused()]].concat());
+        assert!(part.stage == Stage::Uploaded && part.in_doubt);
+        let part = after(&[&all[..1], &[refused()]].concat());
+        assert!(part.stage == Stage::Written && !part.in_doubt);
+        let part = after(&[&all[..1], &[refused()], &all[..1]].concat());
+        assert_eq!(part.uploads, 2);
+    }
+
+    #[test]
+    fn files_at_the_server_are_remembered_for_their_deletion() {
+        let part = after(&[&created()[..], &[fetched()]].concat());
+        assert_eq!(part.files, ["file-1", "file-2"]);
+        assert_eq!((part.batch.as_deref(), &*part.created), (Some("batch-1"), "2026-01-02T03:04:05Z"));
+        // A batch of another creation has no state yet.
+        let again = [&created()[..], &[PartEvent::Seen { state: "failed".to_owned() }], &created()[3..]].concat();
+        assert_eq!(after(&again).state, "");
+    }
+
+    /// An empty journal in a folder.
+    fn journal(folder: &Path) -> Journal {
+        Journal { folder: folder.to_owned(), run: "r".to_owned(), parts: Vec::new(), limits: BTreeMap::new() }
+    }
+
+    /// The journal as it is read after a restart.
+    fn reopened(folder: &Path) -> Result<Journal> {
+        let mut journal = journal(folder);
+        journal.read()?;
+        Ok(journal)
+    }
+
+    #[test]
+    fn a_restart_reads_what_was_recorded() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = journal(folder.path());
+        journal.add("part-1-m-001.jsonl", facts()).unwrap();
+        for event in created() {
+            journal.record(0, event).unwrap();
+        }
+        journal.record(0, PartEvent::QuotaReached { limit: Some(9000) }).unwrap();
+        let piece = SplitPart { file: "part-1-m-002.jsonl".to_owned(), facts: PartFacts { requests: 4, ..facts() } };
+        journal.record(0, PartEvent::Split { into: vec![piece] }).unwrap();
+        let read = reopened(folder.path()).unwrap();
+        assert_eq!(format!("{:?}", read.parts), format!("{:?}", journal.parts));
+        assert_eq!(read.limits, journal.limits);
+        assert_eq!([read.open_requests(), read.free_number("part-1-m") as usize], [4, 3]);
+        assert!(read.has_open_parts() && !read.has_batches());
+    }
+
+    #[test]
+    fn a_line_that_a_kill_cut_is_left_out_and_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut whole = journal(folder.path());
+        whole.add("part-1-m-001.jsonl", facts()).unwrap();
+        whole.record(0, PartEvent::Uploading).unwrap();
+        let path = folder.path().join(BATCH_STATE);
+        let complete = fs::read(&path).unwrap();
+        let first = complete.iter().position(|byte| *byte == b'\n').unwrap() + 1;
+        for length in first..complete.len() {
+            fs::write(&path, &complete[..length]).unwrap();
+            let mut read = reopened(folder.path()).unwrap();
+            assert_eq!(read.parts[0].stage, Stage::Written, "{length} bytes");
+            read.record(0, PartEvent::Uploading).unwrap();
+            assert_eq!(reopened(folder.path()).unwrap().parts[0].uploads, 1, "{length} bytes");
+        }
+    }
+
+    #[test]
+    fn names_that_lead_out_of_the_folder_are_refused() {
+        for name in ["../part-1.jsonl", "part-../x.jsonl", "part-1.txt", "/part-1.jsonl", "part-a/b.jsonl"] {
+            let folder = tempfile::tempdir().unwrap();
+            let line = JournalLine { file: name.to_owned(), event: PartEvent::Uploading, at: String::new() };
+            fs::write(folder.path().join(BATCH_STATE), serde_json::to_string(&line).unwrap() + "\n").unwrap();
+            let refused = reopened(folder.path()).unwrap_err().to_string();
+            assert!(refused.contains("is no name of a part"), "{refused}");
+        }
+    }
+
+    fn assert_cost(journal: &Journal, dollars: f64) {
+        assert!((journal.max_open_cost() - dollars).abs() < 1e-9, "{}", journal.max_open_cost());
+    }
+
+    #[test]
+    fn only_batches_that_may_still_cost_count_against_the_budget() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut journal = journal(folder.path());
+        for number in 1..=3 {
+            journal.add(&format!("part-1-m-00{number}.jsonl"), facts()).unwrap();
+        }
+        assert_cost(&journal, 0.0);
+        for event in created() {
+            journal.record(0, event).unwrap();
+        }
+        journal.record(1, PartEvent::Creating { attempt: 1 }).unwrap();
+        assert_cost(&journal, 4.0);
+        journal.record(0, fetched()).unwrap();
+        assert_cost(&journal, 4.0);
+        journal.record(0, PartEvent::TakenOver { answered: 10, failed: 0 }).unwrap();
+        assert_cost(&journal, 2.0);
+    }
+
+    #[test]
+    fn a_budget_buys_whole_requests_at_their_highest_cost() {
+        for (dollars, requests) in [(0.0, 0), (0.24, 0), (0.25, 1), (1.0, 4), (100.0, 10), (-1.0, 0)] {
+            assert_eq!(facts().requests_within(dollars), requests, "{dollars}");
+        }
+        let unpriced = PartFacts { dollars: None, most_dollars: None, most_dollars_each: None, ..facts() };
+        assert_eq!(unpriced.requests_within(0.0), 10);
+        let earlier = PartFacts { most_dollars: None, most_dollars_each: None, ..facts() };
+        assert_eq!(earlier.requests_within(0.35), 3);
+    }
 }

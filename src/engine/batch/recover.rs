@@ -241,3 +241,27 @@ impl PieceWriter {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::batch::journal::tests::facts;
+
+    #[test]
+    fn a_piece_has_its_share_of_the_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("piece");
+        let mut writer = PieceWriter::default();
+        for line in ["{\"a\":1}\n", "{\"b\":2}\n"] {
+            writer.add(line, || create_new(&path)).unwrap();
+        }
+        let piece = writer.finish(&facts()).unwrap();
+        let text = "{\"a\":1}\n{\"b\":2}\n";
+        assert_eq!(fs::read_to_string(&path).unwrap(), text);
+        assert_eq!(piece.sha256, hexadecimal(&Sha256::digest(text)));
+        assert_eq!((piece.bytes, piece.requests, piece.tokens), (16, 2, 100.0));
+        // The most expensive requests may all be in this piece.
+        assert_eq!((piece.dollars, piece.most_dollars), (Some(0.2), Some(0.5)));
+        assert_eq!(piece.model, facts().model);
+    }
+}

@@ -491,3 +491,51 @@ pub(super) fn for_each_line(path: &Path, mut take: impl FnMut(&str) -> Result<()
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::types::Digest;
+
+    #[test]
+    fn the_key_of_a_line_is_its_first_field() {
+        let key = format!("{}", TrialKey::from(Digest::from_bytes(b"trial")));
+        assert_eq!(
+            key_of(&format!("{{\"custom_id\":\"{key}\",\"body\":{{}}}}")).map(|key| key.to_string()),
+            Some(key.clone())
+        );
+        for line in ["", "{}", "{\"custom_id\":\"x\"}", "{\"body\":{},\"custom_id\":\"\"}"] {
+            assert_eq!(key_of(line), None, "{line}");
+        }
+    }
+
+    #[test]
+    fn lines_are_read_to_the_end_without_blank_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lines");
+        std::fs::write(&path, b"a\n\n  \nb\xff\nlast").unwrap();
+        let mut lines = Vec::new();
+        for_each_line(&path, |line| {
+            lines.push(line.to_owned());
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(lines, ["a\n", "b\u{fffd}\n", "last"]);
+    }
+
+    #[test]
+    fn only_failures_at_the_server_may_be_charged() {
+        assert!(may_be_charged(FailureKind::Server) && may_be_charged(FailureKind::Response));
+        assert!(!may_be_charged(FailureKind::Timeout) && !may_be_charged(FailureKind::RateLimit));
+    }
+
+    #[test]
+    fn a_refusal_states_its_status_once() {
+        let words = |status, message: &str| {
+            refusal_words(&Failure { kind: FailureKind::Response, status, message: message.to_owned() })
+        };
+        assert_eq!(words(Some(400), "the batch says: 400 too long"), "400: too long");
+        assert_eq!(words(Some(400), "too long"), "400: too long");
+        assert_eq!(words(None, "the batch says: too long"), "too long");
+    }
+}
