@@ -323,7 +323,12 @@ impl<E: Experiment> OpenRun<'_, E> {
             let threads = workers.single_threaded.len();
             let held_back =
                 models.iter().map(|model| model.model.held_back()).fold(HeldBack::default(), HeldBack::longest);
-            let line = timings.summary(started.elapsed(), threads, held_back);
+            let line = timings.summary(
+                started.elapsed(),
+                threads,
+                held_back,
+                models.iter().any(|model| model.model.is_remote()),
+            );
             let line = match E::PHASES {
                 [_] => line,
                 phases => format!("{}: {line}", phases[phase]),

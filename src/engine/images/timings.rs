@@ -74,9 +74,10 @@ impl Timings {
     }
 
     /// One line with the time of each step and the bottleneck of a run that took this time on `threads` threads.
-    /// `held_back` is the time for which requests had to wait for their turn.
-    pub(crate) fn summary(&self, took: Duration, threads: usize, held_back: HeldBack) -> String {
-        TimingsText { timings: self, took: took.as_secs_f64(), threads, held_back }.to_string()
+    /// `held_back` is the time for which requests had to wait for their turn. `has_endpoint` is false if every model is
+    /// built in.
+    pub(crate) fn summary(&self, took: Duration, threads: usize, held_back: HeldBack, has_endpoint: bool) -> String {
+        TimingsText { timings: self, took: took.as_secs_f64(), threads, held_back, has_endpoint }.to_string()
     }
 }
 
@@ -86,11 +87,12 @@ struct TimingsText<'a> {
     took: f64,
     threads: usize,
     held_back: HeldBack,
+    has_endpoint: bool,
 }
 
 impl fmt::Display for TimingsText<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { timings, took, threads, held_back } = *self;
+        let Self { timings, took, threads, held_back, has_endpoint } = *self;
         let image_steps =
             [TimedStep::Decode, TimedStep::Degrade, TimedStep::Enhance, TimedStep::Encode, TimedStep::Measure];
         let busy: f64 = image_steps.iter().map(|step| timings.seconds(*step)).sum();
@@ -115,6 +117,9 @@ impl fmt::Display for TimingsText<'_> {
         }
         let slowest = image_steps.into_iter().max_by(|a, b| timings.seconds(*a).total_cmp(&timings.seconds(*b)));
         f.write_str(match slowest {
+            _ if full > idle && full > took / 4.0 && !has_endpoint => {
+                "the built-in models limit the speed: more cores would help"
+            }
             _ if full > idle && full > took / 4.0 => {
                 "the endpoint limits the speed: more --concurrency, or a faster endpoint, would help"
             }
@@ -221,7 +226,7 @@ mod tests {
         for (step, seconds) in steps {
             timings.add(*step, Duration::from_secs(*seconds));
         }
-        timings.summary(Duration::from_secs(10), 2, HeldBack::default())
+        timings.summary(Duration::from_secs(10), 2, HeldBack::default(), true)
     }
 
     #[test]
@@ -230,7 +235,7 @@ mod tests {
             let timings = Timings::default();
             timings.add(TimedStep::Full, Duration::from_secs(8));
             let held_back = HeldBack::seconds(cause, seconds);
-            timings.summary(Duration::from_secs(10), 2, held_back)
+            timings.summary(Duration::from_secs(10), 2, held_back, true)
         };
         let stated = line(PaceCause::ReportedLimits, 5);
         assert!(stated.contains("held back 5.0 s: the limits per minute that the endpoint states"), "{stated}");
@@ -238,6 +243,14 @@ mod tests {
         assert!(line(PaceCause::Quota, 5).contains("--rpm or --tpm limits the speed"));
         let short = line(PaceCause::Quota, 1);
         assert!(short.contains("the endpoint limits the speed"), "{short}");
+    }
+
+    #[test]
+    fn built_in_models_are_no_endpoint() {
+        let timings = Timings::default();
+        timings.add(TimedStep::Full, Duration::from_secs(9));
+        let line = timings.summary(Duration::from_secs(10), 2, HeldBack::default(), false);
+        assert!(line.ends_with("the built-in models limit the speed: more cores would help"), "{line}");
     }
 
     #[test]
