@@ -1,5 +1,7 @@
 //! Leaderboard rows of models that answered multiple-choice questions: [`ModelRunRow`].
 
+use std::collections::{BTreeMap, BTreeSet};
+
 use super::board::{BoardCell, BoardRow, BoardTable};
 use super::open::{GroupDigests, RunLink};
 use crate::report::tables::missing_threshold_reason;
@@ -25,6 +27,8 @@ pub(crate) struct ModelRunRow {
     pub(crate) rank: Option<RankRange>,
     /// Accuracy at L0; `None` without a reply.
     clean: Option<Estimate>,
+    /// Accuracy of raw images at each degraded level.
+    levels: BTreeMap<AxisLevel, Option<Estimate>>,
     /// Mean accuracy from L0 to the darkest level.
     area: Option<Estimate>,
     /// Darkest level; `None` if no degraded level was asked.
@@ -79,12 +83,14 @@ pub(crate) fn choice_rows(findings: &Findings<'_>, variant: &Variant, run: &RunL
 
 fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -> ModelRunRow {
     let grid = &findings.grid;
+    let accuracy = |subject: &ModelInCondition| findings.summary.cell(subject, None, ParsingMode::Strict)?.accuracy;
     let clean = ModelInCondition::with_images(model, AxisLevel::L0, variant, None);
-    let clean = grid.find_up_to_group(&clean).and_then(|index| {
-        let summary = &findings.summary;
-        let cell = summary.cell(&grid.subjects[index], None, ParsingMode::Strict)?;
-        cell.accuracy
-    });
+    let clean = grid.find_up_to_group(&clean).and_then(|index| accuracy(&grid.subjects[index]));
+    let degraded = grid
+        .subjects
+        .iter()
+        .filter(|subject| subject.model == model && subject.variant == *variant && subject.enhancer.is_none());
+    let levels = degraded.filter_map(|subject| Some((subject.level?, accuracy(subject))));
     let curve: Option<&Curve> = findings.curves.iter().find(|curve| {
         curve.model == model && curve.variant == *variant && curve.enhancer.is_none() && curve.family.is_none()
     });
@@ -115,6 +121,7 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
         run: run.clone(),
         rank: None,
         clean,
+        levels: levels.filter(|(level, _)| *level != AxisLevel::L0).collect(),
         area: curve.and_then(|curve| curve.summary.area),
         darkest,
         change: change.map(|change| (change.strict.tested.difference, change.verdict())),
@@ -173,12 +180,11 @@ fn threshold(row: &ModelRunRow) -> TableCell {
     }
 }
 
-/// Heads of the columns on the page.
-const HEAD: [&str; 12] = [
-    "rank",
-    "model",
-    "n",
-    "L0 in %",
+/// Heads of the columns on the page before those of the degraded levels.
+const FIRST_HEADS: [&str; 4] = ["rank", "model", "n", "L0 in %"];
+
+/// Heads of the columns on the page after those of the degraded levels.
+const LAST_HEADS: [&str; 8] = [
     "area in %",
     "change in points",
     "threshold in EV",
@@ -189,12 +195,15 @@ const HEAD: [&str; 12] = [
     "version",
 ];
 
-/// Table for the page.
+/// Table for the page, with a column for each level that a row has.
 pub(super) fn board(rows: &[ModelRunRow]) -> BoardTable {
-    BoardTable { head: HEAD.map(str::to_owned).to_vec(), rows: rows.iter().map(board_row).collect() }
+    let levels: BTreeSet<AxisLevel> = rows.iter().flat_map(|row| row.levels.keys().copied()).collect();
+    let heads = FIRST_HEADS.map(str::to_owned).into_iter();
+    let heads = heads.chain(levels.iter().map(|level| format!("{level} in %"))).chain(LAST_HEADS.map(str::to_owned));
+    BoardTable { head: heads.collect(), rows: rows.iter().map(|row| board_row(row, &levels)).collect() }
 }
 
-fn board_row(row: &ModelRunRow) -> BoardRow {
+fn board_row(row: &ModelRunRow, levels: &BTreeSet<AxisLevel>) -> BoardRow {
     let rank_key = row.rank.map(|rank| rank.first * 1000 + rank.last);
     let rank = BoardCell::text(&row.rank_text()).with_key(rank_key.map_or_else(String::new, |key| key.to_string()));
     let run = if row.is_reference() { format!("{}, for comparison", row.run.name) } else { row.run.name.clone() };
@@ -217,23 +226,28 @@ fn board_row(row: &ModelRunRow) -> BoardRow {
     let unread_share = unread as f64 / replies.max(1) as f64;
     let below = BoardCell::text(&row.below_text(", "))
         .with_key(row.below.first().map_or_else(String::new, |level| level.value().to_string()));
+    let first = [
+        rank.with_class("rank"),
+        BoardCell::text(&row.model).with_line(&run).into_header(row.run.path()),
+        BoardCell::new(Count, &TableCell::from(n)),
+        BoardCell::new(Share, &TableCell::from(row.clean)),
+    ];
+    let by_level =
+        levels.iter().map(|level| BoardCell::new(Share, &TableCell::from(row.levels.get(level).copied().flatten())));
+    let last = [
+        BoardCell::new(Share, &TableCell::from(row.area)),
+        change,
+        threshold,
+        gain,
+        below.with_class(if row.below.is_empty() { "" } else { "below" }),
+        BoardCell::new(ColumnKind::Percent, &TableCell::Number(unread_share))
+            .with_line(&format!("{unread} of {replies}")),
+        BoardCell::text(&row.run.date),
+        BoardCell::text(&row.run.version),
+    ];
     BoardRow {
         words: format!("{} {}", row.model, row.run.name).to_lowercase(),
-        cells: vec![
-            rank.with_class("rank"),
-            BoardCell::text(&row.model).with_line(&run).into_header(row.run.path()),
-            BoardCell::new(Count, &TableCell::from(n)),
-            BoardCell::new(Share, &TableCell::from(row.clean)),
-            BoardCell::new(Share, &TableCell::from(row.area)),
-            change,
-            threshold,
-            gain,
-            below.with_class(if row.below.is_empty() { "" } else { "below" }),
-            BoardCell::new(ColumnKind::Percent, &TableCell::Number(unread_share))
-                .with_line(&format!("{unread} of {replies}")),
-            BoardCell::text(&row.run.date),
-            BoardCell::text(&row.run.version),
-        ],
+        cells: first.into_iter().chain(by_level).chain(last).collect(),
     }
 }
 

@@ -41,3 +41,20 @@ const filter = () => {
 };
 $("filter").addEventListener("input", filter);
 filter();
+
+// The chooser of columns: a box for each head, but that of the models. A column that is off is off in all tables.
+const heads = new Map();
+for (const table of document.querySelectorAll("table.board")) {
+  [...table.tHead.rows[0].cells].forEach((head, column) => {
+    const name = head.textContent;
+    if (name === "model") return;
+    heads.set(name, [...(heads.get(name) ?? []), ...[...table.rows].map((row) => row.cells[column])]);
+  });
+}
+for (const [name, cells] of heads) {
+  const label = make("label"), box = make("input");
+  Object.assign(box, { type: "checkbox", checked: true });
+  box.addEventListener("change", () => cells.forEach((cell) => { cell.hidden = !box.checked; }));
+  label.append(box, " " + name);
+  $("columns").append(label, " ");
+}

@@ -148,8 +148,17 @@ fn site_ranks_models_and_links_pages() {
     Ranks are by mean accuracy over the dark levels (L3, L5), on the 48 items that both models answered at all
         levels from L0 (12 frames), corrected by Holm over 1 pair.
     ");
-    // A site is made again byte for byte.
+    // A column for each level, darkest last; the better model is never right at L5.
     let index = fs::read(bench.path("site/index.html")).unwrap();
+    let text = String::from_utf8_lossy(&index);
+    let heads: Vec<&str> =
+        text.split("<th scope=\"col\"").skip(1).map(|head| &head[..head.find("</th>").unwrap()]).collect();
+    let at = |name: &str| heads.iter().position(|head| head.ends_with(&format!(">{name}"))).unwrap();
+    assert_eq!([at("L0 in %"), at("L3 in %"), at("L5 in %"), at("area in %")], [3, 4, 5, 6]);
+    let good = text.split("<tr data-words=\"script:good.jsonl one\">").nth(1).unwrap();
+    let cells: Vec<&str> = good.split("data-key=\"").skip(1).map(|cell| &cell[..cell.find('"').unwrap()]).collect();
+    assert_eq!(cells[3..6], ["1", "1", "0"], "{cells:?}");
+    // A site is made again byte for byte.
     bench.complete(&words("site one two --out site"));
     assert!(fs::read(bench.path("site/index.html")).unwrap() == index);
 }
