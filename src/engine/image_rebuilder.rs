@@ -80,7 +80,7 @@ impl ImageRebuilder {
             ));
         }
         let flags = ImageFlags::read(&manifest.images).map_err(wrong)?;
-        let flags = with_new_paths(flags, &args).map_err(wrong)?;
+        let flags = found_from(with_new_paths(flags, &args).map_err(wrong)?, folder);
         let has_enhanced = conditions.iter().any(|condition| condition.enhancer.is_some());
         let models = if has_enhanced { &*flags.llie } else { &[] };
         let elsewhere = if has_enhanced { &*flags.enhanced } else { &[] };
@@ -163,6 +163,41 @@ fn with_new_paths(mut flags: ImageFlags, args: &RebuildArgs) -> Result<ImageFlag
         flags.enhanced.clone_from(&args.enhanced);
     }
     Ok(flags)
+}
+
+/// The image flags with the paths of data and enhancers as they can be opened from here (see [`found`]).
+fn found_from(mut flags: ImageFlags, run: &Path) -> ImageFlags {
+    for place in &mut flags.data.data {
+        match place {
+            DataSource::Rooms(_) => {}
+            DataSource::Path(path) | DataSource::Known { path, .. } => *path = found(path, run),
+            DataSource::Files(paths) => paths.iter_mut().for_each(|path| *path = found(path, run)),
+        }
+    }
+    if let Some(walk) = &mut flags.walk {
+        walk.folder = found(&walk.folder, run);
+    }
+    // A name without an extension is that of a built-in enhancer.
+    for path in flags.llie.iter_mut().filter(|path| path.extension().is_some()) {
+        *path = found(path, run);
+    }
+    flags
+}
+
+/// A path of a run, which is relative to the folder that the run was made in. If nothing is there from the working
+/// folder, it is sought from each folder above that of the run, the nearest first.
+fn found(path: &Path, run: &Path) -> PathBuf {
+    if path.is_absolute() || path.exists() {
+        return path.to_owned();
+    }
+    let run = std::path::absolute(run).unwrap_or_else(|_| run.to_owned());
+    match run.ancestors().skip(1).map(|folder| folder.join(path)).find(|path| path.exists()) {
+        Some(found) => {
+            tracing::warn!("{}: read from {}, above the folder of the run", path.display(), found.display());
+            found
+        }
+        None => path.to_owned(),
+    }
 }
 
 /// The frames of a data set. Its questions are ignored.

@@ -13,7 +13,7 @@ use crate::store;
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
     ChoiceDetail, FailureKind, Finish, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record, Reply,
-    RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials,
+    RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials, shell_word,
 };
 use darkqa_score::answers::record::{Detail, answered};
 
@@ -331,6 +331,16 @@ fn list_runs(folder: &Path) -> Vec<String> {
 }
 
 fn no_run(folder: &Path) -> Error {
+    let is_zip = folder.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip"));
+    if is_zip && folder.is_file() {
+        let [zip, target] = [folder, &folder.with_extension("")].map(|path| path.display().to_string());
+        let problem = format!(
+            "a ZIP file; unpack it and name the folder of the run in it: python3 -m zipfile -e {} {}",
+            shell_word(&zip),
+            shell_word(&target)
+        );
+        return Error::Run { path: folder.to_owned(), problem };
+    }
     let hint = match &*list_runs(folder) {
         [] => String::new(),
         runs => format!("; there are runs in it: {}", runs.join(" ")),

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{Cursor, Read};
 use std::path::Path;
+use std::process::Command;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
@@ -291,4 +292,18 @@ fn open_runs_can_be_bundled() {
         ),
         "{readme}"
     );
+}
+
+#[test]
+fn a_bundle_that_is_named_as_a_run_states_how_to_unpack_it() {
+    let bench = Bench::new();
+    bench.complete(&words("--model random --data rooms:frames=2,size=96x72 --levels L0,L3 --out run"));
+    bench.complete(&words("bundle run --out sent.zip"));
+    let refused = bench.call(&words("report sent.zip"));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    let command = refused.stderr.split("in it: ").nth(1).unwrap().trim().to_owned();
+    assert_eq!(command, "python3 -m zipfile -e sent.zip sent");
+    let unpacked = Command::new("sh").args(["-c", &command]).current_dir(bench.path("")).status().unwrap();
+    assert!(unpacked.success());
+    bench.complete(&words("report sent/run"));
 }

@@ -6,7 +6,7 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 
-use crate::support::run::{Bench, words};
+use crate::support::run::{Bench, called, words};
 use crate::support::table::check_rows;
 
 const COMMAND: &str = "--model random --data set.jsonl --levels L0,L3 --out run";
@@ -170,4 +170,26 @@ fn run_can_be_reached_by_link() {
     let bench = bench();
     symlink("run", bench.path("alias")).unwrap();
     bench.complete(&words("report alias"));
+}
+
+#[test]
+fn images_are_found_from_any_folder() {
+    let bench = Bench::with_questions(2);
+    fs::create_dir_all(bench.path("far/away")).unwrap();
+    bench.complete(&words("--model random --data set.jsonl --levels L0,L3 --out runs/one"));
+    let show = |folder: &str, run: &str| {
+        let mut command = bench.command(&words(&format!("show {run} q0 --out {}", bench.path("images").display())));
+        called(command.current_dir(bench.path(folder)))
+    };
+    let there = show("far/away", "../../runs/one");
+    assert_eq!(there.code, Some(0), "{there:?}");
+    assert!(there.stdout.contains("the same bytes as were sent"), "{there:?}");
+    assert!(there.stderr.contains("set.jsonl: read from ") && there.stderr.contains("above the folder of the run"));
+    // From the folder of the run itself nothing is sought.
+    let here = show("", "runs/one");
+    assert!(here.code == Some(0) && !here.stderr.contains("read from"), "{here:?}");
+    fs::rename(bench.path("runs/one"), bench.path("far/one")).unwrap();
+    fs::rename(bench.path("set.jsonl"), bench.path("moved.jsonl")).unwrap();
+    let lost = show("far", "one");
+    assert!(lost.code == Some(2) && lost.stderr.contains("set.jsonl"), "{lost:?}");
 }
