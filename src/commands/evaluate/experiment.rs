@@ -2,11 +2,11 @@
 //!
 //! The trials of an evaluation: [`plan_trials`].
 
-use std::collections::HashSet;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
 
+use super::samples::Sample;
 use super::settings::{ImagePlace, shown_questions};
 use super::setup::{ChoiceSetup, is_other_room};
 use super::write_plan::{power_forecast, run_contents};
@@ -27,7 +27,7 @@ use crate::runs::{Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{
-    ChoiceDetail, Condition, Digest, FrameId, Question, QuestionId, Record, RunQuestion, SetLight, TrialOutcome, View,
+    ChoiceDetail, Condition, Digest, FrameId, Question, Record, RunQuestion, SetLight, TrialOutcome, View,
 };
 use darkqa_questions::rules::Rules;
 use darkqa_score::model_in_condition::is_reference;
@@ -73,15 +73,16 @@ impl Experiment for ChoiceSetup<'_> {
 
     fn questions(&self) -> Vec<RunQuestion> {
         // In a shard, other-room is also asked questions about frames of other shards, with images of this one.
-        let ids: HashSet<&QuestionId> = self.questions.iter().map(|question| &question.id).collect();
-        let others = self.with_other_rooms.iter().filter(|question| !ids.contains(&question.id));
-        self.questions
-            .iter()
+        let others = self.samples.iter().filter(|sample| sample.source.is_none());
+        self.own()
             .chain(others)
-            .map(|question| RunQuestion {
-                image: self.digests.get(&question.frame).copied(),
-                images: self.dataset.image_series(&question.frame).to_vec(),
-                ..RunQuestion::new(question, self.file_places[&question.id], &self.dataset.scene(&question.frame))
+            .map(|sample| {
+                let question = &sample.question;
+                RunQuestion {
+                    image: sample.digest,
+                    images: self.dataset.image_series(&question.frame).to_vec(),
+                    ..RunQuestion::new(question, sample.file_place, &self.dataset.scene(&question.frame))
+                }
             })
             .collect()
     }
@@ -89,7 +90,7 @@ impl Experiment for ChoiceSetup<'_> {
     fn power(&self) -> Option<PowerForecast> {
         let models = self.models.iter().filter(|model| model.view == View::Image && !is_reference(&model.name));
         let asked = run_contents(&self.conditions, models.count());
-        power_forecast(&self.dataset, &self.questions, &self.digests, asked)
+        power_forecast(&self.dataset, self.own().map(|sample| (&sample.question, sample.digest)), asked)
     }
 
     fn identity(&self) -> Identity {
@@ -203,6 +204,8 @@ struct QuestionPrompts {
     item: ChoiceItem,
     image: Prompt,
     blind: Prompt,
+    /// Position of the question among all selected ones.
+    place: usize,
 }
 
 /// The questions asked with the images of one frame.
@@ -218,14 +221,12 @@ struct FrameQuestions {
 fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
     let mut by_source = Vec::new();
     by_source.resize_with(setup.sources.len(), FrameQuestions::default);
-    for question in &setup.questions {
-        let own = &mut by_source[setup.places[&question.frame]].own;
-        own.extend(prompts(setup, question, None)?);
-    }
-    for question in &setup.with_other_rooms {
-        if let Some(shown) = setup.other_rooms.shown_for(&question.frame) {
-            let others = &mut by_source[setup.places[shown]].others;
-            others.extend(prompts(setup, question, Some(shown))?);
+    for sample in &setup.samples {
+        if let Some(source) = sample.source {
+            by_source[source].own.extend(prompts(setup, sample, None)?);
+        }
+        if let Some(shown) = sample.other_room {
+            by_source[shown].others.extend(prompts(setup, sample, Some(&setup.sources[shown].name))?);
         }
     }
     by_source
@@ -244,12 +245,8 @@ fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
 
 /// A question in each order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of
 /// the question.
-fn prompts(
-    setup: &ChoiceSetup<'_>,
-    question: &Question,
-    shown_frame: Option<&FrameId>,
-) -> Result<Vec<QuestionPrompts>> {
-    let (order, repeats) = (setup.config.order, setup.config.repeats);
+fn prompts(setup: &ChoiceSetup<'_>, sample: &Sample, shown_frame: Option<&FrameId>) -> Result<Vec<QuestionPrompts>> {
+    let (order, repeats, question) = (setup.config.order, setup.config.repeats, &sample.question);
     shown_questions(question, order, repeats, setup.recipe.seed)?
         .into_iter()
         .map(|shown| {
@@ -268,6 +265,7 @@ fn prompts(
             Ok(QuestionPrompts {
                 image: prompt(View::Image)?,
                 blind: prompt(View::Blind)?,
+                place: sample.place,
                 item: ChoiceItem {
                     question: Arc::new(shown.question),
                     repeat: shown.repeat,
@@ -303,11 +301,9 @@ fn group(
             View::Image => &shown.image,
             View::Blind => &shown.blind,
         };
-        let place = setup.question_places[&shown.item.question.id];
-        for &(index, model) in models
-            .iter()
-            .filter(|(_, model)| model.is_asked(place) && (view == View::Image && is_other_room(model)) == is_of_other)
-        {
+        for &(index, model) in models.iter().filter(|(_, model)| {
+            model.is_asked(shown.place) && (view == View::Image && is_other_room(model)) == is_of_other
+        }) {
             trials.push(Trial {
                 key: key_facts(shown, prompt, model, condition, image).key()?,
                 model: index,

@@ -2,6 +2,7 @@
 
 pub(crate) mod check;
 mod experiment;
+mod samples;
 mod settings;
 mod setup;
 mod write_plan;

@@ -1,15 +1,14 @@
 //! The data and models of an evaluation, opened and checked: [`ChoiceSetup`].
 //!
-//! Choice of the frame shown to the control `observer:other-room`: [`OtherRooms`].
-//!
 //! Controls of the observer that are added to a run without a flag: [`AddedControls`].
 //!
 //! The warning about frames without the scenes that their names suggest: [`unnamed_scenes`].
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::Path;
 use std::sync::Arc;
 
+use super::samples::{OtherRooms, Sample, Selection};
 use super::settings::{Evaluation, plan_identity};
 use crate::ask::{Model, Random};
 use crate::data::Dataset;
@@ -27,7 +26,7 @@ use crate::engine::settings::JobSettings;
 use crate::error::{Error, Result};
 use crate::runs::shard_records::shard_questions;
 use crate::types::manifests::PartPlace;
-use crate::types::{Condition, Control, Digest, FrameId, Question, QuestionId, SetLight, TreatmentSet};
+use crate::types::{Condition, Control, Digest, Question, QuestionId, SetLight, TreatmentSet};
 use darkqa_enhance::{FRAMES, ModelFile};
 use darkqa_questions::observer::is_in_rulebook;
 use darkqa_questions::rules::Rules;
@@ -37,23 +36,13 @@ use darkqa_score::suggested_scenes::SuggestedScenes;
 pub(super) struct ChoiceSetup<'a> {
     pub(super) config: &'a Evaluation,
     pub(super) dataset: Arc<Dataset>,
-    pub(super) questions: Vec<Question>,
-    /// Questions for the control `observer:other-room` whose image belongs to this run or shard.
-    pub(super) with_other_rooms: Vec<Question>,
-    pub(super) other_rooms: OtherRooms,
+    /// The questions in the order of their selection.
+    pub(super) samples: Vec<Sample>,
     pub(super) sources: Vec<Source>,
     /// In a shard, the sources of the whole run that enhancers are tried on.
     pub(super) probe_sources: Vec<Source>,
     /// Position of the sources within the whole run; `None` if this is the whole run.
     pub(super) part: Option<PartPlace>,
-    /// Index of each frame in `sources`.
-    pub(super) places: HashMap<FrameId, usize>,
-    /// Position of each question among all selected ones, for models that are asked only the first few.
-    pub(super) question_places: HashMap<QuestionId, usize>,
-    /// Position of each question among all questions of the data.
-    pub(super) file_places: HashMap<QuestionId, usize>,
-    /// Digest of each frame that a question is about, over its file or all its files. Empty if no image is read.
-    pub(super) digests: HashMap<FrameId, Digest>,
     pub(super) models: Vec<ModelUnderTest>,
     pub(super) conditions: Vec<Condition>,
     pub(super) recipe: Recipe,
@@ -111,13 +100,12 @@ impl<'a> ChoiceSetup<'a> {
             (job.set_light == SetLight::Dark).then(|| dark_already::brightness(&*dataset, &sources)).flatten();
         let probe_sources =
             if part.is_some() && !enhancer_files.is_empty() { probe_sources(&dataset, &selected) } else { Vec::new() };
-        let mut setup = Self {
+        let shown = models.iter().any(is_other_room).then_some(other_rooms).flatten().filter(|_| shows_images);
+        let selection = Selection { selected, own: questions, file_places, other_rooms: shown };
+        let setup = Self {
             config,
             probe_sources,
-            places: sources.iter().map(|source| source.name.clone()).zip(0..).collect(),
-            question_places: selected.iter().map(|question| question.id.clone()).zip(0..).collect(),
-            file_places,
-            digests: digests(&sources),
+            samples: selection.samples(&dataset, &sources, config.plan.as_ref())?,
             sources,
             part,
             models,
@@ -125,14 +113,8 @@ impl<'a> ChoiceSetup<'a> {
             conditions,
             brightness,
             recipe,
-            questions,
-            with_other_rooms: Vec::new(),
-            other_rooms: other_rooms.unwrap_or_default(),
             dataset,
         };
-        if shows_images && setup.models.iter().any(is_other_room) {
-            setup.add_other_rooms(selected)?;
-        }
         if shows_images {
             check_enhanced(&setup.conditions, &job.enhancers)?;
         }
@@ -147,34 +129,14 @@ impl<'a> ChoiceSetup<'a> {
         for line in self.dataset.printed_summary() {
             progress.note(line);
         }
-        if let Some(warning) = unnamed_scenes(&self.dataset, &self.questions) {
+        if let Some(warning) = unnamed_scenes(&self.dataset, self.own().map(|sample| &sample.question)) {
             tracing::warn!("{warning}");
         }
     }
 
-    /// Adds the selected questions that are asked with the image of another frame, if that image belongs to this run or
-    /// shard.
-    fn add_other_rooms(&mut self, mut questions: Vec<Question>) -> Result<()> {
-        questions.retain(|question| {
-            let shown = self.other_rooms.shown_for(&question.frame);
-            shown.is_some_and(|shown| self.places.contains_key(shown))
-        });
-        for question in &questions {
-            if self.digests.contains_key(&question.frame) {
-                continue;
-            }
-            let plan = self.config.plan.as_ref();
-            if let Some(digest) = plan.and_then(|plan| plan.digest(&question.frame)) {
-                self.digests.insert(question.frame.clone(), digest);
-                continue;
-            }
-            let source = Source::from_questions(&self.dataset, &question.frame)?;
-            if let Some(digest) = source.digest() {
-                self.digests.insert(source.name, digest);
-            }
-        }
-        self.with_other_rooms = questions;
-        Ok(())
+    /// Samples about the frames of this run or shard.
+    pub(super) fn own(&self) -> impl Iterator<Item = &Sample> + Clone {
+        self.samples.iter().filter(|sample| sample.source.is_some())
     }
 }
 
@@ -253,11 +215,6 @@ fn file_places(config: &Evaluation, dataset: &Dataset, selected: &[Question]) ->
     }
 }
 
-/// Digest of each source, over its file or all its files. Sources without frames are left out.
-fn digests(sources: &[Source]) -> HashMap<FrameId, Digest> {
-    sources.iter().filter_map(|source| Some((source.name.clone(), source.digest()?))).collect()
-}
-
 /// Opens the models without sending any request.
 fn open_models(
     config: &Evaluation,
@@ -286,50 +243,6 @@ fn open_models(
             _ => Model::Random(guesser),
         })
     })
-}
-
-/// For each frame, the frame whose image is shown instead.
-///
-/// It is the next frame of another scene in the order of the run; after the last frame, the order starts again at the
-/// first. All frames of the run are considered, so that shards and resumed runs choose the same.
-#[derive(Debug, Default)]
-pub(super) struct OtherRooms(BTreeMap<FrameId, FrameId>);
-
-impl OtherRooms {
-    /// Chooses the other frames; `None` if all frames are of one scene. A frame without a scene (empty) counts as a
-    /// scene of its own.
-    pub(super) fn new(questions: &[Question], scene: impl Fn(&FrameId) -> String) -> Option<Self> {
-        let frames: Vec<&FrameId> =
-            first_question_per_frame(questions).into_iter().map(|question| &question.frame).collect();
-        let scenes: Vec<String> = frames
-            .iter()
-            .map(|frame| match scene(frame) {
-                scene if scene.is_empty() => format!("frame {frame}"),
-                scene => scene,
-            })
-            .collect();
-        if scenes.iter().collect::<HashSet<_>>().len() < 2 {
-            return None;
-        }
-        let count = frames.len();
-        let mut others = BTreeMap::new();
-        let mut next = 0;
-        // Going backwards, `next` is the nearest later frame of another scene. For the last scene this is one of the
-        // first frames, which is known only after one pass over all frames, so the loop makes two.
-        for place in (0..2 * count).rev().map(|place| place % count) {
-            let after = (place + 1) % count;
-            if scenes[after] != scenes[place] {
-                next = after;
-            }
-            others.insert(frames[place].clone(), frames[next].clone());
-        }
-        Some(Self(others))
-    }
-
-    /// The frame that is shown in place of a frame.
-    pub(super) fn shown_for(&self, frame: &FrameId) -> Option<&FrameId> {
-        self.0.get(frame)
-    }
 }
 
 /// True if a model is the control `observer:other-room`, which gets the image of another scene.
@@ -392,55 +305,14 @@ impl AddedControls {
 }
 
 /// The warning; `None` if the data set has scenes, or the names of the frames suggest none.
-pub(super) fn unnamed_scenes(dataset: &Dataset, questions: &[Question]) -> Option<String> {
-    let frames = questions.iter().map(|question| &question.frame);
+pub(super) fn unnamed_scenes<'a>(
+    dataset: &Dataset,
+    questions: impl Iterator<Item = &'a Question> + Clone,
+) -> Option<String> {
+    let frames = questions.map(|question| &question.frame);
     if frames.clone().any(|frame| !dataset.scene(frame).is_empty()) {
         return None;
     }
     let suggested = SuggestedScenes::new(frames)?;
     Some(format!("{}; a \"scene\" in each question (or --map scene=COLUMN) names them", suggested.sentence()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::types::{Choices, Family, QuestionId};
-
-    fn others(frames: &str) -> Option<String> {
-        let questions: Vec<Question> = frames
-            .chars()
-            .enumerate()
-            .map(|(id, frame)| Question {
-                id: QuestionId(id.to_string()),
-                frame: FrameId(frame.to_string()),
-                family: Family::Closest,
-                text: "?".into(),
-                choices: Choices::new(vec!["a".into(), "b".into()], 0).unwrap(),
-                group: None,
-                evidence: serde_json::Value::Null,
-            })
-            .collect();
-        // Lower and upper case are frames of one scene; digits have none.
-        let others = OtherRooms::new(&questions, |frame| frame.0.to_lowercase().replace(char::is_numeric, ""))?;
-        frames.chars().map(|frame| Some(others.shown_for(&FrameId(frame.to_string())).unwrap().0.clone())).collect()
-    }
-
-    #[test]
-    fn the_next_frame_of_another_scene_is_shown() {
-        for (frames, shown) in [
-            ("12", Some("21")),
-            ("aAbB", Some("bbaa")),
-            ("aAbBc", Some("bbcca")),
-            ("adDA", Some("dAAd")),
-            ("aabb", Some("bbaa")),
-            ("123", Some("231")),
-            ("aA", None),
-            ("a", None),
-            ("", None),
-        ] {
-            let found = others(frames);
-            let expected = shown.map(str::to_owned);
-            assert_eq!(found, expected, "{frames}");
-        }
-    }
 }

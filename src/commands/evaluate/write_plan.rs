@@ -2,7 +2,7 @@
 //!
 //! The effect that a planned evaluation can detect: [`power_forecast`].
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::BTreeSet;
 
 use super::settings::{EvaluateArgs, plan_identity};
 use super::setup::ChoiceSetup;
@@ -20,7 +20,7 @@ use crate::runs::run_plan::{NewPlan, PlannedFrame, recorded_command};
 use crate::types::degradations::Kind;
 use crate::types::manifests::Status;
 use crate::types::text::counted;
-use crate::types::{Condition, Digest, FrameId, Question, Variant};
+use crate::types::{Condition, Digest, Question, Variant};
 use darkqa_score::cluster::{Clusters, FrameTies};
 use darkqa_score::tested_sentences::RunContents;
 
@@ -74,20 +74,18 @@ pub(crate) fn plan(mut args: EvaluateArgs, progress: &Progress) -> Result<Outcom
     Ok(Outcome::wrote(folder, Status::Complete, output))
 }
 
-/// The effect that these questions can detect; `None` without questions, or if a true answer is unknown. `digests` are
-/// those of the frames, as far as they are known.
-pub(super) fn power_forecast(
+/// The effect that these questions can detect, each with the digest of its frame if it is known; `None` without
+/// questions, or if a true answer is unknown.
+pub(super) fn power_forecast<'a>(
     dataset: &Dataset,
-    questions: &[Question],
-    digests: &HashMap<FrameId, Digest>,
+    questions: impl Iterator<Item = (&'a Question, Option<Digest>)> + Clone,
     contents: RunContents,
 ) -> Option<PowerForecast> {
-    if questions.iter().any(|question| question.choices.truth().is_none()) {
-        return None;
-    }
-    let mut ties = FrameTies { digests: digests.clone(), ..FrameTies::default() };
-    for question in questions {
+    let mut ties = FrameTies::default();
+    for (question, digest) in questions.clone() {
+        question.choices.truth()?;
         let frame = &question.frame;
+        ties.digests.extend(digest.map(|digest| (frame.clone(), digest)));
         let (scene, several) = (dataset.scene(frame), dataset.image_series(frame));
         if !scene.is_empty() {
             ties.scenes.insert(frame.clone(), scene);
@@ -96,10 +94,10 @@ pub(super) fn power_forecast(
             ties.images.insert(frame.clone(), several.to_vec());
         }
     }
-    let pairs = questions.iter().map(|question| (&question.id, &question.frame));
-    let clusters = Clusters::new(pairs, &ties);
+    let questions = questions.map(|(question, _)| question);
+    let clusters = Clusters::new(questions.clone().map(|question| (&question.id, &question.frame)), &ties);
     let question_clusters: Vec<u32> =
-        questions.iter().filter_map(|question| clusters.get(&question.frame, &question.id)).collect();
+        questions.filter_map(|question| clusters.get(&question.frame, &question.id)).collect();
     PowerForecast::new(&clusters, &question_clusters, contents)
 }
 

@@ -132,7 +132,7 @@ fn check_data(
         }
     };
     check_questions(&asked, findings);
-    if let Some(warning) = unnamed_scenes(&dataset, &asked) {
+    if let Some(warning) = unnamed_scenes(&dataset, asked.iter()) {
         findings.warn(warning);
     }
     if args.job.models.is_empty() {
@@ -143,7 +143,7 @@ fn check_data(
             lights: 1,
             has_noise: true,
         };
-        if let Some(power) = power_forecast(&dataset, &asked, &HashMap::new(), sets) {
+        if let Some(power) = power_forecast(&dataset, asked.iter().map(|question| (question, None)), sets) {
             findings.ok(power.line());
         }
     }
