@@ -14,7 +14,7 @@ pub mod dataset {
 }
 
 pub mod report {
-    pub use crate::report::choice_report::ChoiceReport;
+    pub use crate::report::content::Report;
+    pub use crate::report::outputs::products;
     pub use crate::report::page::PageInputs;
-    pub use crate::report::products::products;
 }

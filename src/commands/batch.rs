@@ -11,7 +11,7 @@ use crate::ask::AccessArgs;
 use crate::engine::batch::{CollectArgs, FolderBatches, FolderTask, replies};
 use crate::engine::images::progress::Progress;
 use crate::error::Result;
-use crate::report::joined::{open, whole};
+use crate::report::joined::written;
 use crate::runs::stored::{ExperimentKind, StoredRun, read_run_manifest};
 use crate::runs::{Outcome, PrintArgs, StdoutFormat, record_table};
 use crate::store::{AddressChange, Store};
@@ -39,8 +39,8 @@ pub(crate) struct BatchImportArgs {
 /// If the folder has no run or no batch, or a line is invalid. The replies of earlier lines stay imported.
 pub(crate) fn import(args: &BatchImportArgs) -> Result<Outcome> {
     match ExperimentKind::read(&args.run)? {
-        ExperimentKind::Choice => import_into::<ChoiceDetail>(args, whole::write),
-        ExperimentKind::Open => import_into::<OpenDetail>(args, open::write),
+        ExperimentKind::Choice => import_into::<ChoiceDetail>(args, written::write),
+        ExperimentKind::Open => import_into::<OpenDetail>(args, written::write_open),
     }
 }
 
@@ -128,8 +128,8 @@ pub(crate) fn cancel(args: &BatchFolderArgs, progress: &Progress) -> Result<Outc
 
 fn carry_out(args: &BatchFolderArgs, task: FolderTask, progress: &Progress) -> Result<Outcome> {
     match ExperimentKind::read(&args.run.run)? {
-        ExperimentKind::Choice => carry_out_in::<ChoiceDetail>(args, task, progress, whole::write),
-        ExperimentKind::Open => carry_out_in::<OpenDetail>(args, task, progress, open::write),
+        ExperimentKind::Choice => carry_out_in::<ChoiceDetail>(args, task, progress, written::write),
+        ExperimentKind::Open => carry_out_in::<OpenDetail>(args, task, progress, written::write_open),
     }
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 
 use crate::error::{Error, Result};
 use crate::files::FolderAccess;
-use crate::report::joined::{open, whole};
+use crate::report::joined::written;
 use crate::runs::missing_thumbnails::MissingThumbnails;
 use crate::runs::shard_records::append_records;
 use crate::runs::sharded_run::{MissingShards, ShardedRun, common_kind, run_folders_in};
@@ -45,8 +45,8 @@ pub(crate) struct MergeArgs {
 pub(crate) fn merge(args: &MergeArgs) -> Result<Outcome> {
     let folders = run_folders(&args.runs)?;
     match common_kind(&folders)? {
-        ExperimentKind::Open => merge_all::<OpenDetail>(args, &folders, open::write),
-        ExperimentKind::Choice => merge_all::<ChoiceDetail>(args, &folders, whole::write),
+        ExperimentKind::Open => merge_all::<OpenDetail>(args, &folders, written::write_open),
+        ExperimentKind::Choice => merge_all::<ChoiceDetail>(args, &folders, written::write),
     }
 }
 

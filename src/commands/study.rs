@@ -19,7 +19,7 @@ use crate::engine::images::progress::Progress;
 use crate::error::{Error, Result};
 use crate::files::{self, write};
 use crate::pictures::Payload;
-use crate::report::joined::whole;
+use crate::report::joined::written;
 use crate::report::study::{StudyImage, StudyQuestion, page};
 use crate::runs::stored::StoredRun;
 use crate::runs::{Outcome, PrintArgs, record_table};
@@ -277,7 +277,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     let mut run = StoredRun::reread(&args.out, people_manifest)?;
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.set_counts(Counts::new(run.trials.len(), failed));
-    let mut outcome = whole::write(&store, run, args.show.format())?;
+    let mut outcome = written::write(&store, run, args.show.format())?;
     record_table::update(&args.out, args.show.record_table())?;
     if !args.show.format().is_json() {
         outcome.output.insert_str(0, &summary(&counts));

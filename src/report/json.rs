@@ -6,14 +6,8 @@ use std::path::Path;
 use serde::{Serialize, Serializer};
 
 use crate::error::{Error, Result};
-use crate::report::choice_report::ChoiceReport;
-use crate::report::sentences::Sentence;
-use crate::report::tables::{BASELINE, strict_groups, summary_rows};
-use crate::report::text::alert::Alert;
 use crate::report::text::table::{Table, TableRow, fields};
-use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
-use crate::types::UnreadReason;
 use crate::types::manifests::RunManifest;
 
 /// JSON document of a head and table rows; each row is an object with the column names as keys.
@@ -31,7 +25,7 @@ struct Document<'a, H> {
 
 /// Rows of tables that have the same columns in their file; each row becomes an object. Tables without a file have no
 /// rows.
-pub(super) struct JsonRows<'a>(&'a [Table]);
+pub(super) struct JsonRows<'a>(pub(super) &'a [Table]);
 
 impl<'a> JsonRows<'a> {
     /// Rows of one table.
@@ -84,24 +78,6 @@ pub(super) fn document(head: impl Serialize, rows: &Table, tables: &[Table], len
     serde_json::to_string_pretty(&document).map(|text| text + "\n").map_err(|e| Error::data("summary.json", e))
 }
 
-/// Head of the summary of an evaluation.
-#[derive(Serialize)]
-struct SummaryHead<'a> {
-    #[serde(flatten)]
-    runs: RunsHead<'a>,
-    /// Noise profiles of the noisy images.
-    readings: ProfileNames,
-    unread: &'a BTreeMap<UnreadReason, usize>,
-    alerts: &'a [Alert],
-    findings: &'a [Sentence],
-    /// Rows of `groups.csv`, without the observer if the report hides it; omitted if empty.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    groups: Option<JsonRows<'a>>,
-    /// Rows of `baseline.csv`; omitted if the report has no such table.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    baseline: Option<JsonRows<'a>>,
-}
-
 /// Runs in the head of a summary: `run` and `folder` for a single run, `runs` for several; unused fields are omitted.
 #[derive(Serialize)]
 pub(super) struct RunsHead<'a> {
@@ -131,6 +107,14 @@ pub(crate) enum SummaryRuns<'a> {
 }
 
 impl<'a> SummaryRuns<'a> {
+    /// Folder of the first run; `None` for a summary in the folder of its run.
+    pub(super) fn first_folder(self) -> Option<&'a Path> {
+        match self {
+            Self::One(_, folder) => folder,
+            Self::Several(runs) => runs.first().map(|(_, folder)| *folder),
+        }
+    }
+
     /// Head of a summary, with the name of its schema.
     pub(super) fn head(self, schema: &'static str) -> RunsHead<'a> {
         let (run, folder, runs) = match self {
@@ -139,24 +123,6 @@ impl<'a> SummaryRuns<'a> {
         };
         RunsHead { schema, folder, run, runs: runs.iter().map(|&(run, folder)| ComparedRun { folder, run }).collect() }
     }
-}
-
-/// Serialises the summary of runs as JSON.
-///
-/// # Errors
-/// If the document cannot be serialised.
-pub(crate) fn summary(report: &ChoiceReport<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String> {
-    let groups = strict_groups(report.findings);
-    let head = SummaryHead {
-        runs: runs.head("darkqa.summary/1"),
-        readings: ProfileNames::new(&report.findings.grid.subjects),
-        unread: &report.findings.summary.unread,
-        alerts: &report.alerts,
-        findings: &report.sentences,
-        groups: (!groups.is_empty()).then_some(JsonRows(&groups)),
-        baseline: report.tables.iter().find(|table| table.name == BASELINE).map(JsonRows::new),
-    };
-    document(head, &summary_rows(&report.findings.summary, &report.findings.grid.listing), &report.tables, length)
 }
 
 #[cfg(test)]

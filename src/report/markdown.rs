@@ -1,131 +1,68 @@
-//! Report as Markdown, for an issue or a README: [`MarkdownReport`].
+//! Report as Markdown, for an issue or a README: [`markdown`].
 
-use std::borrow::Cow;
 use std::fmt::Write;
+use std::path::Path;
 
-use crate::report::choice_report::ChoiceReport;
+use crate::report::content::Report;
 use crate::report::finding_groups::FindingGroups;
-use crate::report::openeqa::{OpenReport, coverage};
-use crate::report::self_agreement;
-use crate::report::self_agreement::AgreementReport;
-use crate::report::sentences::how_to_read;
-use crate::report::short::head;
-use crate::report::text::alert::Alert;
 use crate::report::text::table::{Column, ColumnKind, Table, TableFormat};
 use crate::report::text::terminal::readable;
 use crate::report::text::words::{ends, interval, words};
 use crate::runs::outcome::ReportLength;
+use crate::runs::stored::run_name;
 use crate::types::text::counted;
 
-/// Name of the table of accuracies or scores by level.
-const LEVELS: &str = "levels";
-
-/// Content of a Markdown report.
-pub(crate) struct MarkdownReport<'a> {
-    /// Names of the runs.
-    names: Vec<String>,
-    /// Numbers of models, questions and replies.
-    head: Vec<String>,
-    alerts: &'a [Alert],
-    groups: FindingGroups<'a>,
-    /// Line below the findings.
-    how_to_read: Cow<'static, str>,
-    /// True if the list of all findings is open; false if it is folded below the main findings.
-    is_open: bool,
-    tables: Vec<&'a Table>,
+/// Writes a report as Markdown. `folders` are those of its runs.
+pub(crate) fn markdown(report: &Report<'_>, folders: &[&Path], length: ReportLength) -> String {
+    let names: Vec<String> = folders.iter().map(|folder| inline(&run_name(folder))).collect();
+    let mut text = format!("### Seeing in the dark: {}\n\n", names.join(", "));
+    let _ = writeln!(text, "{}\n", block(&report.head()));
+    for alert in &report.alerts {
+        let _ = writeln!(text, "> **Note:** {}\n", inline(&alert.text));
+    }
+    text += &findings(report, length);
+    let tables = match length {
+        ReportLength::Summary => report.measure.short_markdown_tables(&report.tables),
+        ReportLength::Findings => Vec::new(),
+        ReportLength::Full => {
+            report.tables.iter().filter(|table| !table.section.is_empty() && !table.rows.is_empty()).collect()
+        }
+    };
+    for table in tables {
+        text += &markdown_table(table);
+    }
+    text + &format!("Made by darkqa-eval {}.\n", env!("CARGO_PKG_VERSION"))
 }
 
-impl<'a> MarkdownReport<'a> {
-    /// Report on multiple-choice questions.
-    pub(crate) fn for_choices(report: &'a ChoiceReport<'a>, names: Vec<String>, length: ReportLength) -> Self {
-        let mut tables = tables(&report.tables, LEVELS, length);
-        if length == ReportLength::Summary && report.findings.common.is_some() && tables.len() > 1 {
-            // Models that were asked different questions are compared on the questions that they share.
-            tables.retain(|table| table.caption.contains("all models"));
-        }
-        Self {
-            names,
-            head: vec![head(report)],
-            alerts: &report.alerts,
-            groups: FindingGroups::new(&report.sentences),
-            how_to_read: how_to_read(&report.sentences).into(),
-            is_open: length != ReportLength::Summary,
-            tables,
-        }
+/// Summary, main finding of each group, and all findings; empty without findings. In a short report, the list of all
+/// findings is folded below the main findings.
+fn findings(report: &Report<'_>, length: ReportLength) -> String {
+    let groups = FindingGroups::new(&report.sentences);
+    if groups.count() == 0 {
+        return String::new();
     }
-
-    /// Report on questions without true answers.
-    pub(crate) fn for_own_answers(report: &'a AgreementReport<'a>, names: Vec<String>, length: ReportLength) -> Self {
-        let parts = self_agreement::markdown_parts(report);
-        Self {
-            names,
-            head: vec![parts.head],
-            alerts: parts.alerts,
-            groups: FindingGroups::new(parts.sentences),
-            how_to_read: parts.how_to_read.into(),
-            is_open: length != ReportLength::Summary,
-            tables: tables(parts.tables, parts.levels, length),
+    let is_folded = length == ReportLength::Summary;
+    let mut text = format!("**{}**\n\n", inline(&groups.summary()));
+    if is_folded {
+        for (group, first) in groups.main_findings() {
+            let sign = first.main_sentence().tone.sign();
+            text += &list_item(sign, group, &(first.text() + "."), &first.intervals_text());
         }
+        let count = counted(groups.count(), "finding");
+        let _ = writeln!(text, "\n<details><summary>All {count}</summary>\n");
     }
-
-    /// Report on open questions, with all its tables.
-    pub(crate) fn for_open(report: &'a OpenReport<'_>, all: &'a [Table], length: ReportLength) -> Self {
-        let judge = report.judge.unwrap_or("nobody");
-        let mut head = vec![format!("OpenEQA by LLM-Match, marked by {judge}, protocol {}", report.protocol)];
-        head.extend(coverage(report));
-        Self {
-            names: report.names(),
-            head,
-            alerts: report.alerts,
-            groups: FindingGroups::new(&[]),
-            how_to_read: Cow::default(),
-            is_open: false,
-            tables: tables(all, LEVELS, length),
+    for group in groups.all() {
+        let _ = writeln!(text, "#### {}\n", group.title);
+        for sentence in group.sentences() {
+            text += &list_item(sentence.tone.sign(), "", &sentence.text, &sentence.detail);
         }
+        text.push('\n');
     }
-
-    /// Summary, main finding of each group, and all findings; empty without findings.
-    fn findings(&self) -> String {
-        if self.groups.count() == 0 {
-            return String::new();
-        }
-        let mut text = format!("**{}**\n\n", inline(&self.groups.summary()));
-        if !self.is_open {
-            for (group, first) in self.groups.main_findings() {
-                let sign = first.main_sentence().tone.sign();
-                text += &list_item(sign, group, &(first.text() + "."), &first.intervals_text());
-            }
-            let count = counted(self.groups.count(), "finding");
-            let _ = writeln!(text, "\n<details><summary>All {count}</summary>\n");
-        }
-        for group in self.groups.all() {
-            let _ = writeln!(text, "#### {}\n", group.title);
-            for sentence in group.sentences() {
-                text += &list_item(sentence.tone.sign(), "", &sentence.text, &sentence.detail);
-            }
-            text.push('\n');
-        }
-        let _ = writeln!(text, "{}\n", block(&self.how_to_read));
-        if !self.is_open {
-            text += "</details>\n\n";
-        }
-        text
+    let _ = writeln!(text, "{}\n", block(&report.how_to_read));
+    if is_folded {
+        text += "</details>\n\n";
     }
-
-    /// Writes the report.
-    pub(crate) fn text(&self) -> String {
-        let names: Vec<String> = self.names.iter().map(|name| inline(name)).collect();
-        let mut text = format!("### Seeing in the dark: {}\n\n", names.join(", "));
-        let _ = writeln!(text, "{}\n", block(&self.head.join(" · ")));
-        for alert in self.alerts {
-            let _ = writeln!(text, "> **Note:** {}\n", inline(&alert.text));
-        }
-        text += &self.findings();
-        for table in &self.tables {
-            text += &markdown_table(table);
-        }
-        text + &format!("Made by darkqa-eval {}.\n", env!("CARGO_PKG_VERSION"))
-    }
+    text
 }
 
 /// List item of a finding: sign, title of its group (may be empty), text, and a line of details (may be empty).
@@ -140,20 +77,6 @@ fn list_item(sign: char, group: &str, text: &str, detail: &str) -> String {
         "" => line + "\n",
         _ => format!("{line}\\\n  {detail}\n"),
     }
-}
-
-/// Selects non-empty tables: those with a name in a summary, all tables of the page in a full report, none with only
-/// the findings.
-fn tables<'a>(tables: &'a [Table], name: &str, length: ReportLength) -> Vec<&'a Table> {
-    tables
-        .iter()
-        .filter(|table| match length {
-            ReportLength::Summary => table.name == name,
-            ReportLength::Findings => false,
-            ReportLength::Full => !table.section.is_empty(),
-        })
-        .filter(|table| !table.rows.is_empty())
-        .collect()
 }
 
 /// Table with the columns and rows of the page. Each number is followed by its interval.
@@ -262,7 +185,7 @@ mod tests {
     #[test]
     fn table_rows_have_equal_cell_counts() {
         let share = Estimate { value: 0.5, low: 0.25, high: 0.75, n: 10 };
-        let table = TableBuilder::new(LEVELS, [("a|b\n`c`", Some(share)), ("plain", None)])
+        let table = TableBuilder::new("levels", [("a|b\n`c`", Some(share)), ("plain", None)])
             .page("accuracy", "Accuracy")
             .column(Text, "page model", |row| row.0)
             .column(Accuracy, "page L0", |row| row.1)

@@ -1,8 +1,8 @@
 //! The short report on multiple-choice questions in the terminal.
 //!
-//! Terminal text of a report on multiple-choice questions: [`text()`].
+//! Table of accuracies by level: [`short_table`].
 //!
-//! Start of a report in the terminal, with its findings: [`findings`].
+//! Start of every report in the terminal, with its findings: [`head_and_findings`].
 //!
 //! Lines below the short table: models without images and chance ([`baselines`]), and marks and facts of models
 //! ([`about_models`]).
@@ -16,27 +16,24 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use std::path::Path;
 
 use clap::builder::styling::{AnsiColor, Style};
 
 use super::finding_groups::GroupedFinding;
 use super::sentences::{EffectDirection, Sentence};
 use super::tables::{control_text, unread_note};
-use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::FindingGroups;
-use crate::report::sentences::how_to_read;
 use crate::report::text::alert::{Alert, lines};
 use crate::report::text::ladder::{Ladder, SeriesByLevel};
-use crate::report::text::terminal::{WIDTH, line, render, wrapped};
-use crate::report::text::words::{ProfileNames, frames, percent, shorten_middle, widest_reach_of, with_interval};
+use crate::report::text::terminal::{WIDTH, line, wrapped};
+use crate::report::text::words::{frames, percent, shorten_middle, widest_reach_of, with_interval};
 use crate::runs::outcome::ReportLength;
-use crate::types::manifests::RunManifest;
 use crate::types::replies::OBSERVER;
 use crate::types::text::{counted, escape_hidden, plural};
 use crate::types::{Axis, AxisLevel};
 use darkqa_score::accuracies::{AccuracyCell, Health};
 use darkqa_score::choice::ParsingMode;
+use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::{CHANCE, is_observer, models_under_test, without_run};
 
@@ -52,28 +49,9 @@ const MAX_ROWS: usize = 24;
 /// Maximum number of levels side by side in the table; more would leave too little room for names.
 const MAX_LEVELS: usize = 7;
 
-/// Renders a report on multiple-choice questions as text. `runs` are the manifests with the folders of their runs.
-#[must_use]
-pub(crate) fn text(report: &ChoiceReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
-    let groups = FindingGroups::new(&report.sentences);
-    let mut text = findings(&head(report), &report.alerts, &groups, length, &how_to_read(&report.sentences));
-    match length {
-        ReportLength::Findings => return text,
-        ReportLength::Summary => text += &table(&accuracy_table(report)),
-        ReportLength::Full => text += &render(&report.tables),
-    }
-    text += &open_question(report);
-    for (_, folder) in runs {
-        let _ = writeln!(text, "run: {}", folder.display());
-    }
-    text
-}
-
-/// Note on the question that a single noise profile leaves open; empty without noise or with several noise profiles.
-fn open_question(report: &ChoiceReport<'_>) -> String {
-    ProfileNames::new(&report.findings.grid.subjects)
-        .open_question()
-        .map_or_else(String::new, |question| wrapped(" ", &question, " "))
+/// Table of accuracies by level for the terminal, with the lines below it.
+pub(super) fn short_table(findings: &Findings<'_>) -> String {
+    table(&accuracy_table(findings))
 }
 
 /// Models of a grid, in the order of its subjects.
@@ -117,21 +95,20 @@ fn everyone(grid: &Grid<'_>) -> String {
     std::iter::once(who_is_judged(grid)).chain(references).collect::<Vec<_>>().join(", ")
 }
 
-/// Head line of the report: models, questions, frames, replies, failures, and the unit of the intervals.
-pub(super) fn head(report: &ChoiceReport<'_>) -> String {
-    let findings = report.findings;
+/// Facts at the head of the report: models, questions, frames, replies with failures, and the unit of the intervals.
+pub(super) fn facts(findings: &Findings<'_>) -> Vec<String> {
     let grid = &findings.grid;
     let questions: BTreeSet<_> = grid.items.iter().map(|item| &*item.asked.question).collect();
     let replies: usize = findings.health.iter().map(|health| health.replies).sum();
     let failed: usize = findings.health.iter().map(Health::failures).sum();
     let replies = plural(replies, "reply", "replies");
-    format!(
-        "{} · {} · {} · {replies}, {failed} failed · intervals by {}",
+    vec![
         everyone(grid),
         counted(questions.len(), "question"),
         frames(grid),
-        findings.unit
-    )
+        format!("{replies}, {failed} failed"),
+        format!("intervals by {}", findings.unit),
+    ]
 }
 
 /// Row of the accuracy table.
@@ -154,17 +131,17 @@ impl AccuracyRow<'_> {
 
 /// Table of accuracies by level. With several models, it has one block per light condition and one row per model; with
 /// a single model, one block and one row per light condition.
-fn accuracy_table(report: &ChoiceReport<'_>) -> String {
-    let common = report.findings.common.as_ref();
-    let summary = common.map_or(&report.findings.summary, |common| &common.summary);
+fn accuracy_table(findings: &Findings<'_>) -> String {
+    let common = findings.common.as_ref();
+    let summary = common.map_or(&findings.summary, |common| &common.summary);
     let cells = summary.family_cells(None, ParsingMode::Strict);
-    let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_pairs(report.findings).with_clean();
+    let ladder = Ladder::new(cells.map(|cell| (&cell.subject, cell))).with_pairs(findings).with_clean();
     let mut models: Vec<&str> = ladder.series.keys().map(|series| series.model).collect();
     models.dedup();
     let mut rows: Vec<AccuracyRow<'_>> = Vec::new();
     let is_single = models.len() == 1;
     for (series, cells) in &ladder.series {
-        let listing = &report.findings.grid.listing;
+        let listing = &findings.grid.listing;
         let (block, name) = block_and_name(&ladder.light(series), &listing.label(series.model), is_single);
         let group = listing.group(series.model);
         rows.push(AccuracyRow { block, name, group: group.filter(|_| !is_single), cells });
@@ -201,25 +178,20 @@ fn accuracy_table(report: &ChoiceReport<'_>) -> String {
             let block: Vec<AccuracyRow<'_>> = block.iter().filter(|row| row.axis() == axis).cloned().collect();
             let levels: Vec<AxisLevel> = levels.iter().copied().filter(|level| level.belongs_to(axis)).collect();
             for levels in levels.chunks(MAX_LEVELS) {
-                text += &block_lines(report, &block, levels, &names);
+                text += &block_lines(findings, &block, levels, &names);
             }
         }
     }
     if hidden > 0 {
         let _ = writeln!(text, " {} --full", counted(hidden, "more row"));
     }
-    text += &baselines(report, &ladder);
-    text + &about_models(report, &ladder.models)
+    text += &baselines(findings, &ladder);
+    text + &about_models(findings, &ladder.models)
 }
 
 /// Rows of a block at some levels, below a heading with its title and the levels; empty if no row has a cell at these
 /// levels.
-fn block_lines(
-    report: &ChoiceReport<'_>,
-    block: &[AccuracyRow<'_>],
-    levels: &[AxisLevel],
-    names: &NameColumn,
-) -> String {
+fn block_lines(findings: &Findings<'_>, block: &[AccuracyRow<'_>], levels: &[AxisLevel], names: &NameColumn) -> String {
     let mut text = String::new();
     let mut last_group = None;
     for row in block {
@@ -236,7 +208,7 @@ fn block_lines(
             let _ = writeln!(text, " — {}", last_group.unwrap_or_default());
         }
         let reach = widest_reach_of(cells.iter().flatten().filter_map(|cell| cell.accuracy));
-        text += &names.line(&row.name, cells.iter().map(|cell| accuracy_text(report, *cell)), &reach);
+        text += &names.line(&row.name, cells.iter().map(|cell| accuracy_text(findings, *cell)), &reach);
     }
     text
 }
@@ -247,14 +219,14 @@ fn block_and_name(light: &str, model: &str, is_single: bool) -> (String, String)
 }
 
 /// Accuracy in percent, with a mark if it is below the accuracy without images.
-fn accuracy_text(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> String {
+fn accuracy_text(findings: &Findings<'_>, cell: Option<&AccuracyCell>) -> String {
     let Some(cell) = cell else {
         return String::new();
     };
     let Some(accuracy) = cell.accuracy else {
         return "– ".to_owned();
     };
-    let is_below = !report.findings.below_blind(&cell.subject, None).is_empty();
+    let is_below = !findings.below_blind(&cell.subject, None).is_empty();
     let mark = if is_below { BELOW } else { ' ' };
     format!("{}{mark}", percent(accuracy.value))
 }
@@ -263,17 +235,19 @@ fn accuracy_text(report: &ChoiceReport<'_>, cell: Option<&AccuracyCell>) -> Stri
 const GROUP_WIDTH: usize = 15;
 
 /// Head, alerts and summary, then the main finding of each group, or all findings with a note on how to read them.
-pub(crate) fn findings(
-    head: &str,
+pub(crate) fn head_and_findings(
+    head: &[String],
     alerts: &[Alert],
     groups: &FindingGroups<'_>,
     length: ReportLength,
     how_to_read: &str,
 ) -> String {
-    let mut text = match length {
+    let mut text = if length == ReportLength::Full {
         // As wide as the tables.
-        ReportLength::Full => line("", head, " ") + &lines(alerts),
-        _ => format!("{head}\n") + &alerts.iter().map(alert).collect::<String>(),
+        head.iter().map(|text| line("", text, " ")).collect::<String>() + &lines(alerts)
+    } else {
+        let head = head.iter().map(|text| wrapped("", &escape_hidden(text), " "));
+        head.chain(alerts.iter().map(alert)).collect()
     };
     if groups.count() == 0 {
         return text + "\n";
@@ -313,7 +287,7 @@ fn row(title: &str, finding: &GroupedFinding<'_>) -> String {
 const BELOW: char = '▼';
 
 /// Lines below the table: models without images, chance, and explanations of the last column and of the mark.
-fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {
+fn baselines(findings: &Findings<'_>, ladder: &Ladder<'_, AccuracyCell>) -> String {
     let mut parts = Vec::new();
     for (subject, cell) in &ladder.without_level {
         let Some(share) = cell.accuracy else {
@@ -321,7 +295,7 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
         };
         parts.push(match subject.view {
             None => {
-                let once = report.findings.summary.chance_of_questions;
+                let once = findings.summary.chance_of_questions;
                 let once = once.map(|once| {
                     format!(" over all orders of choices ({} with each question once)", percent(once.value))
                 });
@@ -333,12 +307,11 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
             Some(_) => format!("{} {}", subject.model, with_interval(share)),
         });
     }
-    let has_mark = report
-        .findings
+    let has_mark = findings
         .summary
         .family_cells(None, ParsingMode::Strict)
         .filter(|cell| cell.subject.level.is_some())
-        .any(|cell| !report.findings.below_blind(&cell.subject, None).is_empty());
+        .any(|cell| !findings.below_blind(&cell.subject, None).is_empty());
     if has_mark {
         parts.push(format!("{BELOW} less often right than without images"));
     }
@@ -347,7 +320,7 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
         let line = "95 %: how far the widest interval of the row reaches down and up";
         text += &wrapped(" ", line, " ");
     }
-    let lenient: usize = report.findings.health.iter().map(|health| health.lenient_only).sum();
+    let lenient: usize = findings.health.iter().map(|health| health.lenient_only).sum();
     if lenient > 0 {
         let replies = if lenient == 1 { "reply is" } else { "replies are" };
         let line = format!("{lenient} more {replies} read by the lenient parsing alone: --full");
@@ -356,8 +329,8 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
     if !parts.is_empty() {
         text += &wrapped(" ", &parts.join(" · "), " ");
     }
-    text += &observer_control(report);
-    if let Some(reasons) = unread_note(&report.findings.summary) {
+    text += &observer_control(findings);
+    if let Some(reasons) = unread_note(&findings.summary) {
         text += &wrapped(" ", &reasons, " ");
     }
     text
@@ -365,8 +338,7 @@ fn baselines(report: &ChoiceReport<'_>, ladder: &Ladder<'_, AccuracyCell>) -> St
 
 /// Line that defines the observer, with the score of its standing control in each run; empty if the observer is not in
 /// the report.
-fn observer_control(report: &ChoiceReport<'_>) -> String {
-    let findings = report.findings;
+fn observer_control(findings: &Findings<'_>) -> String {
     let is_shown = findings.grid.subjects.iter().any(|subject| is_observer(&subject.model));
     let controls = findings.observer.standing_controls();
     let Some(first) = controls.first().filter(|_| is_shown) else {
@@ -390,8 +362,8 @@ fn observer_control(report: &ChoiceReport<'_>) -> String {
 
 /// Explanations of the marks of models, training data of enhancers, and a line for each model with the facts that the
 /// user gave about it.
-fn about_models(report: &ChoiceReport<'_>, models: &[&str]) -> String {
-    let listing = &report.findings.grid.listing;
+fn about_models(findings: &Findings<'_>, models: &[&str]) -> String {
+    let listing = &findings.grid.listing;
     let mut text = listing.footnote(models.iter().copied()).map_or_else(String::new, |foot| wrapped(" ", &foot, "   "));
     for (enhancer, training) in listing.trainings() {
         text += &wrapped(" ", &format!("{enhancer}: {training}"), "   ");

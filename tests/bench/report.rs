@@ -15,7 +15,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use darkqa_base::types::questions::FAMILIES;
 use darkqa_base::types::{ChoiceDetail, Condition, Degradation, Digest, Record, Severity, Trials};
 use darkqa_eval::Kind;
-use darkqa_eval::internals::report::{ChoiceReport, PageInputs, products};
+use darkqa_eval::internals::report::{PageInputs, Report, products};
 use darkqa_score::cluster::FrameTies;
 use darkqa_score::findings::Findings;
 use made::record;
@@ -59,7 +59,7 @@ fn bench(c: &mut Criterion) {
     };
     group.bench_function("make the report", |b| {
         b.iter(|| {
-            let report = ChoiceReport::new(&findings, Vec::new());
+            let report = Report::of_accuracy(&findings, Vec::new());
             black_box(products(&report, &shown).unwrap())
         });
     });

@@ -139,7 +139,7 @@ impl Experiment for ChoiceSetup<'_> {
     }
 
     fn report(&self, store: &Store<ChoiceDetail>, run: StoredRun<ChoiceDetail>, show: StdoutFormat) -> Result<Outcome> {
-        joined::whole::write(store, run, show)
+        joined::written::write(store, run, show)
     }
 }
 

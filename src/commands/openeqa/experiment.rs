@@ -24,7 +24,7 @@ use crate::engine::manifest;
 use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
-use crate::report::joined::open;
+use crate::report::joined::written;
 use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::predictions::{AnswerState, predictions};
 use crate::runs::stored::StoredRun;
@@ -184,7 +184,7 @@ impl Experiment for OpenSetup<'_> {
     }
 
     fn report(&self, store: &Store<OpenDetail>, run: StoredRun<OpenDetail>, show: StdoutFormat) -> Result<Outcome> {
-        open::write(store, run, show)
+        written::write_open(store, run, show)
     }
 }
 

@@ -7,7 +7,7 @@ use super::combine::{CombinedRuns, check_comparable, clusters};
 use super::cost::{PricedRun, TrialCost};
 use super::join::join;
 use crate::error::{Error, Result};
-use crate::report::choice_report::ChoiceReport;
+use crate::report::content::Report;
 use crate::report::sentences::{against_baseline, no_verdict};
 use crate::report::tables::baseline;
 use crate::report::text::alert::{Alert, AlertKind};
@@ -17,6 +17,7 @@ use crate::types::{ChoiceDetail, TrialRef};
 use darkqa_score::accuracies::healths;
 use darkqa_score::cluster::ClusterUnit;
 use darkqa_score::comparisons::{BaselineRow, baseline_rows};
+use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::{ModelInCondition, is_control, is_observer};
 use darkqa_score::significance::Verdict;
@@ -174,11 +175,11 @@ impl Baseline {
 
     /// Adds the comparison to a report: its sentences first, its table below the table of levels. The observer is left
     /// out if a control has invalidated it.
-    pub(super) fn add_to(&self, report: &mut ChoiceReport<'_>) {
-        let is_hidden = report.findings.observer.is_hidden();
+    pub(super) fn add_to(&self, report: &mut Report<'_>, findings: &Findings<'_>) {
+        let is_hidden = findings.observer.is_hidden();
         let rows: Vec<BaselineRow> =
             self.rows.iter().filter(|row| !(is_hidden && is_observer(&row.subject.model))).cloned().collect();
-        let sentences = against_baseline(&rows, &self.old, report.findings.unit);
+        let sentences = against_baseline(&rows, &self.old, findings.unit);
         report.sentences.splice(..0, sentences);
         let place = report.tables.len().min(2);
         report.tables.insert(place, baseline(&rows, &self.old));

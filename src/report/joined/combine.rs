@@ -87,9 +87,9 @@ impl CombinedRuns {
                     folder: command_path(&run.folder),
                     name: run.name.clone(),
                     manifest: &run.manifest,
-                    usage: page::RunUsage::new(self.trials_of(run), |model| {
+                    usage: Some(page::RunUsage::new(self.trials_of(run), |model| {
                         run.manifest.is_built_in(without_run(model))
-                    }),
+                    })),
                     cost: run.cost.clone(),
                 })
                 .collect(),

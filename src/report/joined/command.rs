@@ -6,31 +6,31 @@
 
 use std::collections::HashSet;
 use std::fmt::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::alerts::{alerts, duplicate_folder_alerts};
+use super::alerts::duplicate_folder_alerts;
 use super::baseline::{Baseline, FAIL_IF_WORSE};
 use super::combine::{CombinedRuns, combine};
-use super::enhancers::{self, LenientChange};
+use super::enhancers::LenientChange;
 use super::join::TrialPlaces;
-use super::listing::write_in_place;
+use super::listing::{ReportFolder, write_in_place};
 use super::open;
-use super::own_answers::{self, no_records};
-use super::whole::{files as report_files, text, write_flip_rows, write_report};
+use super::written::{Scored, no_records, write_report};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::report::charts::figures::{self, StoryCurves};
-use crate::report::choice_report::ChoiceReport;
+use crate::report::content::Report;
 use crate::report::json::SummaryRuns;
-use crate::report::products::PAGE;
+use crate::report::outputs::{PAGE, files as report_files, printed, write_first_failures};
+use crate::report::page::PageInputs;
 use crate::report::text::alert::Alert;
 use crate::runs::sharded_run::{open_any_run, open_choice_run};
 use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
 use crate::runs::{LUX_AT_L0, LuxArgs, Outcome, PrintArgs, StdoutFormat, Syntax, record_table};
 use crate::store::{AddressChange, Store, now};
-use crate::types::manifests::{Counts, Status};
+use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{AskedItem, ChoiceDetail, Decides, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
 use darkqa_score::accuracies::shared_items;
 use darkqa_score::answers::record::{self, Detail as _};
@@ -205,9 +205,12 @@ fn report_choices(
     let in_folder = args.out.is_none() && !args.common && baseline.is_none() && duplicate_alerts.is_empty();
     let written = match &*combined.runs {
         [run] if in_folder => {
-            let text = write_in_place(&run.folder, run.layout, &run.manifest, |target| {
-                write_report(target, &run.manifest, &combined, args.format())
-            })?;
+            let text =
+                write_in_place(&run.folder, run.layout, &run.manifest, |target: &ReportFolder<'_, ChoiceDetail>| {
+                    let scored = Scored::new(&combined);
+                    let report = scored.report(&combined, &[]);
+                    write_report(&report, target, &run.manifest, &combined.page_inputs(), args.format())
+                })?;
             text.map(|text| (run.folder.clone(), run.layout, text))
         }
         _ => None,
@@ -218,8 +221,12 @@ fn report_choices(
         let reported = Outcome::wrote(folder, Status::Complete, text);
         (reported, table_folder)
     } else {
-        let reported = report_combined(&combined, baseline.as_ref(), args, duplicate_alerts)?;
-        (reported, None)
+        let scored = Scored::new(&combined);
+        let mut report = scored.report(&combined, duplicate_alerts);
+        if let (Some(baseline), Scored::Accuracy(findings)) = (&baseline, &scored) {
+            baseline.add_to(&mut report, findings.shown());
+        }
+        (print_and_write(args, &report, &combined.manifests(), || combined.page_inputs())?, None)
     };
     // Free the trials first, because the record table takes as much memory.
     drop(combined);
@@ -251,48 +258,25 @@ fn refuse_without_truths(args: &ReportArgs) -> Result<()> {
     }
 }
 
-/// Reports on joined runs. Writes the report only if `--out` is set.
-fn report_combined(
-    combined: &CombinedRuns,
-    baseline: Option<&Baseline>,
+/// Prints a report, and writes its files into `--out` if it is set. `runs` are the manifests and folders of its runs.
+fn print_and_write<'a>(
     args: &ReportArgs,
-    duplicate_alerts: &[Alert],
+    report: &Report<'_>,
+    runs: &[(&RunManifest, &Path)],
+    inputs: impl FnOnce() -> PageInputs<'a>,
 ) -> Result<Outcome> {
-    if combined.truths() == Truths::Unknown {
-        let show = args.format();
-        let output = own_answers::report_output(combined, duplicate_alerts, show, args.out.is_some())?;
-        return write_files(args, output.text, output.files);
-    }
-    let findings = combined.findings();
-    let runs = combined.manifests();
-    let mut all_alerts = duplicate_alerts.to_vec();
-    all_alerts.extend(alerts(combined, &findings));
-    let mut report = ChoiceReport::new(&findings, all_alerts).with_enhancers(&enhancers::rows(&combined.runs));
-    if let Some(baseline) = baseline {
-        baseline.add_to(&mut report);
-    }
-    let list = SummaryRuns::Several(&runs);
-    let stdout_text = text(&report, &runs, list, args.format())?;
-    let files = match &args.out {
-        Some(out) => {
-            let files = report_files(&report, combined, list)?;
-            write_flip_rows(&findings, out)?;
-            files
-        }
-        None => Vec::new(),
-    };
-    write_files(args, stdout_text, files)
-}
-
-/// Writes the files of the report into `--out`, if it is set, and adds a line about them to the text.
-fn write_files(args: &ReportArgs, mut text: String, contents: Vec<(String, Vec<u8>)>) -> Result<Outcome> {
+    let folders: Vec<&Path> = runs.iter().map(|(_, folder)| *folder).collect();
+    let list = SummaryRuns::Several(runs);
+    let mut text = printed(report, list, &folders, args.format())?;
     let Some(out) = &args.out else {
         if !args.format().is_document() {
             text += "report: not written; --out DIR writes one\n";
         }
         return Ok(Outcome::text(Status::Complete, text));
     };
-    for (name, content) in contents {
+    let files = report_files(report, list, &inputs())?;
+    write_first_failures(report, out)?;
+    for (name, content) in files {
         files::write(&out.join(name), &content)?;
     }
     if !args.format().is_document() {
@@ -324,8 +308,9 @@ fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicat
     let scores = open::Scores::new(joined)?;
     let run = &scores.run;
     if is_single && args.out.is_none() {
-        let text =
-            write_in_place(&run.folder, run.layout, &run.manifest, |target| scores.write(target, args.format()))?;
+        let text = write_in_place(&run.folder, run.layout, &run.manifest, |target: &ReportFolder<'_, OpenDetail>| {
+            write_report(&scores.report(), target, &run.manifest, &run.page_inputs(), args.format())
+        })?;
         if let Some(text) = text {
             if run.layout == RunLayout::Whole {
                 record_table::update(&run.folder, args.show.show.record_table())?;
@@ -333,11 +318,7 @@ fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicat
             return Ok(Outcome::wrote(&run.folder, Status::Complete, text));
         }
     }
-    let files = match args.out {
-        Some(_) => scores.products()?,
-        None => Vec::new(),
-    };
-    write_files(args, scores.stdout_text(args.format())?, files)
+    print_and_write(args, &scores.report(), &run.manifests(), || run.page_inputs())
 }
 
 /// Parses all stored replies again by the current rules. Stores the changed records and the version of the rules, and

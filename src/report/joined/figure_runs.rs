@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::alerts::alerts;
 use super::combine::{CombinedRuns, combine};
 use super::command::distinct;
-use super::own_answers::without_hidden_models;
+use super::written::without_hidden_models;
 use crate::error::{Error, Result};
 use crate::report::text::alert::Alert;
 use crate::runs::sharded_run::open_choice_run;

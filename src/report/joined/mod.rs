@@ -12,13 +12,12 @@ mod join;
 pub(crate) mod listing;
 mod model_names;
 pub(crate) mod open;
-mod own_answers;
 mod settings;
 pub(crate) mod site;
-pub(crate) mod whole;
+pub(crate) mod written;
 
 pub(crate) use command::{ReportArgs, report, story_curves};
 pub(crate) use cost::price;
 pub(crate) use figure_runs::FigureRuns;
 pub(crate) use site::site;
-pub(crate) use whole::whole_report;
+pub(crate) use written::whole_report;

@@ -1,10 +1,8 @@
-//! The report on runs of open questions: [`Scores`] scores their records, and [`write()`] writes the report into the
-//! folder of a run.
+//! The scores of runs of open questions, and the report on them: [`Scores`].
 //!
 //! Checks that joined runs of open questions were marked by the same judge: [`check_same_judge`].
 
 use std::collections::{BTreeMap, HashMap};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -13,24 +11,20 @@ use super::alerts::{empty_answer_alerts, joining_alerts, missing_alerts, open_ea
 use super::combine::command_path;
 use super::enhancers;
 use super::join::join;
-use super::listing::{ReportFolder, listing};
-use super::own_answers::{WholeReport, with_summary};
+use super::listing::listing;
 use super::settings::{FlagValues, differing_settings, reply_settings};
 use crate::error::{Error, Result};
-use crate::report::markdown::MarkdownReport;
-use crate::report::openeqa::{OpenReport, ReportedAnswer, products, render, summary_json, tables};
-use crate::report::products::PAGE;
+use crate::report::content::Report;
+use crate::report::openeqa::{MarkedAnswers, ReportedAnswer};
+use crate::report::page::{PageInputs, PageRun};
 use crate::report::tables::EnhancerRow;
 use crate::report::text::alert::{Alert, AlertKind};
-use crate::report::text::table::Table;
 use crate::report::text::words;
 use crate::runs::mark_index::{JUDGE, MarkIndex, PROTOCOL};
-use crate::runs::outcome::{Outcome, ReportLength, StdoutFormat, Syntax};
 use crate::runs::predictions::{AnswerState, QuestionAnswer, predictions};
-use crate::runs::stored::{RunLayout, ShownModels, StoredRun, sort_trials, text_setting};
-use crate::store::Store;
+use crate::runs::stored::{RunLayout, StoredRun, sort_trials, text_setting};
 use crate::types::flags::read_word;
-use crate::types::manifests::{JUDGES, RunManifest, Status, judge_flag};
+use crate::types::manifests::{JUDGES, RunManifest, judge_flag};
 use crate::types::{ModelListing, OpenDetail, QuestionId, Record, RunQuestion, Step, Thumbnail, TrialRef};
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::model_in_condition::ModelInCondition;
@@ -100,7 +94,7 @@ impl Scores {
     }
 
     /// True if the mark of an answer cannot be parsed.
-    fn has_unmarked(&self) -> bool {
+    pub(super) fn has_unmarked(&self) -> bool {
         self.answers.iter().any(|answer| answer.outcome == AnswerOutcome::Unmarked)
     }
 
@@ -108,12 +102,11 @@ impl Scores {
         &self.summary
     }
 
-    fn report(&self) -> OpenReport<'_> {
-        OpenReport {
+    /// The report on the scores.
+    pub(super) fn report(&self) -> Report<'_> {
+        let answers = MarkedAnswers {
             summary: &self.summary,
             manifest: &self.run.manifest,
-            alerts: &self.alerts,
-            enhancers: &self.enhancers,
             judge: self.judge.as_deref(),
             protocol: self.protocol,
             runs: self.run.runs(),
@@ -121,59 +114,9 @@ impl Scores {
             questions: &self.run.questions,
             answers: &self.answers,
             thumbnails: &self.run.thumbnails,
-        }
+        };
+        Report::of_marks(answers, &self.alerts, &self.enhancers)
     }
-
-    /// Files of the report by name, without the JSON summary.
-    pub(crate) fn products(&self) -> Result<Vec<(String, Vec<u8>)>> {
-        let report = self.report();
-        products(&report, &tables(&report))
-    }
-
-    /// Files of the report, including the JSON summary, and the report as Markdown.
-    pub(super) fn whole_report(&self) -> Result<WholeReport> {
-        let report = self.report();
-        let tables = tables(&report);
-        Ok(WholeReport {
-            files: files(&report, &tables)?,
-            markdown: MarkdownReport::for_open(&report, &tables, ReportLength::Summary).text(),
-        })
-    }
-
-    /// Text of the report for standard output.
-    pub(crate) fn stdout_text(&self, show: StdoutFormat) -> Result<String> {
-        let report = self.report();
-        self.formatted(&report, &tables(&report), show)
-    }
-
-    fn formatted(&self, report: &OpenReport<'_>, tables: &[Table], show: StdoutFormat) -> Result<String> {
-        let folder = &self.run.folder;
-        match show.syntax {
-            Syntax::Json => summary_json(report, tables, Some(folder), show.length),
-            Syntax::Markdown => Ok(MarkdownReport::for_open(report, tables, show.length).text()),
-            Syntax::Text => Ok(render(report, tables, &self.run.folders())),
-        }
-    }
-
-    /// Writes the report of the run. Returns the text for standard output.
-    pub(super) fn write(&self, target: &ReportFolder<'_, OpenDetail>, show: StdoutFormat) -> Result<String> {
-        let report = self.report();
-        let tables = tables(&report);
-        target.write(&files(&report, &tables)?, &self.run.manifest)?;
-        let mut text = self.formatted(&report, &tables, show)?;
-        if !show.is_document() {
-            let page = target.path().join(PAGE);
-            let _ = writeln!(text, "report: {}", page.display());
-        }
-        Ok(text)
-    }
-}
-
-/// Files of the report of one run by name, including the JSON summary.
-fn files(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
-    let products = products(report, tables)?;
-    let summary = summary_json(report, tables, None, ReportLength::Summary)?;
-    Ok(with_summary(products, summary))
 }
 
 /// A run of open questions, or several joined into one, with complete records.
@@ -206,10 +149,31 @@ impl OpenQuestionRun {
         first.chain(others).collect()
     }
 
-    /// Folders of all runs.
-    fn folders(&self) -> Vec<&Path> {
-        let others = self.others.iter().map(|run| &*run.folder);
-        std::iter::once(&*self.folder).chain(others).collect()
+    /// Manifests and folders of all runs.
+    pub(super) fn manifests(&self) -> Vec<(&RunManifest, &Path)> {
+        let others = self.others.iter().map(|run| (&run.manifest, &*run.folder));
+        std::iter::once((&self.manifest, &*self.folder)).chain(others).collect()
+    }
+
+    /// Inputs of the HTML page that its report does not have. The report has questions, replies and thumbnails itself.
+    pub(super) fn page_inputs(&self) -> PageInputs<'_> {
+        PageInputs {
+            runs: self
+                .runs()
+                .into_iter()
+                .zip(self.manifests())
+                .map(|((name, manifest), (_, folder))| PageRun {
+                    name: name.to_owned(),
+                    folder: command_path(folder),
+                    manifest,
+                    usage: None,
+                    cost: None,
+                })
+                .collect(),
+            questions: Box::new(|_| Ok(HashMap::new())),
+            thumbnails: &[],
+            texts: Box::new(|_| Ok(String::new())),
+        }
     }
 }
 
@@ -281,17 +245,6 @@ fn check_questions(runs: &[StoredRun<OpenDetail>]) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Scores a run, and writes its report and manifest into its folder. The run is incomplete if a mark cannot be parsed.
-pub(crate) fn write(store: &Store<OpenDetail>, mut run: StoredRun<OpenDetail>, show: StdoutFormat) -> Result<Outcome> {
-    run.leave_out(ShownModels::Current);
-    let mut scores = Scores::new(combine(vec![run])?)?;
-    if scores.run.manifest.status == Status::Complete && scores.has_unmarked() {
-        scores.run.manifest.status = Status::Incomplete;
-    }
-    Ok(Outcome::wrote(store.folder(), scores.run.manifest.status, scores.write(&ReportFolder::Run(store), show)?)
-        .in_format(show))
 }
 
 /// True if the trial asked for an answer, false if it asked for a mark. `TrialRef::is_answer` does not coerce to the

@@ -10,17 +10,15 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::fmt::Write;
 
-use super::alerts::alerts;
 use super::combine::{CombinedRuns, clusters, combine};
-use super::own_answers::{self, without_hidden_models};
+use super::open;
 use super::settings::{
     ENCODING, FlagValues, differing_settings, identity_fields, identity_settings, pixel_settings,
     profile_and_variant_settings, shorten,
 };
-use super::{enhancers, open};
-use crate::error::{Error, Result};
-use crate::report::choice_report::ChoiceReport;
-use crate::report::products::{PAGE, products};
+use super::written::{Scored, without_hidden_models};
+use crate::error::Result;
+use crate::report::outputs::html_page;
 use crate::report::site::{
     GroupDifference, GroupDigests, GroupRows, LeaderboardSite, ModelRunRow, OpenRow, Ranking, RunLink, SiteGroup,
     choice_rows, open_rows,
@@ -29,7 +27,7 @@ use crate::runs::mark_index::{JUDGE, PROTOCOL};
 use crate::runs::stored::{AnyRun, StoredRun, text_setting};
 use crate::types::manifests::RunManifest;
 use crate::types::text::{counted, plural};
-use crate::types::{AxisLevel, ChoiceDetail, Digest, ModelListing, OpenDetail, RunQuestion, Trials, Truths, Variant};
+use crate::types::{AxisLevel, ChoiceDetail, Digest, ModelListing, OpenDetail, RunQuestion, Trials, Variant};
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::comparisons::{BestInTheDark, best_in_the_dark, rank_ranges};
 use darkqa_score::grid::Grid;
@@ -110,17 +108,14 @@ fn add_choices(
     site: &mut LeaderboardSite,
 ) -> Result<Option<ChoiceMember>> {
     let combined = combine(vec![without_hidden_models(run)?])?;
-    if combined.truths() == Truths::Unknown {
-        let page = page_of(own_answers::whole_report(&combined)?.files)?;
+    let scored = Scored::new(&combined);
+    let page = html_page(&scored.report(&combined, &[]), &combined.page_inputs())?.into_bytes();
+    let Scored::Accuracy(findings) = &scored else {
         let why = "nobody knows the true answers to its questions";
         site.others.push((link.clone(), why.to_owned()));
         site.pages.push((link, page));
         return Ok(None);
-    }
-    let findings = combined.findings();
-    let report =
-        ChoiceReport::new(&findings, alerts(&combined, &findings)).with_enhancers(&enhancers::rows(&combined.runs));
-    let page = page_of(products(&report, &combined.page_inputs())?)?;
+    };
     let variant = findings.shown().grid.main_variant();
     let variant = variant.unwrap_or(Variant::NONE);
     let rows = choice_rows(findings.shown(), &variant, &link);
@@ -131,8 +126,7 @@ fn add_choices(
         return Ok(None);
     }
     let key = GroupKey::from_choices(&combined, &variant)?;
-    drop(report);
-    drop(findings);
+    drop(scored);
     site.pages.push((link.clone(), page));
     Ok(Some(ChoiceMember {
         key,
@@ -163,17 +157,8 @@ fn add_open(run: StoredRun<OpenDetail>, link: RunLink, site: &mut LeaderboardSit
     let key = GroupKey::from_open(&run)?;
     let scores = open::Scores::new(open::combine(vec![run])?)?;
     let rows = open_rows(scores.summary(), &link);
-    site.pages.push((link, page_of(scores.products()?)?));
+    site.pages.push((link, html_page(&scores.report(), &scores.run.page_inputs())?.into_bytes()));
     Ok(OpenMember { key, rows })
-}
-
-/// The page among the files of a report.
-fn page_of(files: Vec<(String, Vec<u8>)>) -> Result<Vec<u8>> {
-    files
-        .into_iter()
-        .find(|(name, _)| name == PAGE)
-        .map(|(_, page)| page)
-        .ok_or_else(|| Error::data(PAGE, "the report of the run has no page"))
 }
 
 /// The link to the page of a run. The file is named after the run, with characters that are safe in URLs, and numbered

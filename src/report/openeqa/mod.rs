@@ -1,53 +1,56 @@
-//! Report on open questions: its files ([`products`], [`summary_json`]) and its text for the terminal ([`render`]).
+//! The report on open questions: [`Report::of_marks`]. Its measure is the score that a judge gives to answers
+//! ([`MarkedAnswers`]).
 //!
-//! Charts of OpenEQA scores by level of degradation: [`figures`].
+//! Charts of scores by level of degradation: [`figures`].
 
-mod open_report;
+mod marked_answers;
 mod page;
 mod tables;
 
 use std::collections::BTreeMap;
-use std::fmt::Write;
 use std::path::Path;
 
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::report::charts::chart::{self, Chart, Figure, FigureChart, LineContent, LineStyle, Panel, PlotLine};
+use crate::report::charts::chart::{Chart, Figure, FigureChart, LineContent, LineStyle, Panel, PlotLine};
 use crate::report::charts::paper::figure;
-use crate::report::json;
-use crate::report::products::{PAGE, table_files};
-use crate::report::text::alert::{Alert, lines};
+use crate::report::content::{Measure, Report};
+use crate::report::json::{SummaryRuns, document};
+use crate::report::page::{PageHead, PageInputs, PageParts};
+use crate::report::tables::{EnhancerRow, LEVELS};
+use crate::report::text::alert::{Alert, AlertKind};
 use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
 use crate::report::text::table::Table;
-use crate::report::text::terminal::{self, wrapped};
+use crate::report::text::terminal::render;
 use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
 use crate::types::AxisLevel;
 use crate::types::manifests::RunManifest;
-use crate::types::text::counted;
+use crate::types::text::{counted, plural};
 use darkqa_score::model_in_condition::ModelInCondition;
-use darkqa_score::open::{Group, OpenCell};
+use darkqa_score::open::{AnswerOutcome, Group, OpenCell};
 use tables::ladder;
 
-pub(crate) use open_report::{OpenReport, ReportedAnswer};
-pub(crate) use tables::tables;
+pub(crate) use marked_answers::{MarkedAnswers, ReportedAnswer};
 
-pub(super) use page::coverage;
-
-/// Files of a run by name: numbers as CSV, the table as LaTeX, figures as SVG, answers and marks in upstream's format,
-/// and the HTML page.
-///
-/// # Errors
-/// If a file cannot be made.
-pub(crate) fn products(report: &OpenReport<'_>, tables: &[Table]) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures = figures(report)?;
-    let page = page::page(report, tables, &figures)?;
-    let mut files = table_files(tables, &[], "Table")?;
-    files.extend(chart::svg_files(figures));
-    files.extend(tables::files(report)?);
-    files.push((PAGE.to_owned(), page.into_bytes()));
-    Ok(files)
+impl<'a> Report<'a> {
+    /// The report on answers to open questions. The alerts of the runs precede those about missing answers and marks.
+    pub(crate) fn of_marks(answers: MarkedAnswers<'a>, alerts: &[Alert], enhancer_rows: &[EnhancerRow]) -> Self {
+        let measured = format!(
+            "OpenEQA by LLM-Match, marked by {}, protocol {}",
+            answers.judge.unwrap_or("nobody"),
+            answers.protocol
+        );
+        Self {
+            facts: std::iter::once(measured).chain(page::coverage(&answers)).collect(),
+            alerts: alerts.iter().cloned().chain(coverage_alerts(&answers)).collect(),
+            sentences: Vec::new(),
+            how_to_read: String::new(),
+            tables: tables::tables(&answers, enhancer_rows),
+            measure: Box::new(answers),
+        }
+    }
 }
 
 /// Head of `summary.json`.
@@ -69,55 +72,97 @@ struct OpenHead<'a> {
     alerts: &'a [Alert],
 }
 
-/// Serializes the summary as JSON: manifest of the run, judge, protocol, and the rows of the CSV file. `folder` is the
-/// run's folder if the summary is stored elsewhere.
-///
-/// # Errors
-/// If the summary cannot be serialized.
-pub(crate) fn summary_json(
-    report: &OpenReport<'_>,
-    tables: &[Table],
-    folder: Option<&Path>,
-    length: ReportLength,
-) -> Result<String> {
-    let head = OpenHead {
-        schema: "darkqa.openeqa-summary/1",
-        folder,
-        run: report.manifest,
-        joined: report.runs.iter().skip(1).copied().collect(),
-        judge: report.judge,
-        protocol: report.protocol.to_string(),
-        clustered_by: report.summary.unit,
-        clusters: report.summary.clusters,
-        readings: report.noise_profiles(),
-        alerts: report.alerts,
-    };
-    json::document(head, &tables[0], tables, length)
+impl Measure for MarkedAnswers<'_> {
+    fn figures(&self) -> Result<Vec<Figure>> {
+        figures(self)
+    }
+
+    fn page_parts<'p>(&'p self, _: &'p Report<'_>, _: &'p PageInputs<'_>) -> Result<PageParts<'p>> {
+        let heading = match &*self.runs {
+            [(name, _)] => format!("OpenEQA in the dark: {name}"),
+            several => format!("OpenEQA in the dark: {} runs compared", several.len()),
+        };
+        Ok(PageParts {
+            class: "",
+            title: heading.clone(),
+            heading,
+            head: page::summary(self).map(|summary| PageHead::from_summary(&summary)),
+            family: "category",
+            intro: page::intro(self),
+            notes: Vec::new(),
+            sections: &page::SECTIONS,
+            answers_title: "",
+            items: page::packed(self)?,
+        })
+    }
+
+    fn json(&self, report: &Report<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String> {
+        let head = OpenHead {
+            schema: "darkqa.openeqa-summary/1",
+            folder: runs.first_folder(),
+            run: self.manifest,
+            joined: self.runs.iter().skip(1).copied().collect(),
+            judge: self.judge,
+            protocol: self.protocol.to_string(),
+            clustered_by: self.summary.unit,
+            clusters: self.summary.clusters,
+            readings: self.profiles(),
+            alerts: &report.alerts,
+        };
+        document(head, &report.tables[0], &report.tables, length)
+    }
+
+    fn short_tables(&self, report: &Report<'_>) -> String {
+        if self.judge.is_some() { render(&report.tables) } else { String::new() }
+    }
+
+    fn short_markdown_tables<'t>(&self, tables: &'t [Table]) -> Vec<&'t Table> {
+        tables.iter().filter(|table| table.name == LEVELS && !table.rows.is_empty()).collect()
+    }
+
+    fn profiles(&self) -> ProfileNames {
+        ProfileNames::new(self.answers.iter().map(|answer| &answer.subject))
+    }
+
+    fn has_findings(&self) -> bool {
+        false
+    }
+
+    fn latex_title(&self) -> &'static str {
+        "Table"
+    }
+
+    fn files(&self) -> Result<Vec<(String, Vec<u8>)>> {
+        tables::files(self)
+    }
 }
 
-/// Text of the report for the terminal: progress of an incomplete run, scores by level, split and category, number of
-/// scored answers, and folders of the runs.
-#[must_use]
-pub(crate) fn render(report: &OpenReport<'_>, tables: &[Table], folders: &[&Path]) -> String {
-    let mut text = lines(report.alerts);
-    text += &terminal::progress(report.manifest, "answers and marks stored");
-    match report.judge {
-        Some(_) => text += &terminal::render(tables),
-        None => text += "No answer is marked: name a judge with --judge NAME\n",
-    }
-    let open = report.noise_profiles().open_question();
-    for line in coverage(report).into_iter().chain(open) {
-        text += &wrapped("", &line, " ");
-    }
-    for folder in folders {
-        let _ = writeln!(text, "run: {}", folder.display());
-    }
-    text
+/// Alerts about missing marks and answers, and a missing judge.
+fn coverage_alerts(answers: &MarkedAnswers<'_>) -> Vec<Alert> {
+    let (status, counts) = (answers.manifest.status, answers.manifest.counts);
+    let unmarked = answers.answers.iter().filter(|answer| answer.outcome == AnswerOutcome::Unmarked).count();
+    let unmarked = (unmarked > 0).then(|| {
+        let text =
+            format!("{} not scored, because the judge gave no mark.", plural(unmarked, "answer is", "answers are"));
+        Alert::new(AlertKind::Unread, text)
+    });
+    let missing = (counts.answered < counts.trials).then(|| {
+        let text = format!(
+            "{status}: {} of {} answers and marks are stored, {} failed; those that are missing are not scored.",
+            counts.answered, counts.trials, counts.failed
+        );
+        Alert::new(AlertKind::NotComplete, text)
+    });
+    let unjudged = answers
+        .judge
+        .is_none()
+        .then(|| Alert::new(AlertKind::NotComplete, "No answer is marked: name a judge with --judge NAME."));
+    [unmarked, missing, unjudged].into_iter().flatten().collect()
 }
 
 /// Draws a chart of all questions and a chart with a panel for each category. Empty if the run has fewer than two
 /// levels.
-fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
+fn figures(report: &MarkedAnswers<'_>) -> Result<Vec<Figure>> {
     let whole = ladder(report.summary, &Group::All);
     if whole.levels.len() < 2 {
         return Ok(Vec::new());
@@ -159,7 +204,7 @@ fn figures(report: &OpenReport<'_>) -> Result<Vec<Figure>> {
 }
 
 /// Panels of a group of questions: one per degradation axis.
-fn panels(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) -> Vec<Panel> {
+fn panels(report: &MarkedAnswers<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) -> Vec<Panel> {
     ladder(report.summary, group)
         .by_axis()
         .into_iter()
@@ -169,7 +214,12 @@ fn panels(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>) 
 
 /// One panel: a curve per series, and a flat line per model without images. A series has the same line style in every
 /// panel: that of its position in `whole`, the ladder of all questions.
-fn panel(report: &OpenReport<'_>, group: &Group, whole: &Ladder<'_, OpenCell>, ladder: &Ladder<'_, OpenCell>) -> Panel {
+fn panel(
+    report: &MarkedAnswers<'_>,
+    group: &Group,
+    whole: &Ladder<'_, OpenCell>,
+    ladder: &Ladder<'_, OpenCell>,
+) -> Panel {
     let series_count = whole.series.len();
     let curves = ladder.series.iter().map(|(series, cells)| {
         let position = whole.series.keys().position(|other| other == series);
@@ -215,7 +265,7 @@ fn flat_line(subject: &ModelInCondition, cell: &OpenCell, style: LineStyle) -> O
 }
 
 /// Title of a panel: the name of the group and its number of questions.
-fn title(report: &OpenReport<'_>, group: &Group) -> String {
+fn title(report: &MarkedAnswers<'_>, group: &Group) -> String {
     let questions = match group {
         Group::All => report.questions.len(),
         Group::Split(name) | Group::Category(name) => {

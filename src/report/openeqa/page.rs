@@ -1,4 +1,4 @@
-//! HTML page of a run of open questions: [`page`].
+//! The parts of the page on open questions: [`SECTIONS`], [`summary`] and [`intro`].
 //!
 //! Numbers of scored and unscored answers, as lines of text: [`coverage`].
 //!
@@ -6,54 +6,30 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::open_report::{OpenReport, ReportedAnswer};
+use super::marked_answers::{MarkedAnswers, ReportedAnswer};
 use super::tables::{SECTION, ladder};
 use crate::error::Result;
-use crate::report::charts::chart::Figure;
 use crate::report::page::data::{
     ABSENT, DistinctList, FAILED, PageData, PageItem, PageKind, PageQuestion, PageSubject, SizeLimit, UNREAD, levels,
     packed_by, shortened, sizes, thumbnails,
 };
-use crate::report::page::{OpenContent, page_of_open_questions};
 use crate::report::tables::Section;
-use crate::report::text::table::Table;
 use crate::report::text::words::{self, percent, points};
 use crate::types::AxisLevel;
 use crate::types::degradations::Axis;
-use crate::types::text::{counted, plural};
+use crate::types::text::counted;
 use darkqa_score::model_in_condition::{self, ModelInCondition};
 use darkqa_score::open::{AnswerOutcome, Baseline, Group, OpenCell};
 
 /// Sections of the page before the items.
-const SECTIONS: [Section; 1] = [(SECTION, "Scores", "", &["scores", "categories"])];
+pub(super) const SECTIONS: [Section; 1] = [(SECTION, "Scores", "", &["scores", "categories"])];
 
 /// Maximum number of clauses in the summary (chosen to fit one screen).
 const MAX_CLAUSES: usize = 3;
 
-/// Renders the page.
-///
-/// # Errors
-/// If the items cannot be serialized or the template cannot be rendered.
-pub(super) fn page(report: &OpenReport<'_>, tables: &[Table], figures: &[Figure]) -> Result<String> {
-    let content = OpenContent {
-        title: match &*report.runs {
-            [(name, _)] => format!("OpenEQA in the dark: {name}"),
-            several => format!("OpenEQA in the dark: {} runs compared", several.len()),
-        },
-        summary: summary(report),
-        intro: intro(report),
-        alerts: &alerts(report),
-        tables,
-        sections: &SECTIONS,
-        runs: &report.runs,
-        items: packed(report)?,
-    };
-    page_of_open_questions(content, figures)
-}
-
 /// One sentence with the scores at the darkest level: differences from L0, and of each enhancer from raw frames. The
 /// differences are not tested.
-fn summary(report: &OpenReport<'_>) -> Option<String> {
+pub(super) fn summary(report: &MarkedAnswers<'_>) -> Option<String> {
     let whole = ladder(report.summary, &Group::All);
     let clauses: Vec<String> = whole
         .series
@@ -83,38 +59,15 @@ fn summary(report: &OpenReport<'_>) -> Option<String> {
 }
 
 /// Difference of a score from a baseline, with its interval; `None` if they share no questions.
-fn change_text(report: &OpenReport<'_>, subject: &ModelInCondition, baseline: Baseline) -> Option<String> {
+fn change_text(report: &MarkedAnswers<'_>, subject: &ModelInCondition, baseline: Baseline) -> Option<String> {
     let change = report.summary.change(subject, baseline, &Group::All)?;
     let difference = change.difference;
     let [value, low, high] = [difference.value, difference.low, difference.high].map(points);
     Some(format!("{value} [{low}, {high}]"))
 }
 
-/// Warnings at the top of the page: missing marks, missing answers, no judge.
-fn alerts(report: &OpenReport<'_>) -> Vec<String> {
-    let (status, counts) = (report.manifest.status, report.manifest.counts);
-    let mut alerts: Vec<String> = report.alerts.iter().map(|alert| alert.text.clone()).collect();
-    let unmarked = report.answers.iter().filter(|answer| answer.outcome == AnswerOutcome::Unmarked).count();
-    if unmarked > 0 {
-        alerts.push(format!(
-            "{} not scored, because the judge gave no mark.",
-            plural(unmarked, "answer is", "answers are")
-        ));
-    }
-    if counts.answered < counts.trials {
-        alerts.push(format!(
-            "{status}: {} of {} answers and marks are stored, {} failed; those that are missing are not scored.",
-            counts.answered, counts.trials, counts.failed
-        ));
-    }
-    if report.judge.is_none() {
-        alerts.push("Nothing is marked: no judge was named.".to_owned());
-    }
-    alerts
-}
-
 /// Lines at the top of the page on questions, score, intervals and coverage.
-fn intro(report: &OpenReport<'_>) -> Vec<String> {
+pub(super) fn intro(report: &MarkedAnswers<'_>) -> Vec<String> {
     let (summary, judge) = (report.summary, report.judge.unwrap_or("nobody"));
     let walks: BTreeSet<_> = report.questions.iter().map(|question| &question.frame).collect();
     let mut lines = vec![
@@ -135,7 +88,7 @@ fn intro(report: &OpenReport<'_>) -> Vec<String> {
 
 /// One line with the number of scored answers, then one line for each other outcome that occurs.
 #[must_use]
-pub(crate) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
+pub(crate) fn coverage(report: &MarkedAnswers<'_>) -> Vec<String> {
     let scored = total(report, OpenCell::scored);
     let planned = total(report, |cell| cell.planned);
     let unjudged = match report.judge {
@@ -165,7 +118,7 @@ pub(crate) fn coverage(report: &OpenReport<'_>) -> Vec<String> {
 }
 
 /// Sum of a count over all models and conditions.
-fn total(report: &OpenReport<'_>, count: fn(&OpenCell) -> usize) -> usize {
+fn total(report: &MarkedAnswers<'_>, count: fn(&OpenCell) -> usize) -> usize {
     report.summary.cells.iter().filter(|cell| cell.group == Group::All).map(count).sum()
 }
 
@@ -176,7 +129,7 @@ const REASONS: [&str; 3] = ["", "the judge’s reply has no mark", "no judge was
 ///
 /// # Errors
 /// If the data cannot be serialized.
-pub(super) fn packed(report: &OpenReport<'_>) -> Result<String> {
+pub(super) fn packed(report: &MarkedAnswers<'_>) -> Result<String> {
     let subjects: Vec<&model_in_condition::ModelInCondition> =
         report.summary.cells.iter().filter(|cell| cell.group == Group::All).map(|cell| &cell.subject).collect();
     packed_by(|limit| data(report, &subjects, limit))
@@ -198,7 +151,7 @@ struct Results<'a> {
 }
 
 fn data<'a>(
-    report: &'a OpenReport<'_>,
+    report: &'a MarkedAnswers<'_>,
     subjects: &[&'a model_in_condition::ModelInCondition],
     limit: SizeLimit,
 ) -> PageData<'a> {
@@ -258,7 +211,7 @@ fn subject_data<'a>(
 
 /// Answers by subject, with one item for each question; if several people answered a question, each answer is an item
 /// of its own.
-fn results<'a>(report: &'a OpenReport<'_>, subjects: &[&model_in_condition::ModelInCondition]) -> Results<'a> {
+fn results<'a>(report: &'a MarkedAnswers<'_>, subjects: &[&model_in_condition::ModelInCondition]) -> Results<'a> {
     let indices: BTreeMap<&model_in_condition::ModelInCondition, usize> = subjects.iter().copied().zip(0..).collect();
     let mut cells = vec![vec![Vec::<&ReportedAnswer>::new(); subjects.len()]; report.questions.len()];
     for answer in report.answers {

@@ -6,9 +6,9 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::open_report::{OpenReport, ReportedAnswer};
+use super::marked_answers::{MarkedAnswers, ReportedAnswer};
 use crate::error::{Error, Result};
-use crate::report::tables::{enhancers, with_training};
+use crate::report::tables::{EnhancerRow, LEVELS, enhancers, with_training};
 use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
 use crate::report::text::latex::escape;
 use crate::report::text::table::ColumnKind::{self, Accuracy, Count, Points, Share, Text};
@@ -26,7 +26,7 @@ pub(super) const SECTION: &str = "scores";
 
 /// All tables of a run; the first is the summary.
 #[must_use]
-pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
+pub(super) fn tables(report: &MarkedAnswers<'_>, enhancer_rows: &[EnhancerRow]) -> Vec<Table> {
     let mut tables = vec![summary(report.summary)];
     tables.extend(levels(report));
     let groups: Vec<(&Group, Ladder<'_, OpenCell>)> = report
@@ -43,7 +43,7 @@ pub(crate) fn tables(report: &OpenReport<'_>) -> Vec<Table> {
         }
     }
     let mut tables = with_training(tables, &report.summary.listing);
-    tables.extend(enhancers(report.enhancers).map(|table| Table { section: SECTION, ..table }));
+    tables.extend(enhancers(enhancer_rows).map(|table| Table { section: SECTION, ..table }));
     tables
 }
 
@@ -90,7 +90,7 @@ fn summary(summary: &OpenSummary) -> Table {
 }
 
 /// Tables of scores by level, one for each axis.
-fn levels(report: &OpenReport<'_>) -> Vec<Table> {
+fn levels(report: &MarkedAnswers<'_>) -> Vec<Table> {
     let whole = ladder(report.summary, &Group::All);
     let mut tables: Vec<Table> =
         whole.by_axis().into_iter().map(|(axis, ladder)| axis_table(report, axis, &ladder)).collect();
@@ -100,11 +100,11 @@ fn levels(report: &OpenReport<'_>) -> Vec<Table> {
     tables
 }
 
-fn axis_table(report: &OpenReport<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -> Table {
+fn axis_table(report: &MarkedAnswers<'_>, axis: Axis, ladder: &Ladder<'_, OpenCell>) -> Table {
     let summary = report.summary;
     let of = if axis == Axis::LIGHT { String::new() } else { format!(" by {} of {}", axis.title, axis.cause) };
     let mut table = ladder
-        .table("levels", &summary.listing, |cell| score(summary, cell))
+        .table(LEVELS, &summary.listing, |cell| score(summary, cell))
         .page(SECTION, &format!("Score in %{of} with 95 % intervals (difference from L0)"))
         .column(Count, "terminal scored", |line| {
             format!("{} of {}", line.sum(OpenCell::scored), line.sum(|cell| cell.planned))
@@ -199,7 +199,7 @@ struct UpstreamAnswer<'a> {
 ///
 /// Missing answers and marks are left out. A subject with several answers to a question gets no files, because the
 /// format has one answer for each question.
-pub(super) fn files(report: &OpenReport<'_>) -> Result<Vec<(String, Vec<u8>)>> {
+pub(super) fn files(report: &MarkedAnswers<'_>) -> Result<Vec<(String, Vec<u8>)>> {
     let mut by_subject = BTreeMap::<&ModelInCondition, BTreeMap<usize, Vec<&ReportedAnswer>>>::new();
     for reported in report.answers {
         if reported.outcome != AnswerOutcome::Missing {

@@ -11,12 +11,12 @@ use crate::error::Result;
 use crate::report::charts::chart::{Chart, Figure, FigureChart};
 use crate::report::charts::figures::{DisplayNames, overview, split};
 use crate::report::charts::paper::figure;
-use crate::report::choice_report::ChoiceReport;
 use crate::report::finding_groups::{Effect, FindingGroups, GroupedFinding};
 use crate::report::sentences::capitalised;
 use crate::report::text::words::light;
 use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, Thumbnail, Variant};
 use darkqa_score::choice::ParsingMode;
+use darkqa_score::findings::Findings;
 use darkqa_score::grid::{Grid, TrialResult};
 use darkqa_score::model_in_condition::{ModelInCondition, pooled_models};
 
@@ -62,8 +62,8 @@ impl PageHead {
     ///
     /// # Errors
     /// If the chart cannot be drawn, or a question cannot be read.
-    pub(super) fn new(
-        report: &ChoiceReport<'_>,
+    pub(crate) fn new(
+        findings: &Findings<'_>,
         groups: &FindingGroups<'_>,
         inputs: &PageInputs<'_>,
     ) -> Result<Option<Self>> {
@@ -71,8 +71,8 @@ impl PageHead {
             return Ok(None);
         }
         Ok(Some(Self {
-            chart: chart(report)?,
-            strip: Strip::new(&report.findings.grid, inputs)?,
+            chart: chart(findings)?,
+            strip: Strip::new(&findings.grid, inputs)?,
             ..Self::without_images(groups)
         }))
     }
@@ -137,8 +137,8 @@ impl FindingRow {
 
 /// Chart of the first screen: mean accuracy by level raw and with each enhancer, else by variant, else accuracy of each
 /// model.
-fn chart(report: &ChoiceReport<'_>) -> Result<Option<Figure>> {
-    let panels = overview(report.findings, &DisplayNames::default());
+fn chart(findings: &Findings<'_>) -> Result<Option<Figure>> {
+    let panels = overview(findings, &DisplayNames::default());
     ["enhancers", "variants", "models"]
         .into_iter()
         .find_map(|wanted| {

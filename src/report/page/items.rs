@@ -21,7 +21,7 @@ use darkqa_score::model_in_condition::ModelInCondition;
 ///
 /// # Errors
 /// If a reply or a question cannot be read, or the data cannot be serialized.
-pub(super) fn packed<'a>(
+pub(crate) fn packed<'a>(
     grid: &'a Grid<'a>,
     confusions: &'a [confusion::Confusion],
     inputs: &PageInputs<'a>,
@@ -268,7 +268,7 @@ pub(super) fn sample<'a>(grid: &Grid<'a>) -> Option<Grid<'a>> {
 }
 
 /// Note that the page has only a sample of the items; `None` if it has all.
-pub(super) fn note(grid: &Grid<'_>) -> Option<String> {
+pub(crate) fn note(grid: &Grid<'_>) -> Option<String> {
     let (all, max) = (grid.items.len(), max_items(grid));
     (all > max).then(|| {
         format!(

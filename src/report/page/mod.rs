@@ -1,4 +1,4 @@
-//! HTML page of a report: [`page`] for an evaluation, [`page_of`] for other content.
+//! HTML page of a report: [`page`], made of the report and the parts that depend on its measure ([`PageParts`]).
 //!
 //! Numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items and their
 //! thumbnails are packed data, which a script displays. The page needs no network, and its content security policy
@@ -11,6 +11,7 @@
 pub(super) mod data;
 mod head;
 mod items;
+mod parts;
 mod run_usage;
 
 use serde::Serialize;
@@ -20,26 +21,24 @@ use super::tables::ENHANCERS;
 use crate::error::Result;
 use crate::report::charts::chart::Figure;
 use crate::report::charts::samples::{SampleTable, samples_of};
-use crate::report::choice_report::ChoiceReport;
+use crate::report::content::Report;
 use crate::report::finding_groups::{FindingGroup, FindingGroups};
-use crate::report::sentences::{Sentence, how_to_read};
-use crate::report::short::{head, who_is_judged};
-use crate::report::tables::{SECTIONS, Section};
+use crate::report::sentences::Sentence;
+use crate::report::tables::Section;
 use crate::report::template::render;
 use crate::report::text::alert::{Alert, AlertKind};
 use crate::report::text::table::{ColumnKind, Table, TableCell, TableFormat, TableRow};
-use crate::report::text::words::{ProfileNames, ends, interval, words};
+use crate::report::text::words::{ends, interval, words};
+use crate::types::Thumbnail;
 use crate::types::flags::setting_spelling;
 use crate::types::manifests::RunManifest;
-use crate::types::{Thumbnail, Truths};
-use darkqa_score::answers::confusion::Confusion;
 use darkqa_score::estimate::Estimate;
-use darkqa_score::grid::Grid;
-use darkqa_score::model_in_condition::models_under_test;
 use darkqa_score::significance::Verdict;
 
 pub(crate) use data::fitting_thumbnails;
 pub(crate) use head::PageHead;
+pub(crate) use items::{note as items_note, packed as packed_items};
+pub(crate) use parts::PageParts;
 pub(crate) use run_usage::{PageRun, RunUsage};
 
 pub use run_usage::PageInputs;
@@ -75,7 +74,7 @@ struct Page<'a> {
     /// Number of findings; `None` for a kind of report without findings.
     findings: Option<usize>,
     groups: Vec<PageGroup<'a>>,
-    how_to_read: String,
+    how_to_read: &'a str,
     /// Heading of the confusion matrix.
     answers_title: &'static str,
     sections: Vec<PageSection<'a>>,
@@ -119,177 +118,48 @@ impl<'a> PageSentence<'a> {
     }
 }
 
-/// Content of a page, without its figures and the facts about its runs.
-pub(crate) struct PageContent<'a> {
-    /// Text for the models, in the heading.
-    pub(crate) who: String,
-    /// First screen; `None` for a page without one.
-    pub(crate) head: Option<PageHead>,
-    /// Lines at the top about all numbers.
-    pub(crate) intro: Vec<String>,
-    pub(crate) alerts: &'a [Alert],
-    pub(crate) groups: FindingGroups<'a>,
-    pub(crate) how_to_read: String,
-    pub(crate) tables: &'a [Table],
-    pub(crate) sections: &'static [Section],
-    /// Items and the replies to them.
-    pub(crate) grid: &'a Grid<'a>,
-    pub(crate) confusions: &'a [Confusion],
-    /// Heading of the confusion matrix.
-    pub(crate) answers_title: &'static str,
-    pub(crate) truths: Truths,
-}
-
-/// Renders the page of an evaluation.
+/// Renders the page of a report.
 ///
 /// # Errors
 /// If the items cannot be serialized or the template cannot be rendered.
-pub(crate) fn page<'a>(report: &'a ChoiceReport<'a>, figures: &[Figure], inputs: &PageInputs<'a>) -> Result<String> {
-    let findings = report.findings;
+pub(crate) fn page(report: &Report<'_>, figures: &[Figure], inputs: &PageInputs<'_>) -> Result<String> {
+    let parts = report.measure.page_parts(report, inputs)?;
     let groups = FindingGroups::new(&report.sentences);
-    let content = PageContent {
-        who: who_is_judged(&findings.grid),
-        head: PageHead::new(report, &groups, inputs)?,
-        intro: intro(report),
-        alerts: &report.alerts,
-        groups,
-        how_to_read: how_to_read(&report.sentences),
-        tables: &report.tables,
-        sections: &SECTIONS,
-        grid: &findings.grid,
-        confusions: &findings.confusions,
-        answers_title: "Answers given against true answers",
-        truths: Truths::Known,
-    };
-    page_of(content, figures, inputs)
-}
-
-/// Renders a page from its content.
-///
-/// # Errors
-/// If the items cannot be serialized or the template cannot be rendered.
-pub(crate) fn page_of<'a>(content: PageContent<'a>, figures: &[Figure], inputs: &PageInputs<'a>) -> Result<String> {
-    let sections = content.sections;
     // A property of the noise profile holds for every run with it: a line of the introduction, no warning.
     let (notes, warnings): (Vec<&Alert>, Vec<&Alert>) =
-        content.alerts.iter().partition(|alert| alert.kind == AlertKind::Noise);
+        report.alerts.iter().partition(|alert| alert.kind == AlertKind::Noise);
     let notes = notes.into_iter().map(|note| note.text.clone());
     render(
         PAGE,
         Page {
-            class: match content.truths {
-                Truths::Known => "",
-                Truths::Unknown => "no-truth",
-            },
-            title: title(&content.who, inputs),
-            heading: heading(&content.who, inputs),
-            head: content.head,
-            family: "family",
+            class: parts.class,
+            title: parts.title,
+            heading: parts.heading,
+            head: parts.head,
+            family: parts.family,
             alerts: warnings.iter().map(|alert| &*alert.text).collect(),
-            findings: Some(content.groups.count()),
-            groups: content.groups.all().iter().map(PageGroup::new).collect(),
-            how_to_read: content.how_to_read,
-            answers_title: content.answers_title,
-            intro: content.intro.into_iter().chain(notes).chain(items::note(content.grid)).collect(),
-            sections: page_sections(sections, content.tables, figures, inputs.thumbnails),
+            findings: report.measure.has_findings().then_some(groups.count()),
+            groups: groups.all().iter().map(PageGroup::new).collect(),
+            how_to_read: &report.how_to_read,
+            answers_title: parts.answers_title,
+            intro: parts.intro.into_iter().chain(notes).chain(parts.notes).collect(),
+            sections: page_sections(parts.sections, &report.tables, figures, inputs.thumbnails),
             runs: inputs.runs.iter().map(run_facts).collect(),
-            data: items::packed(content.grid, content.confusions, inputs)?,
+            data: parts.items,
             css: STYLE,
             script: [CHART_SCRIPT, SCRIPT].concat(),
         },
     )
-}
-
-/// Content of the page of open questions, without its figures.
-pub(crate) struct OpenContent<'a> {
-    pub(crate) title: String,
-    /// One sentence with the scores; `None` without scores at two levels.
-    pub(crate) summary: Option<String>,
-    pub(crate) intro: Vec<String>,
-    pub(crate) alerts: &'a [String],
-    pub(crate) tables: &'a [Table],
-    pub(crate) sections: &'static [Section],
-    /// Name and manifest of each run.
-    pub(crate) runs: &'a [(&'a str, &'a RunManifest)],
-    /// Items as compressed JSON in base64.
-    pub(crate) items: String,
-}
-
-/// Renders the page of open questions.
-///
-/// # Errors
-/// If the template cannot be rendered.
-pub(crate) fn page_of_open_questions(content: OpenContent<'_>, figures: &[Figure]) -> Result<String> {
-    render(
-        PAGE,
-        Page {
-            class: "",
-            heading: content.title.clone(),
-            title: content.title,
-            head: content.summary.as_deref().map(PageHead::from_summary),
-            family: "category",
-            alerts: content.alerts.iter().map(String::as_str).collect(),
-            findings: None,
-            groups: Vec::new(),
-            how_to_read: String::new(),
-            answers_title: "",
-            intro: content.intro,
-            sections: page_sections(content.sections, content.tables, figures, &[]),
-            runs: content
-                .runs
-                .iter()
-                .map(|(name, manifest)| json!({"name": name, "rows": manifest_facts(manifest)}))
-                .collect(),
-            data: content.items,
-            css: STYLE,
-            script: [CHART_SCRIPT, SCRIPT].concat(),
-        },
-    )
-}
-
-/// Heading of the page, as in `MODEL in the dark`, with the number of runs if there are several.
-fn heading(who: &str, inputs: &PageInputs<'_>) -> String {
-    match &*inputs.runs {
-        [_] => format!("{who} in the dark"),
-        several => format!("{who} in the dark: {} runs compared", several.len()),
-    }
-}
-
-/// Heading with the name of the run, if there is only one.
-fn title(who: &str, inputs: &PageInputs<'_>) -> String {
-    let heading = heading(who, inputs);
-    match &*inputs.runs {
-        [one] => format!("{heading} · {}", one.name),
-        _ => heading,
-    }
-}
-
-/// Lines at the top of the page on the size of the runs, people, and open questions about noise profiles.
-fn intro(report: &ChoiceReport<'_>) -> Vec<String> {
-    let grid = &report.findings.grid;
-    let size = format!("{} (95 %) · strict parsing", head(report));
-    let readings = ProfileNames::new(&grid.subjects);
-    let models = grid.subjects.iter().map(|subject| &*subject.model);
-    let has_people = models.clone().any(|model| grid.listing.is_people(model));
-    let has_models = models_under_test(models).iter().any(|model| !grid.listing.is_people(model));
-    let people =
-        (has_people && has_models).then(|| "The summary and the chart are about models, not about people.".to_owned());
-    std::iter::once(size).chain(people).chain(readings.open_question()).collect()
 }
 
 /// Facts about a run, as JSON for the template.
 fn run_facts(run: &PageRun<'_>) -> Value {
     let manifest = run.manifest;
     let mut rows = status_facts(manifest);
-    rows.extend(run.usage.facts());
+    rows.extend(run.usage.iter().flat_map(RunUsage::facts));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
     rows.extend(setting_facts(manifest));
     json!({"name": run.name, "rows": rows})
-}
-
-/// Facts about a run without usage and cost: names and values.
-fn manifest_facts(manifest: &RunManifest) -> Vec<(String, String)> {
-    [status_facts(manifest), setting_facts(manifest)].concat()
 }
 
 fn fact(name: &str, value: impl Into<String>) -> (String, String) {

@@ -111,7 +111,8 @@ pub struct PageRun<'a> {
     /// Folder of the run, as for use in a command; an absolute path is shortened to `DIR/` and the folder's name.
     pub folder: String,
     pub manifest: &'a RunManifest,
-    pub usage: RunUsage,
+    /// Requests, tokens and times; `None` if the report does not count them.
+    pub usage: Option<RunUsage>,
     /// Text for the cost of the replies; `None` if it is unknown.
     pub cost: Option<String>,
 }

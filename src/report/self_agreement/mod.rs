@@ -1,74 +1,102 @@
-//! Report on questions without true answers: its files ([`products`]), its summary ([`summary`]) and its text
-//! (`text()`).
+//! The report on questions without true answers: [`Report::of_self_agreement`].
 //!
 //! The measure is agreement with the model's own answer at L0. Reports always give it with its floor, its ceiling and
 //! other measures that are needed to interpret it, and never call it accuracy.
 //!
-//! Terminal text of a report on questions without true answers: [`text`].
-//!
-//! Sections of the page on questions without true answers: [`SECTIONS`].
-//!
-//! Figures of a report on questions without true answers: [`figures`].
+//! Sections of the page: [`SECTIONS`]. Figures: [`figures`].
 
 mod tables;
 
 use std::collections::BTreeSet;
-use std::fmt::Write;
-use std::path::Path;
 
 use serde::Serialize;
 
-use super::short::findings;
-use super::tables::{ENHANCERS, Section};
+use super::tables::{ENHANCERS, Section, with_training};
 use crate::error::Result;
 use crate::report::charts::chart::{Chart, Figure, FigureChart, LineContent, LineStyle, Panel, PlotLine};
 use crate::report::charts::paper::figure;
+use crate::report::content::{Measure, Report};
 use crate::report::finding_groups::FindingGroups;
 use crate::report::json::{JsonRows, RunsHead, SummaryRuns, document};
-use crate::report::page::{PageContent, PageHead, PageInputs, page_of};
-use crate::report::products::files;
-use crate::report::sentences::Sentence;
+use crate::report::page::{PageHead, PageInputs, PageParts, items_note, packed_items};
+use crate::report::sentences::{Sentence, self_agreement};
 use crate::report::short::who_is_judged;
 use crate::report::text::alert::Alert;
 use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
 use crate::report::text::table::Table;
-use crate::report::text::terminal::{render, table, wrapped};
+use crate::report::text::terminal::{table, wrapped};
 use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
-use crate::types::manifests::RunManifest;
+use crate::types::AxisLevel;
 use crate::types::text::{counted, plural};
-use crate::types::{AxisLevel, Truths};
 use darkqa_score::accuracies::Health;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::comparisons::self_agreement::cell::{AgreementCell, CellRole};
 use darkqa_score::estimate::Estimate;
 use tables::{AGREEMENT, HOW_TO_READ, levels, notes};
 
-pub(crate) use tables::AgreementReport;
+impl<'a> Report<'a> {
+    /// The report on the agreement of models with their own answers at L0.
+    pub(crate) fn of_self_agreement(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>) -> Self {
+        Self {
+            measure: Box::new(OwnAnswers { found }),
+            facts: facts(found),
+            alerts,
+            sentences: self_agreement(found),
+            how_to_read: HOW_TO_READ.to_owned(),
+            tables: with_training(tables::tables(found), &found.grid.listing),
+        }
+    }
+}
 
-/// Files of a report by name: numbers as CSV, the main tables as LaTeX, figures as SVG, and the HTML page.
-///
-/// # Errors
-/// If a file cannot be made.
-pub(crate) fn products<'a>(report: &'a AgreementReport<'a>, inputs: &PageInputs<'a>) -> Result<Vec<(String, Vec<u8>)>> {
-    let figures = figures(report.found)?;
-    let groups = FindingGroups::new(&report.sentences);
-    let content = PageContent {
-        who: who_is_judged(&report.found.grid),
-        head: (groups.count() > 0).then(|| PageHead::without_images(&groups)),
-        intro: intro(report.found),
-        alerts: &report.alerts,
-        groups,
-        how_to_read: HOW_TO_READ.to_owned(),
-        tables: &report.tables,
-        sections: &SECTIONS,
-        grid: &report.found.grid,
-        confusions: &report.found.confusions,
-        answers_title: "Answers given against those at L0",
-        truths: Truths::Unknown,
-    };
-    let page = page_of(content, &figures, inputs)?;
-    files(&report.tables, &report.sentences, figures, page, inputs)
+/// Agreement of each model with its own answers at L0.
+struct OwnAnswers<'a> {
+    found: &'a SelfAgreement<'a>,
+}
+
+impl Measure for OwnAnswers<'_> {
+    fn figures(&self) -> Result<Vec<Figure>> {
+        figures(self.found)
+    }
+
+    fn page_parts<'p>(&'p self, report: &'p Report<'_>, inputs: &'p PageInputs<'_>) -> Result<PageParts<'p>> {
+        let grid = &self.found.grid;
+        let groups = FindingGroups::new(&report.sentences);
+        Ok(PageParts {
+            class: "no-truth",
+            head: (groups.count() > 0).then(|| PageHead::without_images(&groups)),
+            intro: intro(self.found),
+            notes: items_note(grid).into_iter().collect(),
+            answers_title: "Answers given against those at L0",
+            items: packed_items(grid, &self.found.confusions, inputs)?,
+            ..PageParts::in_the_dark(&who_is_judged(grid), &SECTIONS, inputs)
+        })
+    }
+
+    fn json(&self, report: &Report<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String> {
+        let own_answers = report.tables.iter().find(|table| table.name == tables::OWN_ANSWERS);
+        let head = Head {
+            runs: runs.head("darkqa.self-agreement/1"),
+            measure: AGREEMENT,
+            readings: self.profiles(),
+            alerts: &report.alerts,
+            findings: &report.sentences,
+            own_answers: own_answers.map(JsonRows::new),
+        };
+        document(head, &tables::summary(self.found), &report.tables, length)
+    }
+
+    fn short_tables(&self, _: &Report<'_>) -> String {
+        short_tables(self.found)
+    }
+
+    fn short_markdown_tables<'t>(&self, tables: &'t [Table]) -> Vec<&'t Table> {
+        tables.iter().filter(|table| table.name == AGREEMENT && !table.rows.is_empty()).collect()
+    }
+
+    fn profiles(&self) -> ProfileNames {
+        ProfileNames::new(&self.found.grid.subjects)
+    }
 }
 
 /// Lines at the top of the page.
@@ -86,30 +114,6 @@ fn intro(found: &SelfAgreement<'_>) -> Vec<String> {
     std::iter::once(facts).chain(readings.open_question()).collect()
 }
 
-/// Content for a Markdown report.
-pub(super) struct MarkdownParts<'a> {
-    /// Numbers of models, questions and replies.
-    pub(super) head: String,
-    pub(super) alerts: &'a [Alert],
-    pub(super) sentences: &'a [Sentence],
-    pub(super) how_to_read: &'static str,
-    pub(super) tables: &'a [Table],
-    /// Name of the tables by level.
-    pub(super) levels: &'static str,
-}
-
-/// Selects the content for a Markdown report.
-pub(super) fn markdown_parts<'a>(report: &'a AgreementReport<'_>) -> MarkdownParts<'a> {
-    MarkdownParts {
-        head: head(report),
-        alerts: &report.alerts,
-        sentences: &report.sentences,
-        how_to_read: HOW_TO_READ,
-        tables: &report.tables,
-        levels: AGREEMENT,
-    }
-}
-
 /// Head of the summary.
 #[derive(Serialize)]
 struct Head<'a> {
@@ -123,58 +127,21 @@ struct Head<'a> {
     own_answers: Option<JsonRows<'a>>,
 }
 
-/// Serializes the summary of runs as JSON, with the rows of `summary.csv`.
-///
-/// # Errors
-/// If the document cannot be serialized.
-pub(crate) fn summary(report: &AgreementReport<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String> {
-    let own_answers = report.tables.iter().find(|table| table.name == tables::OWN_ANSWERS);
-    let head = Head {
-        runs: runs.head("darkqa.self-agreement/1"),
-        measure: AGREEMENT,
-        readings: ProfileNames::new(&report.found.grid.subjects),
-        alerts: &report.alerts,
-        findings: &report.sentences,
-        own_answers: own_answers.map(JsonRows::new),
-    };
-    document(head, &tables::summary(report.found), &report.tables, length)
-}
-
-/// Renders the report as text. `runs` are the manifests with the folders of their runs.
-#[must_use]
-pub(crate) fn text(report: &AgreementReport<'_>, runs: &[(&RunManifest, &Path)], length: ReportLength) -> String {
-    let groups = FindingGroups::new(&report.sentences);
-    let mut text = findings(&head(report), &report.alerts, &groups, length, HOW_TO_READ);
-    match length {
-        ReportLength::Findings => return text,
-        ReportLength::Summary => text += &short_tables(report),
-        ReportLength::Full => text += &render(&report.tables),
-    }
-    if let Some(question) = ProfileNames::new(&report.found.grid.subjects).open_question() {
-        text += &wrapped(" ", &question, " ");
-    }
-    for (_, folder) in runs {
-        let _ = writeln!(text, "run: {}", folder.display());
-    }
-    text
-}
-
 /// Table of each axis with a wrapped heading, and the notes.
-fn short_tables(report: &AgreementReport<'_>) -> String {
+fn short_tables(found: &SelfAgreement<'_>) -> String {
     let mut text = String::new();
-    for levels in levels(report.found) {
+    for levels in levels(found) {
         text += &wrapped(" ", levels.heading.as_deref().unwrap_or_default(), " ");
         text += &table(&[levels]);
     }
-    for note in notes(report.found) {
+    for note in notes(found) {
         text += &wrapped(" ", &note, "   ");
     }
     text
 }
 
-/// Head line with the numbers of models, questions, images and replies.
-fn head(report: &AgreementReport<'_>) -> String {
-    let found = report.found;
+/// Facts at the head of the report: models, questions, images, replies with failures, and the unit of the intervals.
+fn facts(found: &SelfAgreement<'_>) -> Vec<String> {
     let items = &found.grid.items;
     let models = found.models();
     let who = match &models[..] {
@@ -185,13 +152,13 @@ fn head(report: &AgreementReport<'_>) -> String {
     let frames: BTreeSet<_> = items.iter().map(|item| &*item.asked.frame).collect();
     let replies: usize = found.health.iter().map(|health| health.replies).sum();
     let failed: usize = found.health.iter().map(Health::failures).sum();
-    format!(
-        "{who} · {} without answers · {} · {}, {failed} failed · intervals by {}",
-        counted(questions.len(), "question"),
+    vec![
+        who,
+        format!("{} without answers", counted(questions.len(), "question")),
         counted(frames.len(), "image"),
-        plural(replies, "reply", "replies"),
-        found.unit
-    )
+        format!("{}, {failed} failed", plural(replies, "reply", "replies")),
+        format!("intervals by {}", found.unit),
+    ]
 }
 
 /// All sections of the page in order.

@@ -1,19 +1,14 @@
 //! Tables of a report on questions without true answers: [`tables`].
 //!
-//! Content of a report on questions without true answers: [`AgreementReport`].
-//!
 //! Tables of agreement by level, with a row for each measure: [`levels`].
 //!
 //! Texts on the measure of a report without true answers: [`AGREEMENT`], [`HOW_TO_READ`].
 
 use std::collections::BTreeSet;
 
-use crate::report::sentences::{Sentence, self_agreement};
 use crate::report::tables::{
-    EnhancerRow, agreement_comparisons, commonest_answers, counted_answers, enhancers, health, in_lux,
-    missing_threshold_reason, with_training,
+    agreement_comparisons, commonest_answers, counted_answers, health, in_lux, missing_threshold_reason,
 };
-use crate::report::text::alert::Alert;
 use crate::report::text::ladder::{Ladder, SeriesByLevel};
 use crate::report::text::table::ColumnKind::{self, Accuracy, Count, Number, Percent, Ratio, Share, Text};
 use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell, TableFormat};
@@ -233,26 +228,6 @@ fn most_frequent_answers(confusions: &[Confusion]) -> Table {
 /// Confusion matrix of the answers at L0 and in each other condition.
 fn confusion_with_l0(confusions: &[Confusion]) -> Table {
     counted_answers("answers_against_light", "csv at_l0", confusions)
-}
-
-/// Results of one or more runs on questions without true answers, as sentences and as tables.
-pub(crate) struct AgreementReport<'a> {
-    pub(super) found: &'a SelfAgreement<'a>,
-    /// Warnings at the top of the report.
-    pub(super) alerts: Vec<Alert>,
-    /// Findings as sentences.
-    pub(super) sentences: Vec<Sentence>,
-    /// All tables; the first is the summary.
-    pub(super) tables: Vec<Table>,
-}
-
-impl<'a> AgreementReport<'a> {
-    /// Writes the sentences and the tables of a report. `enhancer_rows` describe the use of each enhancer.
-    pub(crate) fn new(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>, enhancer_rows: &[EnhancerRow]) -> Self {
-        let mut tables = with_training(tables(found), &found.grid.listing);
-        tables.extend(enhancers(enhancer_rows));
-        Self { sentences: self_agreement(found), found, alerts, tables }
-    }
 }
 
 /// Measure of a series; each has a row of the table.

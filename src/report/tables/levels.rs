@@ -17,6 +17,9 @@ use darkqa_score::choice::ParsingMode;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::ModelInCondition;
 
+/// Name of the tables of accuracies or scores by level.
+pub(crate) const LEVELS: &str = "levels";
+
 /// Tables over all items and, if the models were asked different items, also over the items that they share.
 pub(super) fn levels(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = summary_tables(findings, &findings.summary, "");
@@ -60,7 +63,7 @@ fn axis_table(
         (_, false) => format!("Accuracy in % by {} of {}{items}", axis.title, axis.cause),
     };
     let mut table = ladder
-        .table("levels", &findings.grid.listing, |cell| {
+        .table(LEVELS, &findings.grid.listing, |cell| {
             cell.map_or(TableCell::Blank, |cell| accuracy_cell(summary, cell))
         })
         .page("accuracy", &caption)

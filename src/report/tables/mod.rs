@@ -34,7 +34,7 @@ use sections::REAL;
 
 pub(crate) use answers::{commonest_answers, counted_answers, health};
 pub(crate) use comparisons::{EnhancerRow, FLIPS, agreement_comparisons, enhancers, write_flips};
-pub(crate) use levels::unread_note;
+pub(crate) use levels::{LEVELS, unread_note};
 pub(crate) use observer::{control_text, notes as observer_notes};
 pub(crate) use pooled::{BASELINE, baseline};
 pub(crate) use sections::{ENHANCERS, SECTIONS, Section, with_training};

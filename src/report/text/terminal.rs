@@ -22,7 +22,6 @@ use super::words::shorten_middle;
 use crate::error::{Error, Result};
 use crate::report::text::table::{Column, ColumnKind, Table, TableCell, TableFormat};
 use crate::report::text::words::{interval, percent, points, reach, stops, widest_reach_of, with_interval, words};
-use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::text::escape_hidden;
 
 /// The lenient number in brackets, ` (LENIENT)`, if it differs from the strict one; otherwise empty.
@@ -110,15 +109,6 @@ pub(crate) fn table(parts: &[Table]) -> String {
 fn widest_reach<'t>(cells: impl Iterator<Item = (&'t Column, &'t TableCell)>) -> String {
     let accuracies = cells.filter(|(column, _)| column.kind == ColumnKind::Accuracy);
     widest_reach_of(accuracies.filter_map(|(column, cell)| interval(column.kind, cell)))
-}
-
-/// A line with the progress of a run; empty if the run is complete.
-pub(crate) fn progress(run: &RunManifest, what: &str) -> String {
-    let Counts { trials, answered, failed } = run.counts;
-    match run.status {
-        Status::Complete => String::new(),
-        status => format!("{status}: {answered} of {trials} {what}, {failed} failed\n"),
-    }
 }
 
 /// Terminal columns of a cell in addition to its text, with the gap to the next cell.

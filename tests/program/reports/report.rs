@@ -367,7 +367,7 @@ fn people_enter_as_a_model() {
     assert!(pooled[1..].iter().all(|row| row[names] == "script:said.jsonl"), "{pooled:?}");
     insta::assert_snapshot!(both.lines_with("people"), @"
     exit code: 0
-    script:said.jsonl, people (people) · 6 questions · 1 frame · 36 replies, 0 failed · intervals by question
+    script:said.jsonl, people (people) · 6 questions · 1 frame · 36 replies, 0
      people            100.0    0.0   −39.8 +39.0
      6 answers of people are “I cannot tell”, which counts as wrong and not as
     run: people

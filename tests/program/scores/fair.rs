@@ -41,7 +41,8 @@ fn rotation_averages_position_bias() {
     bench.file("script.jsonl", text);
     let by_text = args("--out by-text --model script:script.jsonl --circular");
     insta::assert_snapshot!(redacted(&bench.complete(&by_text)), @"
-    script:script.jsonl · 6 questions · 1 frame · 18 replies, 0 failed · intervals by question
+    script:script.jsonl · 6 questions · 1 frame · 18 replies, 0 failed · intervals
+     by question
     ! Only 6 questions (8 are needed): wide intervals, few possible verdicts.
 
      accuracy in %

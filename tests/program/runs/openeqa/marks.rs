@@ -127,10 +127,12 @@ fn missing_answers_are_counted() {
     let called = house.call(&[&args[..], &["--protocol", "tolerant"]].concat());
     insta::assert_snapshot!(called.lines_with("scored"), @"
     exit code: 1
-     model            light          L0           L2   scored   95 %
     2 of 6 answers scored
     2 not answered: not scored
     2 without a mark in the judge's reply: not scored (--protocol tolerant reads
+    ! 2 answers are not scored, because the judge gave no mark.
+      missing are not scored.
+     model            light          L0           L2   scored   95 %
     ");
     let after = records(&house.0.path("run"));
     // The two that failed are tried again, nothing else.
@@ -233,9 +235,10 @@ fn larger_limit_repeats_truncated_marks() {
     assert_eq!((first.code, judge.requests().len()), (Some(1), 2));
     insta::assert_snapshot!(first.lines_with("scored"), @"
     exit code: 1
-     model   light       L0   scored   95 %
     0 of 2 answers scored
     2 without a mark in the judge's reply: not scored (--protocol tolerant reads
+    ! 2 answers are not scored, because the judge gave no mark.
+     model   light       L0   scored   95 %
     ");
 
     let grown = call("--judge-max-tokens 200");
@@ -247,8 +250,8 @@ fn larger_limit_repeats_truncated_marks() {
     ");
     insta::assert_snapshot!(grown.lines_with("scored"), @"
     exit code: 0
-     model   light          L0   scored   95 %
     2 of 2 answers scored
+     model   light          L0   scored   95 %
     ");
 
     // Nothing is asked again with this limit, or the first.

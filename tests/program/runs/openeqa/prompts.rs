@@ -117,12 +117,14 @@ fn blind_models_follow_upstream() {
     insta::assert_snapshot!(called, @r#"
     exit code: 0
     stdout:
-    Score in % (LLM-Match, marked by script:j.jsonl, protocol upstream): mean (difference from L0), and how far
-        the widest 95 % interval over 2 episodes reaches down and up
-    m without images: 66.7 [1.3–99.7], n 3
+    OpenEQA by LLM-Match, marked by script:j.jsonl, protocol upstream
     3 of 3 answers scored
     1 without an answer (none in a file, only thoughts, no "A:" of a blind model):
      scored 0, unjudged
+
+    Score in % (LLM-Match, marked by script:j.jsonl, protocol upstream): mean (difference from L0), and how far
+        the widest 95 % interval over 2 episodes reaches down and up
+    m without images: 66.7 [1.3–99.7], n 3
     run: run
     report: run/report.html
     "#);

@@ -1,7 +1,5 @@
-//! Data of a report on open questions: [`OpenReport`].
+//! Answers to open questions with the marks of a judge: [`MarkedAnswers`].
 
-use crate::report::tables::EnhancerRow;
-use crate::report::text::alert::Alert;
 use crate::report::text::words::ProfileNames;
 use crate::types::manifests::RunManifest;
 use crate::types::{RunQuestion, Thumbnail};
@@ -9,18 +7,14 @@ use darkqa_score::choice::llm_match::Protocol;
 use darkqa_score::model_in_condition::ModelInCondition;
 use darkqa_score::open::{AnswerOutcome, OpenSummary};
 
-/// All data of a report on open questions.
+/// Answers to open questions, with their marks and scores.
 #[derive(Debug, Clone)]
-pub(crate) struct OpenReport<'a> {
+pub(crate) struct MarkedAnswers<'a> {
     pub summary: &'a OpenSummary,
     /// Manifest of the run, or of the first run of several.
     pub manifest: &'a RunManifest,
     /// Names and manifests of all runs.
     pub runs: Vec<(&'a str, &'a RunManifest)>,
-    /// Warnings at the top, if there are several runs.
-    pub alerts: &'a [Alert],
-    /// Use of each enhancer.
-    pub enhancers: &'a [EnhancerRow],
     /// Name of the judge; `None` if no judge was named.
     pub judge: Option<&'a str>,
     /// Protocol by which the answers are judged.
@@ -35,7 +29,7 @@ pub(crate) struct OpenReport<'a> {
     pub thumbnails: &'a [Thumbnail],
 }
 
-impl OpenReport<'_> {
+impl MarkedAnswers<'_> {
     /// Names of all runs.
     pub(crate) fn names(&self) -> Vec<String> {
         self.runs.iter().map(|(name, _)| (*name).to_owned()).collect()

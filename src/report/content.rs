@@ -1,0 +1,83 @@
+//! The content of a report, whatever it measures: [`Report`] and its [`Measure`].
+
+use crate::error::Result;
+use crate::report::charts::chart::Figure;
+use crate::report::json::SummaryRuns;
+use crate::report::page::{PageInputs, PageParts};
+use crate::report::sentences::Sentence;
+use crate::report::tables::{EnhancerRow, enhancers};
+use crate::report::text::alert::Alert;
+use crate::report::text::table::Table;
+use crate::report::text::words::ProfileNames;
+use crate::runs::outcome::ReportLength;
+use darkqa_score::findings::Findings;
+
+/// What a report measures: accuracy, agreement of each model with its own answers at L0, or marks of a judge. All else
+/// in a report is the same for each measure.
+pub(crate) trait Measure {
+    /// Figures of the page.
+    fn figures(&self) -> Result<Vec<Figure>>;
+
+    /// The parts of the page that depend on the measure.
+    fn page_parts<'p>(&'p self, report: &'p Report<'_>, inputs: &'p PageInputs<'_>) -> Result<PageParts<'p>>;
+
+    /// Serializes the head of `summary.json` and the tables below it.
+    fn json(&self, report: &Report<'_>, runs: SummaryRuns<'_>, length: ReportLength) -> Result<String>;
+
+    /// The table by level, and the lines below it, for a short text.
+    fn short_tables(&self, report: &Report<'_>) -> String;
+
+    /// The tables of a short Markdown report.
+    fn short_markdown_tables<'t>(&self, tables: &'t [Table]) -> Vec<&'t Table>;
+
+    /// Noise profiles of the noisy images.
+    fn profiles(&self) -> ProfileNames;
+
+    /// False for a measure without statistical tests, whose report has no findings.
+    fn has_findings(&self) -> bool {
+        true
+    }
+
+    /// Title of the file with the tables as LaTeX.
+    fn latex_title(&self) -> &'static str {
+        "Findings and tables"
+    }
+
+    /// Further files, by name.
+    fn files(&self) -> Result<Vec<(String, Vec<u8>)>> {
+        Ok(Vec::new())
+    }
+
+    /// Findings whose items are listed by first failing level in a file of their own, which can be large.
+    fn first_failures(&self) -> Option<&Findings<'_>> {
+        None
+    }
+}
+
+/// Results of one or more runs as sentences and tables.
+pub struct Report<'a> {
+    pub(crate) measure: Box<dyn Measure + 'a>,
+    /// Numbers of models, questions and replies, one fact each.
+    pub(crate) facts: Vec<String>,
+    /// Warnings and notes at the top of the report.
+    pub alerts: Vec<Alert>,
+    /// Findings as sentences.
+    pub(crate) sentences: Vec<Sentence>,
+    /// Remark below the findings.
+    pub(crate) how_to_read: String,
+    /// All tables; the first is the summary.
+    pub tables: Vec<Table>,
+}
+
+impl Report<'_> {
+    /// Adds the tables of enhancer use.
+    pub(crate) fn with_enhancers(mut self, rows: &[EnhancerRow]) -> Self {
+        self.tables.extend(enhancers(rows));
+        self
+    }
+
+    /// The line with the numbers of models, questions and replies.
+    pub(crate) fn head(&self) -> String {
+        self.facts.join(" · ")
+    }
+}
