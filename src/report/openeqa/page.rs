@@ -192,6 +192,7 @@ fn data<'a>(
         texts: shortened(&results.texts, limit.text),
         replies: results.replies,
         judged: results.judged,
+        requests: None,
         confusions: Vec::new(),
     }
 }

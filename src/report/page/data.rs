@@ -92,9 +92,25 @@ pub(crate) struct PageData<'a> {
     pub(crate) replies: Vec<Vec<usize>>,
     /// Index into `texts` of each judge's reply; empty without a judge.
     pub(crate) judged: Vec<Vec<usize>>,
+    /// The requests behind the replies; omitted if no reply came from an endpoint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) requests: Option<PageRequests>,
     pub(crate) confusions: Vec<PageConfusion<'a>>,
     /// Images by frame index and condition name.
     pub(crate) thumbnails: BTreeMap<usize, BTreeMap<String, Picture<'a>>>,
+}
+
+/// Facts about the requests of each subject and item; 0 is not known.
+#[derive(Serialize)]
+pub(crate) struct PageRequests {
+    /// Duration of the last request, in milliseconds.
+    pub(crate) latency: Vec<Vec<u64>>,
+    /// Tokens of the prompt, with the images.
+    pub(crate) prompt: Vec<Vec<u64>>,
+    /// Tokens of the reply.
+    pub(crate) reply: Vec<Vec<u64>>,
+    /// Number of requests.
+    pub(crate) attempts: Vec<Vec<u32>>,
 }
 
 /// Subject of the report: a model in a condition.

@@ -5,8 +5,8 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::data::{
-    ABSENT, DistinctList, FAILED, PageConfusion, PageData, PageItem, PageKind, PageQuestion, PageSubject, SizeLimit,
-    UNREAD, levels, packed_by, shortened, sizes, thumbnails,
+    ABSENT, DistinctList, FAILED, PageConfusion, PageData, PageItem, PageKind, PageQuestion, PageRequests, PageSubject,
+    SizeLimit, UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
 use super::run_usage::PageInputs;
 use crate::error::Result;
@@ -96,8 +96,34 @@ fn data<'a>(
         why,
         texts: shortened(&replies.texts(), limit.text),
         replies: replies.indices.clone(),
+        requests: requests(grid),
         confusions: confusion_data(grid, confusions),
     }
+}
+
+/// The requests behind the replies; `None` if no reply came from an endpoint.
+fn requests(grid: &Grid<'_>) -> Option<PageRequests> {
+    let is_endpoint = |trial: TrialRef<'_>| trial.latency_ms().is_some() || trial.usage().is_some();
+    let places = (0..grid.subjects.len()).flat_map(|subject| (0..grid.items.len()).map(move |item| (subject, item)));
+    if !places.into_iter().any(|(subject, item)| grid.trial(subject, item).is_some_and(is_endpoint)) {
+        return None;
+    }
+    let tokens = |trial: TrialRef<'_>| trial.usage().unwrap_or_default();
+    Some(PageRequests {
+        latency: trial_values(grid, |trial| trial.latency_ms().unwrap_or(0)),
+        prompt: trial_values(grid, |trial| tokens(trial).prompt_tokens.unwrap_or(0)),
+        reply: trial_values(grid, |trial| tokens(trial).completion_tokens.unwrap_or(0)),
+        attempts: trial_values(grid, |trial| if is_endpoint(trial) { trial.attempts() } else { 0 }),
+    })
+}
+
+/// A value of each trial, with a row for each subject and a column for each item; the default without a trial.
+fn trial_values<T: Default>(grid: &Grid<'_>, value: impl Fn(TrialRef<'_>) -> T) -> Vec<Vec<T>> {
+    (0..grid.subjects.len())
+        .map(|subject| {
+            (0..grid.items.len()).map(|item| grid.trial(subject, item).map(&value).unwrap_or_default()).collect()
+        })
+        .collect()
 }
 
 /// Stored questions by id.

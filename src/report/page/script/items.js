@@ -329,7 +329,19 @@ const reply = (subject, i) => {
   $("r-mark").textContent = (sign ? sign + ", " : "") + word;
   $("r-mark").className = name;
   const said = (code) => code < UNREAD ? letter(code) : "nothing";
-  $("r-reading").textContent = lenient < FAILED ? `strict parsing: ${said(chosen(subject, i))} · lenient: ${said(lenient)}` : "";
+  const read = lenient < FAILED ? [`strict parsing: ${said(chosen(subject, i))}`, `lenient: ${said(lenient)}`] : [];
+  $("r-reading").textContent = [...read, ...requestOf(subject, i)].join(" · ");
+};
+
+// The request behind a reply: its time, tokens and attempts, as far as they are known.
+const requestOf = (subject, i) => {
+  if (!data.requests) return [];
+  const [latency, prompt, given, attempts] = ["latency", "prompt", "reply", "attempts"].map((name) => data.requests[name][subject][i]);
+  const facts = [];
+  if (latency) facts.push(`${latency} ms`);
+  if (prompt || given) facts.push(`${prompt} prompt and ${given} reply tokens`);
+  if (attempts > 1) facts.push(`${attempts} attempts`);
+  return facts;
 };
 
 const draw = () => {
@@ -425,8 +437,16 @@ const start = async () => {
   $("i-key").textContent = isOpen()
     ? "Marks of the judge from 1 to 5 (0: no answer) · ? not marked · ! not answered; a click shows the answer and what the judge said"
     : `${hasTruth() ? "✓ right · ✗ wrong" : `= ${SAME} · ≠ ${OTHER}`} · ? not read · ! failed; the letter is the choice that was read; a click shows the reply`;
+  // At first: the first model under test, raw images of the darkest level, and what it got wrong there.
   const first = data.subjects.find((s) => s.light !== "blind" && !s.reference) || data.subjects.find((s) => s.light !== "blind") || data.subjects[0];
-  state = { family: "all", model: first?.model, light: undefined, level: undefined, against: "–", show: "all", words: "", item: data.items.length ? 0 : null, pictured: null };
+  const order = (s) => everyLevel().indexOf(s.level);
+  const raws = data.subjects.filter((s) => s.model === first?.model && s.level !== null && s.enhancer === null);
+  const darkestOrder = Math.max(...raws.map(order));
+  const lost = isOpen() ? "mark below 5" : hasTruth() ? "wrong" : OTHER;
+  const isLost = (s) => data.items.some((_, i) => STATES[lost](data.subjects.indexOf(s), i));
+  const candidates = raws.filter((s) => order(s) === darkestOrder);
+  const darkest = candidates.find(isLost) ?? candidates[0];
+  state = { family: "all", model: first?.model, light: darkest?.light, level: darkest?.level, against: "–", show: darkest && isLost(darkest) ? lost : "all", words: "", item: data.items.length ? 0 : null, pictured: null };
   $("loading").hidden = true;
   $("explorer").hidden = false;
   const set = (key, id) => $(id).addEventListener("change", (event) => { acted(); state[key] = event.target.value; state.pictured = null; refresh(key); });

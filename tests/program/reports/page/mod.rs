@@ -118,10 +118,17 @@ fn level_follows_light(browser: &mut Browser) {
 fn filters(browser: &mut Browser) {
     let model = browser.evaluate("document.querySelector('#f-model').options[1].value");
     assert_eq!(model, SAID);
-    // The page opens at a model that is no reference.
-    let opened = browser.evaluate("document.querySelector('#f-model').value");
-    assert_eq!(opened, SAID);
+    // The items open at a model that is no reference, raw images of the darkest level, and what it got wrong there.
+    let opened = "['model', 'light', 'level', 'state'].map(name => document.querySelector('#f-' + name).value)";
+    assert_eq!(browser.evaluate(opened), json!([SAID, "with noise", "L5", "wrong"]));
+    assert_eq!(count(browser), "1 of 40 items");
+    // They follow the findings, before all tables.
+    let order =
+        browser.evaluate("[...document.querySelectorAll('main > section')].slice(0, 2).map(section => section.id)");
+    assert_eq!(order, json!(["findings", "items"]));
+    browser.choose("#f-state", "all");
     browser.choose("#f-model", "random");
+    browser.choose("#f-light", "untouched");
     level_follows_light(browser);
     browser.choose("#f-model", SAID);
     assert_eq!(count(browser), "40 of 40 items");
