@@ -183,19 +183,9 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
     progress.print_on_terminal(&format!("{model}: enhancing {n} dark images with each value range and colour order"));
     let mut outcome = doctor(&args.files, image, &mut enhancer, &dark, &sample)?;
     if outcome.status == Status::Complete {
-        outcome.output += &latency_of(&mut enhancer, &dark, args.enhancer.loading.threads.count()).to_string();
+        outcome.output += &Latency::of_enhancer(&mut enhancer, &dark).to_string();
     }
     Ok(outcome)
-}
-
-/// The time that the enhancer takes for each of these images; without those that it cannot enhance.
-fn latency_of(enhancer: &mut Enhancer, images: &[Rgb], threads: usize) -> Latency {
-    let mut latency = Latency::new(threads);
-    for image in images {
-        // The examination has reported images that cannot be enhanced.
-        let _ = latency.time((image.width(), image.height()), || enhancer.enhance(image));
-    }
-    latency
 }
 
 /// A sample of the images. Unreadable ones are skipped here, and reported when they are enhanced.
@@ -227,7 +217,7 @@ fn enhance_images(args: &EnhanceArgs, progress: &Progress) -> Result<Outcome> {
     let mut counts = ImageCounts::default();
     let refusals = ImageRefusals::default();
     let mut burnt = Vec::new();
-    let mut latency = Latency::new(loading.threads.count());
+    let mut latency = Latency::new(enhancer.threads());
     for entry in &images.entries {
         let picture = images.picture(entry);
         let outcome = picture.and_then(|picture| {

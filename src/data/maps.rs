@@ -433,6 +433,15 @@ impl Picture {
         }
     }
 
+    /// Exposure value at ISO 100 of the camera's settings; `None` if the file does not state them.
+    #[must_use]
+    pub fn exposure_value(&self) -> Option<f64> {
+        match self {
+            Self::Encoded(file) => file.exposure_value(),
+            Self::Drawn(..) => None,
+        }
+    }
+
     /// Checks that the image can be decoded, and returns its width and height in pixels.
     ///
     /// # Errors

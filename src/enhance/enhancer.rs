@@ -99,6 +99,8 @@ pub struct Enhancer {
     consecutive_overruns: usize,
     description: Description,
     usage: Usage,
+    /// Largest number of threads for an image.
+    threads: usize,
     /// Index of this enhancer among the twins that share `usage`.
     twin: usize,
 }
@@ -166,6 +168,7 @@ impl Enhancer {
                 flushed,
             },
             usage: Usage::default(),
+            threads: threads.or_else(|| std::thread::available_parallelism().ok()).map_or(1, NonZeroUsize::get),
             twin: 0,
         };
         enhancer.note_convention();
@@ -258,6 +261,18 @@ impl Enhancer {
         }
         self.usage.set_sizes(self.twin, &self.log);
         attempt.map_err(|failure| self.run_error(&failure, size))
+    }
+
+    /// Enhances an image as [`Self::enhance`] does, without counting it in the usage record.
+    ///
+    /// # Errors
+    /// As [`Self::enhance`].
+    pub fn enhance_uncounted(&mut self, image: &Rgb) -> Result<Rgb> {
+        let log = self.log.clone();
+        let enhanced = self.enhance(image);
+        self.log = log;
+        self.usage.set_sizes(self.twin, &self.log);
+        enhanced
     }
 
     /// Size rule for an image of this height and width, from the graph, the convention and earlier trials.

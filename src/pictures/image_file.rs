@@ -97,6 +97,13 @@ impl ImageFile {
         Some(StatedOrientation { orientation: orientation.to_exif(), stored_size: (height as usize, width as usize) })
     }
 
+    /// Exposure value at ISO 100 of the camera's settings in the EXIF data (aperture, exposure time, sensitivity); `None`
+    /// if the file does not state them.
+    #[must_use]
+    pub fn exposure_value(&self) -> Option<f64> {
+        self.facts().exposure_value
+    }
+
     /// Path of the file, and line if any, for messages.
     #[must_use]
     pub fn place(&self) -> &str {

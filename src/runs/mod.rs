@@ -19,4 +19,6 @@ pub(crate) mod sharded_run;
 pub(crate) mod stored;
 pub(crate) mod training;
 
-pub(crate) use outcome::{LUX_AT_L0, LuxArgs, Outcome, PrintArgs, StdoutFormat, Syntax};
+pub(crate) use outcome::{
+    EXPOSURE_VALUE, LLIE_BUDGET, LUX_AT_L0, Outcome, PrintArgs, StatedArgs, StdoutFormat, Syntax,
+};

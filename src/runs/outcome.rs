@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 use crate::types::Decides;
-use crate::types::flags::positive;
+use crate::types::flags::{milliseconds, positive};
 use crate::types::manifests::{RunManifest, Status};
 use crate::types::text::money;
 
@@ -72,23 +72,34 @@ pub(crate) struct PrintArgs {
     pub written: WrittenArgs,
 }
 
-/// The light where the images of a run were taken.
+/// What a user states about a run for its report. It changes nothing that is asked.
 #[derive(Debug, Clone, Copy, Default, Args)]
 #[command(next_help_heading = "Output")]
-pub(crate) struct LuxArgs {
+pub(crate) struct StatedArgs {
     /// Light where the images were taken (L0), measured in lux: the report then states thresholds in lux, too, and keeps
     /// it with the run; default: not known
     #[arg(long, alias = "lux-at-L0", value_name = "LUX", value_parser = positive, add = Decides::Nothing)]
     pub lux_at_l0: Option<f64>,
+    /// Time that an enhancer may take for an image, such as 50ms: the report names enhancers that take longer, and keeps
+    /// it with the run; default: no limit
+    #[arg(long, value_name = "TIME", help_heading = "Enhancement", value_parser = milliseconds, add = Decides::Nothing)]
+    pub llie_budget: Option<f64>,
 }
 
-/// Key of the light at L0 in the settings of a manifest.
+/// Key of the light at L0, in lux, in the settings of a manifest.
 pub(crate) const LUX_AT_L0: &str = "--lux-at-l0";
 
-impl LuxArgs {
-    /// The setting for a manifest; `None` if the light is not stated.
-    pub(crate) fn setting(self) -> Option<(&'static str, Value)> {
-        self.lux_at_l0.map(|lux| (LUX_AT_L0, json!(lux)))
+/// Key of the mean exposure value at ISO 100 of the images, and their number, in the settings of a manifest.
+pub(crate) const EXPOSURE_VALUE: &str = "exposure value at ISO 100";
+
+/// Key of the time that an enhancer may take for an image, in milliseconds, in the settings of a manifest.
+pub(crate) const LLIE_BUDGET: &str = "--llie-budget";
+
+impl StatedArgs {
+    /// The settings for a manifest, as far as they are stated.
+    pub(crate) fn settings(self) -> impl Iterator<Item = (&'static str, Value)> {
+        let stated = [(LUX_AT_L0, self.lux_at_l0), (LLIE_BUDGET, self.llie_budget)];
+        stated.into_iter().filter_map(|(key, value)| Some((key, json!(value?))))
     }
 }
 

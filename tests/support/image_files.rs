@@ -88,6 +88,30 @@ pub fn turned_jpeg(jpeg: &[u8], orientation: u16) -> Vec<u8> {
     with_segment(jpeg, 0xE1, &data)
 }
 
+/// A JPEG file that states a camera's aperture and exposure time (fractions) and sensitivity.
+pub fn exposed_jpeg(jpeg: &[u8], aperture: [u32; 2], time: [u32; 2], sensitivity: u16) -> Vec<u8> {
+    let entry = |tag: u16, kind: u16, value: u32| {
+        [&tag.to_be_bytes()[..], &kind.to_be_bytes(), &1_u32.to_be_bytes(), &value.to_be_bytes()].concat()
+    };
+    let (settings, values) = (26, 68);
+    let fractions: Vec<u8> = [time, aperture].concat().iter().flat_map(|number| number.to_be_bytes()).collect();
+    let data = [
+        &b"Exif\0\0MM\0*"[..],
+        &8_u32.to_be_bytes(),
+        &1_u16.to_be_bytes(),
+        &entry(0x8769, 4, settings),
+        &[0; 4],
+        &3_u16.to_be_bytes(),
+        &entry(0x829A, 5, values),
+        &entry(0x829D, 5, values + 8),
+        &entry(0x8827, 3, u32::from(sensitivity) << 16),
+        &[0; 4],
+        &fractions,
+    ]
+    .concat();
+    with_segment(jpeg, 0xE1, &data)
+}
+
 /// The image as a person sees it, by the meaning of the eight values (TIFF 6.0, section 8): the side of the image at
 /// which the first row stands, then the side at which the first column stands.
 pub fn seen(stored: &RgbImage, orientation: u16) -> RgbImage {

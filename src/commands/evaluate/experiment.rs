@@ -23,7 +23,7 @@ use crate::error::Result;
 use crate::report::joined;
 use crate::runs::forecast::PowerForecast;
 use crate::runs::stored::StoredRun;
-use crate::runs::{Outcome, StdoutFormat};
+use crate::runs::{EXPOSURE_VALUE, Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{
@@ -127,7 +127,13 @@ impl Experiment for ChoiceSetup<'_> {
             let note = json!({"mean": mean, "frames": frames});
             ("brightness", note)
         });
-        [bank, reading, light, brightness, self.config.lux.setting()].into_iter().flatten().collect()
+        let exposure =
+            self.exposure_value.map(|(mean, frames)| (EXPOSURE_VALUE, json!({"mean": mean, "frames": frames})));
+        [bank, reading, light, brightness, exposure]
+            .into_iter()
+            .flatten()
+            .chain(self.config.stated.settings())
+            .collect()
     }
 
     fn columns(&self) -> Columns {

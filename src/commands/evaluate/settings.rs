@@ -19,7 +19,7 @@ use crate::engine::models::{ModelName, TextBaseline};
 use crate::engine::settings::{ExperimentSettings, JobArgs, JobSettings};
 use crate::error::{Error, Result};
 use crate::pictures::DecodeRule;
-use crate::runs::LuxArgs;
+use crate::runs::StatedArgs;
 use crate::runs::run_plan::RunPlan;
 use crate::types::manifests::Identity;
 use crate::types::{AxisLevel, Choices, Condition, Decides, Digest, Family, Question, SetLight, Truths, View};
@@ -55,9 +55,9 @@ pub(crate) struct EvaluateArgs {
     /// The size in which images are sent.
     #[command(flatten)]
     pub shrink: ShrinkArgs,
-    /// The light where the images were taken.
+    /// What the user states for the report.
     #[command(flatten)]
-    pub lux: LuxArgs,
+    pub stated: StatedArgs,
 }
 
 /// The flags for asking questions with choices.
@@ -123,8 +123,8 @@ pub(super) struct Evaluation {
     pub(super) observer_controls: bool,
     /// The plan in the folder of the run; `None` if there is none.
     pub(super) plan: Option<RunPlan>,
-    /// The light where the images were taken.
-    pub(super) lux: LuxArgs,
+    /// What the user states for the report.
+    pub(super) stated: StatedArgs,
     pub(super) job: JobSettings,
 }
 
@@ -170,7 +170,7 @@ impl EvaluateArgs {
             order: self.order,
             bank,
             plan,
-            lux: self.lux,
+            stated: self.stated,
             prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
             job,
         })

@@ -50,6 +50,9 @@ pub(super) struct ChoiceSetup<'a> {
     pub(super) bank: Option<Digest>,
     /// Mean linear luminance of a sample of the frames, and the sample size; `None` if the set is not dark.
     pub(super) brightness: Option<(f64, usize)>,
+    /// Mean exposure value at ISO 100 of the frames, from the camera's settings in their files, and the number of frames
+    /// that state them; `None` if at most half of them do.
+    pub(super) exposure_value: Option<(f64, usize)>,
 }
 
 impl<'a> ChoiceSetup<'a> {
@@ -98,6 +101,7 @@ impl<'a> ChoiceSetup<'a> {
             conditions(&job.light, &photographs::names(&sources), job.enhancers.on(), &recipe.enhancer_names());
         let brightness =
             (job.set_light == SetLight::Dark).then(|| dark_already::brightness(&*dataset, &sources)).flatten();
+        let exposure_value = mean_exposure_value(&sources);
         let probe_sources =
             if part.is_some() && !enhancer_files.is_empty() { probe_sources(&dataset, &selected) } else { Vec::new() };
         let shown = models.iter().any(is_other_room).then_some(other_rooms).flatten().filter(|_| shows_images);
@@ -112,6 +116,7 @@ impl<'a> ChoiceSetup<'a> {
             bank: config.bank.as_ref().map(QuestionBank::digest).transpose()?,
             conditions,
             brightness,
+            exposure_value,
             recipe,
             dataset,
         };
@@ -138,6 +143,12 @@ impl<'a> ChoiceSetup<'a> {
     pub(super) fn own(&self) -> impl Iterator<Item = &Sample> + Clone {
         self.samples.iter().filter(|sample| sample.source.is_some())
     }
+}
+
+/// Mean exposure value of the sources and the number of them that have one; `None` if at most half do.
+fn mean_exposure_value(sources: &[Source]) -> Option<(f64, usize)> {
+    let known: Vec<f64> = sources.iter().filter_map(|source| source.middle()?.exposure_value).collect();
+    (2 * known.len() > sources.len()).then(|| (known.iter().sum::<f64>() / known.len() as f64, known.len()))
 }
 
 /// Frames of the whole run, evenly spread, that a shard tries enhancers on. Frames that cannot be read are left out.

@@ -29,6 +29,12 @@ impl Enhancer {
         self.usage.clone()
     }
 
+    /// Largest number of threads that work on one image.
+    #[must_use]
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
     /// The enhancer with another usage record, into which it writes from now on.
     pub(crate) fn with_usage(self, usage: Usage) -> Self {
         let enhancer = Self { usage, ..self };

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::plausible::{DARK, Gravity, MeasuredFlaw, UnclampedImage, brightness, judge, shows_nothing};
 use crate::conventions::LUMA;
 use darkqa_base::error::{Error, Result};
-use darkqa_base::types::manifests::{ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage};
+use darkqa_base::types::manifests::{ConventionLine, ELSEWHERE, EnhancerLatency, EnhancerNote, FlawedImage};
 use darkqa_base::types::{Digest, Rgb, SizeLog};
 
 /// Minimum number of dark images for a verdict on the enhancer; chosen as the number of frames of the probe.
@@ -192,6 +192,11 @@ impl Usage {
     /// Copy of the record's present state.
     pub fn note(&self) -> EnhancerNote {
         self.with(|state| state.note.clone())
+    }
+
+    /// Sets the times for an image.
+    pub fn set_latency(&self, latency: Vec<EnhancerLatency>) {
+        self.update(|note| note.latency = latency);
     }
 
     /// Sets the counts of whole, padded and tiled images of a twin.

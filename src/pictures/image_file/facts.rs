@@ -25,6 +25,8 @@ use darkqa_base::files::guarded;
 pub(super) struct FileFacts {
     /// EXIF orientation; no transform if it is missing or invalid.
     pub(super) orientation: Orientation,
+    /// Exposure value at ISO 100 of the camera's settings in the EXIF data; `None` if they are missing or invalid.
+    pub(super) exposure_value: Option<f64>,
     /// Kind of a file with several pictures, of which only the first is read; else `None`.
     pub(super) first_of: Option<&'static str>,
     pub(super) colour: ColourTag,
@@ -62,6 +64,7 @@ pub(super) enum InkForm {
 impl FileFacts {
     pub(super) const NONE: Self = Self {
         orientation: Orientation::NoTransforms,
+        exposure_value: None,
         first_of: None,
         colour: ColourTag::None,
         depth: SampleType::Eight,
@@ -76,6 +79,7 @@ impl FileFacts {
                 let properties = PngProperties::parse(file);
                 Self {
                     orientation: exif_orientation(properties.exif),
+                    exposure_value: properties.exif.and_then(exposure_value),
                     first_of: kind_if_several(properties.frames, "animated PNG"),
                     colour: properties.colour,
                     depth: code_depth(properties.bits.into()),
@@ -87,6 +91,7 @@ impl FileFacts {
                 let form = if properties.is_adobe { InkForm::Adobe } else { InkForm::Plain };
                 Self {
                     orientation: exif_orientation(properties.exif),
+                    exposure_value: properties.exif.and_then(exposure_value),
                     inks: (properties.components == Some(4)).then_some(form),
                     colour: profile_tag(properties.profile()),
                     ..Self::NONE
@@ -96,6 +101,7 @@ impl FileFacts {
                 let properties = WebpProperties::parse(file);
                 Self {
                     orientation: exif_orientation(properties.exif),
+                    exposure_value: properties.exif.and_then(exposure_value),
                     first_of: kind_if_several(properties.frames, "animated WebP"),
                     colour: profile_tag(properties.profile.map(<[u8]>::to_vec)),
                     ..Self::NONE
@@ -106,6 +112,7 @@ impl FileFacts {
                 let stated = u8::try_from(properties.orientation).ok();
                 Self {
                     orientation: stated.and_then(Orientation::from_exif).unwrap_or(Orientation::NoTransforms),
+                    exposure_value: None,
                     first_of: kind_if_several(properties.pages, "TIFF of several pages"),
                     colour: profile_tag(properties.profile.map(<[u8]>::to_vec)),
                     depth: code_depth(properties.bits),
@@ -132,6 +139,24 @@ impl FileFacts {
 
 fn exif_orientation(exif: Option<&[u8]>) -> Orientation {
     exif.and_then(Orientation::from_exif_chunk).unwrap_or(Orientation::NoTransforms)
+}
+
+/// Exposure value at ISO 100 of the settings in EXIF data: log₂(N² / t) − log₂(S / 100), with the aperture N (`FNumber`),
+/// the exposure time t in seconds (`ExposureTime`) and the sensitivity S (`PhotographicSensitivity`), as in APEX (EXIF
+/// 2.32, annex C); `None` if one of them is missing or not above 0.
+fn exposure_value(exif: &[u8]) -> Option<f64> {
+    let fields = guarded(|| exif::Reader::new().read_raw(exif.to_vec()).map_err(|e| e.to_string())).ok()?;
+    let number = |tag| {
+        let value = &fields.get_field(tag, exif::In::PRIMARY)?.value;
+        let number = match value {
+            exif::Value::Rational(values) => values.first()?.to_f64(),
+            value => f64::from(value.get_uint(0)?),
+        };
+        Some(number).filter(|number| number.is_finite() && *number > 0.0)
+    };
+    let aperture = number(exif::Tag::FNumber)?;
+    let (time, sensitivity) = (number(exif::Tag::ExposureTime)?, number(exif::Tag::PhotographicSensitivity)?);
+    Some(libm::log2(aperture * aperture / time) - libm::log2(sensitivity / 100.0))
 }
 
 fn kind_if_several(pictures: usize, kind: &'static str) -> Option<&'static str> {
@@ -492,5 +517,52 @@ mod tests {
     fn copies_and_masks_are_no_pages() {
         let masked = file(&[(0, Some(1)), (4, Some(2)), (1, None)]);
         assert_eq!(TiffProperties::parse(&masked).pages, 1);
+    }
+
+    /// EXIF data in Intel order with an aperture, an exposure time (fractions) and a sensitivity.
+    fn camera(aperture: [u32; 2], time: [u32; 2], sensitivity: u16) -> Vec<u8> {
+        let entry = |tag: u16, kind: u16, value: u32| {
+            [&tag.to_le_bytes()[..], &kind.to_le_bytes(), &1_u32.to_le_bytes(), &value.to_le_bytes()].concat()
+        };
+        let (exif, values) = (8 + 2 + 12 + 4, 8 + 2 + 12 + 4 + 2 + 3 * 12 + 4);
+        [
+            &b"II*\0"[..],
+            &8_u32.to_le_bytes(),
+            &1_u16.to_le_bytes(),
+            // The directory of the camera's settings.
+            &entry(0x8769, 4, exif),
+            &[0; 4],
+            &3_u16.to_le_bytes(),
+            &entry(0x829A, 5, values),
+            &entry(0x829D, 5, values + 8),
+            &entry(0x8827, 3, sensitivity.into()),
+            &[0; 4],
+            &[time, aperture].concat().iter().flat_map(|number| number.to_le_bytes()).collect::<Vec<u8>>(),
+        ]
+        .concat()
+    }
+
+    #[test]
+    fn exposure_values_follow_apex() {
+        // f/1 for 1 s at ISO 100 is the zero of the scale; each stop of the three settings is one value.
+        for (aperture, time, sensitivity, expected) in [
+            ([1, 1], [1, 1], 100, 0.0),
+            ([2, 1], [1, 1], 100, 2.0),
+            ([1, 1], [1, 8], 100, 3.0),
+            ([1, 1], [1, 1], 1600, -4.0),
+            ([28, 10], [1, 50], 400, 6.615),
+        ] {
+            let found = exposure_value(&camera(aperture, time, sensitivity)).unwrap();
+            assert!((found - expected).abs() < 0.001, "{found} for {expected}");
+        }
+        for (aperture, time, sensitivity) in
+            [([0, 1], [1, 1], 100), ([1, 0], [1, 1], 100), ([1, 1], [0, 1], 100), ([1, 1], [1, 1], 0)]
+        {
+            assert_eq!(exposure_value(&camera(aperture, time, sensitivity)), None);
+        }
+        let complete = camera([2, 1], [1, 1], 100);
+        for length in 0..complete.len() {
+            assert_eq!(exposure_value(&complete[..length]), None, "{length} bytes");
+        }
     }
 }

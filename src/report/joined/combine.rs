@@ -9,8 +9,8 @@ use super::join::{Joined, JoinedRun, join};
 use super::listing::listing;
 use crate::error::{Error, Result};
 use crate::report::page::{self, PageInputs};
-use crate::runs::LUX_AT_L0;
 use crate::runs::stored::StoredRun;
+use crate::runs::{EXPOSURE_VALUE, LUX_AT_L0};
 use crate::types::manifests::RunManifest;
 use crate::types::{ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word};
 use darkqa_score::accuracies::OfferedChoices;
@@ -18,7 +18,7 @@ use darkqa_score::cluster::{ClusterUnit, Clusters, FrameTies};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::without_run;
-use darkqa_score::photographs::PhotographedSet;
+use darkqa_score::photographs::{PhotographedSet, lux_of_exposure_value};
 
 /// Joined runs of questions with choices.
 pub(super) type CombinedRuns = Joined<ChoiceDetail>;
@@ -49,14 +49,29 @@ impl CombinedRuns {
         let stated = |run: &JoinedRun| run.manifest.settings.get(LUX_AT_L0).and_then(Value::as_f64);
         let lux =
             self.runs.first().and_then(stated).filter(|lux| self.runs.iter().all(|run| stated(run) == Some(*lux)));
+        let exposure = if lux.is_none() { self.exposure_value() } else { None };
+        let lux = lux.or_else(|| exposure.map(|(mean, _)| lux_of_exposure_value(mean)));
+        let exposed = exposure.map(|(_, images)| images);
         if self.runs.is_empty() || !self.runs.iter().all(is_dark) {
-            return PhotographedSet { lux, ..PhotographedSet::default() };
+            return PhotographedSet { lux, exposed, ..PhotographedSet::default() };
         }
         let brightness = self.runs.iter().find_map(|run| {
             let measured = run.manifest.settings.get("brightness")?;
             Some((measured.get("mean")?.as_f64()?, measured.get("frames")?.as_u64()? as usize))
         });
-        PhotographedSet { light: SetLight::Dark, brightness, lux }
+        PhotographedSet { light: SetLight::Dark, brightness, lux, exposed }
+    }
+
+    /// Mean exposure value at ISO 100 of the images of all runs, and their number; `None` if a run does not state it.
+    fn exposure_value(&self) -> Option<(f64, usize)> {
+        let stated = |run: &JoinedRun| {
+            let value = run.manifest.settings.get(EXPOSURE_VALUE)?;
+            Some((value.get("mean")?.as_f64()?, value.get("frames")?.as_u64()? as usize))
+        };
+        let all: Vec<(f64, usize)> = self.runs.iter().map(stated).collect::<Option<_>>()?;
+        let images: usize = all.iter().map(|(_, images)| images).sum();
+        let sum: f64 = all.iter().map(|(mean, images)| mean * *images as f64).sum();
+        (images > 0).then(|| (sum / images as f64, images))
     }
 
     /// Whether true answers are known. [`combine`] checks that they are known for all questions or for none.

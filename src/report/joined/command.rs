@@ -9,6 +9,7 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use serde_json::Value;
 
 use super::alerts::duplicate_folder_alerts;
 use super::baseline::{Baseline, FAIL_IF_WORSE};
@@ -28,7 +29,7 @@ use crate::report::page::PageInputs;
 use crate::report::text::alert::Alert;
 use crate::runs::sharded_run::{open_any_run, open_choice_run};
 use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
-use crate::runs::{LUX_AT_L0, LuxArgs, Outcome, PrintArgs, StdoutFormat, Syntax, record_table};
+use crate::runs::{LUX_AT_L0, Outcome, PrintArgs, StatedArgs, StdoutFormat, Syntax, record_table};
 use crate::store::{AddressChange, Store, now};
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{AskedItem, ChoiceDetail, Decides, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
@@ -61,9 +62,9 @@ pub(crate) struct ReportArgs {
     /// An old run to compare with.
     #[command(flatten)]
     pub baseline: BaselineArgs,
-    /// The light where the images were taken.
+    /// What the user states about the runs.
     #[command(flatten)]
-    pub lux: LuxArgs,
+    pub stated: StatedArgs,
     /// How the report is printed.
     #[command(flatten)]
     pub show: ReportShowArgs,
@@ -104,6 +105,11 @@ impl ReportArgs {
     pub(crate) fn writes_into_run(&self) -> bool {
         let is_of_single_run = self.runs.len() == 1 && self.baseline.baseline.is_none();
         is_of_single_run && self.out.is_none() && !self.common
+    }
+
+    /// Settings of the manifests of all runs that the user states.
+    fn stated_settings(&self) -> impl Iterator<Item = (String, Value)> {
+        self.stated.settings().map(|(key, value)| (key.to_owned(), value))
     }
 
     /// Format of the report on standard output.
@@ -176,7 +182,7 @@ fn report_choices(
             run.manifest.counts = Counts::new(run.manifest.counts.trials, failed);
         }
         run.leave_out(args.shown_models());
-        run.manifest.settings.extend(args.lux.setting().map(|(key, value)| (key.to_owned(), value)));
+        run.manifest.settings.extend(args.stated_settings());
     }
     if args.format().is_document() {
         rescore_text.clear();
@@ -292,7 +298,7 @@ fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicat
             "compares runs of questions with choices; marks of open questions have no such test: leave it out";
         return Err(Error::usage(*flag, problem));
     }
-    if args.lux.lux_at_l0.is_some() {
+    if args.stated.lux_at_l0.is_some() {
         return Err(Error::usage(LUX_AT_L0, "a report on open questions has no threshold: leave it out"));
     }
     if let Some(run) = runs.iter().find(|run| run.trials.is_empty()) {
@@ -300,6 +306,7 @@ fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicat
     }
     for run in &mut runs {
         run.leave_out(args.shown_models());
+        run.manifest.settings.extend(args.stated_settings());
     }
     let is_single = runs.len() == 1 && duplicate_alerts.is_empty();
     let mut joined = open::combine(runs)?;

@@ -4,10 +4,14 @@
 
 use std::collections::BTreeSet;
 
+use serde_json::Value;
+
 use super::join::JoinedRun;
 use crate::error::Result;
 use crate::report::tables::EnhancerRow;
 use crate::report::text::alert::{Alert, AlertKind};
+use crate::runs::LLIE_BUDGET;
+use crate::types::flags::setting_spelling;
 use crate::types::manifests::{
     ELSEWHERE, EnhancerNote, FIRST_REPLY_READING, JudgedImages, ProbeOutcome, RunManifest, TRAINED_ON,
 };
@@ -43,7 +47,7 @@ pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
 /// Alerts about the enhancers.
 pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
     let mut alerts: Vec<Alert> = Vec::new();
-    for (_, name, note) in notes(runs) {
+    for (run, name, note) in notes(runs) {
         let mut add = |text: String| {
             let alert = Alert::new(AlertKind::Enhancer, text);
             if !alerts.contains(&alert) {
@@ -59,6 +63,9 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
                 add(format!("{name}, used as its sidecar or preset states: {problem}."));
             }
             _ => {}
+        }
+        for text in over_budget(run, note) {
+            add(format!("{name}{text}."));
         }
         for remark in &note.remarks {
             add(format!("{name}: {remark}."));
@@ -85,7 +92,33 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
             ));
         }
     }
+    let budgets = runs.iter().filter(|run| run.manifest.settings.contains_key(LLIE_BUDGET));
+    if budgets.clone().count() > 0 && budgets.clone().all(|run| run.manifest.enhancers.is_empty()) {
+        alerts.push(Alert::new(
+            AlertKind::Enhancer,
+            format!("{} has no effect: no enhancer ran.", setting_spelling(LLIE_BUDGET)),
+        ));
+    }
     alerts
+}
+
+/// Sizes at which an enhancer takes longer than `--llie-budget` for more than 5 % of the images, as texts that follow
+/// its name.
+fn over_budget(run: &JoinedRun, note: &EnhancerNote) -> Vec<String> {
+    let Some(budget) = run.manifest.settings.get(LLIE_BUDGET).and_then(Value::as_f64) else {
+        return Vec::new();
+    };
+    if note.latency.is_empty() {
+        return vec![format!(
+            ": no time per image is stored, so {} cannot be checked; `darkqa-eval enhance doctor` measures it",
+            setting_spelling(LLIE_BUDGET)
+        )];
+    }
+    note.latency
+        .iter()
+        .filter(|latency| latency.within_95_ms > budget)
+        .map(|latency| format!(" takes longer than {}={budget}ms: {latency}", setting_spelling(LLIE_BUDGET)))
+        .collect()
 }
 
 fn notes(runs: &[JoinedRun]) -> impl Iterator<Item = (&JoinedRun, &str, &EnhancerNote)> {

@@ -147,7 +147,12 @@ pub(super) fn write_report<D: Detail>(
     }
     let cost = inputs.runs.iter().find_map(|run| run.cost.as_ref());
     let cost = cost.map_or_else(String::new, |cost| format!("cost: {cost}\n"));
-    Ok(text + &cost + &format!("report: {}\n", folder.join(PAGE).display()))
+    let latencies: String = manifest
+        .enhancers
+        .iter()
+        .flat_map(|(name, note)| note.latency.iter().map(move |latency| format!("{name}: {latency}\n")))
+        .collect();
+    Ok(text + &latencies + &cost + &format!("report: {}\n", folder.join(PAGE).display()))
 }
 
 /// Removes the models that a report leaves out by default.

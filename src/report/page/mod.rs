@@ -158,6 +158,9 @@ fn run_facts(run: &PageRun<'_>) -> Value {
     let mut rows = status_facts(manifest);
     rows.extend(run.usage.iter().flat_map(RunUsage::facts));
     rows.extend(run.cost.iter().map(|cost| fact("cost", cost.clone())));
+    rows.extend(manifest.enhancers.iter().flat_map(|(name, note)| {
+        note.latency.iter().map(move |latency| fact(&format!("latency of {name}"), latency.to_string()))
+    }));
     rows.extend(setting_facts(manifest));
     json!({"name": run.name, "rows": rows})
 }

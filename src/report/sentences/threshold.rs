@@ -11,6 +11,7 @@ use darkqa_score::accuracies::{Curve, FloorKind};
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
+use darkqa_score::photographs::PhotographedSet;
 use darkqa_score::threshold::Threshold;
 
 /// Maximum number of models that a sentence names (chosen); the table of thresholds has all.
@@ -39,7 +40,7 @@ pub(super) fn seen_down_to(findings: &Findings<'_>, variant: &Variant) -> Vec<Se
     let writer = Writer {
         grid: &findings.grid,
         variant,
-        lux: findings.set.lux,
+        set: findings.set,
         what: if is_blind { "what images add" } else { "the lead over guessing" },
         light: None,
         numbers: NamedNumbers::new(findings.unit),
@@ -68,7 +69,7 @@ pub(super) fn evidence_down_to(found: &SelfAgreement<'_>, model: &str, variant: 
     let writer = Writer {
         grid: &found.grid,
         variant,
-        lux: found.set.lux,
+        set: found.set,
         what: "the evidence of its images",
         light: Some(light(variant, None)),
         numbers: NamedNumbers::new(found.unit),
@@ -88,8 +89,8 @@ struct KnownThreshold<'f> {
 struct Writer<'f, 'a> {
     grid: &'f Grid<'a>,
     variant: &'f Variant,
-    /// Light at L0, in lux.
-    lux: Option<f64>,
+    /// The light at L0.
+    set: PhotographedSet,
     /// Quantity of which half is lost at the threshold.
     what: &'static str,
     /// The light in words, if the sentence names it.
@@ -109,7 +110,14 @@ impl Writer<'_, '_> {
         let first = raw.first()?;
         let text = if asked == 1 { self.one_model(first, &enhanced) } else { self.several_models(&raw, asked) };
         let floor = floor(&mut self.numbers, first.model);
-        let detail = format!("{floor}; an estimate with its interval, not a test");
+        let exposed = match self.set.exposed {
+            Some(images) if self.axis() == Axis::LIGHT => {
+                let images = self.numbers.count("exposed", images);
+                format!("; lux at L0 estimated from the camera settings of {images} images, as its meter would")
+            }
+            _ => String::new(),
+        };
+        let detail = format!("{floor}{exposed}; an estimate with its interval, not a test");
         Some(self.numbers.sentence("threshold", EffectDirection::Note, text, detail))
     }
 
@@ -172,7 +180,7 @@ impl Writer<'_, '_> {
             format!(" [{}, {}]", number("threshold_low", low), number("threshold_high", high))
         };
         let drop = format!("{drop} {}{ends}", axis.unit);
-        match self.lux.filter(|_| axis == Axis::LIGHT && value.is_finite()) {
+        match self.set.lux.filter(|_| axis == Axis::LIGHT && value.is_finite()) {
             None => drop,
             Some(at_l0) => {
                 let light = lux(at_l0, value);

@@ -427,6 +427,15 @@ pub struct PhotographedSet {
     pub brightness: Option<(f64, usize)>,
     /// Light where the photographs were taken, in lux; `None` if it is not known.
     pub lux: Option<f64>,
+    /// Number of images from whose exposure `lux` is estimated ([`lux_of_exposure_value`]); `None` if it was measured.
+    pub exposed: Option<usize>,
+}
+
+/// Light in lux in which a camera's meter chooses an exposure value at ISO 100: C · 2^EV / 100, with C = 250 lx·s for a
+/// flat receptor (ISO 2720:1974, the constant of most incident-light meters).
+#[must_use]
+pub fn lux_of_exposure_value(exposure_value: f64) -> f64 {
+    2.5 * exposure_value.exp2()
 }
 
 impl PhotographedSet {

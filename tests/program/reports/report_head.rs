@@ -3,6 +3,7 @@
 use std::fs;
 
 use crate::support::house::House;
+use crate::support::image_files::{exposed_jpeg, jpeg};
 use crate::support::run::{Bench, words};
 use serde_json::{Value, json};
 
@@ -141,4 +142,52 @@ fn light_at_l0_stays_with_the_run() {
     assert_eq!(stored(), 200.0);
     let refused = bench.call(&words("report run --lux-at-l0 0"));
     assert!(refused.code == Some(2) && refused.stderr.contains("a number above 0 expected"), "{refused:?}");
+}
+
+#[test]
+fn enhancers_are_timed_and_held_to_a_budget() {
+    let bench = Bench::new();
+    let asked = |flags: &str| {
+        bench.complete(&words(&format!("--model random --data rooms:frames=3,size=96x72 --levels L0,L3 {flags}")))
+    };
+    let text = asked("--llie lift --llie-options budget=0.0001ms --out run");
+    assert!(text.contains("lift: 96 × 72: ") && text.contains(" ms per image (median of "), "{text}");
+    let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+    let latency = &manifest["enhancers"]["lift"]["latency"][0];
+    let [median, most] = ["median_ms", "within_95_ms"].map(|field| latency[field].as_f64().unwrap());
+    assert!(0.0 < median && median <= most && latency["threads"].as_u64() >= Some(1), "{latency}");
+    // Timing adds no image to the counts of the run: three frames at one level with noise.
+    assert_eq!(manifest["enhancers"]["lift"]["size_counts"]["images"], 3, "{manifest}");
+    let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
+    assert!(page.contains("latency of lift"), "the run facts");
+    let report = |flags: &str| bench.complete(&words(&format!("report {flags}"))).replace("\n  ", " ");
+    let over = "lift takes longer than --llie-options budget=0.0001ms: 96 × 72: ";
+    assert!(report("run").contains(over), "kept with the run");
+    let text = report("run --llie-budget 100s");
+    assert!(!text.contains("takes longer"), "{text}");
+    asked("--out plain");
+    assert!(report("plain --llie-budget 5").contains("--llie-options budget has no effect: no enhancer ran."));
+    let refused = bench.call(&words("report run --llie-budget fast"));
+    assert!(refused.code == Some(2) && refused.stderr.contains("a time such as 50ms or 0.05s expected"), "{refused:?}");
+}
+
+#[test]
+fn light_at_l0_is_estimated_from_the_settings_of_cameras() {
+    // By ISO 2720, 2.5 · 2^EV lux: f/2.8, 1/50 s, ISO 400 is 6.615 EV; f/2, 1/30 s, ISO 1600 is 2.907; f/8, 1/125 s is
+    // 12.966.
+    for (aperture, time, sensitivity, expected) in
+        [([28, 10], [1, 50], 400, 6.615), ([2, 1], [1, 30], 1600, 2.907), ([8, 1], [1, 125], 100, 12.966)]
+    {
+        let bench = Bench::with_questions(4);
+        let picture = image::open(bench.path("a.png")).unwrap().to_rgb8();
+        // The name keeps its ending: the content decides.
+        fs::write(bench.path("a.png"), exposed_jpeg(&jpeg(&picture), aperture, time, sensitivity)).unwrap();
+        bench.complete(&words("--model random --data set.jsonl --levels L0,L3 --out run"));
+        let manifest: Value = serde_json::from_slice(&fs::read(bench.path("run/manifest.json")).unwrap()).unwrap();
+        let exposure = &manifest["settings"]["exposure value at ISO 100"];
+        assert!((exposure["mean"].as_f64().unwrap() - expected).abs() < 0.1, "{exposure}");
+        assert_eq!(exposure["frames"], 1);
+        let heads = fs::read_to_string(bench.path("run/thresholds.csv")).unwrap();
+        assert!(heads.lines().next().unwrap().contains(",lux,"), "{heads}");
+    }
 }

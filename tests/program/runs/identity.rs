@@ -319,7 +319,7 @@ const OPEN_ADDITIONS: [Addition; 10] = [
 ];
 
 /// Settings that change no answer: on a run's folder they ask nothing.
-const NOTHING: [&str; 43] = [
+const NOTHING: [&str; 44] = [
     "--max-pixels 1000000",
     "--threads 1",
     "--offline",
@@ -360,6 +360,7 @@ const NOTHING: [&str; 43] = [
     "--json",
     "--no-parquet",
     "--lux-at-l0 200",
+    "--llie-budget 50ms",
     "--quiet",
     "--color never",
     "--config other.toml",

@@ -54,6 +54,19 @@ pub fn seconds(text: &str) -> Result<Duration, String> {
         .ok_or_else(|| "a number of seconds above 0 expected".to_owned())
 }
 
+/// Reads a duration above 0, such as `50ms`, `0.05s` or `50` (milliseconds); returns milliseconds.
+///
+/// # Errors
+/// If the text is anything else; the error names the expected value.
+pub fn milliseconds(text: &str) -> Result<f64, String> {
+    let text = text.trim();
+    let (number, factor) = match text.strip_suffix("ms") {
+        Some(number) => (number, 1.0),
+        None => text.strip_suffix('s').map_or((text, 1.0), |number| (number, 1e3)),
+    };
+    positive(number).map(|value| value * factor).map_err(|_| "a time such as 50ms or 0.05s expected".to_owned())
+}
+
 /// Reads a number of threads.
 ///
 /// # Errors

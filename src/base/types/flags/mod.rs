@@ -19,7 +19,7 @@ use super::text::{is_nearly, suggestion};
 pub use flag::Decides;
 
 #[cfg(feature = "program")]
-pub use flag::{flag_words, positive, read_word, seconds, threads, write_word};
+pub use flag::{flag_words, milliseconds, positive, read_word, seconds, threads, write_word};
 
 /// A flag that takes several settings, such as `--noise gain=3,fixed`.
 #[derive(Debug)]
@@ -114,6 +114,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
             ("max-side", "llie-max-side"),
             ("resize", "llie-resize"),
             ("timeout", "llie-timeout"),
+            ("budget", "llie-budget"),
             ("max-memory", "llie-max-memory"),
             ("ort-lib", "ort-lib"),
             ("offline", "offline"),

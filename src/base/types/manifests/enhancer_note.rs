@@ -3,7 +3,7 @@
 //! Counts of the image sizes in which an enhancer ran: [`SizeLog`].
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
+use std::fmt::{self, Write as _};
 
 use serde::{Deserialize, Serialize};
 
@@ -34,6 +34,9 @@ pub struct EnhancerNote {
     /// Findings of the probe before the first question; `None` if it was not run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub probe: Option<ProbeNote>,
+    /// Time for an image, by size; empty if it was not measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub latency: Vec<EnhancerLatency>,
     /// Caveats for readers of the results, as sentences that follow the enhancer's name.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub remarks: Vec<String>,
@@ -43,6 +46,52 @@ pub struct EnhancerNote {
     /// Burnt-out images of the run, by condition.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub burnt_out: BTreeMap<String, BurntOutImages>,
+}
+
+/// Time that an enhancer takes for an image of one size, one image after the other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EnhancerLatency {
+    /// Width of the images, in pixels.
+    pub width: usize,
+    /// Height of the images, in pixels.
+    pub height: usize,
+    /// Number of images.
+    pub images: usize,
+    /// Median time, in milliseconds.
+    pub median_ms: f64,
+    /// Time that 95 % of the images do not exceed, in milliseconds.
+    pub within_95_ms: f64,
+    /// True if the only image also took the preparation for its size.
+    pub with_preparation: bool,
+    /// Largest number of threads for an image.
+    pub threads: usize,
+    /// Architecture and name of the CPU.
+    pub machine: String,
+}
+
+impl fmt::Display for EnhancerLatency {
+    /// `640 × 480: 38 ms per image (median of 20 images; 95 % within 44 ms), up to 2 threads of x86_64, NAME OF THE CPU`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { width, height, images, threads, machine, .. } = self;
+        let [median, most] = [self.median_ms, self.within_95_ms].map(milliseconds);
+        let sample = if self.with_preparation {
+            "one image, with the preparation for its size".to_owned()
+        } else {
+            format!("median of {}; 95 % within {most} ms", counted(*images, "image"))
+        };
+        let threads = counted(*threads, "thread");
+        write!(f, "{width} × {height}: {median} ms per image ({sample}), up to {threads} of {machine}")
+    }
+}
+
+/// Milliseconds with two digits at least: `0.48`, `4.8`, `48`, `480`.
+fn milliseconds(value: f64) -> String {
+    let decimals = match value {
+        ..1.0 => 2,
+        1.0..10.0 => 1,
+        _ => 0,
+    };
+    format!("{value:.decimals$}")
 }
 
 /// Burnt-out images of one condition: most of their pixels are white, although those of the degraded images differ.
@@ -143,6 +192,9 @@ impl EnhancerNote {
         }
         self.resized |= earlier.resized;
         self.probe = self.probe.or(earlier.probe);
+        if self.latency.is_empty() {
+            self.latency = earlier.latency;
+        }
         for remark in earlier.remarks {
             if !self.remarks.contains(&remark) {
                 self.remarks.push(remark);

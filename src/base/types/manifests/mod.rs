@@ -6,8 +6,8 @@ mod manifest;
 mod model_listing;
 
 pub use enhancer_note::{
-    ConventionLine, ELSEWHERE, EnhancerNote, FlawedImage, JudgedImages, ProbeNote, ProbeOutcome, SeamCounts, SizeLog,
-    TRAINED_ON,
+    ConventionLine, ELSEWHERE, EnhancerLatency, EnhancerNote, FlawedImage, JudgedImages, ProbeNote, ProbeOutcome,
+    SeamCounts, SizeLog, TRAINED_ON,
 };
 pub use input_note::{ColourHandling, ColourNote, DepthNote, Flaw, InputNote, InputSummary};
 pub use manifest::{

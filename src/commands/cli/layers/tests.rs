@@ -83,7 +83,7 @@ fn sample(arg: &Arg) -> String {
             Some([name])
                 if [
                     "N", "SECONDS", "PIXELS", "MB", "DOLLARS", "EV", "K", "R", "METRES", "DEGREES", "CODE", "CODES",
-                    "HOURS", "LUX",
+                    "HOURS", "LUX", "TIME",
                 ]
                 .contains(&name.as_str()) =>
             {

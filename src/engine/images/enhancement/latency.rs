@@ -4,7 +4,12 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::time::{Duration, Instant};
 
-use crate::types::text::counted;
+use crate::types::Rgb;
+use crate::types::manifests::EnhancerLatency;
+use darkqa_enhance::Enhancer;
+
+/// Time after which no further image is timed (chosen: a run waits no longer for it).
+const ENOUGH: Duration = Duration::from_secs(2);
 
 /// Times of an enhancer for images, one after the other.
 #[derive(Debug, Default)]
@@ -29,55 +34,58 @@ impl Latency {
         result
     }
 
+    /// Times an enhancer on images until [`ENOUGH`] has passed. The images are not counted as enhanced images of a run.
+    pub(crate) fn of_enhancer(enhancer: &mut Enhancer, images: &[Rgb]) -> Self {
+        let mut latency = Self::new(enhancer.threads());
+        let started = Instant::now();
+        for image in images {
+            // An image that fails has no time; the failure is reported where the image is needed.
+            let _ = latency.time((image.width(), image.height()), || enhancer.enhance_uncounted(image));
+            if started.elapsed() > ENOUGH {
+                break;
+            }
+        }
+        latency
+    }
+
+    /// The times of each size, without the first one, which includes the preparation for that size, unless it is the
+    /// only one.
+    pub(crate) fn by_size(&self) -> Vec<EnhancerLatency> {
+        self.by_size
+            .iter()
+            .map(|((width, height), times)| {
+                let mut sorted = if times.len() > 1 { times[1..].to_vec() } else { times.clone() };
+                sorted.sort_unstable();
+                EnhancerLatency {
+                    width: *width,
+                    height: *height,
+                    images: sorted.len(),
+                    median_ms: quantile_ms(&sorted, 0.5),
+                    within_95_ms: quantile_ms(&sorted, 0.95),
+                    with_preparation: times.len() == 1,
+                    threads: self.threads,
+                    machine: machine(),
+                }
+            })
+            .collect()
+    }
+
     fn add(&mut self, size: (usize, usize), time: Duration) {
         self.by_size.entry(size).or_default().push(time);
     }
 }
 
-/// Times without the first one of a size, which includes the preparation for that size; all if it is the only one.
-fn repeated(times: &[Duration]) -> Vec<Duration> {
-    let mut times = if times.len() > 1 { times[1..].to_vec() } else { times.to_vec() };
-    times.sort_unstable();
-    times
-}
-
-/// The smallest time that at least this share of the sorted times do not exceed.
-fn quantile(sorted: &[Duration], share: f64) -> Duration {
+/// The smallest time that at least this share of the sorted times do not exceed, in milliseconds.
+fn quantile_ms(sorted: &[Duration], share: f64) -> f64 {
     let rank = (share * sorted.len() as f64).ceil() as usize;
-    sorted[rank.clamp(1, sorted.len()) - 1]
+    sorted[rank.clamp(1, sorted.len()) - 1].as_secs_f64() * 1e3
 }
 
 impl fmt::Display for Latency {
-    /// One line per size: `latency: 640 × 480: 38 ms per image (median of 20 images; 95 % within 44 ms), up to 2 threads
-    /// of x86_64, NAME OF THE CPU`. Empty without times.
+    /// One line per size; empty without times.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for ((width, height), times) in &self.by_size {
-            let sorted = repeated(times);
-            let [median, most] = [0.5, 0.95].map(|share| milliseconds(quantile(&sorted, share)));
-            let sample = match (times.len(), sorted.len()) {
-                (1, _) => "one image, with the preparation for its size".to_owned(),
-                (_, n) => format!("median of {}; 95 % within {most} ms", counted(n, "image")),
-            };
-            let threads = counted(self.threads, "thread");
-            writeln!(
-                f,
-                "latency: {width} × {height}: {median} ms per image ({sample}), up to {threads} of {}",
-                machine()
-            )?;
-        }
-        Ok(())
+        self.by_size().iter().try_for_each(|latency| writeln!(f, "latency: {latency}"))
     }
-}
-
-/// A time in milliseconds, with two digits at least: `0.48`, `4.8`, `48`, `480`.
-fn milliseconds(time: Duration) -> String {
-    let value = time.as_secs_f64() * 1e3;
-    let decimals = match value {
-        ..1.0 => 2,
-        1.0..10.0 => 1,
-        _ => 0,
-    };
-    format!("{value:.decimals$}")
 }
 
 /// Architecture, and the name of the CPU where the system states it (Linux).

@@ -68,6 +68,8 @@ pub(crate) struct SourceFrame {
     pub(crate) note: InputNote,
     /// Width and height, in pixels.
     pub(crate) size: (u32, u32),
+    /// Exposure value at ISO 100 of the camera's settings; `None` if the file does not state them.
+    pub(crate) exposure_value: Option<f64>,
     /// Horizontal focal length, in pixels; `None` if unknown.
     pub(crate) focal: Option<f64>,
     /// Photographs of the same scene in the dark.
@@ -83,6 +85,7 @@ impl SourceFrame {
             size: picture.check()?,
             digest: picture.digest(),
             note: picture.note(),
+            exposure_value: picture.exposure_value(),
             focal: frames.focal(id),
             photographs: inspect_photographs(frames, id)?,
         })

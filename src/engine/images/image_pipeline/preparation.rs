@@ -10,6 +10,7 @@ use std::time::Instant;
 use super::{ImagePipeline, has_frames_for_all_workers};
 use crate::ask::ImageLimit;
 use crate::engine::images::enhancement::enhancers::{EnhancerRunArgs, Model};
+use crate::engine::images::enhancement::latency::Latency;
 use crate::engine::images::enhancement::{
     DarkFrames, EnhancedImages, LazyEnhancer, dark_frames, dark_or_darkened, evenly_spaced_indices,
 };
@@ -330,7 +331,11 @@ impl<'a> ImagePipeline<'a> {
         if dark.is_empty() {
             return Ok(());
         }
-        self.steps.timings.time(TimedStep::Enhance, || enhancer.probe(&dark, self.implausible))
+        self.steps.timings.time(TimedStep::Enhance, || {
+            enhancer.probe(&dark, self.implausible)?;
+            enhancer.usage().set_latency(Latency::of_enhancer(enhancer, &dark).by_size());
+            Ok(())
+        })
     }
 
     /// Handles that stop the enhancers.

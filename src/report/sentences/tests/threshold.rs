@@ -45,6 +45,16 @@ fn a_model_has_its_level_interval_and_light() {
 }
 
 #[test]
+fn an_estimated_light_names_its_images() {
+    let trials = replies("m", &FALLING).into_iter().collect();
+    let findings = Findings::new(&trials, &FrameTies::default(), [], &[]);
+    let set = PhotographedSet { lux: Some(200.0), exposed: Some(48), ..PhotographedSet::default() };
+    let findings = findings.with_set(set);
+    let one = sentences(&findings).iter().find(|one| one.kind == "threshold").map(checked).unwrap();
+    assert!(one.contains("lux at L0 estimated from the camera settings of 48 images"), "{one}");
+}
+
+#[test]
 fn an_enhancer_has_its_own_threshold() {
     let with_lift = [FALLING.as_slice(), &[("L2-ev+lift", 1.0), ("L3-ev+lift", 1.0), ("L5-ev+lift", 1.0)]].concat();
     let [one] = &said(replies("m", &with_lift), Some(200.0))[..] else { panic!() };

@@ -21,6 +21,7 @@ fn frame() -> SourceFrame {
         digest: Digest::from_bytes(b"pixels"),
         note: InputNote::default(),
         size: (8, 6),
+        exposure_value: None,
         focal: None,
         photographs: Vec::new(),
     }
