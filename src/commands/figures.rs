@@ -11,7 +11,6 @@ use clap::{Args, ValueEnum};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::pictures::{decode_data_url, png};
-use crate::report::charts::chart::FigureChart;
 use crate::report::charts::figures::{
     DisplayNames, FIGURES, FigureSpec, KnownNames, figure_specs, missing_threshold_message, overview, paper_tables,
 };
@@ -199,15 +198,13 @@ impl Files {
         let name = drawing.name;
         self.add(name, &sheet(&drawing.chart, look), formats)?;
         if formats.contains(&FigureFormat::Tex) {
-            match &drawing.chart {
-                FigureChart::Lines(chart) => self.contents.extend(tex(name, chart, &in_tex(look))),
-                FigureChart::Bars(_) | FigureChart::Thresholds(_) | FigureChart::Reliability(_) => {
-                    self.leave_out(&format!("{name}.tex"), "it is not a chart of lines");
-                }
+            if drawing.chart.is_over_levels() {
+                self.contents.extend(tex(name, &drawing.chart, &in_tex(look)));
+            } else {
+                self.leave_out(&format!("{name}.tex"), "it is not a chart of lines");
             }
         }
-        let note = drawing.chart.note();
-        let _ = writeln!(self.captions, "{name}\n{} ({note}.)\n", drawing.caption);
+        let _ = writeln!(self.captions, "{name}\n{} ({}.)\n", drawing.caption, drawing.chart.note);
         Ok(())
     }
 

@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 
 use super::template::allow_script;
 use crate::error::{Error, Result};
-use crate::report::charts::chart::CountPanel;
+use crate::report::charts::chart::Panel;
 use crate::report::charts::paper::count_figure;
 use crate::report::text::table as files;
 use crate::report::text::table::ColumnKind::{Count, Text};
@@ -406,13 +406,11 @@ fn checks_json(checks: &Checks) -> Value {
 pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
     let questions = summary.candidates.iter().map(|(family, candidates)| (family.to_string(), candidates.asked));
     let rooms = summary.rooms.iter().map(|(room, counts)| (room.clone(), counts.frames as u64));
-    let mut panels = vec![
-        CountPanel::from_counts("Questions by family", questions),
-        CountPanel::from_counts("Frames by room", rooms),
-    ];
+    let mut panels =
+        vec![Panel::of_counts("Questions by family", questions), Panel::of_counts("Frames by room", rooms)];
     for family in Family::by_rule() {
         if let Some(answers) = summary.answers.get(&family) {
-            panels.push(CountPanel::from_counts(
+            panels.push(Panel::of_counts(
                 &format!("Answers: {family}"),
                 answers.iter().map(|(word, count)| (word.clone(), *count as u64)),
             ));
@@ -423,13 +421,13 @@ pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
         class_panel(summary, "Classes by segments", |coverage| coverage.segments),
         class_panel(summary, "Classes by pixels", |coverage| coverage.pixels),
     ]);
-    count_figure(&panels)
+    count_figure(panels)
 }
 
 /// Panel of a count for each class of objects.
-fn class_panel(summary: &QuestionSummary, title: &str, count: fn(&ClassCoverage) -> u64) -> CountPanel {
+fn class_panel(summary: &QuestionSummary, title: &str, count: fn(&ClassCoverage) -> u64) -> Panel {
     let counts = summary.classes.iter().map(|(class, coverage)| (class.clone(), count(coverage)));
-    CountPanel::from_counts(title, counts)
+    Panel::of_counts(title, counts)
 }
 
 /// Template of the page.

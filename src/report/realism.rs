@@ -9,7 +9,7 @@
 use serde::Serialize;
 
 use crate::error::{Error, Result};
-use crate::report::charts::chart::{LineStyle, PointPanel, PointSeries};
+use crate::report::charts::chart::{LineContent, LineStyle, Panel, PlotLine, Scale};
 use crate::report::charts::paper::point_figure;
 use crate::report::charts::sheet;
 use crate::report::charts::sheet::CropRow;
@@ -321,15 +321,16 @@ pub(crate) fn by_code(residuals: &PooledResiduals) -> Result<Vec<u8>> {
 
 /// Figure with histograms of real and synthetic residuals in 8-bit codes.
 pub(crate) fn figure(residuals: &PooledResiduals) -> Result<String> {
-    let mut series = vec![histogram("real".to_owned(), LineStyle::BLACK, residuals.real.shares())];
+    let mut lines = histogram("real", LineStyle::BLACK, residuals.real.shares());
     for (style, (method, noise)) in residuals.noise.iter().enumerate() {
-        let name = format!("synthetic, {method}");
-        series.push(histogram(name, LineStyle(style), noise.shares()));
+        lines.extend(histogram(&format!("synthetic, {method}"), LineStyle(style), noise.shares()));
     }
-    point_figure(&[PointPanel {
+    point_figure(vec![Panel {
         title: "Residuals over the dropped clean image, all pairs".to_owned(),
-        axes: ["residual in 8-bit codes", "log10 of the share of samples"],
-        series,
+        x: Scale::Numbers("residual in 8-bit codes"),
+        y: Scale::Numbers("log10 of the share of samples"),
+        lines,
+        model: None,
     }])
 }
 
@@ -338,14 +339,16 @@ const MIN_SHARE: f64 = 1e-7;
 
 /// Histogram on a logarithmic scale as lines, with gaps at residuals that do not occur. A residual without neighbours
 /// is a point.
-fn histogram(name: String, style: LineStyle, shares: impl Iterator<Item = (i32, f64)>) -> PointSeries {
-    let (points, lines): (Vec<_>, Vec<_>) = shares
+fn histogram(name: &str, style: LineStyle, shares: impl Iterator<Item = (i32, f64)>) -> Vec<PlotLine> {
+    let (points, paths): (Vec<_>, Vec<_>) = shares
         .collect::<Vec<_>>()
         .split(|(_, share)| *share <= MIN_SHARE)
         .filter(|run| !run.is_empty())
         .map(|run| run.iter().map(|(size, share)| [f64::from(*size), libm::log10(*share)]).collect::<Vec<_>>())
         .partition(|run| run.len() == 1);
-    PointSeries { name, style, points: points.concat(), lines }
+    let points = LineContent::points(points.concat());
+    let contents = paths.into_iter().map(LineContent::Path).chain([points]);
+    contents.map(|content| PlotLine::new(name.to_owned(), style, content)).filter(|line| !line.is_empty()).collect()
 }
 
 /// Sheet of crops from each pair, brightened by its exposure drop: real image, exposure drop alone, and each noise
@@ -561,9 +564,12 @@ mod tests {
     #[test]
     fn histograms_have_gaps() {
         let shares = [(-1, 0.1), (0, 0.8), (1, 0.1), (2, 0.0), (3, 0.01), (4, 1e-8)];
-        let series = histogram("real".to_owned(), LineStyle::BLACK, shares.into_iter());
-        assert_eq!(series.points, [[3.0, -2.0]]);
-        assert_eq!(series.lines, [[[-1.0, -1.0], [0.0, libm::log10(0.8)], [1.0, -1.0]]]);
+        let lines = histogram("real", LineStyle::BLACK, shares.into_iter());
+        let [LineContent::Path(path), LineContent::Points(points)] = [&lines[0].content, &lines[1].content] else {
+            panic!("{lines:?}");
+        };
+        assert_eq!(path[..], [[-1.0, -1.0], [0.0, libm::log10(0.8)], [1.0, -1.0]]);
+        assert_eq!(points.iter().map(|(x, y)| [*x, y.value]).collect::<Vec<_>>(), [[3.0, -2.0]]);
     }
 
     #[test]

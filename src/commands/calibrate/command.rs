@@ -23,7 +23,7 @@ use crate::engine::images::progress::Progress;
 use crate::engine::images::workers::{ThreadArgs, pool};
 use crate::error::{Error, Result};
 use crate::files::write;
-use crate::report::charts::chart::{LineStyle, PointPanel, PointSeries};
+use crate::report::charts::chart::{LineContent, LineStyle, Panel, PlotLine, Scale};
 use crate::report::charts::paper::point_figure;
 use crate::report::text::table::ColumnKind::Text;
 use crate::report::text::table::TableBuilder;
@@ -380,17 +380,27 @@ fn noise_line(name: &str, line: &NoiseLine) -> String {
 /// # Errors
 /// If the figure cannot be drawn.
 fn calibration_figure(camera: &CameraFit) -> Result<String> {
-    point_figure(&[transfer(camera), probability(camera), deviations(camera)])
+    point_figure(vec![transfer(camera), probability(camera), deviations(camera)])
 }
 
-/// One series for each camera setting.
-fn setting_series(camera: &CameraFit, series: impl Fn(&SettingFit, LineStyle) -> PointSeries) -> Vec<PointSeries> {
-    camera.settings.iter().enumerate().map(|(style, fit)| series(fit, LineStyle(style))).collect()
+/// Panel of numbers on two axes.
+fn number_panel(title: &str, [x, y]: [&'static str; 2], lines: Vec<PlotLine>) -> Panel {
+    Panel { title: title.to_owned(), x: Scale::Numbers(x), y: Scale::Numbers(y), lines, model: None }
+}
+
+/// A fitted line and the points it is fitted to.
+fn fit_lines(name: &str, style: LineStyle, line: Vec<[f64; 2]>, points: Vec<[f64; 2]>) -> [PlotLine; 2] {
+    [LineContent::Path(line), LineContent::points(points)].map(|content| PlotLine::new(name.to_owned(), style, content))
+}
+
+/// The lines of each camera setting.
+fn setting_lines(camera: &CameraFit, lines: impl Fn(&SettingFit, LineStyle) -> [PlotLine; 2]) -> Vec<PlotLine> {
+    camera.settings.iter().enumerate().flat_map(|(style, fit)| lines(fit, LineStyle(style))).collect()
 }
 
 /// Panel of variance over signal for each exposure and colour plane on logarithmic axes, with the fitted line of K.
-fn transfer(camera: &CameraFit) -> PointPanel {
-    let series = setting_series(camera, |fit, style| {
+fn transfer(camera: &CameraFit) -> Panel {
+    let lines = setting_lines(camera, |fit, style| {
         let points: Vec<[f64; 2]> = fit
             .figure
             .transfer
@@ -401,51 +411,34 @@ fn transfer(camera: &CameraFit) -> PointPanel {
         let signals = points.iter().map(|[signal, _]| *signal);
         let ends = [signals.clone().reduce(f64::min), signals.reduce(f64::max)];
         let line = ends.into_iter().flatten().map(|signal| [signal, signal + libm::log10(fit.gain.value)]).collect();
-        PointSeries { name: format!("{}: K {:.4}", fit.name, fit.gain.value), style, lines: vec![line], points }
+        fit_lines(&format!("{}: K {:.4}", fit.name, fit.gain.value), style, line, points)
     });
-    PointPanel {
-        title: "photon transfer".to_owned(),
-        axes: ["log10 of light in ADU", "log10 of variance in ADU²"],
-        series,
-    }
+    number_panel("photon transfer", ["log10 of light in ADU", "log10 of variance in ADU²"], lines)
 }
 
 /// Panel of scaled residuals over the quantiles of the fitted distribution; the points are on a straight line if the
 /// fit is good.
-fn probability(camera: &CameraFit) -> PointPanel {
-    let series = setting_series(camera, |fit, style| {
+fn probability(camera: &CameraFit) -> Panel {
+    let lines = setting_lines(camera, |fit, style| {
         let points = &fit.figure.plot;
         let ends = [points.first(), points.last()].into_iter().flatten();
-        PointSeries {
-            name: format!("{}: λ {:.4}", fit.name, fit.read_shape.value),
-            style,
-            lines: vec![ends.map(|end| [end[0]; 2]).collect()],
-            points: points.clone(),
-        }
+        let name = format!("{}: λ {:.4}", fit.name, fit.read_shape.value);
+        fit_lines(&name, style, ends.map(|end| [end[0]; 2]).collect(), points.clone())
     });
-    PointPanel {
-        title: "read noise".to_owned(),
-        axes: ["quantile of the Tukey-λ distribution", "residual / σ_TL"],
-        series,
-    }
+    number_panel("read noise", ["quantile of the Tukey-λ distribution", "residual / σ_TL"], lines)
 }
 
 /// Panel of ln σ over ln K for read and row noise, with their fitted lines.
-fn deviations(camera: &CameraFit) -> PointPanel {
-    let read = deviation_series(camera, |fit| fit.read_scale.value, &camera.read_scale);
-    let row = deviation_series(camera, |fit| fit.row_deviation.value, &camera.row_deviation);
-    PointPanel {
-        title: "noise over gain".to_owned(),
-        axes: ["ln K", "ln σ"],
-        series: vec![
-            PointSeries { name: "σ_TL".to_owned(), style: LineStyle(0), ..read },
-            PointSeries { name: "σ_row".to_owned(), style: LineStyle(1), ..row },
-        ],
-    }
+fn deviations(camera: &CameraFit) -> Panel {
+    let read = deviation_points(camera, |fit| fit.read_scale.value, &camera.read_scale);
+    let row = deviation_points(camera, |fit| fit.row_deviation.value, &camera.row_deviation);
+    let names = ["σ_TL", "σ_row"].into_iter().zip([read, row]).enumerate();
+    let lines = names.flat_map(|(style, (name, [line, points]))| fit_lines(name, LineStyle(style), line, points));
+    number_panel("noise over gain", ["ln K", "ln σ"], lines.collect())
 }
 
-/// Unnamed series of ln σ over ln K with its fitted line. Settings without noise are left out.
-fn deviation_series(camera: &CameraFit, sigma: fn(&SettingFit) -> f64, line: &NoiseLine) -> PointSeries {
+/// Fitted line and points of ln σ over ln K. Settings without noise are left out.
+fn deviation_points(camera: &CameraFit, sigma: fn(&SettingFit) -> f64, line: &NoiseLine) -> [Vec<[f64; 2]>; 2] {
     let points: Vec<[f64; 2]> = camera
         .settings
         .iter()
@@ -453,10 +446,5 @@ fn deviation_series(camera: &CameraFit, sigma: fn(&SettingFit) -> f64, line: &No
         .filter(|[_, sigma]| *sigma > 0.0)
         .map(|point| point.map(libm::log))
         .collect();
-    PointSeries {
-        name: String::new(),
-        style: LineStyle(0),
-        lines: vec![points.iter().map(|[x, _]| [*x, libm::log(line.at(libm::exp(*x)))]).collect()],
-        points,
-    }
+    [points.iter().map(|[x, _]| [*x, libm::log(line.at(libm::exp(*x)))]).collect(), points]
 }

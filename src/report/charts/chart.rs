@@ -1,31 +1,17 @@
-//! Data of a report's figures, before they are drawn: line charts over the levels ([`Chart`]), bars, points, counts and
-//! thresholds.
+//! Data of a report's figures before they are drawn: a [`Chart`] has [`Panel`]s with lines, bars, points or ranges over
+//! levels, names or numbers.
 //!
 //! Lines differ by colour, and also by dash and marker, so that they can be distinguished without colour.
 //!
-//! Bar charts ([`BarChart`]), for shares that have no place on an axis of levels, such as those of photographs in the
-//! dark.
-//!
-//! Bar panels of counts by name: [`CountPanel`].
-//!
-//! Data of a line chart for the page's script, which redraws it at the available width: [`ChartData`].
-//!
-//! Any of the charts that a report's figure can have: [`FigureChart`].
-//!
-//! Panels of points and lines over two numeric axes: [`PointPanel`].
-//!
-//! Reliability diagrams, accuracy over confidence: [`ReliabilityChart`].
-//!
-//! Charts of thresholds with one row for each curve: [`ThresholdChart`].
+//! A drawn figure, and its parts for the page: [`Figure`], [`PageParts`].
 
 use serde::Serialize;
 
-use crate::error::Result;
-use crate::report::text::terminal::to_script_json;
-use crate::report::text::words::{self, light, percent, with_interval};
+use crate::report::text::words::{self, light};
 use crate::types::degradations::Axis;
 use crate::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::estimate::Estimate;
+use darkqa_score::model_in_condition::CHANCE;
 use darkqa_score::threshold::Threshold;
 
 /// Colour of axes and text, and of lines that belong to no model.
@@ -52,8 +38,46 @@ pub(crate) struct Figure {
     pub caption: String,
     /// The figure as SVG.
     pub svg: String,
-    /// Data of the chart as JSON, for the page's script; `None` for a figure that the page shows as a static image.
-    pub data: Option<String>,
+    /// Parts for the page.
+    pub parts: PageParts,
+}
+
+/// Panels and legend of a figure on the page, which arranges them by its width.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct PageParts {
+    /// Title of the vertical axis of the first panel.
+    pub measure: String,
+    /// Empty if names are at the bars or rows.
+    pub legend: Vec<PageLine>,
+    pub panels: Vec<PagePanel>,
+    /// Each level with its severity, as in `L3 (6 EV)`; empty if no panel has levels.
+    pub levels: Vec<String>,
+    /// Index of the level whose values are shown first: the last one of the first panel.
+    pub at: usize,
+    /// True if the names of the lines are at their right ends, too.
+    pub has_end_names: bool,
+}
+
+/// Entry of a legend.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct PageLine {
+    pub name: String,
+    pub model: Option<String>,
+    /// `curve`, `marks`, `flat` of a model without images, or `chance`.
+    pub kind: &'static str,
+    /// Sample of the line as SVG.
+    pub sample: String,
+}
+
+/// Panel of a figure on the page.
+#[derive(Debug, Clone, Serialize)]
+pub(crate) struct PagePanel {
+    pub title: String,
+    /// The model of all lines; `None` if there are several.
+    pub model: Option<String>,
+    /// True for a panel with rows or many names, which needs more room.
+    pub is_wide: bool,
+    pub svg: String,
 }
 
 /// SVG files of the figures: path in the report's folder, and contents.
@@ -94,15 +118,23 @@ impl LineStyle {
     }
 }
 
-/// Data of a line in a panel.
+/// What a line of a panel draws.
 #[derive(Debug, Clone)]
 pub(crate) enum LineContent {
-    /// Points over the levels, with a band of their intervals.
+    /// Joined points over the levels, with their intervals.
     Curve(Vec<(AxisLevel, Estimate)>),
     /// A horizontal line: a share that does not depend on the level.
     Flat(f64),
     /// Separate marks for photographs in the dark.
     Marks(Vec<DarkMark>),
+    /// Separate points over numbers, with their intervals.
+    Points(Vec<(f64, Estimate)>),
+    /// A line over numbers, without marks.
+    Path(Vec<[f64; 2]>),
+    /// The bar of a name, with its value as text.
+    Bar { value: Estimate, text: String },
+    /// The interval of a name, which may be infinite, with its text.
+    Range { threshold: Threshold, text: String },
 }
 
 /// Share of a set of photographs in the dark. Their darkness is measured, not one of the levels, so the mark is never
@@ -128,12 +160,11 @@ pub(crate) struct PlotLine {
 }
 
 /// Filter for the page's list of items: the items that a model was asked in one variant, in one family or in all.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub(crate) struct LineItems {
-    model: String,
+    pub model: String,
     /// Variant and enhancer in words, as the list of items names them.
-    light: String,
-    #[serde(skip_serializing_if = "Option::is_none")]
+    pub light: String,
     pub family: Option<String>,
 }
 
@@ -147,30 +178,95 @@ impl LineItems {
     }
 }
 
-/// One panel of a chart.
-#[derive(Debug, Clone)]
-pub(crate) struct Panel {
-    /// Title, with the number of questions.
-    pub title: String,
-    pub lines: Vec<PlotLine>,
-    /// The model of all lines; `None` if there are several.
-    pub model: Option<String>,
-    /// Light at L0 in lux, for the title of the axis; `None` if it is not known.
-    pub lux: Option<f64>,
+impl LineContent {
+    /// Points without intervals: horizontal and vertical value.
+    pub(crate) fn points(points: Vec<[f64; 2]>) -> Self {
+        Self::Points(points.into_iter().map(|[x, y]| (x, Estimate::exact(y, 1))).collect())
+    }
 }
 
-impl PlotLine {
-    /// True if nothing of the line is drawn.
-    pub(crate) fn is_empty(&self) -> bool {
-        match &self.content {
-            LineContent::Curve(points) => points.is_empty(),
-            LineContent::Marks(marks) => marks.is_empty(),
-            LineContent::Flat(_) => false,
+/// Values of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Scale {
+    /// The levels of the curves, at their severities; with the light at L0 in lux, for the title, if it is known.
+    Levels { lux: Option<f64> },
+    /// Shares from 0 to 100 %, with a title.
+    Percent(&'static str),
+    /// Numbers, with a title.
+    Numbers(&'static str),
+    /// Numbers from 0 to `end`, with the distance between two ticks.
+    UpTo { end: f64, step: u8, title: String },
+    /// Counts, which are written at their bars.
+    Counts,
+    /// The names of bars or ranges. On the vertical axis each has a row.
+    Names,
+}
+
+impl Scale {
+    /// Scale of thresholds, from 0 to the end of a ladder of levels: 9 EV for light (L5), 140 ms for motion blur.
+    pub(crate) fn thresholds(axis: Axis) -> Self {
+        let (end, step, name) =
+            if axis == Axis::MOTION { (140.0, 20, "threshold of motion blur") } else { (9.0, 1, "darkness threshold") };
+        Self::UpTo { end, step, title: format!("{name} in {}", axis.unit) }
+    }
+
+    /// Title of the axis of a panel; empty for none.
+    pub(crate) fn title(&self, panel: &Panel) -> String {
+        match self {
+            Self::Levels { .. } => panel.axis_title(),
+            Self::Percent(title) | Self::Numbers(title) => (*title).to_owned(),
+            Self::UpTo { title, .. } => title.clone(),
+            Self::Counts | Self::Names => String::new(),
         }
     }
 }
 
+/// One panel of a chart.
+#[derive(Debug, Clone)]
+pub(crate) struct Panel {
+    /// Title, with the number of questions; may be empty.
+    pub title: String,
+    pub x: Scale,
+    pub y: Scale,
+    pub lines: Vec<PlotLine>,
+    /// The model of all lines; `None` if there are several.
+    pub model: Option<String>,
+}
+
+/// Maximum number of bars in a panel of counts (chosen).
+const MAX_BARS: usize = 24;
+
 impl Panel {
+    /// Panel of shares over the levels. `measure` is the title of the vertical axis, with its unit.
+    pub(crate) fn over_levels(measure: &'static str, title: String, lines: Vec<PlotLine>) -> Self {
+        Self { title, x: Scale::Levels { lux: None }, y: Scale::Percent(measure), lines, model: None }
+    }
+
+    /// Panel of counts by name, from the largest; zeros are left out. If more than [`MAX_BARS`] remain, the smallest
+    /// are added up in one bar. The texts have each count with its share, as in `3 (75.0 %)`.
+    pub(crate) fn of_counts(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
+        let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
+        bars.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
+        if bars.len() > MAX_BARS {
+            let rest = bars.split_off(MAX_BARS - 1);
+            bars.push((format!("{} others", rest.len()), rest.iter().map(|(_, count)| count).sum()));
+        }
+        let total: u64 = bars.iter().map(|(_, count)| count).sum();
+        let bar = |(name, count): (String, u64)| {
+            let text = format!("{count} ({:.1} %)", 100.0 * count as f64 / total as f64);
+            let value = Estimate::exact(count as f64, count as usize);
+            PlotLine::new(name, LineStyle(0), LineContent::Bar { value, text })
+        };
+        let lines = bars.into_iter().map(bar).collect();
+        Self { title: title.to_owned(), x: Scale::Counts, y: Scale::Names, lines, model: None }
+    }
+
+    /// Panel of bars of shares by name, and the share that guessing would reach.
+    pub(crate) fn of_bars(title: String, bars: Vec<PlotLine>, chance: Option<f64>) -> Self {
+        let lines = bars.into_iter().chain(chance.map(PlotLine::chance)).collect();
+        Self { title, x: Scale::Names, y: Scale::Percent(""), lines, model: None }
+    }
+
     /// Levels of all curves of the panel, from L0.
     pub(crate) fn levels(&self) -> Vec<AxisLevel> {
         let mut levels: Vec<AxisLevel> = self
@@ -178,7 +274,7 @@ impl Panel {
             .iter()
             .flat_map(|line| match &line.content {
                 LineContent::Curve(points) => points.iter().map(|(level, _)| *level).collect(),
-                LineContent::Flat(_) | LineContent::Marks(_) => Vec::new(),
+                _ => Vec::new(),
             })
             .collect();
         levels.sort_unstable();
@@ -186,339 +282,111 @@ impl Panel {
         levels
     }
 
-    /// Largest value on the horizontal axis, in the unit of the levels.
+    /// Largest value on an axis of levels, in their unit.
     pub(crate) fn axis_end(&self) -> f64 {
         let marks = self
             .lines
             .iter()
             .flat_map(|line| match &line.content {
                 LineContent::Marks(marks) => &marks[..],
-                LineContent::Flat(_) | LineContent::Curve(_) => &[],
+                _ => &[],
             })
             .map(|mark| mark.ev[2]);
         self.levels().into_iter().map(AxisLevel::value).chain(marks).fold(0.0, f64::max)
     }
 
-    /// Title of the horizontal axis.
+    /// Title of an axis of levels.
     pub(crate) fn axis_title(&self) -> String {
-        let axis = self.levels().into_iter().find_map(AxisLevel::axis);
-        let axis = axis.unwrap_or(Axis::LIGHT);
+        let axis = self.levels().into_iter().find_map(AxisLevel::axis).unwrap_or(Axis::LIGHT);
         let Axis { title, unit, .. } = axis;
-        let light = self.lux.filter(|_| axis == Axis::LIGHT);
-        let light = light.map(|lux| format!(" ({} lux at L0, half at each EV)", words::lux(lux, 0.0)));
-        format!("level; {title} in {unit}{}", light.unwrap_or_default())
+        let light = match self.x {
+            Scale::Levels { lux: Some(lux) } if axis == Axis::LIGHT => {
+                format!(" ({} lux at L0, half at each EV)", words::lux(lux, 0.0))
+            }
+            _ => String::new(),
+        };
+        format!("level; {title} in {unit}{light}")
+    }
+
+    /// Lowest and highest value of points and paths on an axis (0 horizontal, 1 vertical); `None` without any.
+    pub(crate) fn range(&self, axis: usize) -> Option<[f64; 2]> {
+        self.lines
+            .iter()
+            .flat_map(|line| match &line.content {
+                LineContent::Points(points) => points.iter().map(|(x, y)| [*x, y.value]).collect(),
+                LineContent::Path(points) => points.clone(),
+                _ => Vec::new(),
+            })
+            .map(|point| [point[axis]; 2])
+            .reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
+    }
+
+    /// Name and text of each bar or range, in the order of their places.
+    pub(crate) fn places(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.lines.iter().filter_map(|line| match &line.content {
+            LineContent::Bar { text, .. } | LineContent::Range { text, .. } => Some((&*line.name, &**text)),
+            _ => None,
+        })
+    }
+
+    /// True if an axis has names, so that the panel needs no legend.
+    pub(crate) fn has_names(&self) -> bool {
+        self.x == Scale::Names || self.y == Scale::Names
+    }
+}
+
+impl PlotLine {
+    /// Line about no model, without items.
+    pub(crate) fn new(name: String, style: LineStyle, content: LineContent) -> Self {
+        Self { name, style, content, model: None, items: None }
+    }
+
+    /// Bar of a share, with its number as text.
+    pub(crate) fn bar(name: String, style: LineStyle, value: Estimate) -> Self {
+        let text = format!("{:.1}", 100.0 * value.value);
+        Self::new(name, style, LineContent::Bar { value, text })
+    }
+
+    /// Horizontal line at the share that guessing would reach.
+    pub(crate) fn chance(share: f64) -> Self {
+        Self::new(CHANCE.to_owned(), LineStyle::REFERENCE, LineContent::Flat(share))
+    }
+
+    /// True if nothing of the line is drawn.
+    pub(crate) fn is_empty(&self) -> bool {
+        match &self.content {
+            LineContent::Curve(points) => points.is_empty(),
+            LineContent::Marks(marks) => marks.is_empty(),
+            LineContent::Points(points) => points.is_empty(),
+            LineContent::Path(points) => points.is_empty(),
+            LineContent::Flat(_) | LineContent::Bar { .. } | LineContent::Range { .. } => false,
+        }
+    }
+
+    pub(crate) fn is_curve(&self) -> bool {
+        matches!(self.content, LineContent::Curve(_))
+    }
+
+    /// True if the line has a place of its own on an axis of names.
+    pub(crate) fn has_place(&self) -> bool {
+        matches!(self.content, LineContent::Bar { .. } | LineContent::Range { .. })
     }
 }
 
 /// A figure of panels with one legend.
 #[derive(Debug, Clone)]
 pub(crate) struct Chart {
-    /// Title of the vertical axis, with its unit.
-    pub measure: &'static str,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
     /// Number of panels in a row.
     pub columns: usize,
-    /// Text for the end of the caption.
-    pub note: String,
-}
-
-/// One bar.
-#[derive(Debug, Clone)]
-pub(crate) struct Bar {
-    /// Name below the bar, shortened to fit.
-    pub name: String,
-    pub style: LineStyle,
-    pub share: Estimate,
-}
-
-/// The bars of one model.
-#[derive(Debug, Clone)]
-pub(crate) struct BarPanel {
-    pub title: String,
-    pub bars: Vec<Bar>,
-    /// Share that guessing would reach, drawn as a broken line.
-    pub chance: Option<f64>,
-}
-
-/// A figure with one row of bars for each model.
-#[derive(Debug, Clone)]
-pub(crate) struct BarChart {
-    pub panels: Vec<BarPanel>,
-    /// Text for the end of the caption.
-    pub note: String,
-}
-
-/// Maximum number of bars in a panel (chosen).
-const MAX_BARS: usize = 24;
-
-/// Counts by name, drawn as bars.
-#[derive(Debug, Clone)]
-pub(crate) struct CountPanel {
-    pub title: String,
-    pub bars: Vec<(String, u64)>,
-}
-
-impl CountPanel {
-    /// Sorts the counts from the largest and leaves out zeros. If more than [`MAX_BARS`] remain, the smallest are added
-    /// up in one bar.
-    pub(crate) fn from_counts(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
-        let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
-        bars.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
-        if bars.len() > MAX_BARS {
-            let rest = bars.split_off(MAX_BARS - 1);
-            bars.push((format!("{} others", rest.len()), rest.iter().map(|(_, count)| count).sum()));
-        }
-        Self { title: title.to_owned(), bars }
-    }
-}
-
-/// A line chart as data. Shares are between 0 and 1. Texts are formatted as in tables, so that the script rounds
-/// nothing.
-#[derive(Debug, Clone, Serialize)]
-pub(crate) struct ChartData {
-    measure: &'static str,
-    panels: Vec<PanelData>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct PanelData {
-    title: String,
-    /// The model of all lines; `None` if there are several.
-    model: Option<String>,
-    /// Title of the horizontal axis.
-    axis: String,
-    unit: &'static str,
-    levels: Vec<LevelData>,
-    /// Right end of the horizontal axis, in its unit.
-    end: f64,
-    lines: Vec<LineData>,
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct LevelData {
-    name: String,
-    value: f64,
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct LineData {
-    name: String,
-    /// Number of the line's style: colour, dash and mark.
-    style: usize,
-    model: Option<String>,
-    /// Filter for the list of items, applied when a point is clicked.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    items: Option<LineItems>,
-    #[serde(flatten)]
-    content: ContentData,
-}
-
-#[derive(Debug, Clone, Serialize)]
-#[serde(tag = "kind", rename_all = "lowercase")]
-enum ContentData {
-    /// Points over the levels.
-    Curve { points: Vec<PointData> },
-    /// One share at all levels.
-    Flat { share: f64, text: String },
-    /// Photographs in the dark, which are not at a level.
-    Marks { points: Vec<PointData> },
-}
-
-#[derive(Debug, Clone, Serialize)]
-struct PointData {
-    /// Position on the horizontal axis, in its unit: lower end, middle and upper end.
-    x: [f64; 3],
-    /// Share, and both ends of its interval.
-    y: [f64; 3],
-    /// Share with its interval, as in tables.
-    text: String,
-}
-
-impl ChartData {
-    /// Serializes a chart as JSON that can be embedded in a page's script.
-    ///
-    /// # Errors
-    /// None in practice: JSON can represent every value of a chart.
-    pub(crate) fn json(chart: &Chart) -> Result<String> {
-        to_script_json(&Self::new(chart))
-    }
-
-    fn new(chart: &Chart) -> Self {
-        Self { measure: chart.measure, panels: chart.panels.iter().map(panel_data).collect() }
-    }
-}
-
-fn panel_data(panel: &Panel) -> PanelData {
-    let levels = panel.levels();
-    let axis = levels.iter().find_map(|level| level.axis());
-    PanelData {
-        title: panel.title.clone(),
-        model: panel.model.clone(),
-        axis: panel.axis_title(),
-        unit: axis.unwrap_or(Axis::LIGHT).unit,
-        levels: levels.iter().map(|level| LevelData { name: level.to_string(), value: level.value() }).collect(),
-        end: panel.axis_end(),
-        lines: panel.lines.iter().map(line_data).collect(),
-    }
-}
-
-fn line_data(line: &PlotLine) -> LineData {
-    let content = match &line.content {
-        LineContent::Flat(share) => ContentData::Flat { share: *share, text: percent(*share) },
-        LineContent::Curve(points) => ContentData::Curve {
-            points: points
-                .iter()
-                .map(|(level, share)| PointData {
-                    x: [level.value(); 3],
-                    y: [share.value, share.low, share.high],
-                    text: with_interval(*share),
-                })
-                .collect(),
-        },
-        LineContent::Marks(marks) => ContentData::Marks {
-            points: marks
-                .iter()
-                .map(|mark| PointData {
-                    x: mark.ev,
-                    y: [mark.share.value, mark.share.low, mark.share.high],
-                    text: with_interval(mark.share),
-                })
-                .collect(),
-        },
-    };
-    LineData {
-        name: line.name.clone(),
-        style: line.style.0,
-        model: line.model.clone(),
-        items: line.items.clone(),
-        content,
-    }
-}
-
-/// Chart of a figure, before it is drawn.
-#[derive(Debug, Clone)]
-pub(crate) enum FigureChart {
-    Lines(Chart),
-    Bars(BarChart),
-    Thresholds(ThresholdChart),
-    Reliability(ReliabilityChart),
-}
-
-impl FigureChart {
     /// Text for the end of the caption: number of items, and the meaning of bands and bars.
-    pub(crate) fn note(&self) -> String {
-        match self {
-            Self::Lines(chart) => chart.note.clone(),
-            Self::Bars(chart) => chart.note.clone(),
-            Self::Reliability(chart) => chart.note.clone(),
-            Self::Thresholds(chart) => format!("lines are 95 % intervals by {}", chart.unit),
-        }
-    }
-
-    /// Data of the chart as JSON, for the page's script; `None` for a figure that the page shows as a static image.
-    ///
-    /// # Errors
-    /// If the data cannot be serialized.
-    pub(crate) fn script_data(&self) -> Result<Option<String>> {
-        match self {
-            Self::Lines(chart) => ChartData::json(chart).map(Some),
-            Self::Bars(_) | Self::Thresholds(_) | Self::Reliability(_) => Ok(None),
-        }
-    }
-}
-
-/// Points and lines that share a name and a style.
-#[derive(Debug, Clone)]
-pub(crate) struct PointSeries {
-    /// Name in the legend.
-    pub name: String,
-    pub style: LineStyle,
-    /// Points that are drawn as marks: horizontal and vertical value.
-    pub points: Vec<[f64; 2]>,
-    /// Lines without marks, each through its points.
-    pub lines: Vec<Vec<[f64; 2]>>,
-}
-
-/// One panel with its series.
-#[derive(Debug, Clone)]
-pub(crate) struct PointPanel {
-    pub title: String,
-    /// Titles of the horizontal and the vertical axis.
-    pub axes: [&'static str; 2],
-    pub series: Vec<PointSeries>,
-}
-
-impl PointPanel {
-    /// Lowest and highest value on an axis (0 horizontal, 1 vertical); `None` without a point.
-    pub(crate) fn range(&self, axis: usize) -> Option<[f64; 2]> {
-        self.series
-            .iter()
-            .flat_map(|series| series.points.iter().chain(series.lines.iter().flatten()))
-            .map(|point| [point[axis]; 2])
-            .reduce(|[low, high], [value, _]| [low.min(value), high.max(value)])
-    }
-}
-
-/// The bins of one condition.
-#[derive(Debug, Clone)]
-pub(crate) struct ReliabilityLine {
-    /// Name in the legend.
-    pub name: String,
-    pub style: LineStyle,
-    /// Mean confidence and accuracy of each bin, in order of confidence.
-    pub bins: Vec<(f64, Estimate)>,
-}
-
-/// One panel: the lines of one model.
-#[derive(Debug, Clone)]
-pub(crate) struct ReliabilityPanel {
-    pub title: String,
-    pub lines: Vec<ReliabilityLine>,
-}
-
-/// A figure of panels with one legend. Accuracy equals confidence on the diagonal of each panel.
-#[derive(Debug, Clone)]
-pub(crate) struct ReliabilityChart {
-    pub panels: Vec<ReliabilityPanel>,
-    /// Text for the end of the caption.
     pub note: String,
 }
 
-/// Horizontal scale, from 0 to the end of a ladder of levels: 9 EV for light (L5), 140 ms for motion blur.
-#[derive(Debug, Clone)]
-pub(crate) struct LevelScale {
-    pub end: f64,
-    /// Distance between two ticks.
-    pub step: i32,
-    /// Name of the threshold.
-    pub title: &'static str,
-    pub unit: &'static str,
-}
-
-impl LevelScale {
-    pub(crate) fn for_axis(axis: Axis) -> Self {
-        let (end, step, title) =
-            if axis == Axis::MOTION { (140.0, 20, "threshold of motion blur") } else { (9.0, 1, "darkness threshold") };
-        Self { end, step, title, unit: axis.unit }
+impl Chart {
+    /// True if all panels are over levels.
+    pub(crate) fn is_over_levels(&self) -> bool {
+        self.panels.iter().all(|panel| matches!(panel.x, Scale::Levels { .. }))
     }
-}
-
-/// The threshold of one curve.
-#[derive(Debug, Clone)]
-pub(crate) struct ThresholdRow {
-    /// Model and condition.
-    pub name: String,
-    pub threshold: Threshold,
-    /// Threshold with its interval, formatted.
-    pub text: String,
-}
-
-/// A figure of the thresholds on one axis.
-#[derive(Debug, Clone)]
-pub(crate) struct ThresholdChart {
-    pub rows: Vec<ThresholdRow>,
-    pub scale: LevelScale,
-    /// The unit of the intervals: scenes or frames.
-    pub unit: String,
 }

@@ -9,10 +9,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::chart::{
-    Bar, BarChart, BarPanel, Chart, FigureChart, LineContent, LineStyle, Panel, PlotLine, ReliabilityChart,
-    ReliabilityLine, ReliabilityPanel,
-};
+use super::chart::{Chart, LineContent, LineStyle, Panel, PlotLine, Scale};
 use crate::report::charts::figures::FigureSpec;
 use crate::report::text::words::light;
 use crate::types::degradations::{Axis, Kind};
@@ -63,7 +60,7 @@ fn fidelity_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let panels: Vec<Panel> = Axis::ALL
         .into_iter()
         .flat_map(|axis| PANELS.map(|spec| panel(&lights, axis, &spec)))
-        .filter(|panel| panel.lines.iter().any(is_curve))
+        .filter(|panel| panel.lines.iter().any(PlotLine::is_curve))
         .collect();
     if panels.is_empty() {
         return None;
@@ -73,7 +70,6 @@ fn fidelity_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
         several => format!("answers of {several} models together"),
     };
     let chart = Chart {
-        measure: "× 100",
         panels,
         columns: 3,
         note: format!("{models}; the band of an AUC is its 95 % interval by {}; strict parsing", findings.unit),
@@ -83,12 +79,8 @@ fn fidelity_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
         caption: "Does a better picture mean better answers? Between conditions: how similar the images are to their clean frames \
                   and how many answers are right. Within a condition: AUC of PSNR, 50 is chance. PSNR and the AUC of SSIM are in the table."
             .to_owned(),
-        chart: FigureChart::Lines(chart),
+        chart,
     })
-}
-
-fn is_curve(line: &PlotLine) -> bool {
-    matches!(line.content, LineContent::Curve(_))
 }
 
 fn panel(lights: &BTreeMap<LightView<'_>, Vec<&ConditionFidelity>>, axis: Axis, spec: &PanelSpec) -> Panel {
@@ -99,23 +91,11 @@ fn panel(lights: &BTreeMap<LightView<'_>, Vec<&ConditionFidelity>>, axis: Axis, 
         }
         let points: Vec<_> = rows.iter().filter_map(|row| Some((row.level, (spec.quantity)(row)?))).collect();
         if !points.is_empty() {
-            lines.push(PlotLine {
-                name: light(variant, *enhancer),
-                style: LineStyle(style),
-                content: LineContent::Curve(points),
-                model: None,
-                items: None,
-            });
+            lines.push(PlotLine::new(light(variant, *enhancer), LineStyle(style), LineContent::Curve(points)));
         }
     }
-    lines.extend(spec.chance.map(|share| PlotLine {
-        name: "chance".to_owned(),
-        style: LineStyle::REFERENCE,
-        content: LineContent::Flat(share),
-        model: None,
-        items: None,
-    }));
-    Panel { title: spec.title.to_owned(), lines, model: None, lux: None }
+    lines.extend(spec.chance.map(PlotLine::chance));
+    Panel::over_levels("× 100", spec.title.to_owned(), lines)
 }
 
 /// A number without an interval.
@@ -137,32 +117,32 @@ fn real_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
             models.push(&subject.model);
         }
     }
-    let panels: Vec<BarPanel> = findings
+    let panels: Vec<Panel> = findings
         .pairs
         .iter()
         .flat_map(|pair| models.iter().map(move |model| (pair, *model)))
-        .map(|(pair, model)| BarPanel {
-            title: format!("{model}: accuracy in %"),
-            bars: bars(findings, pair, model),
-            chance,
+        .map(|(pair, model)| {
+            let panel = Panel::of_bars(format!("{model}: accuracy in %"), bars(findings, pair, model), chance);
+            Panel { model: Some(model.to_owned()), ..panel }
         })
-        .filter(|panel| panel.bars.len() > 1)
+        .filter(|panel| panel.places().count() > 1)
         .collect();
     if panels.is_empty() {
         return None;
     }
-    let chart = BarChart { panels, note: format!("lines are 95 % intervals by {}; strict parsing", findings.unit) };
+    let chart =
+        Chart { panels, columns: 1, note: format!("lines are 95 % intervals by {}; strict parsing", findings.unit) };
     Some(FigureSpec {
         name: "real",
         caption: "Real against synthetic darkness: accuracy in the light (L0), on photographs in the dark, on synthetic images \
                   that are as dark, and on enhanced photographs. Broken line: chance."
             .to_owned(),
-        chart: FigureChart::Bars(chart),
+        chart,
     })
 }
 
 /// Bars of a model for one set of photographs. Each condition that is compared with the photographs has one bar.
-fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<Bar> {
+fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<PlotLine> {
     let mut subjects: Vec<&ModelInCondition> = Vec::new();
     let mut bars = Vec::new();
     for row in &findings.comparisons {
@@ -180,7 +160,7 @@ fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<Bar> {
             subjects.push(subject);
             let cell = findings.summary.cell(subject, None, ParsingMode::Strict);
             if let Some(share) = cell.and_then(|cell| cell.accuracy) {
-                bars.push(Bar { name: subject.condition(), style: LineStyle(bars.len()), share });
+                bars.push(PlotLine::bar(subject.condition(), LineStyle(bars.len()), share));
             }
         }
     }
@@ -203,27 +183,29 @@ fn reliability_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
         .collect();
     let levels: BTreeSet<AxisLevel> = rows.iter().map(|(_, level)| *level).collect();
     let levels = spread(&levels.into_iter().collect::<Vec<_>>());
-    let mut panels: Vec<ReliabilityPanel> = Vec::new();
+    let mut panels: Vec<Panel> = Vec::new();
     for (row, level) in rows {
         let Some(style) = levels.iter().position(|other| *other == level) else {
             continue;
         };
-        let line = ReliabilityLine {
-            name: level.to_string(),
-            style: LineStyle(style),
-            bins: row.bins.iter().map(|bin| (bin.confidence, bin.accuracy)).collect(),
-        };
-        match panels.iter_mut().find(|panel| panel.title == row.subject.model) {
-            Some(panel) => panel.lines.push(line),
-            None => panels.push(ReliabilityPanel { title: row.subject.model.clone(), lines: vec![line] }),
-        }
+        let position = panels.iter().position(|panel| panel.title == row.subject.model);
+        let position = position.unwrap_or_else(|| {
+            panels.push(reliability_panel(&row.subject.model));
+            panels.len() - 1
+        });
+        let bins = || row.bins.iter().map(|bin| (bin.confidence, bin.accuracy));
+        let path = bins().map(|(confidence, accuracy)| [confidence, accuracy.value]).collect();
+        let line = |content| PlotLine::new(level.to_string(), LineStyle(style), content);
+        let lines = [line(LineContent::Path(path)), line(LineContent::Points(bins().collect()))];
+        panels[position].lines.extend(lines);
     }
     if panels.is_empty() {
         return None;
     }
     let dark = variant.map_or_else(String::new, |variant| format!("; dark images {}", light(&variant, None)));
-    let chart = ReliabilityChart {
+    let chart = Chart {
         panels,
+        columns: 3,
         note: format!(
             "bins of about as many replies each, ten at most; bars are 95 % intervals by {}; strict parsing{dark}",
             findings.unit
@@ -234,8 +216,20 @@ fn reliability_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
         caption: "Is a model as often right as it is confident? Accuracy over confidence; on the dotted diagonal both are equal, below it \
                   the model is overconfident."
             .to_owned(),
-        chart: FigureChart::Reliability(chart),
+        chart,
     })
+}
+
+/// Panel of accuracy over confidence, with the diagonal on which both are equal.
+fn reliability_panel(model: &str) -> Panel {
+    let diagonal = LineContent::Path(vec![[0.0, 0.0], [1.0, 1.0]]);
+    Panel {
+        title: model.to_owned(),
+        x: Scale::Percent("confidence in %"),
+        y: Scale::Percent("accuracy in %"),
+        lines: vec![PlotLine::new(String::new(), LineStyle::REFERENCE, diagonal)],
+        model: Some(model.to_owned()),
+    }
 }
 
 /// Selects at most [`MAX_LEVELS`] levels, evenly from the first to the last.

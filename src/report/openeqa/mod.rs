@@ -13,7 +13,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use crate::error::Result;
-use crate::report::charts::chart::{Chart, Figure, FigureChart, LineContent, LineStyle, Panel, PlotLine};
+use crate::report::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
 use crate::report::charts::paper::figure;
 use crate::report::content::{Measure, Report};
 use crate::report::json::{SummaryRuns, document};
@@ -197,8 +197,7 @@ fn figures(report: &MarkedAnswers<'_>) -> Result<Vec<Figure>> {
         if panels.is_empty() {
             continue;
         }
-        let chart = Chart { measure: "score in %", panels, columns, note: note.clone() };
-        figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
+        figures.push(figure(name, caption, &Chart { panels, columns, note: note.clone() })?);
     }
     Ok(figures)
 }
@@ -231,7 +230,7 @@ fn panel(
         .iter()
         .enumerate()
         .filter_map(|(index, (subject, cell))| flat_line(subject, cell, LineStyle(series_count + index)));
-    Panel { title: title(report, group), lines: curves.chain(flat_lines).collect(), model: None, lux: None }
+    Panel::over_levels("score in %", title(report, group), curves.chain(flat_lines).collect())
 }
 
 /// Scores of a series over the levels. L0 is the start of the series in the ladder.

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::run_usage::PageInputs;
 use crate::error::Result;
-use crate::report::charts::chart::{Chart, Figure, FigureChart};
+use crate::report::charts::chart::{Chart, Figure};
 use crate::report::charts::figures::{DisplayNames, overview, split};
 use crate::report::charts::paper::figure;
 use crate::report::finding_groups::{Effect, FindingGroups, GroupedFinding};
@@ -27,7 +27,8 @@ const MARK_REACH: f64 = 50.0;
 #[derive(Serialize)]
 pub(crate) struct PageHead {
     summary: String,
-    chart: Option<Figure>,
+    /// One chart, or none.
+    figures: Vec<Figure>,
     rows: Vec<FindingRow>,
     strip: Option<Strip>,
 }
@@ -71,7 +72,7 @@ impl PageHead {
             return Ok(None);
         }
         Ok(Some(Self {
-            chart: chart(findings)?,
+            figures: chart(findings)?.into_iter().collect(),
             strip: Strip::new(&findings.grid, inputs)?,
             ..Self::without_images(groups)
         }))
@@ -79,7 +80,7 @@ impl PageHead {
 
     /// First screen with only a summary.
     pub(crate) fn from_summary(summary: &str) -> Self {
-        Self { summary: with_unbroken_percent(summary), chart: None, rows: Vec::new(), strip: None }
+        Self { summary: with_unbroken_percent(summary), figures: Vec::new(), rows: Vec::new(), strip: None }
     }
 
     /// First screen with the summary and the main findings, without chart and images.
@@ -146,7 +147,7 @@ fn chart(findings: &Findings<'_>) -> Result<Option<Figure>> {
         })
         .map(|(caption, chart)| {
             let chart = Chart { note: panels.note.clone(), panels: split(chart.panels.clone()), ..chart.clone() };
-            figure("head", caption, &FigureChart::Lines(chart))
+            figure("head", caption, &chart)
         })
         .transpose()
 }

@@ -13,7 +13,7 @@ use serde::Serialize;
 
 use super::tables::{ENHANCERS, Section, with_training};
 use crate::error::Result;
-use crate::report::charts::chart::{Chart, Figure, FigureChart, LineContent, LineStyle, Panel, PlotLine};
+use crate::report::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine, Scale};
 use crate::report::charts::paper::figure;
 use crate::report::content::{Measure, Report};
 use crate::report::finding_groups::FindingGroups;
@@ -253,12 +253,12 @@ fn figures(found: &SelfAgreement<'_>) -> Result<Vec<Figure>> {
     ];
     let mut figures = Vec::new();
     for (name, caption, measure, panels) in charts {
-        let panels: Vec<Panel> = panels.into_iter().filter(has_points).collect();
+        let panels = panels.into_iter().filter(has_points);
+        let panels: Vec<Panel> = panels.map(|panel| Panel { y: Scale::Percent(measure), ..panel }).collect();
         if panels.is_empty() {
             continue;
         }
-        let chart = Chart { measure, panels, columns: 2, note: note.clone() };
-        figures.push(figure(name, caption, &FigureChart::Lines(chart))?);
+        figures.push(figure(name, caption, &Chart { panels, columns: 2, note: note.clone() })?);
     }
     Ok(figures)
 }
@@ -293,7 +293,8 @@ fn panels(
         .into_iter()
         .map(|(title, mut lines)| {
             add(&mut lines);
-            Panel { title: format!("{title}, n {}", found.items()), lines, model: None, lux: found.set.lux }
+            let panel = Panel::over_levels("", format!("{title}, n {}", found.items()), lines);
+            Panel { x: Scale::Levels { lux: found.set.lux }, ..panel }
         })
         .collect()
 }

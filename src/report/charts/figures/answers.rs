@@ -2,9 +2,7 @@
 //! accuracy by level; accuracy raw and with each enhancer, also of a data set that was photographed in the dark.
 
 use super::{ACCURACY, FigureBuilder, FigureSpec};
-use crate::report::charts::chart::{
-    Bar, BarChart, BarPanel, Chart, FigureChart, LineContent, LineItems, LineStyle, Panel, PlotLine,
-};
+use crate::report::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine};
 use crate::report::text::words::family as family_name;
 use crate::types::questions::{FAMILIES, FamilyAnswers};
 use crate::types::{AxisLevel, Family, SetLight, Variant, View};
@@ -12,6 +10,9 @@ use darkqa_score::answers::confusion::{Confusion, Hallucination};
 use darkqa_score::calibration::Calibration;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::estimate::Estimate;
+
+/// Title of the vertical axis of shares of replies.
+const SHARE: &str = "share of replies in %";
 
 impl FigureBuilder<'_> {
     /// False positives and false negatives on questions about the presence of an object, by level.
@@ -28,7 +29,7 @@ impl FigureBuilder<'_> {
             "Object recognition: false positives (left) and false negatives (right) by level, {}.",
             self.condition_text(&variant, None)
         );
-        self.chart("share of replies in %", panels, 2, &caption)
+        self.chart(panels, 2, &caption)
     }
 
     fn hallucination_panel(
@@ -43,9 +44,9 @@ impl FigureBuilder<'_> {
         });
         let n = lines.iter().find_map(|line| match &line.content {
             LineContent::Curve(points) => points.first().map(|(_, rate)| rate.n),
-            LineContent::Flat(_) | LineContent::Marks(_) => None,
+            _ => None,
         });
-        Panel { title: format!("{title}, n {}", n.unwrap_or(0)), lines, model: None, lux: None }
+        Panel::over_levels(SHARE, format!("{title}, n {}", n.unwrap_or(0)), lines)
     }
 
     /// Share of the most frequent answer by level, against the share of the most frequent true answer.
@@ -60,7 +61,7 @@ impl FigureBuilder<'_> {
             "Answer collapse, {}: how often the answer given most often is given, by level.",
             self.condition_text(&variant, None)
         );
-        let (caption, mut chart) = self.chart("share of replies in %", panels, 2, &caption)?;
+        let (caption, mut chart) = self.chart(panels, 2, &caption)?;
         "shares of all replies, strict parsing; what the answers are is in collapse.csv".clone_into(&mut chart.note);
         Some((caption, chart))
     }
@@ -86,12 +87,8 @@ impl FigureBuilder<'_> {
             model: None,
             items: None,
         });
-        Some(Panel {
-            title: format!("{}, n {n}", self.names.display_name(family_name(Some(family)))),
-            lines,
-            model: None,
-            lux: None,
-        })
+        let title = format!("{}, n {n}", self.names.display_name(family_name(Some(family))));
+        Some(Panel::over_levels(SHARE, title, lines))
     }
 }
 
@@ -133,13 +130,14 @@ impl FigureBuilder<'_> {
                 if !lines.is_empty() {
                     let name = self.names.display_name(model);
                     let title = format!("{name}, {}", self.condition_text(&variant, None));
-                    panels.push(Panel { title, lines, model: Some((*model).to_owned()), lux: None });
+                    let panel = Panel::over_levels("%", title, lines);
+                    panels.push(Panel { model: Some((*model).to_owned()), ..panel });
                 }
             }
         }
         let caption = "Does confidence fall as fast as accuracy in the dark? The mean greatest probability of a choice, and the \
                        accuracy of the same replies, by level.";
-        let (caption, mut chart) = self.chart("%", panels, 2, caption)?;
+        let (caption, mut chart) = self.chart(panels, 2, caption)?;
         chart.note = format!("bands and bars are 95 % intervals by {}; strict parsing", self.findings.unit);
         Some((caption, chart))
     }
@@ -169,7 +167,8 @@ impl FigureBuilder<'_> {
                 if lines.len() > 1 {
                     let (name, light) = (self.curve_name(model), self.condition_text(&variant, None));
                     let title = format!("{name}, {light}, n {}", self.item_count(None));
-                    panels.push(Panel { title, lines, model: Some((*model).to_owned()), lux: None });
+                    let panel = Panel::over_levels(ACCURACY, title, lines);
+                    panels.push(Panel { model: Some((*model).to_owned()), ..panel });
                 }
             }
         }
@@ -178,7 +177,7 @@ impl FigureBuilder<'_> {
         } else {
             "Each enhancer against the raw dark images, by level. L0 is the untouched frame."
         };
-        self.chart(ACCURACY, panels, 2, caption)
+        self.chart(panels, 2, caption)
     }
 
     /// True if clean frames (L0) were enhanced.
@@ -204,13 +203,14 @@ impl FigureBuilder<'_> {
             .family_cells(None, ParsingMode::Strict)
             .filter(|cell| cell.subject.view.is_none())
             .find_map(|cell| Some(cell.accuracy?.value));
-        let panels = self.models.iter().map(|model| BarPanel {
-            title: format!("{}: accuracy in %, n {}", self.names.display_name(model), self.item_count(None)),
-            bars: self.photograph_bars(model),
-            chance,
+        let panels = self.models.iter().map(|model| {
+            let title = format!("{}: accuracy in %, n {}", self.names.display_name(model), self.item_count(None));
+            let panel = Panel::of_bars(title, self.photograph_bars(model), chance);
+            Panel { model: Some((*model).to_owned()), ..panel }
         });
-        let chart = BarChart {
-            panels: panels.filter(|panel| !panel.bars.is_empty()).collect(),
+        let chart = Chart {
+            panels: panels.filter(|panel| panel.places().next().is_some()).collect(),
+            columns: 1,
             note: format!("lines are 95 % intervals by {}; strict parsing", findings.unit),
         };
         if chart.panels.is_empty() {
@@ -220,12 +220,12 @@ impl FigureBuilder<'_> {
             name: "photographed",
             caption: "Accuracy on photographs in the dark, raw (as photographed) and with each enhancer. Broken line: chance."
                 .to_owned(),
-            chart: FigureChart::Bars(chart),
+            chart,
         })
     }
 
     /// Accuracy of a model on the photographs, raw and with each enhancer.
-    fn photograph_bars(&self, model: &str) -> Vec<Bar> {
+    fn photograph_bars(&self, model: &str) -> Vec<PlotLine> {
         self.findings
             .grid
             .subjects
@@ -242,11 +242,8 @@ impl FigureBuilder<'_> {
                     }
                 };
                 let index = self.enhancers.iter().position(|known| Some(*known) == subject.enhancer.as_ref());
-                Some(Bar {
-                    name,
-                    style: LineStyle(index.map_or(0, |index| index + 1)),
-                    share: self.accuracy_of(subject, None)?,
-                })
+                let style = LineStyle(index.map_or(0, |index| index + 1));
+                Some(PlotLine::bar(name, style, self.accuracy_of(subject, None)?))
             })
             .collect()
     }

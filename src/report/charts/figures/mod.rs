@@ -11,8 +11,7 @@ mod tables;
 
 use std::collections::BTreeSet;
 
-use super::chart::FigureChart;
-use crate::report::charts::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine};
+use crate::report::charts::chart::{Chart, DarkMark, LineContent, LineItems, LineStyle, Panel, PlotLine, Scale};
 use crate::report::text::words::{family as family_name, light_with, marked_reference, names_enhancer};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::text::counted;
@@ -22,7 +21,7 @@ use darkqa_score::estimate::Estimate;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::{CHANCE, ModelInCondition, models_under_test, pooled_models};
 
-pub(crate) use names::{DisplayNames, KnownNames};
+pub(crate) use names::{DisplayNames, KnownNames, short_form};
 pub(crate) use overview::{OverviewPanels, overview};
 pub(crate) use split::split;
 pub(crate) use story::{StoryCurves, story_curves};
@@ -35,7 +34,7 @@ pub(crate) struct FigureSpec {
     pub name: &'static str,
     /// Caption without the note of the chart.
     pub caption: String,
-    pub chart: FigureChart,
+    pub chart: Chart,
 }
 
 /// Names of all figures of multiple-choice questions, in the order of a report.
@@ -68,7 +67,6 @@ pub(crate) fn figure_specs(findings: &Findings<'_>, names: &DisplayNames) -> Vec
         .into_iter()
         .filter_map(|(name, chart)| {
             let (caption, chart) = chart?;
-            let chart = FigureChart::Lines(chart);
             Some(FigureSpec { name, caption, chart })
         })
         .collect();
@@ -361,12 +359,8 @@ impl<'a> FigureBuilder<'a> {
                 if variant.kind.map(Kind::axis) == Some(Axis::LIGHT) {
                     lines.extend(self.photograph_marks());
                 }
-                Panel {
-                    title: format!("{}, n {}", self.condition_text(variant, None), self.item_count(None)),
-                    lines,
-                    model: None,
-                    lux: None,
-                }
+                let title = format!("{}, n {}", self.condition_text(variant, None), self.item_count(None));
+                Panel::over_levels(ACCURACY, title, lines)
             })
             .collect();
         let mut marks = self.photograph_marks();
@@ -374,7 +368,7 @@ impl<'a> FigureBuilder<'a> {
             let mut lines = self.accuracy_lines(&Variant::NONE, None);
             lines.append(&mut marks);
             let title = format!("photographed in the dark, n {}", self.item_count(None));
-            panels.push(Panel { title, lines, model: None, lux: None });
+            panels.push(Panel::over_levels(ACCURACY, title, lines));
         }
         let mut caption = format!(
             "Accuracy of each model by level, without enhancement.{}",
@@ -384,7 +378,7 @@ impl<'a> FigureBuilder<'a> {
             caption +=
                 " Hollow: photographed in the dark, at the median exposure drop, with a bar from quartile to quartile.";
         }
-        self.chart(ACCURACY, panels, 2, &caption)
+        self.chart(panels, 2, &caption)
     }
 
     /// Mean accuracy over the models for each variant, with the models' range: one panel for each axis with several
@@ -401,12 +395,8 @@ impl<'a> FigureBuilder<'a> {
             let variants: Vec<&Variant> =
                 all.iter().filter(|variant| variant.kind.map(Kind::axis) == Some(axis)).collect();
             if variants.len() > 1 {
-                panels.push(Panel {
-                    title: title.clone(),
-                    lines: self.variant_lines(&variants, &models),
-                    model: None,
-                    lux: None,
-                });
+                let lines = self.variant_lines(&variants, &models);
+                panels.push(Panel::over_levels(ACCURACY, title.clone(), lines));
             }
         }
         let is_auto = all.iter().any(|variant| variant.kind == Some(Kind::Auto));
@@ -415,7 +405,7 @@ impl<'a> FigureBuilder<'a> {
         } else {
             "Exposure drop alone against exposure drop with sensor noise."
         };
-        let (caption, mut chart) = self.chart(ACCURACY, panels, 1, caption)?;
+        let (caption, mut chart) = self.chart(panels, 1, caption)?;
         if models.len() > 1 {
             chart.note = format!("bands are the range of the {} models, not intervals; strict parsing", models.len());
         }
@@ -478,12 +468,8 @@ impl<'a> FigureBuilder<'a> {
             .into_iter()
             .map(|family| {
                 let n = self.item_count(Some(family));
-                Panel {
-                    title: format!("{}, n {n}", self.names.display_name(family_name(Some(family)))),
-                    lines: self.accuracy_lines(variant, Some(family)),
-                    model: None,
-                    lux: None,
-                }
+                let title = format!("{}, n {n}", self.names.display_name(family_name(Some(family))));
+                Panel::over_levels(ACCURACY, title, self.accuracy_lines(variant, Some(family)))
             })
             .collect();
         let caption = format!(
@@ -491,25 +477,18 @@ impl<'a> FigureBuilder<'a> {
             self.condition_text(variant, None),
             horizontal_lines_note(panels.iter().flat_map(|panel| &panel.lines))
         );
-        self.chart(ACCURACY, panels, 3, &caption)
+        self.chart(panels, 3, &caption)
     }
 
     /// A caption and a chart; `None` without panels or without models that were shown images.
-    fn chart(
-        &self,
-        measure: &'static str,
-        panels: Vec<Panel>,
-        columns: usize,
-        caption: &str,
-    ) -> Option<(String, Chart)> {
+    fn chart(&self, panels: Vec<Panel>, columns: usize, caption: &str) -> Option<(String, Chart)> {
         if panels.is_empty() || self.models.is_empty() {
             return None;
         }
         let note = self.note() + &self.training_note(&panels);
         let lux = self.findings.set.lux;
-        let panels = panels.into_iter().map(|panel| Panel { lux, ..panel }).collect();
-        let chart = Chart { measure, note, panels: split(panels), columns };
-        Some((caption.to_owned(), chart))
+        let panels = panels.into_iter().map(|panel| Panel { x: Scale::Levels { lux }, ..panel }).collect();
+        Some((caption.to_owned(), Chart { panels: split(panels), columns, note }))
     }
 }
 

@@ -47,7 +47,7 @@ impl KnownNames {
 }
 
 /// Short form of a model's name, as on the page: without "script:", folders and the file extension.
-fn short_form(name: &str) -> &str {
+pub(crate) fn short_form(name: &str) -> &str {
     let bare = name.strip_prefix("script:").unwrap_or(name);
     let bare = match bare.rsplit_once('/') {
         Some((_, last)) if !last.is_empty() => last,

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::{ACCURACY, DisplayNames, FigureBuilder, horizontal_lines_note};
-use crate::report::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine};
+use crate::report::charts::chart::{Chart, LineContent, LineItems, LineStyle, Panel, PlotLine, Scale};
 use crate::types::degradations::{Axis, Kind};
 use crate::types::{AxisLevel, EnhancerName, Variant};
 use darkqa_score::findings::Findings;
@@ -70,12 +70,9 @@ pub(crate) fn overview(findings: &Findings<'_>, names: &DisplayNames) -> Overvie
 
 impl FigureBuilder<'_> {
     fn single_panel_chart(&self, title: String, lines: Vec<PlotLine>) -> Chart {
-        Chart {
-            measure: ACCURACY,
-            panels: vec![Panel { title, lines, model: None, lux: self.findings.set.lux }],
-            columns: 1,
-            note: String::new(),
-        }
+        let panel = Panel::over_levels(ACCURACY, title, lines);
+        let x = Scale::Levels { lux: self.findings.set.lux };
+        Chart { panels: vec![Panel { x, ..panel }], columns: 1, note: String::new() }
     }
 
     /// Title of a mean: "mean of 6 models", or the name of a single model.

@@ -1,6 +1,6 @@
 //! Division of panels with many curves into several panels: [`split`].
 
-use crate::report::charts::chart::{LineContent, Panel, PlotLine};
+use crate::report::charts::chart::{Panel, PlotLine};
 
 /// Maximum number of curves per panel: the number of colours in the palette.
 const MAX_CURVES: usize = 6;
@@ -12,11 +12,11 @@ pub(crate) fn split(panels: Vec<Panel>) -> Vec<Panel> {
 }
 
 fn split_panel(panel: Panel) -> Vec<Panel> {
-    let count = panel.lines.iter().filter(|line| is_curve(line)).count();
+    let count = panel.lines.iter().filter(|line| line.is_curve()).count();
     if count <= MAX_CURVES {
         return vec![panel];
     }
-    let (curves, other_lines): (Vec<PlotLine>, Vec<PlotLine>) = panel.lines.into_iter().partition(is_curve);
+    let (curves, other_lines): (Vec<PlotLine>, Vec<PlotLine>) = panel.lines.into_iter().partition(PlotLine::is_curve);
     // Equal parts; the last one may have fewer curves.
     let parts = count.div_ceil(MAX_CURVES);
     let size = count.div_ceil(parts);
@@ -25,8 +25,9 @@ fn split_panel(panel: Panel) -> Vec<Panel> {
         .enumerate()
         .map(|(part, part_curves)| Panel {
             title: format!("{} ({} of {parts})", panel.title, part + 1),
+            x: panel.x.clone(),
+            y: panel.y.clone(),
             model: panel.model.clone(),
-            lux: panel.lux,
             lines: part_curves
                 .iter()
                 .chain(other_lines.iter().filter(|line| share_model(part_curves, line) || !share_model(&curves, line)))
@@ -34,10 +35,6 @@ fn split_panel(panel: Panel) -> Vec<Panel> {
                 .collect(),
         })
         .collect()
-}
-
-fn is_curve(line: &PlotLine) -> bool {
-    matches!(line.content, LineContent::Curve(_))
 }
 
 /// True if a curve is about the same model as the line.
@@ -48,7 +45,7 @@ fn share_model(curves: &[PlotLine], line: &PlotLine) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::report::charts::chart::LineStyle;
+    use crate::report::charts::chart::{LineContent, LineStyle};
 
     fn line(name: &str, content: LineContent, model: Option<&str>) -> PlotLine {
         PlotLine { name: name.to_owned(), style: LineStyle(0), content, model: model.map(str::to_owned), items: None }
@@ -61,7 +58,7 @@ mod tests {
             line("m0 without images", LineContent::Flat(0.4), Some("m0")),
             line("chance", LineContent::Flat(0.3), None),
         ];
-        Panel { title: "t".to_owned(), lines: curves.chain(others).collect(), model: None, lux: None }
+        Panel::over_levels("accuracy in %", "t".to_owned(), curves.chain(others).collect())
     }
 
     fn line_names(panel: &Panel) -> Vec<&str> {

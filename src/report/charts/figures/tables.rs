@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::{DisplayNames, FigureBuilder, FigureSpec};
-use crate::report::charts::chart::{FigureChart, LevelScale, ThresholdChart, ThresholdRow};
+use crate::report::charts::chart::{Chart, LineContent, LineStyle, Panel, PlotLine, Scale};
 use crate::report::tables::missing_threshold_reason;
 use crate::report::text::table::{Column, ColumnHeads, ColumnKind, Table, TableCell, TableRow};
 use crate::report::text::words::{family as family_name, stops};
@@ -283,26 +283,25 @@ impl FigureBuilder<'_> {
 
     /// One row for each curve on an axis, with its threshold and interval; `None` if no curve has a threshold.
     fn thresholds_on(&self, axis: Axis) -> Option<FigureSpec> {
-        let rows: Vec<ThresholdRow> = curves_on(self.findings, axis)
+        let lines: Vec<PlotLine> = curves_on(self.findings, axis)
             .filter_map(|curve| {
                 let threshold = *curve.summary.threshold.as_ref().ok()?;
                 let darkest = curve.summary.darkest.value();
                 let light = self.condition_text(&curve.variant, curve.enhancer.as_ref());
-                Some(ThresholdRow {
-                    name: format!("{}, {light}", self.curve_name(&curve.model)),
-                    threshold,
-                    text: format!(
-                        "{} [{}, {}]",
-                        stops(threshold.value, darkest),
-                        stops(threshold.low, darkest),
-                        stops(threshold.high, darkest)
-                    ),
-                })
+                let text = format!(
+                    "{} [{}, {}]",
+                    stops(threshold.value, darkest),
+                    stops(threshold.low, darkest),
+                    stops(threshold.high, darkest)
+                );
+                let name = format!("{}, {light}", self.curve_name(&curve.model));
+                Some(PlotLine::new(name, LineStyle(0), LineContent::Range { threshold, text }))
             })
             .collect();
-        if rows.is_empty() {
+        if lines.is_empty() {
             return None;
         }
+        let panel = Panel { title: String::new(), x: Scale::thresholds(axis), y: Scale::Names, lines, model: None };
         let (name, caption) = if axis == Axis::MOTION {
             (
                 "blur_thresholds",
@@ -319,11 +318,11 @@ impl FigureBuilder<'_> {
         Some(FigureSpec {
             name,
             caption: caption.to_owned(),
-            chart: FigureChart::Thresholds(ThresholdChart {
-                rows,
-                scale: LevelScale::for_axis(axis),
-                unit: self.findings.unit.to_string(),
-            }),
+            chart: Chart {
+                panels: vec![panel],
+                columns: 1,
+                note: format!("lines are 95 % intervals by {}", self.findings.unit),
+            },
         })
     }
 }

@@ -30,15 +30,25 @@ impl<'a> From<&'a PlotLine> for LegendEntry<'a> {
             name: &line.name,
             style: line.style,
             sample: match line.content {
-                LineContent::Curve(_) => LegendSample::Curve,
                 LineContent::Marks(_) => LegendSample::Marks,
                 LineContent::Flat(_) => LegendSample::Flat,
+                _ => LegendSample::Curve,
             },
         }
     }
 }
 
 impl LegendEntry<'_> {
+    /// Kind of the line, as the page's script names it.
+    pub(super) fn kind(&self) -> &'static str {
+        match self.sample {
+            LegendSample::Flat if self.style == LineStyle::REFERENCE => "chance",
+            LegendSample::Flat => "flat",
+            LegendSample::Curve => "curve",
+            LegendSample::Marks => "marks",
+        }
+    }
+
     /// True for the horizontal line of a model without images.
     fn is_without_images(&self) -> bool {
         self.sample == LegendSample::Flat && self.style != LineStyle::REFERENCE
@@ -64,15 +74,15 @@ const ROW: f64 = 1.4;
 const START: f64 = 0.3;
 
 impl<'a> Legend<'a> {
-    /// Legend of the lines in a line chart.
+    /// Legend of the named lines of a chart. Panels with names need none.
     pub(super) fn for_chart(chart: &'a Chart, look: &Look) -> Self {
-        let entries =
-            chart.panels.iter().flat_map(|panel| &panel.lines).filter(|line| !line.is_empty()).map(LegendEntry::from);
-        Self::new(entries, look)
+        let panels = chart.panels.iter().filter(|panel| !panel.has_names());
+        let lines = panels.flat_map(|panel| &panel.lines).filter(|line| !line.is_empty() && !line.name.is_empty());
+        Self::new(lines.map(LegendEntry::from), look)
     }
 
     /// Arranges the entries in rows of the figure's width. Only the first entry of each name is kept.
-    pub(super) fn new(entries: impl Iterator<Item = LegendEntry<'a>>, look: &Look) -> Self {
+    fn new(entries: impl Iterator<Item = LegendEntry<'a>>, look: &Look) -> Self {
         let font = Font::bundled();
         let (font_size, row) = (look.font_size, ROW * look.font_size);
         let mut arranged: Vec<(LegendEntry<'a>, Point)> = Vec::new();
@@ -98,26 +108,41 @@ impl<'a> Legend<'a> {
         let font_size = look.font_size;
         for (entry, [x, y]) in &self.entries {
             let y = top + y + 0.6 * font_size;
-            let ends = [[*x, y], [x + SAMPLE * font_size, y]];
-            let middle = [x + SAMPLE * font_size / 2.0, y];
-            match entry.sample {
-                LegendSample::Curve => {
-                    let pen = look.pen(entry.style);
-                    sheet.line(&ends, &pen.stroke);
-                    look.draw_marker(sheet, &pen, middle);
-                }
-                LegendSample::Marks => {
-                    sheet.line(&ends, &look.thin_stroke(look.colour(entry.style)));
-                    look.draw_hollow_marker(sheet, entry.style, middle);
-                }
-                LegendSample::Flat => sheet.line(&ends, &self.flat_stroke(*entry, look)),
-            }
+            self.draw_sample(sheet, look, *entry, [*x, y]);
             let start = (SAMPLE + AFTER_SAMPLE) * font_size;
             let room = look.width - x - start;
             let name = Font::bundled().shortened(entry.name, font_size, room);
             let position = [x + start, y + 0.35 * font_size];
             sheet.label(&name, position, font_size, Anchor::Start);
         }
+    }
+
+    /// Draws the sample of an entry, its left end at a position.
+    fn draw_sample(&self, sheet: &mut Sheet, look: &Look, entry: LegendEntry<'_>, [x, y]: Point) {
+        let ends = [[x, y], [x + SAMPLE * look.font_size, y]];
+        let middle = [x + SAMPLE * look.font_size / 2.0, y];
+        match entry.sample {
+            LegendSample::Curve => {
+                let pen = look.pen(entry.style);
+                sheet.line(&ends, &pen.stroke);
+                look.draw_marker(sheet, &pen, middle);
+            }
+            LegendSample::Marks => {
+                sheet.line(&ends, &look.thin_stroke(look.colour(entry.style)));
+                look.draw_hollow_marker(sheet, entry.style, middle);
+            }
+            LegendSample::Flat => sheet.line(&ends, &self.flat_stroke(entry, look)),
+        }
+    }
+
+    /// Each entry, with its sample on a sheet of its own.
+    pub(super) fn samples(&self, look: &Look) -> impl Iterator<Item = (LegendEntry<'a>, Sheet)> {
+        let size = [SAMPLE * look.font_size, look.font_size];
+        self.entries.iter().map(move |(entry, _)| {
+            let mut sheet = Sheet { size, ..Sheet::default() };
+            self.draw_sample(&mut sheet, look, *entry, [0.0, size[1] / 2.0]);
+            (*entry, sheet)
+        })
     }
 
     /// Stroke of a horizontal line. The lines of models without images differ in their dashes, by their order in the

@@ -136,6 +136,16 @@ impl Look {
         }
     }
 
+    /// Draws a hollow marker.
+    pub(super) fn draw_hollow_marker(&self, sheet: &mut Sheet, style: LineStyle, centre: Point) {
+        sheet.shapes.push(Shape::Disc {
+            centre,
+            radius: 2.2 * self.line_scale(),
+            fill: Some(PAPER),
+            edge: Some(Stroke::solid(self.colour(style), 0.9 * self.line_scale())),
+        });
+    }
+
     /// Draws the marker of a pen at a point.
     pub(super) fn draw_marker(&self, sheet: &mut Sheet, pen: &Pen, [x, y]: Point) {
         let reach = 1.9 * self.line_scale();

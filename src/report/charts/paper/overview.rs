@@ -5,9 +5,8 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::figure::{arrange_in_rows, column_look};
+use super::figure::{arrange_in_rows, column_look, sheet};
 use super::font::Font;
-use super::lines::lines;
 use super::look::Look;
 use super::sheet::{Anchor, PAPER, Point, Shape, Sheet, Stroke, TextDirection};
 use crate::error::{Error, Result};
@@ -52,7 +51,7 @@ pub(crate) fn overview_sheet(
                 for panel in &mut chart.panels {
                     panel.title = format!("({}) {}", letter(parts.len()), panel.title);
                 }
-                parts.push((lines(&chart, &half), caption.clone()));
+                parts.push((sheet(&chart, &half), caption.clone()));
                 charts.push(chart);
             }
         }

@@ -80,6 +80,7 @@ impl<'a> PdfPage<'a> {
                 self.paint(*fill, edge.as_ref());
             }
             Shape::Label(label) => self.write_label(label),
+            Shape::Group(group) => group.shapes.iter().for_each(|shape| self.draw(shape)),
             Shape::Picture { corner: [x, y], size: [width, height], image } => {
                 let [x, y, width, height] = [x, y, width, height].map(|length| *length as f32);
                 let name = picture_name(self.pictures.len());

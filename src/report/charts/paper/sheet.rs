@@ -66,6 +66,7 @@ pub(crate) enum Shape {
         edge: Option<Stroke>,
     },
     Label(TextLabel),
+    Group(ShapeGroup),
     /// A bitmap image.
     Picture {
         /// Upper left corner.
@@ -76,6 +77,19 @@ pub(crate) enum Shape {
     },
 }
 
+/// Shapes that belong together. PDF and SVG files have the shapes alone; the page has the group with its class, data
+/// and title, for its style and its script.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct ShapeGroup {
+    /// CSS classes.
+    pub class: &'static str,
+    /// Names and values of the attributes whose names begin with `data-`.
+    pub data: Vec<(&'static str, String)>,
+    /// Text that a browser shows at the pointer; empty for none.
+    pub title: String,
+    pub shapes: Vec<Shape>,
+}
+
 /// Text on one line.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TextLabel {
@@ -84,7 +98,25 @@ pub(crate) struct TextLabel {
     pub start: Point,
     /// Font size in points.
     pub size: f64,
+    /// Part of the baseline that keeps its position if another font is used.
+    pub anchor: Anchor,
     pub direction: TextDirection,
+}
+
+impl TextLabel {
+    /// Width in points.
+    pub(super) fn width(&self) -> f64 {
+        Font::bundled().width(&self.text, self.size)
+    }
+
+    /// Position of the anchor.
+    pub(super) fn position(&self) -> Point {
+        let ([x, y], offset) = (self.start, self.anchor.offset(self.width()));
+        match self.direction {
+            TextDirection::Right => [x + offset, y],
+            TextDirection::Up => [x, y - offset],
+        }
+    }
 }
 
 /// Direction in which a text runs.
@@ -96,22 +128,32 @@ pub(crate) enum TextDirection {
 
 /// Part of a text's baseline that is at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Anchor {
+pub(crate) enum Anchor {
     Start,
     Middle,
     End,
+}
+
+impl Anchor {
+    /// Distance of the anchor from the start of a text of a width.
+    fn offset(self, width: f64) -> f64 {
+        match self {
+            Self::Start => 0.0,
+            Self::Middle => width / 2.0,
+            Self::End => width,
+        }
+    }
 }
 
 #[cfg(test)]
 impl Sheet {
     /// Bottom centre of the first label with a text.
     pub(super) fn label_position(&self, text: &str) -> Point {
-        self.shapes
-            .iter()
+        self.ungrouped()
+            .into_iter()
             .find_map(|shape| match shape {
                 Shape::Label(label) if label.text == text => {
-                    let width = Font::bundled().width(text, label.size);
-                    Some([label.start[0] + width / 2.0, label.start[1]])
+                    Some([label.start[0] + label.width() / 2.0, label.start[1]])
                 }
                 _ => None,
             })
@@ -126,6 +168,12 @@ impl Sheet {
 
     pub(super) fn area(&mut self, corners: Vec<Point>, fill: Colour, opacity: f64) {
         self.shapes.push(Shape::Area { corners, fill, opacity });
+    }
+
+    /// Adds shapes as a group of a class.
+    pub(super) fn group(&mut self, class: &'static str, shapes: impl IntoIterator<Item = Shape>) {
+        let shapes = shapes.into_iter().collect();
+        self.shapes.push(Shape::Group(ShapeGroup { class, shapes, ..ShapeGroup::default() }));
     }
 
     /// Adds a horizontal text whose anchor is at a position.
@@ -145,17 +193,12 @@ impl Sheet {
         if text.is_empty() {
             return;
         }
-        let width = Font::bundled().width(text, size);
-        let offset = match anchor {
-            Anchor::Start => 0.0,
-            Anchor::Middle => width / 2.0,
-            Anchor::End => width,
-        };
+        let offset = anchor.offset(Font::bundled().width(text, size));
         let start = match direction {
             TextDirection::Right => [x - offset, y],
             TextDirection::Up => [x, y + offset],
         };
-        self.shapes.push(Shape::Label(TextLabel { text: text.to_owned(), start, size, direction }));
+        self.shapes.push(Shape::Label(TextLabel { text: text.to_owned(), start, size, anchor, direction }));
     }
 
     /// Adds a white background, for viewers with a dark one.
@@ -172,16 +215,14 @@ impl Sheet {
 
     /// Adds the shapes of another sheet, with its upper left corner at a position.
     pub(super) fn insert(&mut self, other: Sheet, [left, top]: Point) {
-        let moved = |[x, y]: Point| [x + left, y + top];
-        self.shapes.extend(other.shapes.into_iter().map(|shape| match shape {
-            Shape::Line { points, stroke } => Shape::Line { points: points.into_iter().map(moved).collect(), stroke },
-            Shape::Area { corners, fill, opacity } => {
-                Shape::Area { corners: corners.into_iter().map(moved).collect(), fill, opacity }
-            }
-            Shape::Disc { centre, radius, fill, edge } => Shape::Disc { centre: moved(centre), radius, fill, edge },
-            Shape::Label(label) => Shape::Label(TextLabel { start: moved(label.start), ..label }),
-            Shape::Picture { corner, size, image } => Shape::Picture { corner: moved(corner), size, image },
-        }));
+        self.shapes.extend(other.shapes.into_iter().map(|shape| shape.moved([left, top])));
+    }
+
+    /// Shapes without groups, from the lowest to the topmost.
+    pub(super) fn ungrouped(&self) -> Vec<&Shape> {
+        let mut shapes = Vec::new();
+        ungroup(&self.shapes, &mut shapes);
+        shapes
     }
 
     /// Checks that the bundled font has all characters of the sheet.
@@ -190,7 +231,7 @@ impl Sheet {
     /// If the font lacks a character; the error names the text and the character.
     pub(crate) fn check_characters(&self) -> Result<()> {
         let font = Font::bundled();
-        for shape in &self.shapes {
+        for shape in self.ungrouped() {
             let Shape::Label(TextLabel { text, .. }) = shape else {
                 continue;
             };
@@ -202,5 +243,34 @@ impl Sheet {
             }
         }
         Ok(())
+    }
+}
+
+fn ungroup<'a>(shapes: &'a [Shape], into: &mut Vec<&'a Shape>) {
+    for shape in shapes {
+        match shape {
+            Shape::Group(group) => ungroup(&group.shapes, into),
+            shape => into.push(shape),
+        }
+    }
+}
+
+impl Shape {
+    /// The shape at another place, moved right and down by a vector.
+    fn moved(self, vector: Point) -> Self {
+        let moved = |[x, y]: Point| [x + vector[0], y + vector[1]];
+        match self {
+            Self::Line { points, stroke } => Self::Line { points: points.into_iter().map(moved).collect(), stroke },
+            Self::Area { corners, fill, opacity } => {
+                Self::Area { corners: corners.into_iter().map(moved).collect(), fill, opacity }
+            }
+            Self::Disc { centre, radius, fill, edge } => Self::Disc { centre: moved(centre), radius, fill, edge },
+            Self::Label(label) => Self::Label(TextLabel { start: moved(label.start), ..label }),
+            Self::Group(group) => {
+                let shapes = group.shapes.into_iter().map(|shape| shape.moved(vector)).collect();
+                Self::Group(ShapeGroup { shapes, ..group })
+            }
+            Self::Picture { corner, size, image } => Self::Picture { corner: moved(corner), size, image },
+        }
     }
 }

@@ -2,9 +2,11 @@
 
 use std::fmt::Write;
 
+use super::figure::fitting_columns;
 use super::font::Font;
 use super::legend::Legend;
 use super::look::Look;
+use super::panel::MAX_BANDS;
 use super::sheet::{Colour, Stroke};
 use crate::report::charts::chart::{Chart, LineContent, Panel, PlotLine};
 use crate::report::text::latex::escape;
@@ -21,13 +23,9 @@ const LAST: f64 = 1.0;
 const SAMPLE: f64 = 43.0;
 /// Maximum width of a text in the font of a paper, relative to Arial.
 const WIDER: f64 = 1.08;
-/// Intervals are drawn as bands in panels of up to this many curves, and as bars in others.
-const MAX_BANDS: usize = 3;
-
-/// Writes a chart as files by name: its source, and the data of each panel.
+/// Writes a chart over levels as files by name: its source, and the data of each panel.
 pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8>)> {
-    let fitting = (look.width / (14.0 * look.font_size)) as usize;
-    let columns = chart.columns.min(fitting).min(chart.panels.len()).max(1);
+    let columns = fitting_columns(chart, look);
     let rows = chart.panels.len().div_ceil(columns);
     // Space for tick labels, and in the first column for the axis title.
     let between = (10.0 * BETWEEN * look.font_size).floor() / 10.0;
@@ -57,12 +55,13 @@ pub(crate) fn tex(name: &str, chart: &Chart, look: &Look) -> Vec<(String, Vec<u8
     for (index, panel) in chart.panels.iter().enumerate() {
         let data = format!("{name}-{}.dat", index + 1);
         let is_first = index % columns == 0;
-        text += &axes_options(panel, if is_first { chart.measure } else { "" });
+        let measure = if is_first { panel.y.title(panel) } else { String::new() };
+        text += &axes_options(panel, &measure);
         if index == 0 {
             let _ = write!(text, ", legend to name={{darkqa-{name}}}");
         }
         text += "]\n";
-        let curves = panel.lines.iter().filter(|line| matches!(line.content, LineContent::Curve(_)));
+        let curves = panel.lines.iter().filter(|line| line.is_curve());
         let source = PanelSource { look, legend: &legend, data: &data, has_bands: curves.count() <= MAX_BANDS };
         for (index, line) in panel.lines.iter().enumerate() {
             if line.is_empty() {
@@ -205,6 +204,8 @@ impl PanelSource<'_> {
                     )
                 }
             }
+            // Other contents are not over levels.
+            _ => String::new(),
         }
     }
 }

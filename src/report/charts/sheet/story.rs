@@ -182,8 +182,6 @@ fn draw_curves(sheet: &mut SheetCanvas, layout: &StorySizes, top: usize, story: 
                 sheet.path(&[[ends[0], y], [ends[1], y]], Some([6.0, 4.0]), 1.5, colour);
                 y
             }
-            // Photographs in the dark have no column.
-            LineContent::Marks(_) => continue,
             LineContent::Curve(points) => {
                 let points: Vec<(f64, &Estimate)> = points
                     .iter()
@@ -202,6 +200,8 @@ fn draw_curves(sheet: &mut SheetCanvas, layout: &StorySizes, top: usize, story: 
                 }
                 path.last().map_or_else(|| y(0.0), |point| point[1])
             }
+            // Photographs in the dark have no column.
+            _ => continue,
         };
         labels.push((end_y, &line.name, colour));
     }

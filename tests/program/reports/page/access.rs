@@ -112,13 +112,12 @@ fn faint(browser: &mut Browser) -> Vec<String> {
         const names = ['--ink', ...[0, 1, 2, 3, 4, 5].map((n) => '--line-' + n)];
         const named = names.map((name) => { probe.style.color = `var(${name})`; return [name, getComputedStyle(probe).color]; });
         probe.remove();
-        const of = (selector, property) => [...document.querySelectorAll('.plot ' + selector)].map((e) => [selector, getComputedStyle(e)[property]]);
-        const all = [...named, ...of('.line', 'stroke'), ...of('.stroked', 'stroke'), ...of('.filled', 'fill')];
-        // Figures that are shown as they are, but for their ground, grid, text and bands.
-        const still = [...document.querySelectorAll('figure:not(.drawn) .drawing svg *')].filter((e) => Number(getComputedStyle(e).opacity) > 0.5);
-        const plain = ['#ffffff', '#222222', '#dddddd', 'none', null];
-        for (const property of ['fill', 'stroke']) {
-          all.push(...still.filter((e) => !plain.includes(e.getAttribute(property))).map((e) => [e.tagName, getComputedStyle(e)[property]]));
+        const all = [...named];
+        const parts = '.key *, .panel [data-line], .panel [data-line] *';
+        for (const e of document.querySelectorAll(parts)) {
+          if (!['polyline', 'polygon', 'circle'].includes(e.tagName) || e.matches('.band, .target')) continue;
+          const { fill, stroke } = getComputedStyle(e);
+          all.push([e.tagName, stroke === 'none' ? fill : stroke]);
         }
         return { ground: getComputedStyle(document.body).backgroundColor,
                  all };
