@@ -2,6 +2,7 @@
 
 import contextlib
 import csv
+import importlib.util
 import io
 import os
 import re
@@ -28,6 +29,11 @@ def rows(path, **values):
         return [row for row in csv.DictReader(file) if all(row[name] == value for name, value in values.items())]
 
 
+def condition(row):
+    """The condition of a row of `summary.csv` without an enhancer."""
+    return row["level"] if row["variant"] == "none" else f"{row['level']}-{row['variant']}"
+
+
 def by_key(table):
     """The rows of a frame by its index, or those of a series; in the words of CSV files."""
 
@@ -39,19 +45,24 @@ def by_key(table):
 
 
 class Recipes(RunTest):
-    def run_page(self):
+    def run_blocks(self, language, least):
         """Run the blocks of the page in the test's folder, in one namespace; return that."""
         self.addCleanup(os.chdir, os.getcwd())
         os.chdir(self.folder)
         names, count = {}, 0
-        for is_run, above, text in blocks("python"):
+        for is_run, above, text in blocks(language):
             # Empty lines above give an error the number of its line in the page.
             code = compile("\n" * above + text, str(PAGE), "exec")
             if is_run:
                 count += 1
                 with contextlib.redirect_stdout(io.StringIO()):
                     exec(code, names)
-        self.assertGreater(count, 8)
+        self.assertGreaterEqual(count, least)
+        return names
+
+    def run_page(self):
+        """Run the recipes of pandas."""
+        names = self.run_blocks("python", 9)
         # A recipe that changes the table of trials would change the numbers of the next ones.
         loaded = load_run(self.folder / "runs" / "a")
         self.assertEqual(len(names["trials"]), (~loaded["model"].str.startswith("observer:")).sum())
@@ -63,6 +74,7 @@ class Recipes(RunTest):
         self.check_accuracy(names, summary(run))
         self.check_differences(names, run / "comparisons.csv")
         self.check_two_runs(names, self.folder / "compared" / "baseline.csv")
+        self.check_seeds(names["by_seed"], names["means"])
 
     def check_accuracy(self, names, table):
         table = [row for row in table if row["family"] == "all" and row["model"] != "chance"]
@@ -112,6 +124,54 @@ class Recipes(RunTest):
             for name in ("n", "old", "new", "difference"):
                 self.assertAlmostEqual(found[name], float(row[name]), msg=(name, row))
 
+    def check_seeds(self, by_seed, means):
+        self.assertEqual(list(by_seed.columns), [1, 2, 3])
+        for seed in by_seed.columns:
+            table = summary(self.folder / "runs" / f"seed-{seed}")
+            expected = {
+                (row["model"], condition(row)): row
+                for row in table
+                if row["family"] == "all" and row["mode"] == "strict" and row["level"] and row["model"] != "chance"
+            }
+            found = by_key(by_seed[seed])
+            self.assertEqual(set(found), set(expected))
+            for key, row in expected.items():
+                self.assertAlmostEqual(found[key], float(row["value"]), msg=(seed, key))
+        for key, row in by_key(means).items():
+            self.assertAlmostEqual(row["difference"], by_seed.loc[key].mean(), msg=key)
+            self.assertTrue(0 <= row["low"] <= row["difference"] <= row["high"] <= 1, row)
+
+    @unittest.skipUnless(importlib.util.find_spec("polars"), "no polars")
+    def test_polars_agrees_with_the_tables(self):
+        data = "--data rooms:frames=6,size=96x64 --levels L0,L3"
+        self.call(f"--model observer --model random --blind-model random --llie lift --out runs/a {data}")
+        for seed in (1, 2, 3):
+            self.call(f"--model random --seed {seed} --out runs/seed-{seed} {data}")
+        names = self.run_blocks("python polars", 1)
+        table = summary(self.folder / "runs" / "a")
+        table = [row for row in table if row["family"] == "all" and row["mode"] == "strict" and row["model"] != "chance"]
+        expected = {tuple(row[name] for name in SUBJECT): (int(row["n"]), float(row["value"])) for row in table}
+        found = {tuple(row[name] or "" for name in SUBJECT): (row["n"], row["accuracy"]) for row in names["accuracy"].to_dicts()}
+        self.assertEqual(set(found), set(expected))
+        for key, (n, accuracy) in expected.items():
+            self.assertEqual(found[key][0], n, key)
+            self.assertAlmostEqual(found[key][1], accuracy, msg=key)
+        differences = rows(self.folder / "runs" / "a" / "comparisons.csv", kind="enhancer", family="all", mode="strict")
+        effects = {(row["model"], row["condition"]): row for row in names["effects"].to_dicts()}
+        self.assertEqual(set(effects), {(row["model"], row["condition"]) for row in differences})
+        for row in differences:
+            effect = effects[row["model"], row["condition"]]
+            self.assertEqual(effect["n"], int(row["n"]))
+            self.assertAlmostEqual(effect["difference"], float(row["difference"]), msg=row)
+        means = {row["condition"]: row["mean"] for row in names["means"].to_dicts()}
+        values = {}
+        for seed in (1, 2, 3):
+            for row in rows(self.folder / "runs" / f"seed-{seed}" / "summary.csv", family="all", mode="strict", model="random"):
+                values.setdefault(condition(row), []).append(float(row["value"]))
+        self.assertEqual(set(means), set(values))
+        for name, of_seeds in values.items():
+            self.assertAlmostEqual(means[name], sum(of_seeds) / 3, msg=name)
+
     def test_on_the_runs_of_the_page(self):
         commands = "".join(text for is_run, _, text in blocks("sh") if is_run).splitlines()
         for command in commands:
@@ -135,6 +195,8 @@ class Recipes(RunTest):
             self.add_usage(self.folder / "runs" / name / "records.jsonl")
             self.call(f"report runs/{name}")
         self.call("report runs/b --baseline runs/a --out compared")
+        for seed in (1, 2, 3):
+            self.call(f"--model random --data rooms --levels L0,L5 --seed {seed} --out runs/seed-{seed}")
         names = self.run_page()
         self.check(names)
         self.check_tokens(names)
