@@ -29,8 +29,9 @@ use darkqa_eval::cli;
 use page::{Block, BlockKind, Page, files, pages, root};
 use regex::Regex;
 
-/// Flags of other programs that pages name: `sbatch`, `hf`, `pip`, `cargo`, `inspect eval`, and servers of models.
-const OF_OTHERS: [&str; 25] = [
+/// Flags of other programs that pages name: `sbatch`, `hf`, `pip`, `cargo`, `inspect eval`, `promptfoo`,
+/// VLMEvalKit, and servers of models.
+const OF_OTHERS: [&str; 31] = [
     "--repo-type",
     "--local-dir",
     "--revision",
@@ -41,6 +42,12 @@ const OF_OTHERS: [&str; 25] = [
     "--release",
     "--path",
     "--no-log-images",
+    "--max-connections",
+    "--max-samples",
+    "--display",
+    "--no-cache",
+    "--api-mode",
+    "--api-nproc",
     "--bench",
     "--test",
     "--ignored",
