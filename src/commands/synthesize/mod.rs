@@ -52,7 +52,7 @@ pub(crate) struct SynthesizeCommand {
 enum SynthesizeForm {
     /// Compare the images of a folder with the digests in their JSON files; nothing is made or changed
     Check {
-        /// The folder of the images
+        /// The folder of the images, with its subfolders
         #[arg(value_name = "DIR", add = Decides::Nothing)]
         folder: PathBuf,
     },
@@ -323,25 +323,34 @@ const SCHEMAS: [&str; 3] = ["darkqa.image/1", "darkqa.image/2", "darkqa.sheet/1"
 /// Maximum number of images without a JSON file that are named; chosen.
 const MAX_NAMED: usize = 3;
 
-/// Checks that each image in a folder has a JSON file and the digest in it. Nothing is changed.
+/// The files in a folder and its subfolders, sorted. Links to folders are not followed.
+fn files_below(folder: &Path) -> Result<Vec<PathBuf>> {
+    let unread = |e| Error::file(folder, "read", e);
+    let mut files = Vec::new();
+    for entry in fs::read_dir(folder).map_err(unread)? {
+        let entry = entry.map_err(unread)?;
+        if entry.file_type().map_err(unread)?.is_dir() {
+            files.extend(files_below(&entry.path())?);
+        } else {
+            files.push(entry.path());
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+/// Checks that each image in a folder and its subfolders has a JSON file and the digest in it. Nothing is changed.
 ///
 /// # Errors
-/// If the folder cannot be read, or has no JSON file of an image.
+/// If a folder cannot be read, or none has a JSON file of an image.
 fn check(folder: &Path) -> Result<Outcome> {
-    let entries = fs::read_dir(folder).map_err(|e| Error::file(folder, "read", e))?;
-    let files: std::io::Result<Vec<PathBuf>> = entries.map(|entry| Ok(entry?.path())).collect();
-    let mut files = files.map_err(|e| Error::file(folder, "read", e))?;
-    files.sort();
+    let files = files_below(folder)?;
     let (mut intact, mut wrong) = (0, 0);
-    let mut unknown: BTreeSet<String> = files
-        .iter()
-        .filter(|file| is_image(file))
-        .filter_map(|file| Some(file.file_name()?.to_string_lossy().into_owned()))
-        .collect();
+    let mut unknown: BTreeSet<PathBuf> = files.iter().filter(|file| is_image(file)).cloned().collect();
     for file in files.iter().filter(|file| file.extension().is_some_and(|end| end == "json")) {
         match read_output(file) {
             Ok(Some(output)) => {
-                unknown.remove(&output.file);
+                unknown.remove(&file.with_file_name(&output.file));
                 match check_image(file, &output) {
                     Ok(()) => intact += 1,
                     Err(e) => {
@@ -353,7 +362,7 @@ fn check(folder: &Path) -> Result<Outcome> {
             Ok(None) => {}
             Err(e) => {
                 // The image has a JSON file, although an unusable one.
-                unknown.retain(|image| Path::new(image).file_stem() != file.file_stem());
+                unknown.retain(|image| image.with_extension("") != file.with_extension(""));
                 tracing::error!("{e}");
                 wrong += 1;
             }
@@ -364,7 +373,8 @@ fn check(folder: &Path) -> Result<Outcome> {
         return Err(Error::data(folder.display(), problem));
     }
     if !unknown.is_empty() {
-        let unknown: Vec<String> = unknown.iter().cloned().collect();
+        let below = unknown.iter().map(|image| image.strip_prefix(folder).unwrap_or(image));
+        let unknown: Vec<String> = below.map(|image| image.display().to_string()).collect();
         tracing::error!(
             "{}: no JSON file says how they were made: {}",
             folder.display(),

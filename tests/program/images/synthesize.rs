@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use crate::support::run::{Bench, words};
+use crate::support::run::{Bench, files, words};
 use crate::support::snapshot::each;
 use crate::support::table::check_rows;
 use serde_json::{Value, json};
@@ -232,6 +232,22 @@ fn json_file_verifies_image_bytes() {
         checked.stdout,
         "out: images as they were written: 1; not as they were written: 0; without a JSON file: 0\n"
     );
+}
+
+/// Frames of scenes have a folder for each scene.
+#[test]
+fn images_in_subfolders_are_checked() {
+    let bench = Bench::new();
+    bench.rooms("frames", 2, "96x72");
+    bench.complete(&words("synthesize frames --levels L3 --out dark"));
+    let checked = bench.complete(&words("synthesize --check dark"));
+    assert_eq!(checked, "dark: images as they were written: 4; not as they were written: 0; without a JSON file: 0\n");
+    let images = files(&bench.path("dark"));
+    let image = images.iter().find(|path| path.extension().is_some_and(|end| end == "png")).unwrap();
+    assert_ne!(image.parent().unwrap(), bench.path("dark"));
+    fs::copy(image, image.with_file_name("foreign.png")).unwrap();
+    let foreign = bench.call(&words("synthesize --check dark"));
+    assert!(foreign.code == Some(1) && foreign.stderr.contains("/foreign.png"), "{foreign:?}");
 }
 
 /// Fresh draws and a camera of another make leave the level's own traces in the file: nothing else is needed.
