@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::sentence::{EffectDirection, NamedNumbers, Sentence, capitalised, level_runs};
+use super::sentence::{EffectDirection, NamedNumbers, Sentence, level_runs};
 use super::threshold::evidence_down_to;
 use crate::report::text::words::light;
 use crate::types::{AxisLevel, EnhancerName, SetLight, Variant};
@@ -104,14 +104,18 @@ fn between(found: &SelfAgreement<'_>) -> Vec<Sentence> {
     }).collect()
 }
 
-/// The degraded variants of a model, sorted.
-fn variants(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<Variant> {
-    found
+/// The degraded variants of a model: the main variant of the report, then the others, sorted.
+fn variants(found: &SelfAgreement<'_>, model: &str) -> Vec<Variant> {
+    let main = found.grid.main_variant();
+    let own: BTreeSet<&Variant> = found
         .whole()
         .filter(|cell| cell.subject.model == model)
-        .map(|cell| cell.subject.variant.clone())
+        .map(|cell| &cell.subject.variant)
         .filter(|variant| variant.kind.is_some())
-        .collect()
+        .collect();
+    let mut own: Vec<Variant> = own.into_iter().cloned().collect();
+    own.sort_by_key(|variant| main.as_ref() != Some(variant));
+    own
 }
 
 fn enhancers(found: &SelfAgreement<'_>, model: &str) -> BTreeSet<EnhancerName> {
@@ -232,7 +236,7 @@ fn enhanced(found: &SelfAgreement<'_>, model: &str, variant: &Variant, enhancer:
     let p = numbers.p("p", strongest.strict.tested.stated_p());
     let against = if level == AxisLevel::L0 { "L0 asked again" } else { "raw" };
     let detail = format!("largest at {level}: {difference} points of agreement against {against}, {p}");
-    Some(numbers.sentence("agreement_enhanced", tone, capitalised(&text), detail))
+    Some(numbers.sentence("agreement_enhanced", tone, text, detail))
 }
 
 /// The effect of an enhancer on the answers of a model to images of a variant; `better` and `worse` are the levels at

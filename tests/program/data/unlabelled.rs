@@ -470,7 +470,7 @@ fn enhancing_bright_photographs_is_reported_harmful() {
     let line = "--data photos --ask bank.jsonl --model script:eyes.jsonl --llie lift";
     let of = |flags: &str| on_one_line(&bench.complete(&words(&format!("{line} {flags}"))));
     let dark = of("--light dark --out dark");
-    assert!(dark.contains("Lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known. lift was trained on this program's synthesis."),"{dark}");
+    assert!(dark.contains("lift changes answers of script:eyes.jsonl to these photographs: whether for the better is not known. lift was trained on this program's synthesis."),"{dark}");
     assert!(!dark.contains("harm"), "{dark}");
     let lit = of("--levels L0 --llie-on l0 --out lit");
     assert!(lit.contains("harm where nothing was dark"), "{lit}");
