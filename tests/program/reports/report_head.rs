@@ -167,6 +167,8 @@ fn enhancers_are_timed_and_held_to_a_budget() {
     assert!(!text.contains("takes longer"), "{text}");
     asked("--out plain");
     assert!(report("plain --llie-budget 5").contains("--llie-options budget has no effect: no enhancer ran."));
+    let unused = "--lux-at-l0 200 changes nothing here: no threshold is known; the table of thresholds says why.";
+    assert!(report("plain --lux-at-l0 200").contains(unused));
     let refused = bench.call(&words("report run --llie-budget fast"));
     assert!(refused.code == Some(2) && refused.stderr.contains("a time such as 50ms or 0.05s expected"), "{refused:?}");
 }

@@ -12,6 +12,7 @@ use super::combine::CombinedRuns;
 use super::enhancers::enhancer_alerts;
 use super::join::{Joined, JoinedRun};
 use crate::report::text::alert::{Alert, AlertKind};
+use crate::runs::LUX_AT_L0;
 use crate::runs::outcome::OverBudget;
 use crate::types::manifests::Status;
 use crate::types::text::plural;
@@ -45,6 +46,7 @@ pub(super) fn alerts(combined: &CombinedRuns, findings: &Findings<'_>) -> Vec<Al
     alerts.extend(questions::cluster_alerts(combined, findings.grid.clusters, findings.unit));
     alerts.extend(questions::rare_loss_alert(findings));
     alerts.extend(dark_photographs_alert(findings.set));
+    alerts.extend(unused_lux_alert(findings.set, findings.curves.iter().any(|curve| curve.summary.threshold.is_ok())));
     alerts.extend(many_models_alert(findings));
     alerts.extend(many_enhancers_alert(findings));
     alerts
@@ -67,8 +69,17 @@ pub(super) fn alerts_without_truths(combined: &CombinedRuns, agreement: &SelfAgr
     alerts.extend(models::constraint_alerts(&combined.runs, &combined.trials));
     alerts.extend(questions::cluster_alerts(combined, agreement.grid.clusters, agreement.unit));
     alerts.extend(dark_photographs_alert(agreement.set));
+    alerts.extend(unused_lux_alert(agreement.set, agreement.curves.iter().any(|curve| curve.threshold.is_ok())));
     alerts.sort_by_key(|alert| alert.kind);
     alerts
+}
+
+/// Alert about a stated light at L0 that no number is derived from, because no threshold is known.
+fn unused_lux_alert(set: PhotographedSet, has_threshold: bool) -> Option<Alert> {
+    let lux = set.lux.filter(|_| set.exposed.is_none() && !has_threshold)?;
+    let text =
+        format!("{LUX_AT_L0} {lux} changes nothing here: no threshold is known; the table of thresholds says why.");
+    Some(Alert::new(AlertKind::Light, text))
 }
 
 /// Alerts about replies that the server ended early, and that have no answer in the strict parsing.
