@@ -25,6 +25,10 @@ const theme = () => {
 };
 $("theme").addEventListener("click", theme);
 
+// The navigation stays at the top of the window: links lead to just below it.
+const nav = document.querySelector("nav");
+if (nav) new ResizeObserver(() => { document.documentElement.style.scrollPaddingTop = nav.offsetHeight + 12 + "px"; }).observe(nav);
+
 // The shortest form of a name: without "script:", folders and the ending; long ones keep both ends. Names that would be alike stay whole.
 const MOST_LETTERS = 22;
 const shortened = (names) => {
