@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::Path;
 use std::sync::Arc;
 
-use parquet::basic::{LogicalType, Repetition, Type as Physical};
+use parquet::basic::{ColumnOrder, LogicalType, Repetition, Type as Physical};
 use parquet::data_type::{ByteArray, ByteArrayType, DataType, DoubleType, FloatType, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -36,6 +36,13 @@ pub fn metadata(path: &Path) -> BTreeMap<String, String> {
     let reader = open(path);
     let pairs = reader.metadata().file_metadata().key_value_metadata();
     pairs.into_iter().flatten().map(|pair| (pair.key.clone(), pair.value.clone().unwrap())).collect()
+}
+
+/// True if every column of a file has the order of its type, which readers of any age know.
+pub fn has_orders_of_types(path: &Path) -> bool {
+    let reader = open(path);
+    let orders = reader.metadata().file_metadata().column_orders();
+    orders.is_some_and(|orders| orders.iter().all(|order| matches!(order, ColumnOrder::TYPE_DEFINED_ORDER(_))))
 }
 
 /// The part of a file that holds its values: what stands before its footer.
