@@ -183,7 +183,7 @@ fn examine(args: &DoctorArgs, progress: &Progress) -> Result<Outcome> {
     progress.print_on_terminal(&format!("{model}: enhancing {n} dark images with each value range and colour order"));
     let mut outcome = doctor(&args.files, image, &mut enhancer, &dark, &sample)?;
     if outcome.status == Status::Complete {
-        outcome.output += &Latency::of_enhancer(&mut enhancer, &dark).to_string();
+        outcome.output += &Latency::measure(&mut enhancer, &dark).to_string();
     }
     Ok(outcome)
 }

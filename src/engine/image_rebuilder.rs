@@ -174,6 +174,12 @@ fn found_from(mut flags: ImageFlags, run: &Path) -> ImageFlags {
             DataSource::Files(paths) => paths.iter_mut().for_each(|path| *path = found(path, run)),
         }
     }
+    for path in &mut flags.data.set.root.data_root {
+        *path = found(path, run);
+    }
+    for images in &mut flags.enhanced {
+        images.folder = found(&images.folder, run);
+    }
     if let Some(walk) = &mut flags.walk {
         walk.folder = found(&walk.folder, run);
     }

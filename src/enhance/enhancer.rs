@@ -263,14 +263,15 @@ impl Enhancer {
         attempt.map_err(|failure| self.run_error(&failure, size))
     }
 
-    /// Enhances an image as [`Self::enhance`] does, without counting it in the usage record.
+    /// Enhances an image as [`Self::enhance`] does, without counting it: neither in the usage record, nor among the images
+    /// in a row that exceeded a limit.
     ///
     /// # Errors
     /// As [`Self::enhance`].
     pub fn enhance_uncounted(&mut self, image: &Rgb) -> Result<Rgb> {
-        let log = self.log.clone();
+        let (log, overruns) = (self.log.clone(), self.consecutive_overruns);
         let enhanced = self.enhance(image);
-        self.log = log;
+        (self.log, self.consecutive_overruns) = (log, overruns);
         self.usage.set_sizes(self.twin, &self.log);
         enhanced
     }

@@ -1,4 +1,4 @@
-//! The report on accuracy in multiple-choice questions: [`Report::of_accuracy`].
+//! The report on accuracy in multiple-choice questions: [`Report::from_findings`].
 
 use std::collections::BTreeMap;
 
@@ -9,10 +9,10 @@ use crate::report::charts::chart::Figure;
 use crate::report::charts::figures::{DisplayNames, figure_specs};
 use crate::report::charts::paper::figure;
 use crate::report::charts::views;
-use crate::report::content::{Measure, Report};
+use crate::report::content::{Measure, PageParts, Report};
 use crate::report::finding_groups::FindingGroups;
 use crate::report::json::{JsonRows, RunsHead, SummaryRuns, document};
-use crate::report::page::{PageHead, PageInputs, PageParts, items_note, packed_items};
+use crate::report::page::{PageHead, PageInputs, items_note, packed_items};
 use crate::report::sentences::{Sentence, how_to_read, sentences};
 use crate::report::short::{facts, short_table, who_is_judged};
 use crate::report::tables::{
@@ -29,7 +29,7 @@ use darkqa_score::model_in_condition::models_under_test;
 impl<'a> Report<'a> {
     /// The report on the accuracy of models. Notes about the observer follow `alerts`.
     #[must_use]
-    pub fn of_accuracy(findings: &'a Findings<'a>, alerts: Vec<Alert>) -> Self {
+    pub fn from_findings(findings: &'a Findings<'a>, alerts: Vec<Alert>) -> Self {
         let shown = findings.shown();
         let notes = observer_notes(&findings.observer).into_iter().map(|note| Alert::new(AlertKind::Observer, note));
         let sentences = sentences(shown);

@@ -407,10 +407,10 @@ pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
     let questions = summary.candidates.iter().map(|(family, candidates)| (family.to_string(), candidates.asked));
     let rooms = summary.rooms.iter().map(|(room, counts)| (room.clone(), counts.frames as u64));
     let mut panels =
-        vec![Panel::of_counts("Questions by family", questions), Panel::of_counts("Frames by room", rooms)];
+        vec![Panel::from_counts("Questions by family", questions), Panel::from_counts("Frames by room", rooms)];
     for family in Family::by_rule() {
         if let Some(answers) = summary.answers.get(&family) {
-            panels.push(Panel::of_counts(
+            panels.push(Panel::from_counts(
                 &format!("Answers: {family}"),
                 answers.iter().map(|(word, count)| (word.clone(), *count as u64)),
             ));
@@ -427,7 +427,7 @@ pub(crate) fn figure(summary: &QuestionSummary) -> Result<String> {
 /// Panel of a count for each class of objects.
 fn class_panel(summary: &QuestionSummary, title: &str, count: fn(&ClassCoverage) -> u64) -> Panel {
     let counts = summary.classes.iter().map(|(class, coverage)| (class.clone(), count(coverage)));
-    Panel::of_counts(title, counts)
+    Panel::from_counts(title, counts)
 }
 
 /// Template of the page.

@@ -72,7 +72,7 @@ pub(crate) struct PrintArgs {
     pub written: WrittenArgs,
 }
 
-/// What a user states about a run for its report. It changes nothing that is asked.
+/// Facts that a user states about a run for its report. They do not change what is asked.
 #[derive(Debug, Clone, Copy, Default, Args)]
 #[command(next_help_heading = "Output")]
 pub(crate) struct StatedArgs {

@@ -59,7 +59,7 @@ fn bench(c: &mut Criterion) {
     };
     group.bench_function("make the report", |b| {
         b.iter(|| {
-            let report = Report::of_accuracy(&findings, Vec::new());
+            let report = Report::from_findings(&findings, Vec::new());
             black_box(products(&report, &shown).unwrap())
         });
     });

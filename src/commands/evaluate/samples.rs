@@ -31,8 +31,6 @@ pub(super) struct Sample {
 pub(super) struct Selection {
     /// Selected questions of the whole run.
     pub(super) selected: Vec<Question>,
-    /// Those about the frames of this run or shard.
-    pub(super) own: Vec<Question>,
     /// Position of each question among all questions of the data.
     pub(super) file_places: HashMap<QuestionId, usize>,
     /// `None` if the control `observer:other-room` is not asked.
@@ -48,11 +46,11 @@ impl Selection {
     /// If a frame of another shard cannot be read.
     pub(super) fn samples(self, dataset: &Dataset, sources: &[Source], plan: Option<&RunPlan>) -> Result<Vec<Sample>> {
         let places: HashMap<&FrameId, usize> = sources.iter().map(|source| &source.name).zip(0..).collect();
-        let own: HashSet<QuestionId> = self.own.into_iter().map(|question| question.id).collect();
         let mut other_digests = HashMap::<FrameId, Option<Digest>>::new();
         let mut samples = Vec::new();
         for (place, question) in self.selected.into_iter().enumerate() {
-            let source = places.get(&question.frame).copied().filter(|_| own.contains(&question.id));
+            // A shard has all questions about a frame or none.
+            let source = places.get(&question.frame).copied();
             let shown = self.other_rooms.as_ref().and_then(|others| others.shown_for(&question.frame));
             let other_room = shown.and_then(|shown| places.get(shown).copied());
             let digest = match (source, other_room) {

@@ -55,7 +55,7 @@ pub(crate) struct EvaluateArgs {
     /// The size in which images are sent.
     #[command(flatten)]
     pub shrink: ShrinkArgs,
-    /// What the user states for the report.
+    /// Facts that the user states for the report.
     #[command(flatten)]
     pub stated: StatedArgs,
 }
@@ -123,7 +123,7 @@ pub(super) struct Evaluation {
     pub(super) observer_controls: bool,
     /// The plan in the folder of the run; `None` if there is none.
     pub(super) plan: Option<RunPlan>,
-    /// What the user states for the report.
+    /// Facts that the user states for the report.
     pub(super) stated: StatedArgs,
     pub(super) job: JobSettings,
 }

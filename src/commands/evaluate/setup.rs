@@ -105,7 +105,7 @@ impl<'a> ChoiceSetup<'a> {
         let probe_sources =
             if part.is_some() && !enhancer_files.is_empty() { probe_sources(&dataset, &selected) } else { Vec::new() };
         let shown = models.iter().any(is_other_room).then_some(other_rooms).flatten().filter(|_| shows_images);
-        let selection = Selection { selected, own: questions, file_places, other_rooms: shown };
+        let selection = Selection { selected, file_places, other_rooms: shown };
         let setup = Self {
             config,
             probe_sources,

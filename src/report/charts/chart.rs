@@ -3,7 +3,7 @@
 //!
 //! Lines differ by colour, and also by dash and marker, so that they can be distinguished without colour.
 //!
-//! A drawn figure, and its parts for the page: [`Figure`], [`PageParts`].
+//! A drawn figure, and its parts for the page: [`Figure`], [`FigureParts`].
 
 use serde::Serialize;
 
@@ -39,12 +39,12 @@ pub(crate) struct Figure {
     /// The figure as SVG.
     pub svg: String,
     /// Parts for the page.
-    pub parts: PageParts,
+    pub parts: FigureParts,
 }
 
 /// Panels and legend of a figure on the page, which arranges them by its width.
 #[derive(Debug, Clone, Serialize)]
-pub(crate) struct PageParts {
+pub(crate) struct FigureParts {
     /// Title of the vertical axis of the first panel.
     pub measure: String,
     /// Empty if names are at the bars or rows.
@@ -118,7 +118,7 @@ impl LineStyle {
     }
 }
 
-/// What a line of a panel draws.
+/// Content of a line.
 #[derive(Debug, Clone)]
 pub(crate) enum LineContent {
     /// Joined points over the levels, with their intervals.
@@ -244,7 +244,7 @@ impl Panel {
 
     /// Panel of counts by name, from the largest; zeros are left out. If more than [`MAX_BARS`] remain, the smallest
     /// are added up in one bar. The texts have each count with its share, as in `3 (75.0 %)`.
-    pub(crate) fn of_counts(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
+    pub(crate) fn from_counts(title: &str, counts: impl Iterator<Item = (String, u64)>) -> Self {
         let mut bars: Vec<(String, u64)> = counts.filter(|(_, count)| *count > 0).collect();
         bars.sort_by(|a, b| b.1.cmp(&a.1).then_with(|| a.0.cmp(&b.0)));
         if bars.len() > MAX_BARS {
@@ -262,7 +262,7 @@ impl Panel {
     }
 
     /// Panel of bars of shares by name, and the share that guessing would reach.
-    pub(crate) fn of_bars(title: String, bars: Vec<PlotLine>, chance: Option<f64>) -> Self {
+    pub(crate) fn from_bars(title: String, bars: Vec<PlotLine>, chance: Option<f64>) -> Self {
         let lines = bars.into_iter().chain(chance.map(PlotLine::chance)).collect();
         Self { title, x: Scale::Names, y: Scale::Percent(""), lines, model: None }
     }

@@ -122,7 +122,7 @@ fn real_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
         .iter()
         .flat_map(|pair| models.iter().map(move |model| (pair, *model)))
         .map(|(pair, model)| {
-            let panel = Panel::of_bars(format!("{model}: accuracy in %"), bars(findings, pair, model), chance);
+            let panel = Panel::from_bars(format!("{model}: accuracy in %"), bars(findings, pair, model), chance);
             Panel { model: Some(model.to_owned()), ..panel }
         })
         .filter(|panel| panel.places().count() > 1)

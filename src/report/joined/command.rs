@@ -62,7 +62,7 @@ pub(crate) struct ReportArgs {
     /// An old run to compare with.
     #[command(flatten)]
     pub baseline: BaselineArgs,
-    /// What the user states about the runs.
+    /// Facts that the user states about the runs.
     #[command(flatten)]
     pub stated: StatedArgs,
     /// How the report is printed.

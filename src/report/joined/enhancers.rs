@@ -92,8 +92,8 @@ pub(super) fn enhancer_alerts(runs: &[JoinedRun]) -> Vec<Alert> {
             ));
         }
     }
-    let budgets = runs.iter().filter(|run| run.manifest.settings.contains_key(LLIE_BUDGET));
-    if budgets.clone().count() > 0 && budgets.clone().all(|run| run.manifest.enhancers.is_empty()) {
+    let has_budget = runs.iter().any(|run| run.manifest.settings.contains_key(LLIE_BUDGET));
+    if has_budget && notes(runs).next().is_none() {
         alerts.push(Alert::new(
             AlertKind::Enhancer,
             format!("{} has no effect: no enhancer ran.", setting_spelling(LLIE_BUDGET)),
@@ -109,10 +109,13 @@ fn over_budget(run: &JoinedRun, note: &EnhancerNote) -> Vec<String> {
         return Vec::new();
     };
     if note.latency.is_empty() {
-        return vec![format!(
-            ": no time per image is stored, so {} cannot be checked; `darkqa-eval enhance doctor` measures it",
-            setting_spelling(LLIE_BUDGET)
-        )];
+        let reason = match convention(note, ELSEWHERE, "") {
+            Some(_) => "its images were made by another program",
+            None => {
+                "its images came from the store or an earlier version, without their times; `darkqa-eval enhance doctor MODEL IMAGES` measures it"
+            }
+        };
+        return vec![format!(": {} cannot be checked, because {reason}", setting_spelling(LLIE_BUDGET))];
     }
     note.latency
         .iter()

@@ -115,7 +115,7 @@ impl Scores {
             answers: &self.answers,
             thumbnails: &self.run.thumbnails,
         };
-        Report::of_marks(answers, &self.alerts, &self.enhancers)
+        Report::from_marked_answers(answers, &self.alerts, &self.enhancers)
     }
 }
 

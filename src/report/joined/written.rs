@@ -1,5 +1,5 @@
-//! The report on runs, scored from their records ([`Scored`]) and written into a folder: [`write()`] and [`write_open`] for the run that was
-//! just asked, [`write_report`] for a stored one, and [`whole_report`] for a copy of all its files.
+//! The report on runs, scored from their records ([`Scored`]) and written into a folder: [`write()`] and [`write_open`]
+//! for the run that was just asked, [`write_report`] for a stored one, and [`whole_report`] for a copy of all its files.
 
 use std::path::{Path, PathBuf};
 
@@ -49,11 +49,11 @@ impl<'a> Scored<'a> {
         let report = match self {
             Self::Accuracy(findings) => {
                 all_alerts.extend(alerts(combined, findings));
-                Report::of_accuracy(findings, all_alerts)
+                Report::from_findings(findings, all_alerts)
             }
             Self::SelfAgreement(agreement) => {
                 all_alerts.extend(alerts_without_truths(combined, agreement));
-                Report::of_self_agreement(agreement, all_alerts)
+                Report::from_self_agreement(agreement, all_alerts)
             }
         };
         report.with_enhancers(&enhancers::rows(&combined.runs))

@@ -1,4 +1,4 @@
-//! The report on open questions: [`Report::of_marks`]. Its measure is the score that a judge gives to answers
+//! The report on open questions: [`Report::from_marked_answers`]. Its measure is the score that a judge gives to answers
 //! ([`MarkedAnswers`]).
 //!
 //! Charts of scores by level of degradation: [`figures`].
@@ -15,9 +15,9 @@ use serde::Serialize;
 use crate::error::Result;
 use crate::report::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine};
 use crate::report::charts::paper::figure;
-use crate::report::content::{Measure, Report};
+use crate::report::content::{Measure, PageParts, Report};
 use crate::report::json::{SummaryRuns, document};
-use crate::report::page::{PageHead, PageInputs, PageParts};
+use crate::report::page::{PageHead, PageInputs};
 use crate::report::tables::{EnhancerRow, LEVELS};
 use crate::report::text::alert::{Alert, AlertKind};
 use crate::report::text::ladder::{Ladder, LadderSeries, SeriesByLevel};
@@ -36,7 +36,11 @@ pub(crate) use marked_answers::{MarkedAnswers, ReportedAnswer};
 
 impl<'a> Report<'a> {
     /// The report on answers to open questions. The alerts of the runs precede those about missing answers and marks.
-    pub(crate) fn of_marks(answers: MarkedAnswers<'a>, alerts: &[Alert], enhancer_rows: &[EnhancerRow]) -> Self {
+    pub(crate) fn from_marked_answers(
+        answers: MarkedAnswers<'a>,
+        alerts: &[Alert],
+        enhancer_rows: &[EnhancerRow],
+    ) -> Self {
         let measured = format!(
             "OpenEQA by LLM-Match, marked by {}, protocol {}",
             answers.judge.unwrap_or("nobody"),

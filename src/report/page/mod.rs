@@ -1,4 +1,4 @@
-//! HTML page of a report: [`page`], made of the report and the parts that depend on its measure ([`PageParts`]).
+//! HTML page of a report: [`page`], made of the report and the parts that depend on its measure ([`PageParts`](crate::report::content::PageParts)).
 //!
 //! Numbers and figures are text and SVG, so that the page can be read and printed without scripts. The items and their
 //! thumbnails are packed data, which a script displays. The page needs no network, and its content security policy
@@ -11,7 +11,6 @@
 pub(super) mod data;
 mod head;
 mod items;
-mod parts;
 mod run_usage;
 
 use serde::Serialize;
@@ -38,7 +37,6 @@ use darkqa_score::significance::Verdict;
 pub(crate) use data::fitting_thumbnails;
 pub(crate) use head::PageHead;
 pub(crate) use items::{note as items_note, packed as packed_items};
-pub(crate) use parts::PageParts;
 pub(crate) use run_usage::{PageRun, RunUsage};
 
 pub use run_usage::PageInputs;

@@ -1,4 +1,4 @@
-//! The report on questions without true answers: [`Report::of_self_agreement`].
+//! The report on questions without true answers: [`Report::from_self_agreement`].
 //!
 //! The measure is agreement with the model's own answer at L0. Reports always give it with its floor, its ceiling and
 //! other measures that are needed to interpret it, and never call it accuracy.
@@ -15,10 +15,10 @@ use super::tables::{ENHANCERS, Section, with_training};
 use crate::error::Result;
 use crate::report::charts::chart::{Chart, Figure, LineContent, LineStyle, Panel, PlotLine, Scale};
 use crate::report::charts::paper::figure;
-use crate::report::content::{Measure, Report};
+use crate::report::content::{Measure, PageParts, Report};
 use crate::report::finding_groups::FindingGroups;
 use crate::report::json::{JsonRows, RunsHead, SummaryRuns, document};
-use crate::report::page::{PageHead, PageInputs, PageParts, items_note, packed_items};
+use crate::report::page::{PageHead, PageInputs, items_note, packed_items};
 use crate::report::sentences::{Sentence, self_agreement};
 use crate::report::short::who_is_judged;
 use crate::report::text::alert::Alert;
@@ -37,7 +37,7 @@ use tables::{AGREEMENT, HOW_TO_READ, levels, notes};
 
 impl<'a> Report<'a> {
     /// The report on the agreement of models with their own answers at L0.
-    pub(crate) fn of_self_agreement(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>) -> Self {
+    pub(crate) fn from_self_agreement(found: &'a SelfAgreement<'a>, alerts: Vec<Alert>) -> Self {
         Self {
             measure: Box::new(OwnAnswers { found }),
             facts: facts(found),

@@ -198,9 +198,10 @@ const LAST_HEADS: [&str; 8] = [
 /// Table for the page, with a column for each level that a row has.
 pub(super) fn board(rows: &[ModelRunRow]) -> BoardTable {
     let levels: BTreeSet<AxisLevel> = rows.iter().flat_map(|row| row.levels.keys().copied()).collect();
-    let heads = FIRST_HEADS.map(str::to_owned).into_iter();
-    let heads = heads.chain(levels.iter().map(|level| format!("{level} in %"))).chain(LAST_HEADS.map(str::to_owned));
-    BoardTable { head: heads.collect(), rows: rows.iter().map(|row| board_row(row, &levels)).collect() }
+    let by_level = levels.iter().map(|level| format!("{level} in %"));
+    let head =
+        FIRST_HEADS.map(str::to_owned).into_iter().chain(by_level).chain(LAST_HEADS.map(str::to_owned)).collect();
+    BoardTable { head, rows: rows.iter().map(|row| board_row(row, &levels)).collect() }
 }
 
 fn board_row(row: &ModelRunRow, levels: &BTreeSet<AxisLevel>) -> BoardRow {

@@ -169,6 +169,15 @@ fn enhancers_are_timed_and_held_to_a_budget() {
     assert!(report("plain --llie-budget 5").contains("--llie-options budget has no effect: no enhancer ran."));
     let unused = "--lux-at-l0 200 changes nothing here: no threshold is known; the table of thresholds says why.";
     assert!(report("plain --lux-at-l0 200").contains(unused));
+    // The second run opens no enhancer, because the store has its images.
+    for (model, out) in [("random", "first"), ("observer", "second")] {
+        bench.complete(&words(&format!(
+            "--model {model} --data rooms:frames=3,size=96x72 --levels L0,L3 --llie lift --images-cache store --out {out}"
+        )));
+    }
+    let unknown = "lift: --llie-options budget cannot be checked, because its images came from the store";
+    assert!(report("second --llie-budget 5").contains(unknown));
+    assert!(!report("first --llie-budget 100s").contains("cannot be checked"));
     let refused = bench.call(&words("report run --llie-budget fast"));
     assert!(refused.code == Some(2) && refused.stderr.contains("a time such as 50ms or 0.05s expected"), "{refused:?}");
 }

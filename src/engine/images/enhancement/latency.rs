@@ -26,20 +26,20 @@ impl Latency {
         Self { by_size: BTreeMap::new(), threads }
     }
 
-    /// Runs `enhance` for an image of this width and height, and adds its time.
-    pub(crate) fn time<T>(&mut self, size: (usize, usize), enhance: impl FnOnce() -> T) -> T {
+    /// Runs `enhance` for an image of this width and height, and adds its time. An image that fails has none.
+    pub(crate) fn time<T, E>(&mut self, size: (usize, usize), enhance: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
         let started = Instant::now();
-        let result = enhance();
+        let enhanced = enhance()?;
         self.add(size, started.elapsed());
-        result
+        Ok(enhanced)
     }
 
     /// Times an enhancer on images until [`ENOUGH`] has passed. The images are not counted as enhanced images of a run.
-    pub(crate) fn of_enhancer(enhancer: &mut Enhancer, images: &[Rgb]) -> Self {
+    pub(crate) fn measure(enhancer: &mut Enhancer, images: &[Rgb]) -> Self {
         let mut latency = Self::new(enhancer.threads());
         let started = Instant::now();
         for image in images {
-            // An image that fails has no time; the failure is reported where the image is needed.
+            // A failure is reported where the image is needed.
             let _ = latency.time((image.width(), image.height()), || enhancer.enhance_uncounted(image));
             if started.elapsed() > ENOUGH {
                 break;
@@ -122,7 +122,9 @@ mod tests {
     #[test]
     fn times_of_an_action_are_added() {
         let mut latency = Latency::new(1);
-        assert_eq!(latency.time((8, 8), || 5), 5);
+        assert_eq!(latency.time((4, 4), || Err::<i32, &str>("refused")), Err("refused"));
+        assert_eq!(latency.to_string(), "");
+        assert_eq!(latency.time((8, 8), || Ok::<i32, &str>(5)), Ok(5));
         assert!(latency.to_string().contains("8 × 8"));
     }
 }

@@ -333,7 +333,7 @@ impl<'a> ImagePipeline<'a> {
         }
         self.steps.timings.time(TimedStep::Enhance, || {
             enhancer.probe(&dark, self.implausible)?;
-            enhancer.usage().set_latency(Latency::of_enhancer(enhancer, &dark).by_size());
+            enhancer.usage().set_latency(Latency::measure(enhancer, &dark).by_size());
             Ok(())
         })
     }

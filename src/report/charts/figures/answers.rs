@@ -205,7 +205,7 @@ impl FigureBuilder<'_> {
             .find_map(|cell| Some(cell.accuracy?.value));
         let panels = self.models.iter().map(|model| {
             let title = format!("{}: accuracy in %, n {}", self.names.display_name(model), self.item_count(None));
-            let panel = Panel::of_bars(title, self.photograph_bars(model), chance);
+            let panel = Panel::from_bars(title, self.photograph_bars(model), chance);
             Panel { model: Some((*model).to_owned()), ..panel }
         });
         let chart = Chart {

@@ -90,7 +90,7 @@ impl Ruler {
             Scale::Percent(_) => {
                 plain(0.0, 1.0, (0..=5).map(|step| Tick::new(f64::from(step) / 5.0, (step * 20).to_string())).collect())
             }
-            Scale::Numbers(_) => Self::of_numbers(panel.range(axis)),
+            Scale::Numbers(_) => Self::for_range(panel.range(axis)),
             Scale::UpTo { end, step, .. } => {
                 let ticks = (0..=*end as i32).step_by(usize::from(*step));
                 plain(0.0, *end, ticks.map(|tick| Tick::new(f64::from(tick), tick.to_string())).collect())
@@ -119,7 +119,7 @@ impl Ruler {
 
     /// Axis of a range with margins; from 0 to 1 with margins if there is no range. The ticks are at multiples of 1, 2
     /// or 5 times a power of ten.
-    fn of_numbers(range: Option<[f64; 2]>) -> Self {
+    fn for_range(range: Option<[f64; 2]>) -> Self {
         let [low, high] = range.unwrap_or([0.0, 1.0]);
         let margin = if high > low { MARGIN * (high - low) } else { 1.0 };
         let (low, high) = (low - margin, high + margin);
@@ -399,7 +399,7 @@ mod tests {
             (Some([-7.0, 0.0]), &["−6", "−4", "−2", "0"]),
             (Some([0.001, 0.002]), &["0.0010", "0.0012", "0.0014", "0.0016", "0.0018", "0.0020"]),
         ] {
-            let ticks: Vec<String> = Ruler::of_numbers(range).ticks.into_iter().map(|tick| tick.label).collect();
+            let ticks: Vec<String> = Ruler::for_range(range).ticks.into_iter().map(|tick| tick.label).collect();
             assert_eq!(ticks, texts, "{range:?}");
         }
     }

@@ -3,7 +3,7 @@
 
 use super::axes::{Axes, Margins, Title, plot_size};
 use super::legend::Legend;
-use super::page::page_parts;
+use super::page::figure_parts;
 use super::panel::{Medium, PanelDrawing};
 use super::{FigureColours, Look, Sheet, svg};
 use crate::error::{Error, Result};
@@ -31,7 +31,7 @@ pub(crate) fn figure(name: &'static str, caption: &str, chart: &Chart) -> Result
         name,
         caption: format!("{caption} ({}.)", chart.note),
         svg: to_svg(sheet(chart, &look(if is_narrow { NARROW } else { WIDE })))?,
-        parts: page_parts(chart)?,
+        parts: figure_parts(chart)?,
     })
 }
 
@@ -179,9 +179,9 @@ mod tests {
         let look = Look { width: 510.0, font_size: 8.5, palette: FigureColours::Colour };
         let many = (0..40_u64).map(|number| (format!("class {number:02}"), number + 1));
         let panels = [
-            Panel::of_counts("two", [("a".to_owned(), 3), ("b".to_owned(), 1)].into_iter()),
-            Panel::of_counts("many", many),
-            Panel::of_counts("empty", [("c".to_owned(), 0)].into_iter()),
+            Panel::from_counts("two", [("a".to_owned(), 3), ("b".to_owned(), 1)].into_iter()),
+            Panel::from_counts("many", many),
+            Panel::from_counts("empty", [("c".to_owned(), 0)].into_iter()),
         ];
         let sheet = pack(panels.into(), &look);
         let lengths: Vec<f64> = sheet

@@ -1,4 +1,4 @@
-//! Parts of a figure for the page: [`page_parts`]. Each panel is an SVG of its own, so that the page arranges panels by
+//! Parts of a figure for the page: [`figure_parts`]. Each panel is an SVG of its own, so that the page arranges panels by
 //! its width and scales them, and its script has nothing to draw.
 
 use std::collections::BTreeSet;
@@ -10,7 +10,7 @@ use super::sheet::{Anchor, Point, Shape, ShapeGroup, Sheet};
 use super::svg::{escape_attribute, page_svg};
 use super::{FigureColours, Look};
 use crate::error::Result;
-use crate::report::charts::chart::{Chart, INK, LineContent, PageLine, PagePanel, PageParts, Panel, PlotLine, Scale};
+use crate::report::charts::chart::{Chart, FigureParts, INK, LineContent, PageLine, PagePanel, Panel, PlotLine, Scale};
 use crate::report::charts::figures::short_form;
 use crate::report::charts::paper::font::Font;
 use crate::types::{Axis, AxisLevel};
@@ -34,14 +34,14 @@ const MAX_NAMES: usize = 14;
 ///
 /// # Errors
 /// None in practice: only an image cannot be drawn.
-pub(super) fn page_parts(chart: &Chart) -> Result<PageParts> {
+pub(super) fn figure_parts(chart: &Chart) -> Result<FigureParts> {
     let legend = Legend::for_chart(chart, &LOOK);
     let lines = || chart.panels.iter().flat_map(|panel| &panel.lines);
     let levels: BTreeSet<AxisLevel> = chart.panels.iter().flat_map(Panel::levels).collect();
     let levels: Vec<AxisLevel> = levels.into_iter().collect();
     let last = chart.panels.iter().find_map(|panel| panel.levels().last().copied());
     let has_end_names = chart.is_over_levels() && matches!(&*chart.panels, [panel] if panel.lines.len() <= MAX_NAMES);
-    Ok(PageParts {
+    Ok(FigureParts {
         measure: chart.panels.first().map_or_else(String::new, |panel| panel.y.title(panel)),
         legend: legend
             .samples(&LOOK)
@@ -152,7 +152,7 @@ fn short_name(line: &PlotLine) -> String {
     }
 }
 
-/// Shortens a name to the space right of the panel; that of a model without images stays recognizable.
+/// Shortens a name to the space right of the panel; the name of a model without images stays recognizable.
 fn end_name(name: &str, size: f64) -> String {
     const WITHOUT: &str = " without images";
     const BRIEF: &str = ", no image";
@@ -188,9 +188,9 @@ mod tests {
     use crate::types::degradations::Kind;
     use darkqa_score::estimate::Estimate;
 
-    fn parts(line: PlotLine) -> PageParts {
+    fn parts(line: PlotLine) -> FigureParts {
         let panel = Panel::over_levels("accuracy in %", "a panel".to_owned(), vec![line, PlotLine::chance(0.25)]);
-        page_parts(&Chart { panels: vec![panel], columns: 1, note: String::new() }).unwrap()
+        figure_parts(&Chart { panels: vec![panel], columns: 1, note: String::new() }).unwrap()
     }
 
     #[test]

@@ -100,7 +100,7 @@ impl PanelDrawing<'_> {
         }
     }
 
-    /// What is below all curves: a horizontal line, the band of a curve, on paper the bars of one of many curves, or the
+    /// Background of a line, below all curves: a horizontal line, the band of a curve, on paper the bars of one of many curves, or the
     /// bar or range of a name, of which `place` come before it.
     fn background(&self, line: &PlotLine, curves: usize, place: usize) -> ShapeGroup {
         match &line.content {

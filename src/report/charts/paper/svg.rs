@@ -21,7 +21,7 @@ pub(crate) type Png<'a> = &'a dyn Fn(&Rgb) -> Result<Vec<u8>>;
 /// # Errors
 /// If an image cannot be encoded.
 pub(crate) fn svg(sheet: &Sheet, png: Png) -> Result<String> {
-    let writer = SvgWriter { medium: Medium::File(png) };
+    let writer = SvgWriter { target: SvgTarget::File(png) };
     let [width, height] = sheet.size.map(|length| writer.number(length));
     let mut text = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}pt\" height=\"{height}pt\" viewBox=\"0 0 {width} {height}\" \
@@ -41,7 +41,7 @@ pub(crate) fn svg(sheet: &Sheet, png: Png) -> Result<String> {
 /// # Errors
 /// If the sheet has an image.
 pub(super) fn page_svg(sheet: &Sheet, font_size: f64, attributes: &str) -> Result<String> {
-    let writer = SvgWriter { medium: Medium::Page { font_size } };
+    let writer = SvgWriter { target: SvgTarget::Page { font_size } };
     let [width, height, size] = [sheet.size[0], sheet.size[1], font_size].map(|length| writer.number(length));
     let mut text = format!("<svg viewBox=\"0 0 {width} {height}\" font-size=\"{size}\"{attributes}>");
     for shape in &sheet.shapes {
@@ -54,8 +54,8 @@ pub(super) fn page_svg(sheet: &Sheet, font_size: f64, attributes: &str) -> Resul
 /// Number of bytes up to which the width of a text on the page does not matter (chosen).
 const SHORT: usize = 12;
 
-/// What the SVG is for.
-enum Medium<'a> {
+/// Destination of an SVG.
+enum SvgTarget<'a> {
     File(Png<'a>),
     /// The page; a label of this font size says nothing about it.
     Page {
@@ -100,12 +100,12 @@ impl Tags {
 
 /// Writer of the elements.
 struct SvgWriter<'a> {
-    medium: Medium<'a>,
+    target: SvgTarget<'a>,
 }
 
 impl SvgWriter<'_> {
     fn is_page(&self) -> bool {
-        matches!(self.medium, Medium::Page { .. })
+        matches!(self.target, SvgTarget::Page { .. })
     }
 
     /// Number with at most two decimals, or one on the page, whose drawings are larger.
@@ -122,7 +122,7 @@ impl SvgWriter<'_> {
         points.join(" ")
     }
 
-    /// A colour; on the page, that of its theme.
+    /// A colour; on the page, a variable of the theme.
     fn colour(&self, colour: Colour) -> String {
         if self.is_page() {
             let line = COLOURS.iter().position(|line| *line == colour);
@@ -182,7 +182,7 @@ impl SvgWriter<'_> {
             Shape::Label(label) => self.text_element(label, tags),
             Shape::Group(group) => self.group(group)?,
             Shape::Picture { corner: [x, y], size: [width, height], image } => {
-                let Medium::File(png) = self.medium else {
+                let SvgTarget::File(png) = self.target else {
                     return Err(Error::data("figure", "has a picture"));
                 };
                 let own = format!(
@@ -198,7 +198,7 @@ impl SvgWriter<'_> {
         })
     }
 
-    /// A group; that of a single shape is the shape with the tags of the group.
+    /// A group. A group of a single shape is written as that shape with the tags of the group.
     fn group(&self, group: &ShapeGroup) -> Result<String> {
         let tags = Tags::new(group);
         if let [shape] = &*group.shapes
@@ -221,8 +221,8 @@ impl SvgWriter<'_> {
             TextDirection::Up => format!(" transform=\"rotate(-90 {x} {y})\""),
         };
         let size = self.number(label.size);
-        let style = match self.medium {
-            Medium::Page { font_size } => {
+        let style = match self.target {
+            SvgTarget::Page { font_size } => {
                 let anchor = match label.anchor {
                     Anchor::Start => "",
                     Anchor::Middle => " text-anchor=\"middle\"",
@@ -233,7 +233,7 @@ impl SvgWriter<'_> {
                 let length = if label.text.len() > SHORT { self.text_length(label) } else { String::new() };
                 format!("{anchor}{size}{length}")
             }
-            Medium::File(_) => {
+            SvgTarget::File(_) => {
                 format!(" font-size=\"{size}\" fill=\"{}\"{}", self.colour(INK), self.text_length(label))
             }
         };

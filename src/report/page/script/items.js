@@ -339,7 +339,8 @@ const requestOf = (subject, i) => {
   const [latency, prompt, given, attempts] = ["latency", "prompt", "reply", "attempts"].map((name) => data.requests[name][subject][i]);
   const facts = [];
   if (latency) facts.push(`${latency} ms`);
-  if (prompt || given) facts.push(`${prompt} prompt and ${given} reply tokens`);
+  const tokens = [[prompt, "prompt"], [given, "reply"]].filter(([count]) => count).map(([count, kind]) => `${count} ${kind}`);
+  if (tokens.length) facts.push(tokens.join(" and ") + " tokens");
   if (attempts > 1) facts.push(`${attempts} attempts`);
   return facts;
 };
