@@ -10,7 +10,7 @@ use std::io::Write;
 use std::ops::Range;
 
 use super::pooled::too_few_clusters;
-use super::sections::{ENHANCERS, REAL};
+use super::sections::{COMPARISONS, ENHANCERS, REAL};
 use crate::error::Result;
 use crate::report::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
 use crate::report::text::table::{self, Column, Table, TableBuilder, TableCell, TableFormat};
@@ -28,7 +28,7 @@ const MAX_ROWS: usize = 40;
 
 /// Tables of the differences in accuracy. Files also have the rows with lenient parsing of replies.
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
-    let mut tables = tables_by_kind(&findings.comparisons, findings.unit, accuracy_titles);
+    let mut tables = tables_by_kind(&findings.comparisons, findings.unit, |kind| kind.accuracy);
     for kind in ComparisonKind::ALL {
         let all: Vec<&Comparison> = findings.comparisons.iter().filter(|comparison| comparison.kind == kind).collect();
         tables.push(table(kind, "", &all, ParsingMode::Lenient).in_files_only());
@@ -42,7 +42,7 @@ pub(crate) fn agreement_comparisons(
     unit: ClusterUnit,
     measure: &'static str,
 ) -> Vec<Table> {
-    let mut tables = tables_by_kind(comparisons, unit, agreement_titles);
+    let mut tables = tables_by_kind(comparisons, unit, |kind| kind.agreement);
     for table in &mut tables {
         let caption = format!("{}, paired by question, in percentage points.", table.caption);
         table.latex = table.latex.as_ref().map(|_| caption);
@@ -65,24 +65,19 @@ pub(crate) fn agreement_comparisons(
 
 /// Two tables for each kind of comparison: over all families, and by family.
 ///
-/// `titles` returns the caption on the page and the heading in the terminal.
-fn tables_by_kind(
-    comparisons: &[Comparison],
-    unit: ClusterUnit,
-    titles: fn(ComparisonKind) -> (&'static str, Option<&'static str>),
-) -> Vec<Table> {
+/// `titles` chooses those of the measure.
+fn tables_by_kind(comparisons: &[Comparison], unit: ClusterUnit, titles: fn(KindTable) -> Titles) -> Vec<Table> {
     let mut tables = Vec::new();
     for kind in ComparisonKind::ALL {
         let (overall, by_family): (Vec<&Comparison>, Vec<&Comparison>) = comparisons
             .iter()
             .filter(|comparison| comparison.kind == kind)
             .partition(|comparison| comparison.family.is_none());
-        let (caption, heading) = titles(kind);
+        let (caption, heading) = titles(KindTable::of(kind));
         let least_p_values = overall.iter().map(|comparison| (comparison.least_holm, comparison.strict.clusters));
         let clusters_note = too_few_clusters(least_p_values, &unit.to_string());
         let mut overall_table = table(kind, caption, &overall, ParsingMode::Strict);
-        overall_table.is_folded =
-            !matches!(kind, ComparisonKind::Enhancer | ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced);
+        overall_table.is_folded = KindTable::of(kind).is_folded;
         if !overall.is_empty() {
             overall_table.heading = heading.map(str::to_owned);
             if kind == ComparisonKind::Enhancer {
@@ -101,72 +96,122 @@ fn tables_by_kind(
     tables
 }
 
-/// Caption on the page and heading in the terminal for differences in accuracy.
-///
-/// The kind `Level` has no heading, because another table in the terminal shows accuracy by level.
-fn accuracy_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
-    match kind {
-        ComparisonKind::Level => ("Each dark level less L0, raw", None),
-        ComparisonKind::Variant => (
-            "Sensor noise less exposure drop alone",
-            Some("Sensor noise against exposure drop alone, paired by question"),
-        ),
-        ComparisonKind::Enhancer => ("Enhanced less raw", Some("Enhanced against raw, paired by question")),
-        ComparisonKind::EnhancerPair => {
-            ("One enhancer less another", Some("One enhancer against another, paired by question"))
-        }
-        ComparisonKind::Model => ("Model less model", Some("Model against model, paired by question")),
-        ComparisonKind::Blind => ("With images less without", Some("With images against without, paired by question")),
-        ComparisonKind::Light => {
-            ("Light less light", Some("One light against another, same model, paired by question"))
-        }
-        ComparisonKind::RealSynthetic => (
-            "Photographed in the dark less synthetic",
-            Some("Photographed in the dark against synthetic, paired by question"),
-        ),
-        ComparisonKind::RealEnhanced => (
-            "Photographed in the dark: enhanced less raw",
-            Some("Photographed in the dark, enhanced against raw, paired by question"),
-        ),
-    }
+/// What the tables of a kind of comparison have of their own.
+struct KindTable {
+    section: &'static str,
+    /// True if the page shows the table only after a click.
+    is_folded: bool,
+    /// True if a column names the second side. Otherwise the kind determines it.
+    names_second_side: bool,
+    accuracy: Titles,
+    /// Titles for differences in agreement with the answers at L0. L0 is then a second request with the same images.
+    agreement: Titles,
 }
 
-/// Caption on the page and heading in the terminal for differences in agreement with the answers at L0.
-///
-/// The level L0 in these comparisons is a second request with the same images.
-fn agreement_titles(kind: ComparisonKind) -> (&'static str, Option<&'static str>) {
-    match kind {
-        ComparisonKind::Level => (
-            "Agreement at each dark level less that of L0 again, raw",
-            Some("Agreement in the dark against that of L0 asked again, paired by question"),
-        ),
-        ComparisonKind::Variant => (
-            "Agreement with sensor noise less exposure drop alone",
-            Some("Agreement with sensor noise against exposure drop alone, paired by question"),
-        ),
-        ComparisonKind::Enhancer => {
-            ("Agreement of enhanced less raw", Some("Agreement of enhanced against raw, paired by question"))
+/// Caption on the page, and heading in the terminal. A table without a heading is not in the terminal: it would repeat
+/// another one.
+type Titles = (&'static str, Option<&'static str>);
+
+impl KindTable {
+    const fn of(kind: ComparisonKind) -> Self {
+        match kind {
+            ComparisonKind::Level => Self {
+                section: COMPARISONS,
+                is_folded: true,
+                names_second_side: false,
+                accuracy: ("Each dark level less L0, raw", None),
+                agreement: (
+                    "Agreement at each dark level less that of L0 again, raw",
+                    Some("Agreement in the dark against that of L0 asked again, paired by question"),
+                ),
+            },
+            ComparisonKind::Variant => Self {
+                section: COMPARISONS,
+                is_folded: true,
+                names_second_side: false,
+                accuracy: (
+                    "Sensor noise less exposure drop alone",
+                    Some("Sensor noise against exposure drop alone, paired by question"),
+                ),
+                agreement: (
+                    "Agreement with sensor noise less exposure drop alone",
+                    Some("Agreement with sensor noise against exposure drop alone, paired by question"),
+                ),
+            },
+            ComparisonKind::Enhancer => Self {
+                section: ENHANCERS,
+                is_folded: false,
+                names_second_side: false,
+                accuracy: ("Enhanced less raw", Some("Enhanced against raw, paired by question")),
+                agreement: (
+                    "Agreement of enhanced less raw",
+                    Some("Agreement of enhanced against raw, paired by question"),
+                ),
+            },
+            ComparisonKind::EnhancerPair => Self {
+                section: ENHANCERS,
+                is_folded: true,
+                names_second_side: true,
+                accuracy: ("One enhancer less another", Some("One enhancer against another, paired by question")),
+                agreement: (
+                    "Agreement with one enhancer less another",
+                    Some("Agreement with one enhancer against another, paired by question"),
+                ),
+            },
+            ComparisonKind::Model => Self {
+                section: COMPARISONS,
+                is_folded: true,
+                names_second_side: true,
+                accuracy: ("Model less model", Some("Model against model, paired by question")),
+                agreement: ("Model less model", None),
+            },
+            ComparisonKind::Blind => Self {
+                section: COMPARISONS,
+                is_folded: true,
+                names_second_side: true,
+                accuracy: ("With images less without", Some("With images against without, paired by question")),
+                agreement: (
+                    "Agreement with images less without",
+                    Some("Agreement with images against without, paired by question"),
+                ),
+            },
+            ComparisonKind::Light => Self {
+                section: COMPARISONS,
+                is_folded: true,
+                names_second_side: true,
+                accuracy: ("Light less light", Some("One light against another, same model, paired by question")),
+                agreement: (
+                    "Agreement in one light less another",
+                    Some("Agreement in one light against another, same model, paired by question"),
+                ),
+            },
+            ComparisonKind::RealSynthetic => Self {
+                section: REAL,
+                is_folded: false,
+                names_second_side: true,
+                accuracy: (
+                    "Photographed in the dark less synthetic",
+                    Some("Photographed in the dark against synthetic, paired by question"),
+                ),
+                agreement: (
+                    "Agreement on photographs in the dark less synthetic",
+                    Some("Agreement on photographs in the dark against synthetic, paired by question"),
+                ),
+            },
+            ComparisonKind::RealEnhanced => Self {
+                section: REAL,
+                is_folded: false,
+                names_second_side: false,
+                accuracy: (
+                    "Photographed in the dark: enhanced less raw",
+                    Some("Photographed in the dark, enhanced against raw, paired by question"),
+                ),
+                agreement: (
+                    "Agreement on photographs in the dark: enhanced less raw",
+                    Some("Agreement on photographs in the dark, enhanced against raw, paired by question"),
+                ),
+            },
         }
-        ComparisonKind::EnhancerPair => (
-            "Agreement with one enhancer less another",
-            Some("Agreement with one enhancer against another, paired by question"),
-        ),
-        ComparisonKind::Model => ("Model less model", None),
-        ComparisonKind::Blind => {
-            ("Agreement with images less without", Some("Agreement with images against without, paired by question"))
-        }
-        ComparisonKind::Light => (
-            "Agreement in one light less another",
-            Some("Agreement in one light against another, same model, paired by question"),
-        ),
-        ComparisonKind::RealSynthetic => (
-            "Agreement on photographs in the dark less synthetic",
-            Some("Agreement on photographs in the dark against synthetic, paired by question"),
-        ),
-        ComparisonKind::RealEnhanced => (
-            "Agreement on photographs in the dark: enhanced less raw",
-            Some("Agreement on photographs in the dark, enhanced against raw, paired by question"),
-        ),
     }
 }
 
@@ -208,11 +253,7 @@ fn hide_rows_in_terminal(table: &mut Table, kind: ComparisonKind, comparisons: &
 }
 
 fn table(kind: ComparisonKind, caption: &str, comparisons: &[&Comparison], mode: ParsingMode) -> Table {
-    let section = match kind {
-        ComparisonKind::Enhancer | ComparisonKind::EnhancerPair => ENHANCERS,
-        ComparisonKind::RealSynthetic | ComparisonKind::RealEnhanced => REAL,
-        _ => "comparisons",
-    };
+    let section = KindTable::of(kind).section;
     let builder = TableBuilder::new("comparisons", comparisons.iter().copied()).page(section, caption);
     let has_models_under_test = comparisons.iter().any(|one| !one.first.is_reference());
     let builder = number_columns(subject_columns(builder, kind, has_models_under_test), mode);
@@ -245,18 +286,10 @@ fn subject_columns(
         .column(Text, "csv against_condition", |comparison| comparison.second.condition())
         .column(Text, "terminal model | page model", |comparison| comparison.first.model.clone())
         .column(Text, "terminal condition | page condition", |comparison| comparison.first.condition());
-    let builder = match kind {
-        ComparisonKind::EnhancerPair
-        | ComparisonKind::Model
-        | ComparisonKind::Blind
-        | ComparisonKind::Light
-        | ComparisonKind::RealSynthetic => {
-            builder.column(Text, "terminal less | page less", |comparison| second_side_label(comparison))
-        }
-        // No column for the second side: the kind of comparison determines it.
-        ComparisonKind::Level | ComparisonKind::Variant | ComparisonKind::Enhancer | ComparisonKind::RealEnhanced => {
-            builder
-        }
+    let builder = if KindTable::of(kind).names_second_side {
+        builder.column(Text, "terminal less | page less", |comparison| second_side_label(comparison))
+    } else {
+        builder
     };
     builder.family(|comparison| comparison.family.as_ref())
 }

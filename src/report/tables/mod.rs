@@ -36,8 +36,8 @@ pub(crate) use answers::{commonest_answers, counted_answers, health};
 pub(crate) use comparisons::{EnhancerRow, FLIPS, agreement_comparisons, enhancers, write_flips};
 pub(crate) use levels::{LEVELS, unread_note};
 pub(crate) use observer::{control_text, notes as observer_notes};
-pub(crate) use pooled::{BASELINE, baseline};
-pub(crate) use sections::{ENHANCERS, SECTIONS, Section, with_training};
+pub(crate) use pooled::baseline;
+pub(crate) use sections::{BASELINE, ENHANCERS, SECTIONS, Section, with_training};
 pub(crate) use strict_groups::strict_groups;
 pub(crate) use thresholds::{in_lux, missing_threshold_reason};
 

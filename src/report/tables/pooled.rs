@@ -6,6 +6,7 @@
 
 use std::collections::BTreeSet;
 
+use super::sections::{BASELINE, COMPARISONS};
 use crate::report::sentences::{dark_levels, left_out};
 use crate::report::text::latex::escape;
 use crate::report::text::table::ColumnKind::{self, Count, Number, P, Percent, Points, Text};
@@ -54,7 +55,7 @@ pub(super) fn pooled(findings: &Findings<'_>) -> Vec<Table> {
 
 fn table(caption: &str, models: &str, findings: &[&PooledFinding], mode: ParsingMode) -> Table {
     let builder = TableBuilder::new("pooled", findings.iter().copied())
-        .page("comparisons", caption)
+        .page(COMPARISONS, caption)
         .column(Text, "csv kind", |finding| finding.kind.name_on(finding.variant.kind))
         .column(Text, "csv level", |finding| levels(finding))
         .column(Text, "csv variant", |finding| finding.variant.to_string())
@@ -246,9 +247,6 @@ pub(super) fn best(findings: &Findings<'_>) -> Table {
     table.is_folded = true;
     table
 }
-
-/// Name of the table, and id of its section on the page.
-pub(crate) const BASELINE: &str = "baseline";
 
 /// Builds the table of paired differences; `old` is the name of the baseline run.
 #[must_use]

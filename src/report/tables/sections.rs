@@ -5,7 +5,6 @@
 //! Notes below tables on the training data of enhancers: [`with_training`].
 
 use super::calibration::CONFIDENCE;
-use super::pooled::BASELINE;
 use crate::report::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::report::text::table::{Table, TableBuilder, TableCell};
 use crate::report::text::words::{names_enhancer, percent};
@@ -98,7 +97,7 @@ pub(crate) const SECTIONS: [Section; 15] = [
         &["confidence", "reliability"],
     ),
     (
-        "comparisons",
+        COMPARISONS,
         "Comparisons",
         "Each paired by item, in percentage points; tested by swapping whole clusters, and corrected by Holm over the comparisons of one kind and model.",
         &[],
@@ -126,8 +125,14 @@ pub(crate) const SECTIONS: [Section; 15] = [
     ),
 ];
 
+/// Id of the section on differences from a baseline, and name of its table.
+pub(crate) const BASELINE: &str = "baseline";
+
 /// Id of the section on photographs in the dark.
 pub(crate) const REAL: &str = "real";
+
+/// Id of the section on paired differences.
+pub(super) const COMPARISONS: &str = "comparisons";
 
 /// Id of the section on enhancers, which also has the sample images.
 pub(crate) const ENHANCERS: &str = "enhancers";
