@@ -38,5 +38,6 @@ pub mod suggested_scenes;
 pub mod tested_sentences;
 #[cfg(test)]
 mod tests;
+pub mod variation;
 
 pub use statistics::{auc, bootstrap, estimate, significance, threshold};

@@ -249,7 +249,7 @@ impl PairedTest {
         let n = clusters.iter().map(|cluster| cluster.items as usize).sum();
         let sums: Vec<(f64, f64)> =
             clusters.iter().map(|cluster| (cluster.net as f64 / scale, f64::from(cluster.items))).collect();
-        let (estimate, spread) = interval(&sums, squares / scale / scale, n);
+        let (estimate, spread) = paired_spread(&sums, squares / scale / scale, n);
         let nets: Vec<i64> = clusters.iter().map(|cluster| cluster.net).collect();
         let swapped = swap_test(&nets);
         let p = spread.p(estimate.value * n as f64 / (n as f64 + ADDED)).max(swapped.p);
@@ -273,7 +273,7 @@ fn extended_to_zero(estimate: Estimate) -> Estimate {
 }
 
 /// Number of pairs that Bonett and Price add to the sample.
-const ADDED: f64 = 2.0;
+pub(crate) const ADDED: f64 = 2.0;
 
 /// Standard error of a difference, and the degrees of freedom of Student's t.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -316,19 +316,21 @@ pub const POWER: f64 = 0.8;
 /// number; `squares` is the sum of the squared differences of all pairs, and `n` the number of all pairs.
 #[must_use]
 pub fn difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> Estimate {
-    interval(clusters, squares, n).0
+    paired_spread(clusters, squares, n).0
 }
 
 /// Estimates a difference like [`difference`], with its p-value by Student's t: below 0.05 if and only if the interval
 /// excludes 0.
 #[must_use]
 pub(crate) fn tested_difference(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, f64) {
-    let (estimate, spread) = interval(clusters, squares, n);
+    let (estimate, spread) = paired_spread(clusters, squares, n);
     let p = spread.p(estimate.value * n as f64 / (n as f64 + ADDED));
     (estimate, p)
 }
 
-fn interval(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, Spread) {
+/// Estimates a difference like [`difference`], with its standard error. The center of the interval is the value times
+/// n / (n + [`ADDED`]).
+pub(crate) fn paired_spread(clusters: &[(f64, f64)], squares: f64, n: usize) -> (Estimate, Spread) {
     let (all, c) = (n as f64, clusters.len() as f64);
     let sum: f64 = clusters.iter().map(|(net, _)| net).sum();
     let value = sum / all;

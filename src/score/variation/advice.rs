@@ -1,0 +1,88 @@
+//! Planned runs: [`Design`].
+
+use super::components::{Components, Source};
+use super::observation::Facet;
+use crate::comparisons::paired::Spread;
+use crate::significance::ALPHA;
+
+/// Design of a run: how many questions of how many scenes, under how many levels of each facet. All numbers are at
+/// least 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Design {
+    pub scenes: usize,
+    /// Questions of all scenes together.
+    pub questions: usize,
+    pub wordings: usize,
+    pub orders: usize,
+    pub draws: usize,
+    pub repeats: usize,
+    /// True if each question has a random half of the combinations of wording, order and draw, in which the levels of
+    /// each facet are as equally frequent as possible.
+    pub is_half: bool,
+}
+
+impl Design {
+    /// Number of combinations of wording, order and draw under which a question is asked.
+    #[must_use]
+    pub fn combinations(&self) -> usize {
+        let all = self.wordings * self.orders * self.draws;
+        if self.is_half { all.div_ceil(2) } else { all }
+    }
+
+    /// Number of requests to one model in one condition; a difference needs twice as many.
+    #[must_use]
+    pub fn requests(&self) -> usize {
+        self.questions * self.combinations() * self.repeats
+    }
+
+    fn levels(&self, facet: Facet) -> usize {
+        match facet {
+            Facet::Wording => self.wordings,
+            Facet::Order => self.orders,
+            Facet::Draw => self.draws,
+        }
+    }
+}
+
+impl Components {
+    /// Standard error of the mean of a design, for other scenes, questions and levels of the facets, and its degrees of
+    /// freedom (Brennan 2001, section 4.1; Satterthwaite 1946, Biometrics Bull. 2:110).
+    ///
+    /// For a difference, take the components of the differences. A facet that was not varied has no component, and is
+    /// missing in the error. If the data have one repeat, more repeats do not reduce the error, because the replies may
+    /// be the same in all of them. Half of the combinations double the variance of combinations and rest, and leave the
+    /// others.
+    #[must_use]
+    pub fn spread(&self, design: &Design) -> Spread {
+        let count = |number: usize| number.max(1) as f64;
+        let (scenes, questions) = (count(design.scenes), count(design.questions));
+        let combinations = count(design.combinations());
+        let repeats = if self.deviation(Source::Combination).is_some() { count(design.repeats) } else { 1.0 };
+        let mut by_question = self.variance(Source::Question)
+            + (self.variance(Source::Combination) + self.variance(Source::Rest) / repeats) / combinations;
+        let (mut facets, mut squares) = (0.0, 0.0);
+        for facet in Facet::ALL {
+            let levels = count(design.levels(facet));
+            by_question += self.variance(Source::QuestionFacet(facet)) / levels.min(combinations);
+            let variance = self.variance(Source::Facet(facet)) / levels;
+            facets += variance;
+            squares += variance * variance / (levels - 1.0).max(1.0);
+        }
+        let between_scenes = self.variance(Source::Scene) / scenes + by_question / questions;
+        squares += between_scenes * between_scenes / (scenes - 1.0).max(1.0);
+        let variance = between_scenes + facets;
+        let degrees = if squares > 0.0 { variance * variance / squares } else { (scenes - 1.0).max(1.0) };
+        Spread { error: variance.sqrt(), degrees }
+    }
+}
+
+/// The design with the fewest requests that detects a difference with a power of 80 % at a level of 5 %, and the first
+/// of equal ones; `None` if none does. `differences` has the components of the differences of such a comparison.
+#[must_use]
+pub fn cheapest(differences: &Components, designs: &[Design], difference: f64) -> Option<Design> {
+    designs
+        .iter()
+        .filter(|design| differences.spread(design).detectable(ALPHA) <= difference)
+        .min_by_key(|design| design.requests())
+        .copied()
+}
