@@ -21,6 +21,7 @@ mod secrets;
 pub(crate) mod vendors;
 mod wire;
 mod wire_kind;
+mod wordings;
 
 #[cfg(test)]
 pub(crate) use pace::PaceCause;
@@ -49,3 +50,4 @@ pub use requests::{
 };
 pub use secrets::Secret;
 pub use wire_kind::WireSetting;
+pub(crate) use wordings::{PromptSet, Wording};

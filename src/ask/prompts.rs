@@ -30,12 +30,28 @@ pub struct Prompts {
 }
 
 impl Prompts {
-    /// The built-in prompts.
+    /// The names of the built-in prompts.
+    pub const BUILT_IN: [&str; 3] = [Self::DEFAULT, "terse", "letter"];
+
+    /// The name of the prompts that a run uses without a flag: those of the paper.
+    pub const DEFAULT: &str = "paper";
+
+    /// The built-in prompts of this name; the default ones for any other name.
     ///
     /// # Errors
     /// Never in practice: tests render the embedded templates.
-    pub fn built_in() -> Result<Self> {
-        Self::new(Sources::default())
+    pub fn built_in(name: &str) -> Result<Self> {
+        Self::new(match name {
+            "terse" => Sources::new(
+                include_str!("../../prompts/terse/choice.txt"),
+                include_str!("../../prompts/terse/blind.txt"),
+            ),
+            "letter" => Sources::new(
+                include_str!("../../prompts/letter/choice.txt"),
+                include_str!("../../prompts/letter/blind.txt"),
+            ),
+            _ => Sources::default(),
+        })
     }
 
     /// Reads the prompts in a folder; the built-in prompts replace missing ones.
@@ -133,12 +149,15 @@ struct Sources {
     blind: String,
 }
 
+impl Sources {
+    fn new(choice: &str, blind: &str) -> Self {
+        Self { choice: choice.to_owned(), blind: blind.to_owned() }
+    }
+}
+
 impl Default for Sources {
     fn default() -> Self {
-        Self {
-            choice: include_str!("../../prompts/choice.txt").to_owned(),
-            blind: include_str!("../../prompts/blind.txt").to_owned(),
-        }
+        Self::new(include_str!("../../prompts/choice.txt"), include_str!("../../prompts/blind.txt"))
     }
 }
 
@@ -292,7 +311,7 @@ mod tests {
 
     #[test]
     fn built_in_prompts_have_the_expected_text() {
-        let prompts = Prompts::built_in().unwrap();
+        let prompts = Prompts::built_in(Prompts::DEFAULT).unwrap();
         let asked = question("What type of room is this?", &["Kitchen", "Bedroom"]);
         assert_eq!(
             prompts.render(View::Image, &asked).unwrap(),
@@ -312,7 +331,7 @@ mod tests {
             "{{ 7 * 7 }} {% raw %} <b>\"url\":\"\"</b>\nand a second line",
             &["{{ question }}", "a & b", "{# gone #}"],
         );
-        let prompts = Prompts::built_in().unwrap();
+        let prompts = Prompts::built_in(Prompts::DEFAULT).unwrap();
         for view in [View::Image, View::Blind] {
             let rendered = prompts.render(view, &hostile).unwrap();
             assert!(rendered.starts_with(&hostile.text));
@@ -326,7 +345,7 @@ mod tests {
         let prompts = load(&[("choice.txt", own), ("README.md", "x"), (".swp", "x")]).unwrap();
         let asked = question("Red?", &["yes", "no"]);
         assert_eq!(prompts.render(View::Image, &asked).unwrap(), "Q: Red?\n(A) yes\n(B) no\n");
-        let built_in = Prompts::built_in().unwrap();
+        let built_in = Prompts::built_in(Prompts::DEFAULT).unwrap();
         assert_eq!(prompts.render(View::Blind, &asked).unwrap(), built_in.render(View::Blind, &asked).unwrap());
         assert_ne!(prompts.digest(), built_in.digest());
     }

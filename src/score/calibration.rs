@@ -39,7 +39,7 @@ use crate::comparisons::Tested;
 use crate::comparisons::paired::tested_difference;
 use crate::estimate::{ClusterCount, Estimate};
 use crate::statistics::auc::{Auc, PairCounts, RankedReply};
-use darkqa_base::types::{AxisLevel, OptionProbabilities, QuestionId, TrialOutcome, TrialRef, View};
+use darkqa_base::types::{AxisLevel, ItemKey, OptionProbabilities, TrialOutcome, TrialRef, View};
 
 /// Minimum number of replies with probabilities for a sentence (chosen, the same as for a calibration error).
 pub const MIN_CONFIDENT_REPLIES: usize = 100;
@@ -531,7 +531,7 @@ impl RiskCoverage {
     }
 }
 
-/// Replies to one question in one repeat, over all orders of its choices.
+/// Replies to one question in one wording and repeat, over all orders of its choices.
 #[derive(Default)]
 struct AskedInOrders<'a> {
     cluster: u32,
@@ -545,7 +545,7 @@ struct AskedInOrders<'a> {
 /// Share of questions whose true choice has the highest probability on average over the orders; `None` if no question
 /// was asked in several orders. A preference for letters averages out.
 fn accuracy_over_rotations(grid: &Grid<'_>, subject: usize) -> Option<Estimate> {
-    let mut questions = BTreeMap::<(&QuestionId, u32), AskedInOrders<'_>>::new();
+    let mut questions = BTreeMap::<ItemKey<'_>, AskedInOrders<'_>>::new();
     for (index, item) in grid.items.iter().enumerate() {
         let Some(trial) = grid.trial(subject, index) else {
             continue;
@@ -553,7 +553,7 @@ fn accuracy_over_rotations(grid: &Grid<'_>, subject: usize) -> Option<Estimate> 
         let Some(options) = usable_probabilities(Some(trial)) else {
             continue;
         };
-        let asked = questions.entry((trial.question(), trial.repeat())).or_default();
+        let asked = questions.entry(ItemKey { choices: &[], ..trial.item().key() }).or_default();
         asked.cluster = item.cluster;
         asked.truth = trial.choices().get(trial.truth()?)?;
         asked.shown.insert(trial.choices());

@@ -54,7 +54,7 @@ impl TrialResult {
     }
 }
 
-/// One repeat of a question with its choices in one order.
+/// One repeat of a question in one wording, with its choices in one order.
 #[derive(Debug, Clone, Copy)]
 pub struct GridItem<'a> {
     /// The question as asked.
@@ -84,7 +84,7 @@ pub struct Grid<'a> {
     pub subjects: Vec<ModelInCondition>,
     /// Order, groups and labels of the models.
     pub listing: ModelListing,
-    /// Items, sorted by frame, question, repeat and choices.
+    /// Items, sorted by frame, question, repeat, wording and choices.
     pub items: Vec<GridItem<'a>>,
     /// Number of clusters.
     pub clusters: usize,
@@ -355,7 +355,7 @@ impl GridScope {
 }
 
 fn sort_key(asked: &AskedItem) -> impl Ord + '_ {
-    (&asked.frame, &asked.question, asked.repeat, &asked.choices)
+    (&asked.frame, asked.key())
 }
 
 fn trial_result(trial: TrialRef<'_>) -> TrialResult {

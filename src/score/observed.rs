@@ -7,7 +7,7 @@ use super::estimate::Estimate;
 use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use darkqa_base::types::replies::OBSERVER;
 use darkqa_base::types::{
-    AnswerSource, ChoiceDetail, Control, FrameId, Observed, QuestionId, TrialOutcome, TrialRef, Trials,
+    AnswerSource, ChoiceDetail, Control, FrameId, ItemKey, Observed, TrialOutcome, TrialRef, Trials,
 };
 
 /// Results of the observer, or of one of its controls, in one condition.
@@ -138,9 +138,6 @@ impl ObserverSummary {
         )
     }
 }
-
-/// Identity of an item: question, order of choices and repeat.
-type ItemKey<'a> = (&'a QuestionId, &'a [String], u32);
 
 /// Computes the result of some trials; `None` without trials of frames that have a cluster.
 fn cell(subject: ModelInCondition, trials: &[TrialRef<'_>], clusters: &Clusters) -> Option<ObserverCell> {

@@ -32,6 +32,8 @@ pub(super) fn records(model: &str, condition: &str, answers: Answers) -> Vec<Rec
                 choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
                 truth: Some(0),
                 repeat: 0,
+                wording: None,
+                order: 0,
                 strict: chosen,
                 lenient: chosen,
                 outcome: match right {

@@ -13,6 +13,8 @@ pub fn record(model: &str, condition: &Condition, (question, frame): (usize, usi
         choices: ["a", "b", "c"].map(str::to_owned).to_vec(),
         truth: Some(0),
         repeat: 0,
+        wording: None,
+        order: 0,
         strict: Some(chosen),
         lenient: Some(chosen),
         outcome: if right { TrialOutcome::Right } else { TrialOutcome::Wrong },

@@ -38,8 +38,8 @@ pub use questions::{
 #[cfg(feature = "program")]
 pub use records::{
     AskedItem, AskedParts, ChoiceDetail, ChoiceFacts, ChoiceTables, Failure, FailureKind, ImageFacts, ImageFidelity,
-    KeptTrial, ObjectCrop, OpenDetail, ParsedAnswer, SentImages, Step, StoredDetail, TextPlace, Thumbnail, TrialKey,
-    TrialOutcome, TrialRef, Trials, Via, View, WalkFacts,
+    ItemKey, KeptTrial, ObjectCrop, OpenDetail, ParsedAnswer, SentImages, Step, StoredDetail, TextPlace, Thumbnail,
+    TrialKey, TrialOutcome, TrialRef, Trials, Via, View, WalkFacts,
 };
 #[cfg(feature = "program")]
 pub use replies::{

@@ -2,6 +2,8 @@
 //!
 //! The trials of an evaluation: [`plan_trials`].
 
+use std::collections::HashSet;
+use std::num::NonZeroU32;
 use std::sync::Arc;
 
 use serde_json::{Value, json};
@@ -10,7 +12,7 @@ use super::samples::Sample;
 use super::settings::{ImagePlace, shown_questions};
 use super::setup::{ChoiceSetup, is_other_room};
 use super::write_plan::{power_forecast, run_contents};
-use crate::ask::{ImagePlaces, Query};
+use crate::ask::{ImagePlaces, Query, Wording};
 use crate::engine::experiment::Experiment;
 use crate::engine::images::frames::{Frames, Source};
 use crate::engine::images::recipes::Recipe;
@@ -19,7 +21,7 @@ use crate::engine::key_facts::KeyFacts;
 use crate::engine::manifest;
 use crate::engine::models::{ModelUnderTest, asked_in};
 use crate::engine::settings::JobSettings;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::report::joined;
 use crate::runs::forecast::PowerForecast;
 use crate::runs::stored::StoredRun;
@@ -27,7 +29,7 @@ use crate::runs::{EXPOSURE_VALUE, Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{
-    ChoiceDetail, Condition, Digest, FrameId, Question, Record, RunQuestion, SetLight, TrialOutcome, View,
+    ChoiceDetail, Condition, Digest, FrameId, Question, Record, RunQuestion, SetLight, Shared, TrialOutcome, View,
 };
 use darkqa_questions::rules::Rules;
 use darkqa_score::model_in_condition::is_reference;
@@ -99,8 +101,8 @@ impl Experiment for ChoiceSetup<'_> {
         let rules = Some(self.config.rules.digest()).filter(|own| rules.is_ok_and(|rules| rules != *own));
         let fields = [
             Some(("--data", json!(self.dataset.name()))),
-            Some(("--prompts", json!(self.config.prompts.digest()))),
-            order.shuffle_options.then_some(("--shuffle-options", true.into())),
+            Some(("--prompts", prompt_digests(&self.config.wordings))),
+            order.shuffle_options.map(|orders| ("--shuffle-options", shuffle_setting(orders))),
             order.circular.then_some(("--circular", true.into())),
             rules.map(|rules| ("--rules", json!(rules))),
             self.bank.map(|bank| (ASK, json!(bank))),
@@ -153,9 +155,13 @@ impl Experiment for ChoiceSetup<'_> {
 #[derive(Debug, Clone)]
 pub(crate) struct ChoiceItem {
     pub(super) question: Arc<Question>,
-    /// Number of times that this order was asked before.
+    /// Name of the wording; `None` if the run has a single one.
+    pub(super) wording: Option<Shared<String>>,
+    /// Number of the order of the choices among those of the question, from 0.
+    pub(super) order: u32,
+    /// Number of times that the question was asked before in this wording and order.
     pub(super) repeat: u32,
-    /// Number of times that the question was asked before, in any order of its choices.
+    /// Number of times that the question was asked before, in any wording and order of its choices.
     pub(super) turn: u32,
     /// The frame whose image is shown, if it is not the frame of the question.
     pub(super) shown_frame: Option<FrameId>,
@@ -191,6 +197,8 @@ impl Item for ChoiceItem {
             choices: question.choices.texts().to_vec(),
             truth: question.choices.truth(),
             repeat: trial.item.repeat,
+            wording: trial.item.wording.as_ref().map(ToString::to_string),
+            order: trial.item.order,
             strict: None,
             lenient: None,
             outcome: TrialOutcome::Failed,
@@ -205,7 +213,7 @@ impl Item for ChoiceItem {
     }
 }
 
-/// One order of a question, with the prompts for models that see the image and for blind models.
+/// One wording and order of a question, with the prompts for models that see the image and for blind models.
 struct QuestionPrompts {
     item: ChoiceItem,
     image: Prompt,
@@ -249,38 +257,42 @@ fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
         .collect()
 }
 
-/// A question in each order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of
+/// A question in each wording and order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of
 /// the question.
 fn prompts(setup: &ChoiceSetup<'_>, sample: &Sample, shown_frame: Option<&FrameId>) -> Result<Vec<QuestionPrompts>> {
     let (order, repeats, question) = (setup.config.order, setup.config.repeats, &sample.question);
-    shown_questions(question, order, repeats, setup.recipe.seed)?
-        .into_iter()
-        .map(|shown| {
+    let is_of_several = !setup.dataset.image_series(&question.frame).is_empty();
+    let mut prompts = Vec::new();
+    for shown in shown_questions(question, order, repeats, setup.recipe.seed)? {
+        let question = Arc::new(shown.question);
+        for wording in &setup.config.wordings {
             let prompt = |view| {
-                let words = setup.config.prompts.render(view, &shown.question)?;
+                let words = wording.prompts.render(view, &question)?;
                 let prompt = match (view, setup.config.image_place) {
                     (View::Image, ImagePlace::BeforeWords) => Prompt::after_images(words.into()),
                     _ => Prompt::from_text(words.into()),
                 };
-                let several = setup.dataset.image_series(&question.frame);
-                Ok(match view {
-                    View::Image if !several.is_empty() => prompt.with_places(ImagePlaces::Marked),
+                Ok::<_, Error>(match view {
+                    View::Image if is_of_several => prompt.with_places(ImagePlaces::Marked),
                     View::Image | View::Blind => prompt,
                 })
             };
-            Ok(QuestionPrompts {
+            prompts.push(QuestionPrompts {
                 image: prompt(View::Image)?,
                 blind: prompt(View::Blind)?,
                 place: sample.place,
                 item: ChoiceItem {
-                    question: Arc::new(shown.question),
+                    question: Arc::clone(&question),
+                    wording: wording.name.clone(),
+                    order: shown.order,
                     repeat: shown.repeat,
-                    turn: shown.turn,
+                    turn: prompts.len() as u32,
                     shown_frame: shown_frame.cloned(),
                 },
-            })
-        })
-        .collect()
+            });
+        }
+    }
+    Ok(prompts)
 }
 
 /// The trials in a condition; `None` if no model is asked in it.
@@ -302,6 +314,9 @@ fn group(
     let count = questions.own.len() + questions.others.len();
     let mut trials = Vec::with_capacity(count * models.len());
     let times = setup.config.repeats.times(condition);
+    // Wordings may share their words without an image: the same request is sent once, for the first of them.
+    let has_wordings = setup.config.wordings.len() > 1;
+    let mut keys = HashSet::new();
     for (shown, is_of_other) in own.chain(others).filter(|(shown, _)| shown.item.repeat < times) {
         let prompt = match view {
             View::Image => &shown.image,
@@ -310,15 +325,33 @@ fn group(
         for &(index, model) in models.iter().filter(|(_, model)| {
             model.is_asked(shown.place) && (view == View::Image && is_other_room(model)) == is_of_other
         }) {
-            trials.push(Trial {
-                key: key_facts(shown, prompt, model, condition, image).key()?,
-                model: index,
-                prompt: prompt.clone(),
-                item: shown.item.clone(),
-            });
+            let key = key_facts(shown, prompt, model, condition, image).key()?;
+            if has_wordings && !keys.insert(key) {
+                continue;
+            }
+            trials.push(Trial { key, model: index, prompt: prompt.clone(), item: shown.item.clone() });
         }
     }
     Ok(Some(TrialGroup { condition: condition.cloned(), trials }))
+}
+
+/// Digest of the prompts, or of those of each wording by its name.
+fn prompt_digests(wordings: &[Wording]) -> Value {
+    match wordings {
+        [Wording { name: None, prompts }] => json!(prompts.digest()),
+        several => several
+            .iter()
+            .map(|wording| {
+                let name = wording.name.as_ref().map_or_else(String::new, ToString::to_string);
+                (name, json!(wording.prompts.digest()))
+            })
+            .collect(),
+    }
+}
+
+/// Number of shuffled orders as a setting; `true` for one, as earlier versions wrote it.
+fn shuffle_setting(orders: NonZeroU32) -> Value {
+    if orders == NonZeroU32::MIN { true.into() } else { orders.get().into() }
 }
 
 fn key_facts<'a>(

@@ -5,12 +5,12 @@
 //! Settings that a run must share with its plan: [`plan_identity`].
 
 use std::num::NonZeroU32;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use clap::Args;
 use serde_json::{Value, json};
 
-use crate::ask::{Constrain, Prompts};
+use crate::ask::{Constrain, PromptSet, Wording};
 use crate::data::{BankArgs, DataArgs, DataSource, Dataset, DecodeArgs, SceneArgs, SelectionArgs, SetArgs};
 use crate::engine::images::recipes::Recipe;
 use crate::engine::images::trials::{ASK, QuestionBank, rules};
@@ -73,9 +73,10 @@ pub(crate) struct ChoiceArgs {
     /// Send the image before the text, as Anthropic advises; servers can then cache it for all questions about a frame
     #[arg(long, add = Decides::Reply)]
     pub image_first: bool,
-    /// Folder with custom prompts (choice.txt, blind.txt); default: built in
-    #[arg(long, value_name = "DIR", add = Decides::Reply)]
-    pub prompts: Option<PathBuf>,
+    /// Prompts: built in (paper, terse, letter), or a folder with choice.txt and blind.txt; repeatable with names:
+    /// every question is then asked in each wording; default: paper
+    #[arg(long, value_name = "[NAME=]DIR", add = Decides::Reply)]
+    pub prompts: Vec<PromptSet>,
     /// Also ask every control of the observer (observer:other-room, or observer:tiles with a single scene, is always
     /// asked)
     #[arg(long, add = Decides::Trials)]
@@ -114,7 +115,8 @@ pub(super) struct Evaluation {
     pub(super) order: ChoiceOrder,
     /// Number of times that each order of choices is asked.
     pub(super) repeats: Repeats,
-    pub(super) prompts: Prompts,
+    /// The wordings in which questions are asked, at least one.
+    pub(super) wordings: Vec<Wording>,
     /// The place of the image in a message.
     pub(super) image_place: ImagePlace,
     /// The rulebook for making questions and for the observer's answers.
@@ -137,7 +139,6 @@ impl EvaluateArgs {
         if self.job.models.is_empty() {
             return Err(self.job.no_model_error());
         }
-        let prompts = self.choice.prompts.as_deref();
         let place = self.scene.place(self.data.place());
         let set_light = self.scene.set_light(&place, &self.data.set.root.data_root)?;
         let experiment = ExperimentSettings { data: place.path().map(Path::to_owned), set_light, ..self.experiment() };
@@ -171,7 +172,7 @@ impl EvaluateArgs {
             bank,
             plan,
             stated: self.stated,
-            prompts: prompts.map_or_else(Prompts::built_in, Prompts::load)?,
+            wordings: Wording::open(&self.choice.prompts)?,
             job,
         })
     }
@@ -229,9 +230,10 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
 pub(crate) struct ChoiceOrder {
-    /// Shuffle the choices of each question by --seed, equally in every condition
-    #[arg(long, add = Decides::Reply)]
-    pub shuffle_options: bool,
+    /// Shuffle the choices of each question by --seed, equally in every condition, or ask in N different
+    /// orders; default: none
+    #[arg(long, value_name = "N", num_args = 0..=1, require_equals = true, default_missing_value = "1", add = Decides::Reply)]
+    pub shuffle_options: Option<NonZeroU32>,
     /// Ask each question once per rotation of its choices, so that position preferences average out
     #[arg(long, add = Decides::Reply)]
     pub circular: bool,
@@ -288,13 +290,13 @@ impl ChoiceOrder {
 pub(super) struct ShownQuestion {
     /// The question with its choices in the order shown.
     pub(super) question: Question,
+    /// Number of the order among those of the question, from 0.
+    pub(super) order: u32,
     /// Number of times that this order was shown before.
     pub(super) repeat: u32,
-    /// Number of times that the question was shown before, in any order.
-    pub(super) turn: u32,
 }
 
-/// All showings of a question: each rotation of the first order, repeated up to [`Repeats::max`].
+/// All showings of a question: each of its [`orders`], repeated up to [`Repeats::max`].
 ///
 /// A record stores the choices in the order shown, so that parsed choices need no mapping. Different orders have
 /// different keys, because the key depends on the choices.
@@ -305,31 +307,67 @@ pub(super) fn shown_questions(
     seed: u64,
 ) -> Result<Vec<ShownQuestion>> {
     let choices = &question.choices;
-    let mut order: Vec<usize> = (0..choices.len()).collect();
-    if choice_order.shuffle_options {
-        // Sorting by a digest of each choice gives a random order that does not depend on other questions.
-        order.sort_by_cached_key(|&index| {
-            let text = choices.texts()[index].as_bytes();
-            let parts = [b"shuffle", &seed.to_le_bytes()[..], question.id.0.as_bytes(), text];
-            *Digest::from_parts(parts).as_bytes()
-        });
-    }
-    let rotations = if choice_order.circular { choices.len() } else { 1 };
     let mut shown = Vec::new();
     for repeat in 0..repeats.max().get() {
-        for rotation in 0..rotations {
-            let mut order = order.clone();
-            order.rotate_left(rotation);
+        for (number, order) in (0..).zip(orders(question, choice_order, seed)) {
             let texts = order.iter().map(|&index| choices.texts()[index].clone());
             let truth = order.iter().position(|&index| Some(index) == choices.truth());
             shown.push(ShownQuestion {
                 question: Question { choices: Choices::with_truth(texts.collect(), truth)?, ..question.clone() },
+                order: number,
                 repeat,
-                turn: shown.len() as u32,
             });
         }
     }
     Ok(shown)
+}
+
+/// Indices of the choices of a question in each order, without duplicates: that of the data or its shuffles, and with
+/// `circular` all rotations of each.
+///
+/// A question has fewer shuffles than asked for if it has fewer orders: two choices have two.
+fn orders(question: &Question, choice_order: ChoiceOrder, seed: u64) -> Vec<Vec<usize>> {
+    let count = question.choices.len();
+    let wanted = choice_order.shuffle_options.map_or(1, NonZeroU32::get) as usize;
+    let possible = (1..=count).try_fold(1_usize, usize::checked_mul).unwrap_or(usize::MAX);
+    let mut first: Vec<Vec<usize>> = Vec::new();
+    let mut draw = 0;
+    while first.len() < wanted.min(possible) {
+        let order = match choice_order.shuffle_options {
+            Some(_) => shuffled(question, seed, draw),
+            None => (0..count).collect(),
+        };
+        draw += 1;
+        if !first.contains(&order) {
+            first.push(order);
+        }
+    }
+    let rotations = if choice_order.circular { count } else { 1 };
+    let mut orders: Vec<Vec<usize>> = Vec::new();
+    for order in first {
+        for rotation in 0..rotations {
+            let mut order = order.clone();
+            order.rotate_left(rotation);
+            if !orders.contains(&order) {
+                orders.push(order);
+            }
+        }
+    }
+    orders
+}
+
+/// The choices in random order. Sorting by a digest of each choice gives an order that does not depend on other
+/// questions. The first draw is that of earlier versions, which had one.
+fn shuffled(question: &Question, seed: u64, draw: u64) -> Vec<usize> {
+    let texts = question.choices.texts();
+    let mut order: Vec<usize> = (0..texts.len()).collect();
+    order.sort_by_cached_key(|&index| {
+        let (seed, number) = (seed.to_le_bytes(), draw.to_le_bytes());
+        let parts = [&b"shuffle"[..], &seed, question.id.0.as_bytes(), texts[index].as_bytes(), &number];
+        let used = if draw == 0 { &parts[..4] } else { &parts };
+        *Digest::from_parts(used.iter().copied()).as_bytes()
+    });
+    order
 }
 
 /// The settings of data, questions and light. Models, enhancers and request settings are not included, so that they may
@@ -384,7 +422,7 @@ fn light_settings(config: &Evaluation) -> Vec<(String, Value)> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
+    use std::collections::{BTreeMap, BTreeSet};
 
     use super::*;
     use crate::types::{Family, FrameId, QuestionId};
@@ -402,8 +440,9 @@ mod tests {
         }
     }
 
-    fn shown(id: usize, shuffled: bool, circular: bool, repeats: u32) -> Vec<(String, u32)> {
-        let choice_order = ChoiceOrder { shuffle_options: shuffled, circular, repeats: NonZeroU32::new(repeats) };
+    fn shown(id: usize, shuffles: u32, circular: bool, repeats: u32) -> Vec<(String, u32)> {
+        let [shuffle_options, repeats] = [shuffles, repeats].map(NonZeroU32::new);
+        let choice_order = ChoiceOrder { shuffle_options, circular, repeats };
         let repeats = choice_order.repeats(Truths::Known);
         shown_questions(&question(id), choice_order, repeats, 7)
             .unwrap()
@@ -422,9 +461,9 @@ mod tests {
 
     #[test]
     fn every_rotation_is_repeated() {
-        assert_eq!(shown(0, false, false, 1), [expected("abc", 0)]);
+        assert_eq!(shown(0, 0, false, 1), [expected("abc", 0)]);
         assert_eq!(
-            shown(0, false, true, 2),
+            shown(0, 0, true, 2),
             [
                 expected("abc", 0),
                 expected("bca", 0),
@@ -436,8 +475,21 @@ mod tests {
         );
     }
 
+    #[test]
+    fn shuffles_differ_and_number_at_most_all_orders() {
+        for (shuffles, expected) in [(2, 2), (3, 3), (6, 6), (9, 6)] {
+            let orders = shown(5, shuffles, false, 1);
+            assert_eq!(orders.iter().collect::<BTreeSet<_>>().len(), expected);
+            assert_eq!(orders[0], shown(5, 1, false, 1)[0], "the first is that of a single shuffle");
+            assert_eq!(orders, shown(5, shuffles, false, 1));
+        }
+        // The rotations of two shuffles are all six orders, or three of them twice.
+        let rotated = (0..40).map(|id| shown(id, 2, true, 1).len());
+        assert!(rotated.clone().all(|count| count == 3 || count == 6) && rotated.clone().any(|count| count == 3));
+    }
+
     fn times(repeats: Option<u32>, truths: Truths, condition: Option<&str>) -> u32 {
-        let order = ChoiceOrder { shuffle_options: false, circular: false, repeats: repeats.and_then(NonZeroU32::new) };
+        let order = ChoiceOrder { shuffle_options: None, circular: false, repeats: repeats.and_then(NonZeroU32::new) };
         let condition = condition.map(|name| name.parse::<Condition>().unwrap());
         order.repeats(truths).times(condition.as_ref())
     }
@@ -455,8 +507,8 @@ mod tests {
     fn shuffled_orders_are_equally_frequent_and_reproducible() {
         let mut counts = BTreeMap::<String, usize>::new();
         for id in 0..6000 {
-            let order = shown(id, true, false, 1);
-            assert_eq!(order, shown(id, true, false, 1));
+            let order = shown(id, 1, false, 1);
+            assert_eq!(order, shown(id, 1, false, 1));
             *counts.entry(order[0].0.clone()).or_default() += 1;
         }
         assert_eq!(counts.len(), 6);

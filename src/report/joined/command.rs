@@ -32,7 +32,7 @@ use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
 use crate::runs::{LUX_AT_L0, Outcome, PrintArgs, StatedArgs, StdoutFormat, Syntax, record_table};
 use crate::store::{AddressChange, Store, now};
 use crate::types::manifests::{Counts, RunManifest, Status};
-use crate::types::{AskedItem, ChoiceDetail, Decides, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
+use crate::types::{ChoiceDetail, Decides, ItemKey, ModelColumn, OpenDetail, QuestionId, TrialRef, Truths};
 use darkqa_score::accuracies::shared_items;
 use darkqa_score::answers::record::{self, Detail as _};
 
@@ -374,24 +374,19 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
 /// # Errors
 /// If there is no such item.
 fn keep_common_items(mut combined: CombinedRuns) -> Result<CombinedRuns> {
-    let shared: HashSet<(QuestionId, Vec<String>, u32)> = {
+    let items = combined.trials.items();
+    let (is_shared, questions): (Vec<bool>, HashSet<QuestionId>) = {
         let grid = combined.grid();
-        grid.items
-            .iter()
-            .zip(shared_items(&grid))
-            .filter(|(_, is_shared)| *is_shared)
-            .map(|(item, _)| item_key(item.asked))
-            .collect()
+        let shared = grid.items.iter().zip(shared_items(&grid)).filter(|(_, is_shared)| *is_shared);
+        let shared: HashSet<ItemKey<'_>> = shared.map(|(item, _)| item.asked.key()).collect();
+        (
+            items.into_iter().map(|item| item.is_some_and(|item| shared.contains(&item.key()))).collect(),
+            shared.iter().map(|item| item.question.clone()).collect(),
+        )
     };
-    if shared.is_empty() {
+    if questions.is_empty() {
         return Err(Error::usage("--common", "no item was answered by every model; leave it out"));
     }
-    let is_shared: Vec<bool> = combined
-        .trials
-        .items()
-        .into_iter()
-        .map(|item| item.is_some_and(|item| shared.contains(&item_key(item))))
-        .collect();
     // The new place of each trial; `None` if it is removed.
     let mut places = Vec::with_capacity(combined.trials.len());
     let mut next = 0;
@@ -405,15 +400,8 @@ fn keep_common_items(mut combined: CombinedRuns) -> Result<CombinedRuns> {
         run.trials = TrialPlaces::Some(kept.collect());
     }
     combined.trials.retain(|trial| is_shared[trial.item_number()]);
-    let questions: HashSet<&QuestionId> = shared.iter().map(|(question, ..)| question).collect();
     combined.questions.retain(|question| questions.contains(&question.id));
     Ok(combined)
-}
-
-/// The identity of an item: question, order of choices and repeat.
-fn item_key(item: &AskedItem) -> (QuestionId, Vec<String>, u32) {
-    let (question, choices, repeat) = item.key();
-    (question.clone(), choices.to_vec(), repeat)
 }
 
 /// The curves of a run; `None` if no model was shown a dark image.

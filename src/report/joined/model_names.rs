@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use super::settings::{FlagValues, Setting, differing_settings, is_digest, model_settings};
 use crate::runs::stored::StoredRun;
 use crate::types::flags::setting_spelling;
-use crate::types::{Condition, QuestionId, RunQuestion, TrialKey, TrialRef, View};
+use crate::types::{Condition, ItemKey, QuestionId, RunQuestion, TrialKey, TrialRef, View};
 use darkqa_score::answers::record::Detail;
 
 /// Maximum number of settings in the name of a model; if more settings differ, the name of the run is used.
@@ -21,22 +21,12 @@ struct MatchKey<'a> {
     view: View,
     model: &'a str,
     condition: Option<&'a Condition>,
-    question: &'a QuestionId,
-    /// The choices in the order in which they were shown.
-    choices: &'a [String],
-    repeat: u32,
+    item: ItemKey<'a>,
 }
 
 impl<'a> MatchKey<'a> {
     fn from_trial<D: Detail>(trial: TrialRef<'a, D>) -> Self {
-        Self {
-            view: trial.view(),
-            model: trial.model(),
-            condition: trial.condition(),
-            question: trial.question(),
-            choices: trial.choices(),
-            repeat: trial.repeat(),
-        }
+        Self { view: trial.view(), model: trial.model(), condition: trial.condition(), item: trial.item().key() }
     }
 }
 

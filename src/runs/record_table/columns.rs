@@ -182,6 +182,8 @@ fn question_columns() -> Vec<Column<ChoiceRow>> {
         column("truth", Int8, MayBeNull, |row: &ChoiceRow| Cell::int(row.record.detail.truth)),
         column("choice_count", Int8, Always, |row| Cell::int(Some(row.record.detail.choices.len()))),
         column("repeat", Int32, MayBeNull, |row| Cell::int(Some(row.record.detail.repeat))),
+        column("wording", Text, MayBeNull, |row| Cell::text(row.record.detail.wording.as_deref())),
+        column("order", Int32, MayBeNull, |row| Cell::int(Some(row.record.detail.order))),
         column("answer", Text, MayBeNull, |row| choice_text(row, row.record.detail.truth)),
         column("choices", Text, Always, |row| {
             let choices = serde_json::to_string(&row.record.detail.choices);

@@ -36,6 +36,8 @@ fn record(name: &str, outcome: TrialOutcome) -> Record {
         choices: vec!["a".into(), "b".into()],
         truth: Some(0),
         repeat: 0,
+        wording: None,
+        order: 0,
         strict: None,
         lenient: None,
         outcome,

@@ -262,7 +262,7 @@ async fn scripts_and_guesses_answer_without_endpoint() {
     let condition = "L3-noise".parse().unwrap();
     let other = "L0".parse().unwrap();
     let asked = question("q1", "Red?");
-    let prompt = Prompts::built_in().unwrap().render(View::Blind, &asked).unwrap();
+    let prompt = Prompts::built_in(Prompts::DEFAULT).unwrap().render(View::Blind, &asked).unwrap();
     let call = |question, condition| Call {
         query: Query::Choice(question),
         condition,

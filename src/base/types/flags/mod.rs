@@ -94,7 +94,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
         name: "choice-order",
         heading: "Data",
         about: "Order of the choices; default: as in the data",
-        alone: None,
+        alone: Some("1"),
         keys: &[("shuffle", "shuffle-options"), ("circular", "circular")],
     },
     KeyedFlag {

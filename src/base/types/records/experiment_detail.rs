@@ -21,6 +21,8 @@ impl StoredDetail for ChoiceDetail {
             family: Cow::Borrowed(&self.family),
             choices: &self.choices,
             truth: self.truth,
+            wording: self.wording.as_deref(),
+            order: self.order,
             repeat: self.repeat,
         }
     }
@@ -73,6 +75,8 @@ impl StoredDetail for OpenDetail {
             family: Cow::Owned(Family::from(&*self.category)),
             choices: &[],
             truth: None,
+            wording: None,
+            order: 0,
             repeat: 0,
         }
     }

@@ -350,6 +350,12 @@ details! {
         /// How many times the same question was asked before; not in the file if 0.
         #[serde(default, skip_serializing_if = "is_first")]
         repeat: u32,
+        /// The name of the prompts, if the run asks with several; not in the file otherwise.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        wording: Option<String>,
+        /// The number of the order of the choices among those of the question, from 0; not in the file if 0.
+        #[serde(default, skip_serializing_if = "is_first")]
+        order: u32,
         /// The strict parsing of the reply; `None` if no reply came.
         strict: Option<ParsedAnswer>,
         /// The lenient parsing of the reply; `None` if no reply came.
@@ -395,8 +401,8 @@ impl ChoiceDetail {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
-fn is_first(repeat: &u32) -> bool {
-    *repeat == 0
+fn is_first(number: &u32) -> bool {
+    *number == 0
 }
 
 details! {

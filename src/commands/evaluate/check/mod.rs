@@ -20,7 +20,7 @@ use super::estimate;
 use super::settings::EvaluateArgs;
 use super::setup::unnamed_scenes;
 use super::write_plan::power_forecast;
-use crate::ask::Prompts;
+use crate::ask::{PromptSet, Wording};
 use crate::data::{DataSource, Dataset, Picture};
 use crate::engine::dark_already::DarkImages;
 use crate::engine::images::enhancement::enhancers::{self, EnhancerModels, EnhancerRunArgs};
@@ -229,9 +229,8 @@ fn check_settings(args: &EvaluateArgs, findings: &mut ImageFindings) {
     }
     let rulebook = args.selection.rules.as_deref();
     add(findings, rules(rulebook).map(|_| file_line("rules", rulebook)));
-    let folder = args.choice.prompts.as_deref();
-    let prompts = folder.map_or_else(Prompts::built_in, Prompts::load);
-    add(findings, prompts.map(|_| file_line("prompts", folder)));
+    let folders = args.choice.prompts.iter().find_map(PromptSet::folder);
+    add(findings, Wording::open(&args.choice.prompts).map(|_| file_line("prompts", folders)));
     if !args.job.models.is_empty() {
         let models = args
             .job

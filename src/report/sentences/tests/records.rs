@@ -44,6 +44,8 @@ pub(crate) fn unanswered(frame: String, family: Family, choices: &[&str]) -> Cho
         choices: choices.iter().map(|text| (*text).to_owned()).collect(),
         truth: Some(0),
         repeat: 0,
+        wording: None,
+        order: 0,
         strict: None,
         lenient: None,
         outcome: TrialOutcome::Wrong,

@@ -36,6 +36,8 @@ _CONDITION = {
 }
 _READINGS = {
     "repeat": "Int16",
+    "wording": "category",
+    "order": "Int16",
     "choices": "object",
     "choice_count": "Int16",
     "truth": "Int16",
@@ -118,7 +120,8 @@ def add_question(record: Record, question: Record) -> None:
 def add_readings(record: Record) -> None:
     """Add the choices as texts, and what the strict and the lenient parsing found in the reply."""
     choices, truth = record["choices"], record["truth"]
-    record.setdefault("repeat", 0)
+    for name, default in (("repeat", 0), ("wording", None), ("order", 0)):
+        record.setdefault(name, default)
     record.setdefault("shown_frame", None)
     observed = record.get("observed") or {}
     for name in ("from", "things", "seen", "detected", "explained_ppm"):

@@ -9,16 +9,13 @@ use crate::choice::ParsingMode;
 use crate::estimate::Estimate;
 use darkqa_base::types::questions::CANNOT_TELL;
 use darkqa_base::types::{
-    ChoiceDetail, Condition, Family, QuestionId, RunGroup, Treatment, TrialRef, Trials, UnreadReason, View,
+    ChoiceDetail, Condition, Family, ItemKey, RunGroup, Treatment, TrialRef, Trials, UnreadReason, View,
 };
-
-/// Identity of a question for a model: its id and the order of its choices.
-type QuestionKey<'a> = (&'a QuestionId, &'a [String]);
 
 /// The first reply of one model to each question at L0: the reference for its other replies.
 pub(super) struct LightAnswers<'a> {
     model: &'a str,
-    by_question: HashMap<QuestionKey<'a>, Vec<TrialRef<'a>>>,
+    by_question: HashMap<ItemKey<'a>, Vec<TrialRef<'a>>>,
 }
 
 /// Counts of a model's replies at L0.
@@ -84,11 +81,11 @@ pub(super) fn is_refused(trial: TrialRef<'_>) -> bool {
 impl<'a> LightAnswers<'a> {
     /// Collects the replies of a model at L0.
     pub(super) fn new(trials: &'a Trials<ChoiceDetail>, model: &'a str) -> Self {
-        let mut by_question = HashMap::<QuestionKey<'a>, Vec<TrialRef<'a>>>::new();
+        let mut by_question = HashMap::<ItemKey<'a>, Vec<TrialRef<'a>>>::new();
         for trial in
             trials.iter().filter(|trial| trial.model() == model).filter(|trial| is_light(*trial) && trial.repeat() == 0)
         {
-            let key = (trial.question(), trial.choices());
+            let key = question_key(trial);
             by_question.entry(key).or_default().push(trial);
         }
         Self { model, by_question }
@@ -101,7 +98,7 @@ impl<'a> LightAnswers<'a> {
 
     /// Choice of the model at L0 for the question of a trial; `None` if it is unreadable or missing.
     fn reference(&self, trial: TrialRef<'_>, mode: ParsingMode) -> Option<usize> {
-        let key = (trial.question(), trial.choices());
+        let key = question_key(trial);
         let own = run_group(trial);
         let light = self.by_question.get(&key)?.iter().find(|light| RunGroup::overlap(run_group(**light), own))?;
         chosen(*light, mode)
@@ -160,9 +157,14 @@ impl<'a> LightAnswers<'a> {
     }
 
     fn offers_cannot_tell(&self) -> bool {
-        let lists: HashSet<&[String]> = self.by_question.keys().map(|(_, choices)| *choices).collect();
+        let lists: HashSet<&[String]> = self.by_question.keys().map(|key| key.choices).collect();
         lists.iter().any(|choices| choices.iter().any(|choice| is_cannot_tell(choice)))
     }
+}
+
+/// Identity of the item of a trial, without its repeat.
+fn question_key(trial: TrialRef<'_>) -> ItemKey<'_> {
+    ItemKey { repeat: 0, ..trial.item().key() }
 }
 
 fn run_group(trial: TrialRef<'_>) -> Option<&RunGroup> {

@@ -5,7 +5,7 @@ use std::hash::{Hash, Hasher};
 
 use crate::types::{Family, FrameId, QuestionId, Shared};
 
-/// One question in one order of its choices and one repeat.
+/// One question in one wording, one order of its choices and one repeat.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AskedItem {
     /// The name of the question.
@@ -18,8 +18,25 @@ pub struct AskedItem {
     pub choices: Shared<Vec<String>>,
     /// The index of the true choice; `None` if nobody knows it.
     pub truth: Option<usize>,
-    /// How many times the same question was asked before.
+    /// The name of the prompts; `None` if the run asks with one set of prompts.
+    pub wording: Option<Shared<String>>,
+    /// The number of the order of the choices among those of the question, from 0.
+    pub order: u32,
+    /// How many times the same question was asked before in this wording and order.
     pub repeat: u32,
+}
+
+/// The identity of an item within a run, or across runs of the same data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct ItemKey<'a> {
+    /// The name of the question.
+    pub question: &'a QuestionId,
+    /// The number of earlier trials of the question in this wording and order.
+    pub repeat: u32,
+    /// The name of the prompts; `None` if the run asks with one set of prompts.
+    pub wording: Option<&'a str>,
+    /// The choices in the order shown.
+    pub choices: &'a [String],
 }
 
 /// The fields of an [`AskedItem`] without the question, borrowed from a record.
@@ -33,15 +50,24 @@ pub struct AskedParts<'r> {
     pub choices: &'r [String],
     /// The index of the true choice; `None` if nobody knows it.
     pub truth: Option<usize>,
-    /// How many times the same question was asked before.
+    /// The name of the prompts; `None` if the run asks with one set of prompts.
+    pub wording: Option<&'r str>,
+    /// The number of the order of the choices among those of the question, from 0.
+    pub order: u32,
+    /// How many times the same question was asked before in this wording and order.
     pub repeat: u32,
 }
 
 impl AskedItem {
-    /// Identity of an item: the question, the order of its choices and the repeat.
+    /// The identity of the item.
     #[must_use]
-    pub fn key(&self) -> (&QuestionId, &[String], u32) {
-        (&self.question, &self.choices, self.repeat)
+    pub fn key(&self) -> ItemKey<'_> {
+        ItemKey {
+            question: &self.question,
+            repeat: self.repeat,
+            wording: self.wording.as_ref().map(|wording| wording.as_str()),
+            choices: &self.choices,
+        }
     }
 
     /// The item of a record.
@@ -52,6 +78,8 @@ impl AskedItem {
             family: parts.family.clone().into_owned().into(),
             choices: parts.choices.to_vec().into(),
             truth: parts.truth,
+            wording: parts.wording.map(|wording| wording.to_owned().into()),
+            order: parts.order,
             repeat: parts.repeat,
         }
     }
@@ -63,6 +91,8 @@ impl AskedItem {
             family: Cow::Borrowed(&self.family),
             choices: &self.choices,
             truth: self.truth,
+            wording: self.wording.as_ref().map(|wording| wording.as_str()),
+            order: self.order,
             repeat: self.repeat,
         };
         (&self.question, parts)

@@ -23,7 +23,7 @@ use asked_model::{AskedModel, Ending};
 use choice_facts::{TrialFacts, hash_reply};
 use interner::Interner;
 
-pub use asked_item::{AskedItem, AskedParts};
+pub use asked_item::{AskedItem, AskedParts, ItemKey};
 pub use choice_facts::{ChoiceFacts, ChoiceTables, SentImages};
 pub use interner::TextPlace;
 pub use trial_ref::TrialRef;

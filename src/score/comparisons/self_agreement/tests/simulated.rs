@@ -55,6 +55,8 @@ pub(super) fn record(question: usize, image: usize, condition: &str, repeat: u32
         choices: ["yes", "no"].map(str::to_owned).to_vec(),
         truth: None,
         repeat,
+        wording: None,
+        order: 0,
         strict: Some(reading),
         lenient: Some(reading),
         outcome: chosen.map_or(TrialOutcome::Unparsed, |_| TrialOutcome::Answered),
