@@ -16,7 +16,7 @@ struct GroupKinds {
 }
 
 /// All groups in order. Sentences of any other kind are in the last group.
-const GROUPS: [GroupKinds; 8] = [
+const GROUPS: [GroupKinds; 9] = [
     GroupKinds { title: "Baseline", leading: &["baseline"], further: &[] },
     GroupKinds { title: "Threshold", leading: &["threshold"], further: &[] },
     GroupKinds {
@@ -24,6 +24,7 @@ const GROUPS: [GroupKinds; 8] = [
         leading: &["darkness", "real darkness", "agreement_in_the_dark"],
         further: &["real against synthetic", "families", "best", "apart"],
     },
+    GroupKinds { title: "Wordings", leading: &["variation"], further: &[] },
     GroupKinds { title: "Noise", leading: &["noise"], further: &["readings"] },
     GroupKinds {
         title: "Enhancers",

@@ -19,6 +19,7 @@ use super::model_in_condition::{ModelInCondition, is_control, is_observer};
 use super::observed::ObserverSummary;
 use super::photographs::{self, FidelityFindings, PairDarkness, PhotographedSet};
 use super::significance::Verdict;
+use super::variation::RunVariation;
 use darkqa_base::types::{ChoiceDetail, Family, ImageFidelity, ModelListing, RunQuestion, Trials, Variant};
 
 /// All results that are computed from the trials of a run.
@@ -49,6 +50,8 @@ pub struct Findings<'a> {
     pub lenient_best: Option<BestInTheDark>,
     /// Paired differences between subjects.
     pub comparisons: Vec<Comparison>,
+    /// Variation over wordings and orders; `None` if every question was asked in one of each.
+    pub variation: Option<RunVariation>,
     /// Thresholds and areas, for all families together and for each family.
     pub curves: Vec<Curve>,
     /// Confidence and accuracy of each subject with known probabilities of the choices.
@@ -155,6 +158,7 @@ impl<'a> Findings<'a> {
             .into_iter()
             .flat_map(|family| curves(grid, &draws, family, &findings.summary.unbalanced))
             .collect();
+        findings.variation = RunVariation::new(grid, &findings.comparisons);
         findings.first_failures = first_failures(grid);
         findings.agreements = agreements(grid);
         findings.light_agreements = light_agreements(grid);
@@ -184,6 +188,7 @@ impl<'a> Findings<'a> {
             best: best_in_the_dark(&grid, ParsingMode::Strict),
             lenient_best: best_in_the_dark(&grid, ParsingMode::Lenient),
             comparisons: comparisons(&grid),
+            variation: None,
             curves: Vec::new(),
             calibrations: calibrations(&grid, &draws),
             confusions: confusions(&grid),

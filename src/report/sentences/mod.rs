@@ -27,6 +27,7 @@ mod sentence;
 #[cfg(test)]
 pub(crate) mod tests;
 mod threshold;
+mod variation;
 
 use std::collections::BTreeSet;
 
@@ -53,14 +54,20 @@ pub(crate) use sample::left_out;
 pub(crate) use self_agreement::self_agreement;
 pub(crate) use sentence::{EffectDirection, Sentence, capitalised, with_separators};
 
-/// The line below the sentences that explains their signs, p-values and intervals.
+/// The line below the sentences that explains their signs, p-values and intervals, and what the intervals leave out.
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
+    let has_variation = sentences.iter().any(|sentence| sentence.kind == "variation");
+    let asked = if has_variation {
+        "the wordings and orders that were asked; the table of wordings and orders has intervals for others, too"
+    } else {
+        "one wording of the prompt, one order of the choices and one draw of the noise; how far others move the results is unknown"
+    };
     let has_baseline = sentences.iter().any(|sentence| sentence.kind == "baseline");
     let old_run = if has_baseline { ", and 5 % more for the old run" } else { "" };
     format!(
         "Signs and p are corrected over all tests behind these sentences: a report without any effect has a sign with a probability of \
          5 % at most{old_run}. A sign holds in the strict and the lenient parsing. An interval is of one test: it leaves out 0 if and \
-         only if the uncorrected p is below 0.05."
+         only if the uncorrected p is below 0.05. Intervals hold for {asked}."
     )
 }
 
@@ -73,6 +80,7 @@ pub(crate) fn sentences(findings: &Findings<'_>) -> Vec<Sentence> {
     sentences.extend(readings(&findings.by_profile, findings.unit));
     sentences.extend(in_each_light(findings, threshold::seen_down_to));
     sentences.extend(darkness::darkness(findings));
+    sentences.extend(variation::variation(findings));
     sentences.extend(real::real(findings));
     sentences.extend(in_each_light(findings, about_light));
     sentences.extend(below_blind::untouched(findings));

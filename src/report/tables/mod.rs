@@ -18,6 +18,7 @@ mod pooled;
 mod sections;
 mod strict_groups;
 mod thresholds;
+mod variation;
 
 use crate::report::text::table::ColumnKind::{Count, Number, P, Percent, Ratio, Share, Text};
 use crate::report::text::table::{SUMMARY, Table, TableBuilder, TableCell};
@@ -68,6 +69,7 @@ fn all_tables(findings: &Findings<'_>) -> Vec<Table> {
         strict_groups(findings),
         pooled::pooled(findings),
         comparisons::comparisons(findings),
+        variation::variation(findings),
         answers::answers(findings),
         calibration::calibration(findings),
         Vec::from_iter(fidelity(findings.fidelity.as_ref())),

@@ -5,6 +5,7 @@
 //! Notes below tables on the training data of enhancers: [`with_training`].
 
 use super::calibration::CONFIDENCE;
+use super::variation::VARIATION;
 use crate::report::text::table::ColumnKind::{Count, Percent, Share, Text};
 use crate::report::text::table::{Table, TableBuilder, TableCell};
 use crate::report::text::words::{names_enhancer, percent};
@@ -16,7 +17,7 @@ use darkqa_score::choice::ParsingMode;
 pub(crate) type Section = (&'static str, &'static str, &'static str, &'static [&'static str]);
 
 /// All sections of the page in order.
-pub(crate) const SECTIONS: [Section; 15] = [
+pub(crate) const SECTIONS: [Section; 16] = [
     (
         BASELINE,
         "Against the baseline",
@@ -100,6 +101,14 @@ pub(crate) const SECTIONS: [Section; 15] = [
         COMPARISONS,
         "Comparisons",
         "Each paired by item, in percentage points; tested by swapping whole clusters, and corrected by Holm over the comparisons of one kind and model.",
+        &[],
+    ),
+    (
+        VARIATION,
+        "Wordings and orders",
+        "How much of it is the darkness, and how much the wording of the prompt or the order of the choices? The standard deviation \
+         that each source adds to a reply (0 or 1), in % of accuracy, by a crossed random-effects decomposition; two or three wordings say \
+         little about all others, and their intervals show it. The intervals of the differences hold for other scenes, wordings and orders.",
         &[],
     ),
     (

@@ -46,6 +46,7 @@
 //! ```
 
 mod advice;
+mod by_run;
 mod components;
 mod difference;
 mod facets;
@@ -56,6 +57,7 @@ mod ranks;
 mod tests;
 
 pub use advice::{Design, cheapest};
+pub use by_run::{AccuracyVariation, DifferenceVariation, RunVariation};
 pub use components::{Component, Components, Source};
 pub use difference::{FacetedDifference, SignCount};
 pub use facets::{FacetRange, facet_ranges};

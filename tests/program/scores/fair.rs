@@ -1,5 +1,5 @@
 //! Orders of choices, repeats, constraints, and reading again.
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
@@ -116,6 +116,64 @@ fn repeats_are_trials_of_their_own() {
     }
     run(&bench, &repeated);
     assert_eq!(mock.requests().len(), 18, "none is asked again");
+}
+
+/// The wording, order and question of each record of a model, with its number of records.
+fn askings(bench: &Bench, view: &str) -> BTreeMap<(String, u64, String), usize> {
+    let mut askings = BTreeMap::new();
+    for record in records(&bench.path("run")).iter().filter(|record| record["view"] == view) {
+        let wording = record["wording"].as_str().unwrap_or("none").to_owned();
+        let order = record["order"].as_u64().unwrap_or(0);
+        *askings.entry((wording, order, record["question"].to_string())).or_default() += 1;
+    }
+    askings
+}
+
+#[test]
+fn every_question_is_asked_in_each_wording_and_order_once() {
+    let bench = Bench::with_questions(6);
+    let mock = MockEndpoint::start([Answer::text("C")]);
+    let own = bench.path("own");
+    fs::create_dir(&own).unwrap();
+    fs::write(
+        own.join("choice.txt"),
+        "Q: {{ question }}\n{% for c in choices %}{{ c.letter }}) {{ c.text }}\n{% endfor %}",
+    )
+    .unwrap();
+    let models = format!("--model m --blind-model m --base-url {}", mock.base_url());
+    let several =
+        format!("{models} --prompts paper --prompts terse --prompts own={} --choice-order shuffle=2", own.display());
+    run(&bench, &several);
+    let images = askings(&bench, "image");
+    assert_eq!(images.len(), 6 * 3 * 2);
+    assert!(images.values().all(|count| *count == 1));
+    // The words without an image of "own" are those of "paper", and a request is never paid twice.
+    let blind = askings(&bench, "blind");
+    assert!(blind.keys().all(|(wording, ..)| wording == "paper" || wording == "terse"));
+    assert_eq!((blind.len(), mock.requests().len()), (6 * 2 * 2, 6 * 3 * 2 + 6 * 2 * 2));
+    let requests = mock.requests();
+    let own = requests.iter().filter(|request| request.json().to_string().contains("Q: ")).count();
+    assert_eq!(own, 12, "the prompts of the folder are sent");
+    run(&bench, &several);
+    assert_eq!(mock.requests().len(), 60, "none is asked again");
+    let csv = fs::read_to_string(bench.path("run/variation.csv")).unwrap();
+    assert!(csv.lines().any(|line| line.starts_with("m,image,L0,")), "{csv}");
+    let fewer = bench.call(&[args("--out run"), words(&models), words("--prompts paper")].concat());
+    assert!(fewer.stderr.contains("--prompts"), "other wordings are another run: {}", fewer.stderr);
+}
+
+#[test]
+fn a_report_says_whether_other_wordings_were_asked() {
+    let bench = Bench::with_questions(12);
+    let models = "--data set.jsonl --levels L0,L5 --variant ev --model random";
+    let one = bench.complete(&[words(models), words("--out one --findings")].concat());
+    assert!(on_one_line(&one).contains("how far others move the results is unknown"), "{one}");
+    assert!(!bench.path("one/variation.csv").exists());
+    let prompts = "--prompts paper --prompts letter --out two --findings";
+    let two = bench.complete(&[words(models), words(prompts)].concat());
+    assert!(on_one_line(&two).contains("combinations of 2 wordings, 1 order"), "{two}");
+    assert!(on_one_line(&two).contains("has intervals for others, too"), "{two}");
+    assert!(bench.path("two/variation_differences.csv").exists());
 }
 
 #[test]

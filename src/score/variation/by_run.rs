@@ -1,0 +1,225 @@
+//! Variation of the results of a run that asked in several wordings or orders: [`RunVariation`].
+
+use super::{Components, Facet, FacetRange, FacetedDifference, Observation, facet_ranges, paired, rank_agreement};
+use crate::choice::ParsingMode;
+use crate::comparisons::{Comparison, ComparisonKind};
+use crate::estimate::Estimate;
+use crate::grid::Grid;
+use crate::model_in_condition::{ModelInCondition, is_reference};
+use darkqa_base::types::text::counted;
+
+/// How far wordings of the prompt and orders of the choices move the results of a run, in the strict parsing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunVariation {
+    /// Names of the wordings, sorted; empty if there is one.
+    pub wordings: Vec<String>,
+    /// Number of orders of the choices; 1 if each question has one.
+    pub orders: usize,
+    /// Accuracy of each subject.
+    pub accuracies: Vec<AccuracyVariation>,
+    /// Differences over all families, in the order of the comparisons.
+    pub differences: Vec<DifferenceVariation>,
+    /// Agreement of the wordings on the order of the models at the darkest level of the main variant (Kendall's W);
+    /// `None` with one wording or one model.
+    pub ranks: Option<Estimate>,
+}
+
+/// Variation of the accuracy of one subject.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AccuracyVariation {
+    pub subject: ModelInCondition,
+    pub components: Components,
+    /// How far apart the wordings and the orders are.
+    pub ranges: Vec<FacetRange>,
+}
+
+/// Variation of one difference.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DifferenceVariation {
+    pub kind: ComparisonKind,
+    pub first: ModelInCondition,
+    pub second: ModelInCondition,
+    pub found: FacetedDifference,
+    /// The difference in each wording in which both sides have replies.
+    by_wording: Vec<f64>,
+}
+
+impl DifferenceVariation {
+    /// The smallest and the largest difference over the wordings; `None` with one wording.
+    #[must_use]
+    pub fn by_wording(&self) -> Option<[f64; 2]> {
+        let ends = self.by_wording.iter().copied();
+        Some([ends.clone().reduce(f64::min)?, ends.reduce(f64::max)?])
+    }
+}
+
+impl RunVariation {
+    /// Wordings and orders in words: `3 wordings, 2 orders`.
+    #[must_use]
+    pub fn asked(&self) -> String {
+        format!("{}, {}", counted(self.wordings.len().max(1), "wording"), counted(self.orders, "order"))
+    }
+
+    /// Computes the variation; `None` if every question was asked in one wording and one order.
+    #[must_use]
+    pub fn new(grid: &Grid<'_>, comparisons: &[Comparison]) -> Option<Self> {
+        let mut wordings: Vec<&str> = grid.items.iter().filter_map(|item| item.asked.key().wording).collect();
+        wordings.sort_unstable();
+        wordings.dedup();
+        let orders = grid.items.iter().map(|item| item.asked.order as usize + 1).max().unwrap_or(1);
+        if wordings.len() < 2 && orders < 2 {
+            return None;
+        }
+        let observations: Vec<Vec<Observation>> =
+            (0..grid.subjects.len()).map(|subject| observations(grid, &wordings, subject)).collect();
+        let accuracies = grid.subjects.iter().zip(&observations).filter(|(_, replies)| !replies.is_empty());
+        let accuracies = accuracies.map(|(subject, replies)| AccuracyVariation {
+            subject: subject.clone(),
+            components: Components::new(replies),
+            ranges: facet_ranges(replies),
+        });
+        let differences =
+            comparisons.iter().filter(|comparison| comparison.family.is_none()).filter_map(|comparison| {
+                let [first, second] = [&comparison.first, &comparison.second]
+                    .map(|side| grid.find(side).map(|index| &observations[index]));
+                let pairs = paired(first?, second?);
+                Some(DifferenceVariation {
+                    kind: comparison.kind,
+                    first: comparison.first.clone(),
+                    second: comparison.second.clone(),
+                    found: FacetedDifference::new(&pairs)?,
+                    by_wording: if wordings.len() > 1 { means(&pairs, wordings.len()) } else { Vec::new() },
+                })
+            });
+        Some(Self {
+            orders,
+            accuracies: accuracies.collect(),
+            differences: differences.collect(),
+            ranks: ranks(grid, &observations),
+            wordings: wordings.into_iter().map(str::to_owned).collect(),
+        })
+    }
+}
+
+/// The replies of a subject.
+fn observations(grid: &Grid<'_>, wordings: &[&str], subject: usize) -> Vec<Observation> {
+    let mut observations = Vec::new();
+    let mut question = 0;
+    for (index, item) in grid.items.iter().enumerate() {
+        // Items are sorted by frame and question.
+        if index > 0 && grid.items[index - 1].asked.question != item.asked.question {
+            question += 1;
+        }
+        let Some(chosen) = grid.result(subject, index).parsed(ParsingMode::Strict) else {
+            continue;
+        };
+        let wording = item.asked.key().wording.and_then(|name| wordings.binary_search(&name).ok()).unwrap_or(0);
+        observations.push(Observation {
+            question,
+            scene: item.cluster,
+            wording: wording as u16,
+            order: item.asked.order as u16,
+            draw: 0,
+            repeat: item.asked.repeat as u16,
+            value: f64::from(u8::from(item.is_right(chosen))),
+        });
+    }
+    observations
+}
+
+/// Mean difference in each wording with pairs.
+fn means(pairs: &[Observation], wordings: usize) -> Vec<f64> {
+    (0..wordings)
+        .filter_map(|wording| {
+            let own = pairs.iter().filter(|pair| usize::from(pair.wording) == wording).map(|pair| pair.value);
+            let count = own.clone().count();
+            (count > 0).then(|| own.sum::<f64>() / count as f64)
+        })
+        .collect()
+}
+
+/// Kendall's W of the models over the wordings, with raw images at the darkest level of the main variant.
+fn ranks(grid: &Grid<'_>, observations: &[Vec<Observation>]) -> Option<Estimate> {
+    let main = grid.main_variant()?;
+    let is_dark = |subject: &ModelInCondition| {
+        subject.variant == main && subject.enhancer.is_none() && !is_reference(&subject.model)
+    };
+    let darkest = grid.subjects.iter().filter(|subject| is_dark(subject)).filter_map(|subject| subject.level).max();
+    let models: Vec<&[Observation]> = grid
+        .subjects
+        .iter()
+        .zip(observations)
+        .filter(|(subject, replies)| is_dark(subject) && subject.level == darkest && !replies.is_empty())
+        .map(|(_, replies)| &**replies)
+        .collect();
+    if models.len() < 2 { None } else { rank_agreement(&models, Facet::Wording) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::comparisons::comparisons;
+    use crate::tests::{Answers, records, with_grid};
+    use crate::variation::Source;
+    use darkqa_base::types::{Digest, Record};
+
+    /// The records of a model in a condition and a wording.
+    fn worded(model: &str, condition: &str, wording: &str, answers: Answers) -> Vec<Record> {
+        let mut records = records(model, condition, answers);
+        for record in &mut records {
+            record.detail.wording = Some(wording.to_owned());
+            record.key = Digest::from_bytes(format!("{wording} {:?}", record.key).as_bytes()).into();
+        }
+        records
+    }
+
+    fn variation(records: &[Vec<Record>]) -> Option<RunVariation> {
+        with_grid(&records.concat(), |grid| RunVariation::new(grid, &comparisons(grid)))
+    }
+
+    #[test]
+    fn one_wording_has_no_variation() {
+        let one = [records("m", "L0", |_| Some(true)), records("m", "L5-ev", |item| Some(item % 2 == 0))];
+        assert_eq!(variation(&one), None);
+    }
+
+    #[test]
+    fn wordings_that_change_a_loss_are_told_from_those_that_do_not() {
+        let right: Answers = |_| Some(true);
+        let half: Answers = |item| Some(item % 2 == 0);
+        let of = |dark: [Answers; 2]| {
+            let run = variation(&[
+                worded("m", "L0", "a", right),
+                worded("m", "L0", "b", right),
+                worded("m", "L5-ev", "a", dark[0]),
+                worded("m", "L5-ev", "b", dark[1]),
+            ]);
+            run.unwrap()
+        };
+        let found = of([half, right]);
+        assert_eq!((&*found.asked(), found.ranks), ("2 wordings, 1 order", None));
+        let loss = &found.differences[0];
+        assert_eq!((loss.found.difference.value, loss.by_wording()), (-0.25, Some([-0.5, 0.0])));
+        assert_eq!((loss.found.signs.same, loss.found.signs.of), (1, 2));
+        let wording = |found: &RunVariation, subject: usize| {
+            found.accuracies[subject].components.deviation(Source::Facet(Facet::Wording)).unwrap().value
+        };
+        assert!(wording(&found, 0).abs() < 1e-12 && wording(&found, 1) > 0.2);
+        // Without an effect of the wording, the loss has the same sign in both, and the wording adds nothing.
+        let control = of([half, half]);
+        let loss = &control.differences[0];
+        assert_eq!((loss.found.signs.same, loss.by_wording()), (2, Some([-0.5, -0.5])));
+        assert!(wording(&control, 1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn models_in_the_same_order_under_each_wording_agree() {
+        let run = variation(&[
+            worded("a", "L5-ev", "x", |item| Some(item % 2 == 0)),
+            worded("a", "L5-ev", "y", |item| Some(item % 3 == 0)),
+            worded("b", "L5-ev", "x", |item| Some(item % 3 > 0)),
+            worded("b", "L5-ev", "y", |item| Some(item % 2 == 0)),
+        ]);
+        assert!(run.unwrap().ranks.is_some_and(|ranks| (ranks.value - 1.0).abs() < 1e-12));
+    }
+}
