@@ -1,10 +1,14 @@
 //! Tests of the findings over all models, [`super::comparisons`], on synthetic records.
 
+use std::collections::BTreeSet;
+
 use super::answers::confusion::{Collapse, FalseAnswer, confusions};
 use super::choice::ParsingMode;
 use super::cluster::{Clusters, FrameTies};
 use super::comparisons::paired::PairedComparison;
-use super::comparisons::{Comparison, ComparisonKind, PooledFinding, PooledKind, best_in_the_dark, pooled};
+use super::comparisons::{
+    Comparison, ComparisonKind, PooledFinding, PooledKind, best_in_the_dark, comparisons, pooled,
+};
 use super::findings::Findings;
 use super::grid::Grid;
 use super::model_in_condition::ModelInCondition;
@@ -99,6 +103,37 @@ fn one_model_pooled_is_its_own_comparison() {
         let by_family = findings.iter().filter(|finding| finding.family.is_some()).count();
         assert_eq!(by_family, 4);
     });
+}
+
+#[test]
+fn of_many_models_the_best_in_the_dark_are_compared() {
+    /// A model that is right about the first questions.
+    fn right_about(count: usize, model: &str, condition: &str) -> Vec<Record> {
+        let mut records = records(model, condition, |_| Some(true));
+        for record in &mut records[count..] {
+            let wrong = Some(ParsedAnswer { chosen: Some(1), why: None });
+            (record.detail.strict, record.detail.lenient, record.detail.outcome) = (wrong, wrong, TrialOutcome::Wrong);
+        }
+        records
+    }
+    let compared = |models: usize| {
+        // Each model is right about one question more in the dark than the one before, and about one less at L0.
+        let of = |model: usize| {
+            let name = format!("m{model:02}");
+            [right_about(24 - model, &name, "L0"), right_about(model, &name, "L3-ev")].concat()
+        };
+        let records: Vec<Record> = (0..models).flat_map(of).collect();
+        with_grid(&records, |grid| {
+            let pairs = comparisons(grid).into_iter().filter(|one| one.kind == ComparisonKind::Model);
+            let pairs: Vec<Comparison> = pairs.filter(|one| one.family.is_none()).collect();
+            let names: BTreeSet<String> =
+                pairs.iter().flat_map(|pair| [pair.first.model.clone(), pair.second.model.clone()]).collect();
+            (names.len(), names.first().cloned(), pairs.len())
+        })
+    };
+    // 66 pairs of 12 models, in two conditions.
+    assert_eq!(compared(12), (12, Some("m00".to_owned()), 2 * 66));
+    assert_eq!(compared(14), (12, Some("m02".to_owned()), 2 * 66));
 }
 
 #[test]

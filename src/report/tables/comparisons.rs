@@ -19,8 +19,9 @@ use crate::types::text::counted;
 use darkqa_score::accuracies::FirstFailure;
 use darkqa_score::choice::ParsingMode;
 use darkqa_score::cluster::ClusterUnit;
-use darkqa_score::comparisons::{Comparison, ComparisonKind, MIN_PAIRS};
+use darkqa_score::comparisons::{Comparison, ComparisonKind, MAX_COMPARED_MODELS, MIN_PAIRS};
 use darkqa_score::findings::Findings;
+use darkqa_score::model_in_condition::models_under_test;
 use darkqa_score::significance::Verdict;
 
 /// Maximum number of rows that the terminal shows of one kind of comparison. The CSV file has all rows.
@@ -29,6 +30,10 @@ const MAX_ROWS: usize = 40;
 /// Tables of the differences in accuracy. Files also have the rows with lenient parsing of replies.
 pub(super) fn comparisons(findings: &Findings<'_>) -> Vec<Table> {
     let mut tables = tables_by_kind(&findings.comparisons, findings.unit, |kind| kind.accuracy);
+    let note = compared_models_note(findings);
+    for table in tables.iter_mut().filter(|table| table.caption == KindTable::of(ComparisonKind::Model).accuracy.0) {
+        table.foot.clone_from(&note);
+    }
     for kind in ComparisonKind::ALL {
         let all: Vec<&Comparison> = findings.comparisons.iter().filter(|comparison| comparison.kind == kind).collect();
         tables.push(table(kind, "", &all, ParsingMode::Lenient).in_files_only());
@@ -213,6 +218,16 @@ impl KindTable {
             },
         }
     }
+}
+
+/// Note with the number of models that are compared; `None` if all are.
+fn compared_models_note(findings: &Findings<'_>) -> Option<String> {
+    let models = models_under_test(findings.grid.subjects.iter().map(|subject| &*subject.model)).len();
+    (models > MAX_COMPARED_MODELS).then(|| {
+        format!(
+            "Compared are the {MAX_COMPARED_MODELS} of {models} models with the highest accuracy in the dark; records.parquet has the replies of all."
+        )
+    })
 }
 
 /// Note with the number of rows whose sides share too few items for a verdict; `None` if all share enough.

@@ -7,7 +7,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use super::comparison::compares_models;
+use super::comparison::ranks_models;
 use super::paired::{BoundedSums, PairedTest, net_bounds};
 use super::pooled::pool;
 use super::tested::Tested;
@@ -129,7 +129,7 @@ type AskedLevels<'g> = (&'g str, BTreeSet<AxisLevel>);
 /// at L0 and at a degraded level, or if the models share no degraded level or no item.
 #[must_use]
 pub fn best_in_the_dark(grid: &Grid<'_>, mode: ParsingMode) -> Option<BestInTheDark> {
-    if !compares_models(grid) {
+    if !ranks_models(grid) {
         return None;
     }
     let variant = grid.main_variant()?;

@@ -126,16 +126,50 @@ impl Comparison {
     }
 }
 
-/// Maximum number of comparisons between models, and between enhancers (chosen); they take at most a gigabyte each.
+/// Maximum number of comparisons for a ranking of models, and between enhancers (chosen); they take at most a gigabyte
+/// each.
 const MAX_COMPARISONS: usize = 500_000;
 
-/// True if models are compared with each other. The number of pairs grows with the square of the number of models, so
-/// it is limited.
+/// True if models are ranked. The number of pairs grows with the square of the number of models, so it is limited.
 #[must_use]
-pub fn compares_models(grid: &Grid<'_>) -> bool {
+pub fn ranks_models(grid: &Grid<'_>) -> bool {
     let models: BTreeSet<&str> = grid.subjects.iter().map(|s| &*s.model).collect();
     let pairs = grid.subjects.len() * models.len().saturating_sub(1) / 2;
     pairs.saturating_mul(grid.groups().len()) <= MAX_COMPARISONS
+}
+
+/// Maximum number of models that are compared pair by pair (chosen): a reader compares no 8,128 pairs of 128 models, and
+/// the tables and time of a report would be those of the pairs.
+pub const MAX_COMPARED_MODELS: usize = 12;
+
+/// Models that are compared pair by pair, sorted: the models under test, or the [`MAX_COMPARED_MODELS`] with the highest
+/// mean accuracy over the raw degraded conditions of the main variant, or over all conditions without such.
+///
+/// The choice goes by the replies that are compared, so the differences among the chosen models are a little smaller
+/// than those between all. A pair is corrected over its own comparisons alone ([`Comparison::strict`]), so that its
+/// result does not depend on the choice.
+#[must_use]
+pub fn compared_models<'g>(grid: &'g Grid<'_>) -> BTreeSet<&'g str> {
+    let all = models_under_test(grid.subjects.iter().map(|subject| &*subject.model));
+    if all.len() <= MAX_COMPARED_MODELS {
+        return all;
+    }
+    let main = grid.main_variant();
+    let mean = |model: &str, is_dark: bool| {
+        let own = grid.subjects.iter().enumerate().filter(|(_, subject)| {
+            let is_shown = !is_dark || (main.as_ref() == Some(&subject.variant) && subject.enhancer.is_none());
+            subject.model == model && is_shown
+        });
+        let accuracies: Vec<f64> = own
+            .filter_map(|(index, _)| grid.accuracy(index, None, ParsingMode::Strict))
+            .map(|accuracy| accuracy.value)
+            .collect();
+        (!accuracies.is_empty()).then(|| accuracies.iter().sum::<f64>() / accuracies.len() as f64)
+    };
+    let mut ranked: Vec<(&str, f64)> =
+        all.into_iter().filter_map(|model| Some((model, mean(model, true).or_else(|| mean(model, false))?))).collect();
+    ranked.sort_by(|(one, a), (other, b)| b.total_cmp(a).then(one.cmp(other)));
+    ranked.into_iter().take(MAX_COMPARED_MODELS).map(|(model, _)| model).collect()
 }
 
 /// True if enhancers are compared with each other. The number of pairs grows with the square of the number of
@@ -247,8 +281,8 @@ fn corrected(mut all: Vec<Comparison>) -> Vec<Comparison> {
 /// Indices of the subjects that a kind compares.
 pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)> {
     let mut pairs = Vec::new();
-    let (compares_models, compares_enhancers) = (compares_models(grid), compares_enhancers(grid));
-    let under_test = models_under_test(grid.subjects.iter().map(|subject| &*subject.model));
+    let compares_enhancers = compares_enhancers(grid);
+    let compared = if kind == ComparisonKind::Model { compared_models(grid) } else { BTreeSet::new() };
     for (index, subject) in grid.subjects.iter().enumerate() {
         let against: Vec<usize> = match kind {
             // Only raw images show the cost of darkness. The curves show how much of it an enhancer recovers.
@@ -276,7 +310,7 @@ pub(super) fn pairs(grid: &Grid<'_>, kind: ComparisonKind) -> Vec<(usize, usize)
             ComparisonKind::EnhancerPair if compares_enhancers && subject.enhancer.is_some() => {
                 later_enhancers(grid, index)
             }
-            ComparisonKind::Model if compares_models => later_models(grid, index, &under_test),
+            ComparisonKind::Model => later_models(grid, index, &compared),
             ComparisonKind::Light => later_lights(grid, index),
             ComparisonKind::Blind if subject.view == Some(View::Image) => blind(grid, subject),
             _ => Vec::new(),
@@ -309,11 +343,11 @@ fn later_enhancers(grid: &Grid<'_>, index: usize) -> Vec<usize> {
         .collect()
 }
 
-/// Later models of the grid in the same condition, so that each pair occurs once. Only models in `under_test` are
+/// Later models of the grid in the same condition, so that each pair occurs once. Only models in `compared` are
 /// compared.
-fn later_models(grid: &Grid<'_>, index: usize, under_test: &BTreeSet<&str>) -> Vec<usize> {
+fn later_models(grid: &Grid<'_>, index: usize, compared: &BTreeSet<&str>) -> Vec<usize> {
     let subject = &grid.subjects[index];
-    if !under_test.contains(&*subject.model) {
+    if !compared.contains(&*subject.model) {
         return Vec::new();
     }
     let condition = |of: &ModelInCondition| (of.view, of.level, of.variant.clone(), of.enhancer.clone());
@@ -322,7 +356,7 @@ fn later_models(grid: &Grid<'_>, index: usize, under_test: &BTreeSet<&str>) -> V
         .enumerate()
         .skip(index + 1)
         .filter(|(_, other)| other.model != subject.model && condition(other) == condition(subject))
-        .filter(|(_, other)| under_test.contains(&*other.model))
+        .filter(|(_, other)| compared.contains(&*other.model))
         .map(|(other, _)| other)
         .collect()
 }

@@ -17,7 +17,9 @@ pub use best::{
     BestInTheDark, Crossing, DarkAccuracy, DarkGain, DarkPair, LevelLead, RankRange, best_in_the_dark, rank_ranges,
 };
 pub use by_profile::{ClaimVerdict, EffectInProfile, FindingByProfile, NoiseHypothesis, Robustness};
-pub use comparison::{Comparison, ComparisonKind, MIN_PAIRS, compares_enhancers, compares_models};
+pub use comparison::{
+    Comparison, ComparisonKind, MAX_COMPARED_MODELS, MIN_PAIRS, compared_models, compares_enhancers, ranks_models,
+};
 pub use pooled::{FamilyContrast, ModelsLeftOut, PooledDifference, PooledFinding, pool, pooled};
 pub use pooled_kind::PooledKind;
 pub use tested::{Claim, Tested};

@@ -19,7 +19,7 @@ use crate::types::text::plural;
 use crate::types::{InputSummary, OpenDetail, StoredDetail as _, TrialRef};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::comparisons::self_agreement::SelfAgreement;
-use darkqa_score::comparisons::{compares_enhancers, compares_models};
+use darkqa_score::comparisons::{compares_enhancers, ranks_models};
 use darkqa_score::findings::Findings;
 use darkqa_score::photographs::{PairDarkness, PhotographedSet};
 
@@ -101,11 +101,10 @@ pub(super) fn open_early_ends(joined: &Joined<OpenDetail>) -> Vec<Alert> {
     )
 }
 
-/// Alert for a report with too many models for pairwise comparisons.
+/// Alert for a report with too many models for a ranking.
 fn many_models_alert(findings: &Findings<'_>) -> Option<Alert> {
-    let text = "Too many models to compare them with each other: no pair of them is tested, and none is called best. Reports of fewer \
-                models do both.";
-    (!compares_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
+    let text = "Too many models to rank them: none is called best. Reports of fewer models rank them.";
+    (!ranks_models(&findings.grid)).then(|| Alert::new(AlertKind::Models, text))
 }
 
 /// Alert for a report with too many enhancers for pairwise comparisons.

@@ -243,7 +243,7 @@ fn sparse_files_are_not_read() {
 }
 
 #[test]
-fn many_models_are_reported_without_pairs() {
+fn many_models_are_reported_without_a_ranking() {
     let bench = Bench::with_questions(2);
     let line = "--model random --data set.jsonl --levels L0,L3 --no-parquet --out run";
     assert_eq!(call(&bench, line).code, Some(0));
@@ -269,7 +269,7 @@ fn many_models_are_reported_without_pairs() {
     let finished = call(&bench, "report run --out report");
     assert_eq!(finished.code, Some(0), "{}", stderr(&finished));
     let text = String::from_utf8_lossy(&finished.stdout);
-    assert!(text.contains("Too many models to compare"), "{text}");
+    assert!(text.contains("Too many models to rank them"), "{text}");
 }
 
 #[test]
