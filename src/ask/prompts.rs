@@ -14,7 +14,7 @@ use regex::Regex;
 use crate::error::{Error, Result};
 use crate::files;
 use crate::types::questions::letter;
-use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId, View};
+use crate::types::{Choices, Digest, Evidence, Family, FrameId, Question, QuestionId, View};
 
 /// Template for questions with the image.
 const CHOICE: &str = "choice.txt";
@@ -175,7 +175,7 @@ fn sample_question() -> Result<Question> {
         text: "sample-question?".into(),
         choices: Choices::new(texts, 0)?,
         group: None,
-        evidence: serde_json::Value::Null,
+        evidence: Evidence::default(),
     })
 }
 

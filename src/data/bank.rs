@@ -19,7 +19,8 @@ use serde_json::{Value, json};
 use super::ready_made::one_line;
 use crate::error::{Error, Result};
 use crate::files::text;
-use crate::types::questions::{BANK_ID, CANNOT_TELL};
+use crate::types::evidence::BANK_ID;
+use crate::types::questions::CANNOT_TELL;
 use crate::types::text::excerpt;
 use crate::types::{Choices, Digest, Family, FrameId, Question, QuestionId};
 
@@ -191,7 +192,7 @@ impl BankQuestion {
             text: self.text.clone(),
             choices: self.choices.clone(),
             group: None,
-            evidence: json!({ BANK_ID: self.id }),
+            evidence: json!({ BANK_ID: self.id }).into(),
         }
     }
 }
@@ -297,7 +298,7 @@ mod tests {
         let ids: Vec<&str> = asked.iter().map(|question| &*question.id.0).collect();
         assert_eq!(ids, ["lamp@a.png", "2@a.png", "lamp@b/c.png", "2@b/c.png"]);
         assert!(asked.iter().all(|question| question.choices.truth().is_none()));
-        assert_eq!(asked[0].evidence, json!({"bank_id": "lamp"}));
+        assert_eq!(asked[0].evidence.value(), json!({"bank_id": "lamp"}));
     }
 
     fn drawn(home: &Bank, frames: &[FrameId], per_image: usize) -> BTreeSet<String> {

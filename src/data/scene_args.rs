@@ -18,7 +18,7 @@ use super::root::Root;
 use super::source::{DataSource, refuse_questions};
 use crate::error::{Error, Result};
 use crate::files;
-use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId, SetLight};
+use crate::types::{Choices, Decides, Digest, Evidence, Family, FrameId, Question, QuestionId, SetLight};
 
 /// Flags for sets of photographs.
 #[derive(Debug, Clone, Default, Args)]
@@ -193,7 +193,7 @@ pub(super) fn open(root: &Root, question: &str, choices: Option<NonZeroUsize>) -
                 choices: Choices::new(texts, truth.unwrap_or(usize::MAX))
                     .map_err(|e| e.at(folder.display().to_string()))?,
                 group: None,
-                evidence: serde_json::Value::Null,
+                evidence: Evidence::default(),
             });
             sources.insert(FrameId(id), ImageSource::image(path.clone()));
         }

@@ -148,10 +148,8 @@ fn is_varied(asked: &[GeneratedQuestion], list: &[usize], rule: &BalanceRule) ->
 
 #[cfg(test)]
 mod tests {
-    use serde_json::Value;
-
     use super::*;
-    use darkqa_base::types::{Choices, FrameId, Question, QuestionId};
+    use darkqa_base::types::{Choices, Evidence, FrameId, Question, QuestionId};
 
     fn asked(number: usize, family: Family, about: &str, answer: usize) -> GeneratedQuestion {
         let texts = ["yes", "no", "perhaps"].map(str::to_owned).to_vec();
@@ -162,7 +160,7 @@ mod tests {
             text: format!("{about}?"),
             choices: Choices::new(texts, answer).unwrap(),
             group: None,
-            evidence: Value::Null,
+            evidence: Evidence::default(),
         };
         GeneratedQuestion { question, about: about.to_owned(), scene: format!("s{}", number % 5) }
     }

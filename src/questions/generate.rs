@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use serde_json::{Value, json};
+use serde_json::json;
 
 use super::balance::{BalanceMode, balance};
 use super::colors::Palette;
@@ -264,7 +264,7 @@ fn into_question(
         text: candidate.text,
         choices,
         group: None,
-        evidence: Value::clone(&evidence),
+        evidence: evidence.into(),
     };
     Ok(GeneratedQuestion { question, about: candidate.about, scene: frame.scene.clone() })
 }

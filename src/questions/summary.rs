@@ -183,7 +183,7 @@ impl QuestionSummary {
                 counts[truth] += 1;
             }
         }
-        if let Some(gap) = question.evidence.get("gap_mm").and_then(serde_json::Value::as_u64) {
+        if let Some(gap) = question.evidence.value().get("gap_mm").and_then(serde_json::Value::as_u64) {
             *self.gaps.entry(gap / 250 * 250).or_insert(0) += 1;
         }
         if question.family == Family::RoomType {
@@ -338,7 +338,7 @@ fn prior(questions: &[&GeneratedQuestion]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use darkqa_base::types::{Choices, FrameId, Question, QuestionId};
+    use darkqa_base::types::{Choices, Evidence, FrameId, Question, QuestionId};
 
     fn closest(scene: &str, choices: [&str; 2]) -> GeneratedQuestion {
         GeneratedQuestion {
@@ -349,7 +349,7 @@ mod tests {
                 text: "Which object is closest?".to_owned(),
                 choices: Choices::new(choices.map(str::to_owned).to_vec(), 0).unwrap(),
                 group: None,
-                evidence: serde_json::Value::Null,
+                evidence: Evidence::default(),
             },
             about: choices[0].to_owned(),
             scene: scene.to_owned(),

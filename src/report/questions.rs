@@ -25,7 +25,7 @@ use crate::report::text::terminal::{self, to_script_json};
 use crate::report::text::words::with_interval;
 use crate::types::questions::FAMILIES;
 use crate::types::text::counted;
-use crate::types::{Digest, Family};
+use crate::types::{Digest, Evidence, Family};
 use darkqa_questions::GeneratedQuestion;
 use darkqa_questions::appearance::{FrameAppearance, MIN_EDGE_GRADIENT};
 use darkqa_questions::colors::{Color, NONE};
@@ -445,7 +445,7 @@ pub(crate) struct ReviewItem<'a> {
     question: &'a str,
     choices: &'a [String],
     answer: &'a str,
-    evidence: &'a serde_json::Value,
+    evidence: &'a Evidence,
     /// Path of the image relative to the page.
     image: String,
     /// Size of the image in pixels: width, height.
@@ -538,7 +538,7 @@ mod tests {
             text: "\u{2028}</SCRIPT>".into(),
             choices: Choices::new(choices, 0).unwrap(),
             group: None,
-            evidence: json!({ "segments": [] }),
+            evidence: json!({ "segments": [] }).into(),
         };
         let generated = GeneratedQuestion { question, about: String::new(), scene: String::new() };
         let page = page(&[ReviewItem::new(&generated, "a.png".into(), [4, 3])]).unwrap();

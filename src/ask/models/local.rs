@@ -229,7 +229,7 @@ mod tests {
 
     use super::*;
     use crate::ask::{Message, Query};
-    use crate::types::{Choices, Condition, Family, FrameId, QuestionId};
+    use crate::types::{Choices, Condition, Evidence, Family, FrameId, QuestionId};
 
     fn question(id: usize, choices: usize) -> Question {
         let texts = (0..choices).map(|i| format!("choice {i}")).collect();
@@ -240,7 +240,7 @@ mod tests {
             text: "?".into(),
             choices: Choices::new(texts, 0).unwrap(),
             group: None,
-            evidence: serde_json::Value::Null,
+            evidence: Evidence::default(),
         }
     }
 

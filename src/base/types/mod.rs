@@ -1,6 +1,8 @@
 //! Types shared by all crates of the workspace, without input or output.
 
 pub mod degradations;
+#[cfg(feature = "program")]
+pub mod evidence;
 pub mod flags;
 pub mod images;
 #[cfg(feature = "program")]
@@ -18,6 +20,8 @@ pub use degradations::{
     Axis, AxisLevel, Condition, ConditionColumns, Degradation, EnhancerName, ExposureFacts, KindSet, PairDark,
     PairFacts, PhotoName, ProfileName, RunGroup, SetLight, Severity, Treatment, TreatmentSet, Variant,
 };
+#[cfg(feature = "program")]
+pub use evidence::Evidence;
 #[cfg(feature = "program")]
 pub use flags::Decides;
 #[cfg(feature = "program")]

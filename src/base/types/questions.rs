@@ -8,12 +8,14 @@
 //!
 //! Questions that are scored together: [`StrictGroup`].
 
+use std::borrow::Cow;
 use std::fmt;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use super::evidence::{BANK_ID, Evidence};
 use super::images::FrameId;
 use super::text::counted;
 use super::values::Digest;
@@ -282,8 +284,8 @@ pub struct Question {
     pub choices: Choices,
     /// The group of questions that are scored together; `None` if the data set has no groups.
     pub group: Option<StrictGroup>,
-    /// The facts from which the generator derived the answer; `Null` if the data set states none.
-    pub evidence: serde_json::Value,
+    /// The facts from which the generator derived the answer.
+    pub evidence: Evidence,
 }
 
 /// The answer that is read from a reply.
@@ -337,10 +339,6 @@ impl UnreadReason {
     ];
 }
 
-/// The key in [`RunQuestion::evidence`] with the name of a question that is asked about every image
-/// ([`RunQuestion::bank_id`]).
-pub const BANK_ID: &str = "bank_id";
-
 /// One line of a run's `questions.jsonl`: a question with the scene of its frame. The file can also be used as
 /// `--questions`.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -369,7 +367,7 @@ pub struct RunQuestion {
     pub extra_answers: Option<Vec<String>>,
     /// The facts from which the answer was derived.
     #[serde(default)]
-    pub evidence: Value,
+    pub evidence: Evidence,
     /// The digest of the frame's file, or of the walk's files in the order shown. `None` if all models were blind.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub image: Option<Digest>,
@@ -450,8 +448,8 @@ impl RunQuestion {
     /// [`bank_id`](Self::bank_id).
     #[must_use]
     pub fn without_evidence(mut self) -> Self {
-        let bank_id = self.evidence.get_mut(BANK_ID).map(Value::take);
-        self.evidence = bank_id.map_or(Value::Null, |id| serde_json::json!({ BANK_ID: id }));
+        let bank_id = self.evidence.bank_id().map(|id| serde_json::json!({ BANK_ID: id }));
+        self.evidence = bank_id.map(Evidence::from).unwrap_or_default();
         self
     }
 
@@ -471,8 +469,8 @@ impl RunQuestion {
     /// The name of a question that is asked about every image, the same for all images; for other questions their own
     /// name.
     #[must_use]
-    pub fn bank_id(&self) -> &str {
-        self.evidence.get(BANK_ID).and_then(Value::as_str).unwrap_or(&self.id.0)
+    pub fn bank_id(&self) -> Cow<'_, str> {
+        self.evidence.bank_id().unwrap_or(Cow::Borrowed(&self.id.0))
     }
 
     /// The stored form of a question; `place` is its index among all questions of the data, `scene` the scene of its
@@ -534,8 +532,9 @@ impl RunQuestion {
     /// candidates for the closest object. Empty for questions about the whole room or without evidence.
     #[must_use]
     pub fn outlines(&self) -> Vec<PixelBox> {
-        let about = self.evidence.get("about").and_then(Value::as_str).filter(|about| !about.is_empty());
-        self.evidence
+        let evidence = self.evidence.value();
+        let about = evidence.get("about").and_then(Value::as_str).filter(|about| !about.is_empty());
+        evidence
             .get("segments")
             .and_then(Value::as_array)
             .into_iter()
@@ -640,10 +639,10 @@ mod tests {
         assert_eq!(change(|q| q.place = 7), None);
     }
 
-    fn question(family: Family, evidence: Value) -> RunQuestion {
+    fn question(family: Family, evidence: impl Into<Evidence>) -> RunQuestion {
         let line =
             json!({"id": "q", "frame": "f", "family": "other", "question": "?", "choices": ["a", "b"], "answer": "a"});
-        RunQuestion { family, evidence, ..serde_json::from_value(line).unwrap() }
+        RunQuestion { family, evidence: evidence.into(), ..serde_json::from_value(line).unwrap() }
     }
 
     #[test]

@@ -123,7 +123,7 @@ impl OtherRooms {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::types::{Choices, Family};
+    use crate::types::{Choices, Evidence, Family};
 
     fn others(frames: &str) -> Option<String> {
         let questions: Vec<Question> = frames
@@ -136,7 +136,7 @@ mod tests {
                 text: "?".into(),
                 choices: Choices::new(vec!["a".into(), "b".into()], 0).unwrap(),
                 group: None,
-                evidence: serde_json::Value::Null,
+                evidence: Evidence::default(),
             })
             .collect();
         // Lower and upper case are frames of one scene; digits have none.

@@ -425,7 +425,7 @@ mod tests {
     use std::collections::{BTreeMap, BTreeSet};
 
     use super::*;
-    use crate::types::{Family, FrameId, QuestionId};
+    use crate::types::{Evidence, Family, FrameId, QuestionId};
 
     fn question(id: usize) -> Question {
         let texts = ["a", "b", "c"].map(str::to_owned).to_vec();
@@ -436,7 +436,7 @@ mod tests {
             text: "?".into(),
             choices: Choices::new(texts, 1).unwrap(),
             group: None,
-            evidence: serde_json::Value::Null,
+            evidence: Evidence::default(),
         }
     }
 

@@ -31,7 +31,9 @@ use crate::runs::stored::StoredRun;
 use crate::runs::{Outcome, StdoutFormat};
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, JUDGES, PartPlace};
-use crate::types::{Condition, Digest, Family, FrameId, OpenDetail, QuestionId, Record, RunQuestion, TrialKey, View};
+use crate::types::{
+    Condition, Digest, Evidence, Family, FrameId, OpenDetail, QuestionId, Record, RunQuestion, TrialKey, View,
+};
 use darkqa_score::choice::llm_match::Protocol;
 
 /// A typical answer, for estimating the length of a judge's prompt.
@@ -103,7 +105,7 @@ impl Experiment for OpenSetup<'_> {
                     answer: Some(question.answer.clone()),
                     extra_answers: question.extra.clone(),
                     group: None,
-                    evidence: Value::Null,
+                    evidence: Evidence::default(),
                     image: walk.and_then(|walk| walk.digest()),
                     images: Vec::new(),
                 }

@@ -29,7 +29,7 @@ use crate::runs::resolved_shard::{keep_shard, shard_from_flag};
 use crate::runs::shard::Shard;
 use crate::types::questions::FAMILIES;
 use crate::types::text::{counted, plural};
-use crate::types::{Decides, Digest, Family, FrameId, Labels, QuestionId, shell_word};
+use crate::types::{Decides, Digest, Evidence, Family, FrameId, Labels, QuestionId, shell_word};
 use checked::StatisticsCache;
 use darkqa_questions::appearance::FrameAppearance;
 use darkqa_questions::balance::BalanceMode;
@@ -389,7 +389,7 @@ struct WrittenQuestion<'a> {
     question: &'a str,
     choices: &'a [String],
     answer: &'a str,
-    evidence: &'a Value,
+    evidence: &'a Evidence,
 }
 
 impl<'a> WrittenQuestion<'a> {

@@ -41,7 +41,7 @@ use crate::engine::observer::Observer;
 use crate::error::{Error, Result};
 use crate::runs::Outcome;
 use crate::types::manifests::Status;
-use crate::types::{Choices, Decides, Digest, Family, FrameId, Question, QuestionId};
+use crate::types::{Choices, Decides, Digest, Evidence, Family, FrameId, Question, QuestionId};
 use completion::{Completion, MemoryBound, RequestFault};
 use darkqa_questions::rules::Rules;
 use request::{AskedQuestion, FrameMatcher, MAX_PIXELS, ServedQuestion};
@@ -207,7 +207,7 @@ impl ServerState {
             choices: Choices::new(parsed.choices, 0)
                 .map_err(|e| RequestFault::new(StatusCode::BAD_REQUEST, e.to_string()))?,
             group: None,
-            evidence: serde_json::Value::Null,
+            evidence: Evidence::default(),
             frame: frame.cloned().unwrap_or(FrameId(String::new())),
         };
         let call = Call {

@@ -469,7 +469,7 @@ fn build_questions(
             text: question.text,
             choices: question.choices,
             group: groups.group(row),
-            evidence: evidence.map_or(serde_json::Value::Null, |column| column.cell(cells).into()),
+            evidence: evidence.map(|column| serde_json::Value::from(column.cell(cells)).into()).unwrap_or_default(),
         });
     }
     Ok(questions)

@@ -8,12 +8,11 @@ use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde::Serialize;
-use serde_json::Value;
 
 use crate::error::{Error, Result};
 use crate::report::text::words;
 use crate::types::questions::PixelBox;
-use crate::types::{Axis, AxisLevel, EnhancerName, FrameId, ObjectCrop, Thumbnail, View};
+use crate::types::{Axis, AxisLevel, EnhancerName, Evidence, FrameId, ObjectCrop, Thumbnail, View};
 use darkqa_score::model_in_condition;
 
 /// Result code of a reply that could not be parsed. Smaller codes are choice indices or marks of the judge
@@ -156,7 +155,7 @@ pub(crate) struct PageQuestion<'a> {
     pub(crate) frame: usize,
     pub(crate) family: usize,
     pub(crate) text: &'a str,
-    pub(crate) evidence: Option<&'a Value>,
+    pub(crate) evidence: Option<&'a Evidence>,
     /// Bounding boxes of the objects in question, in pixels of the frame.
     pub(crate) outlines: Vec<PixelBox>,
     /// Bounding box of all objects in question together.

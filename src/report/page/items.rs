@@ -60,7 +60,9 @@ fn data<'a>(
                 object: run_question.and_then(RunQuestion::object),
                 answer: None,
                 also_right: &[],
-                evidence: run_question.map(|run_question| &run_question.evidence).filter(|e| !e.is_null()),
+                evidence: run_question
+                    .map(|run_question| &run_question.evidence)
+                    .filter(|evidence| !evidence.is_none()),
             });
         }
         let time = times.entry(&asked.question).or_default();

@@ -155,7 +155,7 @@ fn wrong(asked: &GeneratedQuestion, seen: &Seen) -> Option<String> {
     };
     (truth != answer).then(|| {
         format!(
-            "{} {}: {answer:?}, but {truth:?} ({})",
+            "{} {}: {answer:?}, but {truth:?} ({:?})",
             asked.question.frame, asked.question.text, asked.question.evidence
         )
     })

@@ -9,7 +9,7 @@ use crate::support::table::check_rows;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use darkqa_base::types::{
-    Choices, Digest, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
+    Choices, Digest, Evidence, FailureKind, Family, Finish, FrameId, Question, QuestionId, Reply, Rgb, View,
 };
 use darkqa_eval::internals::ask::{
     Access, BaseUrl, Call, Constrain, Endpoint, ExtraFields, ImageDetail, Message, Model, Parameters, Prompts, Query,
@@ -17,7 +17,7 @@ use darkqa_eval::internals::ask::{
 };
 use darkqa_pictures::Payload;
 use darkqa_pictures::PayloadFormat;
-use serde_json::{Value, json};
+use serde_json::json;
 
 const KEY: &str = "sk-very-secret-0123";
 
@@ -48,7 +48,7 @@ fn question(id: &str, text: &str) -> Question {
         text: text.into(),
         choices: Choices::new(vec!["yes".into(), "no".into()], 0).unwrap(),
         group: None,
-        evidence: Value::Null,
+        evidence: Evidence::default(),
     }
 }
 

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::tests::{records, with_grid};
-use darkqa_base::types::Record;
+use darkqa_base::types::{Evidence, Record};
 
 /// The questions of records, in the groups that `group` names for an item, of the size that the groups have then.
 fn questions(records: &[Record], group: impl Fn(usize) -> Option<String>) -> Vec<RunQuestion> {
@@ -23,7 +23,7 @@ fn questions(records: &[Record], group: impl Fn(usize) -> Option<String>) -> Vec
             choices: record.detail.choices.clone(),
             answer: Some("a".to_owned()),
             extra_answers: None,
-            evidence: serde_json::Value::Null,
+            evidence: Evidence::default(),
             image: None,
             images: Vec::new(),
             group: group(item).map(|name| StrictGroup { name, size: 0 }),

@@ -237,7 +237,7 @@ pub(super) fn questions_in_light(
             QuestionInLight {
                 model: model.to_owned(),
                 index,
-                bank_id: example.bank_id().to_owned(),
+                bank_id: example.bank_id().into_owned(),
                 text: example.text.clone(),
                 family: example.family.clone(),
                 images,

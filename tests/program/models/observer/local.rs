@@ -160,7 +160,8 @@ fn untouched(asked: &Asked, changed: &Rgb) -> BTreeSet<u32> {
 
 /// Whether all segments that decide the answer are among these.
 fn is_about(question: &Question, segments: &BTreeSet<u32>) -> bool {
-    let deciding = question.evidence["segments"].as_array();
+    let evidence = question.evidence.value();
+    let deciding = evidence["segments"].as_array();
     deciding.is_some_and(|deciding| {
         let among = |segment: &serde_json::Value| {
             let id = segment["id"].as_u64();

@@ -160,7 +160,7 @@ fn a_repainted_thing_loses_its_colour() {
     let set = &*SMALL;
     let repainted = |asked: &Asked| {
         let colored = asked.questions.iter().find(|question| question.family == Family::Color)?;
-        let id = colored.evidence["segments"][0]["id"].as_u64()?;
+        let id = colored.evidence.value()["segments"][0]["id"].as_u64()?;
         let image = mapped(&asked.image, |y, x, channel, code| {
             let own = u64::from(asked.segments[y * asked.image.width() + x]) == id;
             let painted = [0.3, 0.7, 1.0][channel] * code;

@@ -6,7 +6,7 @@ use crate::cluster::FrameTies;
 use crate::comparisons::self_agreement::SelfAgreement;
 use crate::comparisons::self_agreement::cell::AgreementCell;
 use crate::statistics::bootstrap::SplitMix;
-use darkqa_base::types::questions::BANK_ID;
+use darkqa_base::types::evidence::BANK_ID;
 use darkqa_base::types::{
     ChoiceDetail, Condition, Digest, Family, FrameId, ModelListing, ParsedAnswer, QuestionId, Record, RunQuestion,
     TrialOutcome, UnreadReason,
@@ -86,7 +86,7 @@ pub(super) fn questions() -> Vec<RunQuestion> {
             answer: None,
             extra_answers: None,
             group: None,
-            evidence: json!({ BANK_ID: format!("q{question:02}") }),
+            evidence: json!({ BANK_ID: format!("q{question:02}") }).into(),
             image: None,
             images: Vec::new(),
         })
