@@ -16,13 +16,14 @@ use crate::report::page::{PageHead, PageInputs, items_note, packed_items};
 use crate::report::sentences::{Sentence, how_to_read, sentences};
 use crate::report::short::{facts, short_table, who_is_judged};
 use crate::report::tables::{
-    BASELINE, LEVELS, SECTIONS, observer_notes, strict_groups, summary_rows, tables, with_training,
+    BASELINE, LEVELS, SECTIONS, enhancer_effects, observer_notes, strict_groups, summary_rows, tables, with_training,
 };
 use crate::report::text::alert::{Alert, AlertKind};
 use crate::report::text::table::Table;
 use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
 use crate::types::UnreadReason;
+use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
 use darkqa_score::model_in_condition::models_under_test;
 
@@ -128,6 +129,10 @@ impl Measure for Accuracy<'_> {
 
     fn profiles(&self) -> ProfileNames {
         ProfileNames::new(&self.findings.grid.subjects)
+    }
+
+    fn enhancer_effects(&self) -> Vec<&PooledFinding> {
+        enhancer_effects(self.findings)
     }
 
     fn first_failures(&self) -> Option<&Findings<'_>> {

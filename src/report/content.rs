@@ -11,6 +11,7 @@ use crate::report::text::alert::Alert;
 use crate::report::text::table::Table;
 use crate::report::text::words::ProfileNames;
 use crate::runs::outcome::ReportLength;
+use darkqa_score::comparisons::PooledFinding;
 use darkqa_score::findings::Findings;
 
 /// What a report measures: accuracy, agreement of each model with its own answers at L0, or marks of a judge. All else
@@ -49,6 +50,11 @@ pub(crate) trait Measure {
         Ok(Vec::new())
     }
 
+    /// Effects of the enhancers on what is measured; empty for a measure that does not test them.
+    fn enhancer_effects(&self) -> Vec<&PooledFinding> {
+        Vec::new()
+    }
+
     /// Findings whose items are listed by first failing level in a file of their own, which can be large.
     fn first_failures(&self) -> Option<&Findings<'_>> {
         None
@@ -73,7 +79,8 @@ pub struct Report<'a> {
 impl Report<'_> {
     /// Adds the tables of enhancer use.
     pub(crate) fn with_enhancers(mut self, rows: &[EnhancerRow]) -> Self {
-        self.tables.extend(enhancers(rows));
+        let table = enhancers(rows, &self.measure.enhancer_effects());
+        self.tables.extend(table);
         self
     }
 

@@ -24,9 +24,21 @@ use darkqa_score::choice::LENIENT_VERSION;
 pub(super) fn rows(runs: &[JoinedRun]) -> Vec<EnhancerRow> {
     let mut rows: Vec<(EnhancerRow, BTreeSet<&str>)> = Vec::new();
     for (run, name, note) in notes(runs) {
-        let row = EnhancerRow { name: name.to_owned(), how: how(note), looks: looks(note) };
-        match rows.iter_mut().find(|(known, _)| *known == row) {
-            Some((_, runs)) => drop(runs.insert(&run.name)),
+        let row = EnhancerRow {
+            name: name.to_owned(),
+            enhancer: name.to_owned(),
+            how: how(note),
+            looks: looks(note),
+            latency: note.latency.clone(),
+        };
+        // The times differ between equal uses.
+        let is_same =
+            |known: &EnhancerRow| [&known.name, &known.how, &known.looks] == [&row.name, &row.how, &row.looks];
+        match rows.iter_mut().find(|(known, _)| is_same(known)) {
+            Some((known, runs)) => {
+                runs.insert(&run.name);
+                known.latency.extend(row.latency);
+            }
             None => rows.push((row, BTreeSet::from([&*run.name]))),
         }
     }

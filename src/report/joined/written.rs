@@ -13,6 +13,7 @@ use crate::report::json::SummaryRuns;
 use crate::report::markdown::markdown;
 use crate::report::outputs::{PAGE, files, first_failures, printed, write_first_failures};
 use crate::report::page::PageInputs;
+use crate::report::tables::help_for_time;
 use crate::report::text::alert::Alert;
 use crate::runs::outcome::{Outcome, ReportLength, StdoutFormat};
 use crate::runs::stored::{AnyRun, ShownModels, StoredRun};
@@ -147,10 +148,17 @@ pub(super) fn write_report<D: Detail>(
     }
     let cost = inputs.runs.iter().find_map(|run| run.cost.as_ref());
     let cost = cost.map_or_else(String::new, |cost| format!("cost: {cost}\n"));
+    let effects = report.measure.enhancer_effects();
     let latencies: String = manifest
         .enhancers
         .iter()
-        .flat_map(|(name, note)| note.latency.iter().map(move |latency| format!("{name}: {latency}\n")))
+        .flat_map(|(name, note)| {
+            let times = note.latency.iter().map(move |latency| format!("{name}: {latency}\n"));
+            let help = (!effects.is_empty() && !note.latency.is_empty())
+                .then(|| help_for_time(name, &effects, &note.latency))
+                .flatten();
+            times.chain(help.map(|help| format!("{name}, {help}\n")))
+        })
         .collect();
     Ok(text + &latencies + &cost + &format!("report: {}\n", folder.join(PAGE).display()))
 }

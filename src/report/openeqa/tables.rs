@@ -43,7 +43,7 @@ pub(super) fn tables(report: &MarkedAnswers<'_>, enhancer_rows: &[EnhancerRow]) 
         }
     }
     let mut tables = with_training(tables, &report.summary.listing);
-    tables.extend(enhancers(enhancer_rows).map(|table| Table { section: SECTION, ..table }));
+    tables.extend(enhancers(enhancer_rows, &[]).map(|table| Table { section: SECTION, ..table }));
     tables
 }
 

@@ -52,7 +52,7 @@ pub(crate) use baseline::{against_baseline, no_verdict};
 pub(crate) use models::dark_levels;
 pub(crate) use sample::left_out;
 pub(crate) use self_agreement::self_agreement;
-pub(crate) use sentence::{EffectDirection, Sentence, capitalised, with_separators};
+pub(crate) use sentence::{EffectDirection, Sentence, capitalised, level_runs, with_separators};
 
 /// The line below the sentences that explains their signs, p-values and intervals, and what the intervals leave out.
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {

@@ -274,7 +274,7 @@ pub(crate) fn capitalised(text: &str) -> String {
 }
 
 /// Levels in words; levels that are neighbours in `all` become a range, as `L1–L3, L5`.
-pub(super) fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> String {
+pub(crate) fn level_runs<T: PartialEq + ToString>(levels: &[T], all: &[T]) -> String {
     let runs: Vec<String> = levels
         .chunk_by(|a, b| {
             let [a, b] = [a, b].map(|level| all.iter().position(|other| other == level));

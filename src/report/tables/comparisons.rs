@@ -1,8 +1,6 @@
 //! Tables of paired differences and their tests. Each kind of comparison has a table over all families and one by
 //! family.
 //!
-//! Table of the use of each enhancer: preprocessing, resizing, and the brightness of its images.
-//!
 //! File of first failing levels, with a row for each item and curve: [`write_flips`]. The table can be large, so it is
 //! written in parts.
 
@@ -345,34 +343,6 @@ fn second_side_label(comparison: &Comparison) -> String {
         (false, ComparisonKind::Light | ComparisonKind::RealSynthetic) => second.condition(),
         (false, _) => String::new(),
     }
-}
-
-/// Use of an enhancer in a run, as texts.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct EnhancerRow {
-    /// Name of the enhancer, with the name of its run if there are several.
-    pub(crate) name: String,
-    /// Input and output conventions of the model, and changes of image size.
-    pub(crate) how: String,
-    /// Appearance of its images of the probe and of the run's dark frames.
-    pub(crate) looks: String,
-}
-
-/// Builds the table; `None` without an enhancer.
-pub(crate) fn enhancers(rows: &[EnhancerRow]) -> Option<Table> {
-    if rows.is_empty() {
-        return None;
-    }
-    let name = "csv enhancer | terminal enhancer | page enhancer";
-    let how = "csv how | terminal fed and read | page fed and read";
-    let looks = "csv dark_images | terminal dark images | page its images of dark frames";
-    let table = TableBuilder::new("enhancer_use", rows)
-        .page(ENHANCERS, "How each enhancer was used")
-        .column(Text, name, |row| row.name.clone())
-        .column(Text, how, |row| row.how.clone())
-        .column(Text, looks, |row| row.looks.clone())
-        .build();
-    Some(table)
 }
 
 /// Name of the file.

@@ -12,6 +12,7 @@ mod answers;
 mod by_profile;
 mod calibration;
 mod comparisons;
+mod enhancer_use;
 mod levels;
 mod observer;
 mod pooled;
@@ -34,7 +35,8 @@ use darkqa_score::significance::ALPHA;
 use sections::REAL;
 
 pub(crate) use answers::{commonest_answers, counted_answers, health};
-pub(crate) use comparisons::{EnhancerRow, FLIPS, agreement_comparisons, enhancers, write_flips};
+pub(crate) use comparisons::{FLIPS, agreement_comparisons, write_flips};
+pub(crate) use enhancer_use::{EnhancerRow, enhancer_effects, enhancers, help_for_time};
 pub(crate) use levels::{LEVELS, unread_note};
 pub(crate) use observer::{control_text, notes as observer_notes};
 pub(crate) use pooled::baseline;

@@ -160,6 +160,10 @@ fn enhancers_are_timed_and_held_to_a_budget() {
     assert_eq!(manifest["enhancers"]["lift"]["size_counts"]["images"], 3, "{manifest}");
     let page = fs::read_to_string(bench.path("run/report.html")).unwrap();
     assert!(page.contains("latency of lift"), "the run facts");
+    let help = text.lines().find(|line| line.starts_with("lift, ")).unwrap();
+    assert!(help.ends_with(" ms an image: no verdict possible at L3 with noise"), "{help}");
+    assert!(page.contains("help for its time") && page.contains(help.strip_prefix("lift, ").unwrap()), "{help}");
+    assert!(!fs::read_to_string(bench.path("run/enhancer_use.csv")).unwrap().contains(" ms an image"));
     let report = |flags: &str| bench.complete(&words(&format!("report {flags}"))).replace("\n  ", " ");
     let over = "lift takes longer than --llie-options budget=0.0001ms: 96 × 72: ";
     assert!(report("run").contains(over), "kept with the run");

@@ -85,7 +85,8 @@ impl fmt::Display for EnhancerLatency {
 }
 
 /// Milliseconds with two digits at least: `0.48`, `4.8`, `48`, `480`.
-fn milliseconds(value: f64) -> String {
+#[must_use]
+pub fn milliseconds(value: f64) -> String {
     let decimals = match value {
         ..1.0 => 2,
         1.0..10.0 => 1,

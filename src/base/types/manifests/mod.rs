@@ -7,7 +7,7 @@ mod model_listing;
 
 pub use enhancer_note::{
     ConventionLine, ELSEWHERE, EnhancerLatency, EnhancerNote, FlawedImage, JudgedImages, ProbeNote, ProbeOutcome,
-    SeamCounts, SizeLog, TRAINED_ON,
+    SeamCounts, SizeLog, TRAINED_ON, milliseconds,
 };
 pub use input_note::{ColourHandling, ColourNote, DepthNote, Flaw, InputNote, InputSummary};
 pub use manifest::{

@@ -26,7 +26,7 @@ use darkqa_score::significance::SwapMethod;
 use darkqa_score::significance::Verdict::{self, Better, NotShown, TooFewClusters, Worse};
 
 /// A finding at one of the named levels, with an interval of ± 4 points.
-fn finding(kind: PooledKind, level: usize, difference: f64, verdict: Verdict) -> PooledFinding {
+pub(crate) fn finding(kind: PooledKind, level: usize, difference: f64, verdict: Verdict) -> PooledFinding {
     let enhancer = (kind == PooledKind::Enhancer).then(|| EnhancerName::new("lift").unwrap());
     PooledFinding {
         kind,

@@ -56,7 +56,7 @@ fn every_condition_runs_raw_and_enhanced() {
     onnx::gamma(0.5).write(&bench.path(""), "curve.onnx");
     let args = words("--data frames --model random --llie bright.onnx --llie curve.onnx --llie-anyway --out run");
     let table = bench.complete(&args);
-    insta::assert_snapshot!(lines_with(&table, "with noise"), @"
+    insta::assert_snapshot!(lines_with(&table, "with noise "), @"
     with noise            0.0   33.3   66.7   66.7   33.3   33.3   −65.4 +98.4
     with noise + bright         33.3   66.7    0.0   33.3   33.3   −65.4 +98.4
     with noise + curve          33.3   66.7   33.3   66.7   33.3   −65.4 +65.4

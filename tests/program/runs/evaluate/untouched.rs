@@ -149,7 +149,7 @@ fn report_has_untouched_images_enhanced() {
     let bench = photos(220);
     let full = format!("{ASK} --levels L0,L3 --llie-on all --full");
     let table = bench.complete(&words(&full));
-    insta::assert_snapshot!(lines_with(&table, "untouched"), @"
+    insta::assert_snapshot!(lines_with(&table, "untouched "), @"
     script:answers.jsonl   untouched              100.0         3          0        0   −56.1 0.0
     script:answers.jsonl   untouched + lift         0.0         3          0        0   0.0 +56.1
     ");
