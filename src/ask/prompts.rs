@@ -10,6 +10,7 @@ use std::sync::LazyLock;
 
 use minijinja::{AutoEscape, Environment, UndefinedBehavior, Value, context};
 use regex::Regex;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
 use crate::files;
@@ -26,6 +27,7 @@ const BLIND: &str = "blind.txt";
 #[derive(Debug)]
 pub struct Prompts {
     templates: Environment<'static>,
+    sources: Sources,
     digest: Digest,
 }
 
@@ -91,11 +93,11 @@ impl Prompts {
         let mut templates = Environment::new();
         templates.set_undefined_behavior(UndefinedBehavior::Strict);
         templates.set_auto_escape_callback(|_| AutoEscape::None);
-        let digest = Digest::from_parts([sources.choice.as_bytes(), sources.blind.as_bytes()]);
-        for (name, source) in [(CHOICE, sources.choice), (BLIND, sources.blind)] {
-            templates.add_template_owned(name, source).map_err(|error| prompt_error(name, error))?;
+        for (name, source) in [(CHOICE, &sources.choice), (BLIND, &sources.blind)] {
+            templates.add_template_owned(name, source.clone()).map_err(|error| prompt_error(name, error))?;
         }
-        let prompts = Self { templates, digest };
+        let digest = sources.digest();
+        let prompts = Self { templates, sources, digest };
         let sample = sample_question()?;
         for view in [View::Image, View::Blind] {
             prompts.render(view, &sample)?;
@@ -109,26 +111,51 @@ impl Prompts {
         self.digest
     }
 
+    /// The templates, for the manifest of a run; `None` for the built-in ones, which each version has.
+    #[must_use]
+    pub(crate) fn stored(&self) -> Option<serde_json::Value> {
+        let sources = (self.digest != Sources::default().digest()).then_some(&self.sources)?;
+        serde_json::to_value(sources).ok()
+    }
+
+    /// The prompts of a run, from the digest and the templates in its manifest; `None` if the manifest lacks them, as
+    /// those of earlier versions do, or states others.
+    #[must_use]
+    pub(crate) fn from_stored(digest: &str, stored: Option<&serde_json::Value>) -> Option<Self> {
+        let sources = match stored {
+            Some(stored) => serde_json::from_value(stored.clone()).ok()?,
+            None => Sources::default(),
+        };
+        Self::new(sources).ok().filter(|prompts| prompts.digest.to_string() == digest)
+    }
+
     /// Renders the prompt for one question. The texts of the question and the choices are inserted unchanged.
     ///
     /// # Errors
     /// If the template fails, or if the prompt omits the question or a choice: its reply would cost money and measure
     /// nothing.
     pub fn render(&self, view: View, question: &Question) -> Result<String> {
+        self.render_texts(view, &question.text, question.choices.texts())
+    }
+
+    /// Renders the prompt for the texts of a question and its choices, like [`render`](Self::render).
+    ///
+    /// # Errors
+    /// As for [`render`](Self::render).
+    pub(crate) fn render_texts(&self, view: View, question: &str, texts: &[String]) -> Result<String> {
         let name = match view {
             View::Image => CHOICE,
             View::Blind => BLIND,
         };
-        let texts = question.choices.texts();
         let choices: Vec<Value> =
             (0..).map(letter).zip(texts).map(|(letter, text)| context! { letter => letter, text => text }).collect();
-        let values = context! { question => question.text.as_str(), choices => choices };
+        let values = context! { question => question, choices => choices };
         let rendered = self
             .templates
             .get_template(name)
             .and_then(|template| template.render(values))
             .map_err(|error| prompt_error(name, error))?;
-        if !rendered.contains(&question.text) {
+        if !rendered.contains(question) {
             return Err(prompt_error(name, "the question does not occur in it; write {{ question }} where it belongs"));
         }
         if let Some(text) = texts.iter().find(|text| !rendered.contains(*text)) {
@@ -144,6 +171,7 @@ impl Prompts {
 }
 
 /// Text of each template.
+#[derive(Debug, Serialize, Deserialize)]
 struct Sources {
     choice: String,
     blind: String,
@@ -152,6 +180,10 @@ struct Sources {
 impl Sources {
     fn new(choice: &str, blind: &str) -> Self {
         Self { choice: choice.to_owned(), blind: blind.to_owned() }
+    }
+
+    fn digest(&self) -> Digest {
+        Digest::from_parts([self.choice.as_bytes(), self.blind.as_bytes()])
     }
 }
 

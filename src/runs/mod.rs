@@ -20,5 +20,5 @@ pub(crate) mod stored;
 pub(crate) mod training;
 
 pub(crate) use outcome::{
-    EXPOSURE_VALUE, LLIE_BUDGET, LUX_AT_L0, Outcome, PrintArgs, StatedArgs, StdoutFormat, Syntax,
+    EXPOSURE_VALUE, LLIE_BUDGET, LUX_AT_L0, Outcome, PROMPTS, PrintArgs, StatedArgs, StdoutFormat, Syntax,
 };

@@ -92,6 +92,9 @@ pub(crate) const LUX_AT_L0: &str = "--lux-at-l0";
 /// Key of the mean exposure value at ISO 100 of the images, and their number, in the settings of a manifest.
 pub(crate) const EXPOSURE_VALUE: &str = "exposure value at ISO 100";
 
+/// Key of the prompt templates in the settings of a manifest, if they are not the built-in ones.
+pub(crate) const PROMPTS: &str = "prompt templates";
+
 /// Key of the time that an enhancer may take for an image, in milliseconds, in the settings of a manifest.
 pub(crate) const LLIE_BUDGET: &str = "--llie-budget";
 

@@ -55,6 +55,8 @@ fn bench(c: &mut Criterion) {
         runs: Vec::new(),
         questions: Box::new(|_| Ok(HashMap::new())),
         thumbnails: &[],
+        costs: Box::new(|| Ok(HashMap::new())),
+        prompts: None,
         texts: Box::new(|_| Ok(String::new())),
     };
     group.bench_function("make the report", |b| {

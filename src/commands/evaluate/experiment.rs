@@ -25,7 +25,7 @@ use crate::error::{Error, Result};
 use crate::report::joined;
 use crate::runs::forecast::PowerForecast;
 use crate::runs::stored::StoredRun;
-use crate::runs::{EXPOSURE_VALUE, Outcome, StdoutFormat};
+use crate::runs::{EXPOSURE_VALUE, Outcome, PROMPTS, StdoutFormat};
 use crate::store::Store;
 use crate::types::manifests::{Columns, Identity, PartPlace};
 use crate::types::{
@@ -131,7 +131,12 @@ impl Experiment for ChoiceSetup<'_> {
         });
         let exposure =
             self.exposure_value.map(|(mean, frames)| (EXPOSURE_VALUE, json!({"mean": mean, "frames": frames})));
-        [bank, reading, light, brightness, exposure]
+        // The page shows the prompt of a reply only if all have the same wording.
+        let prompts = match &*self.config.wordings {
+            [only] => only.prompts.stored().map(|prompts| (PROMPTS, prompts)),
+            _ => None,
+        };
+        [bank, reading, light, brightness, exposure, prompts]
             .into_iter()
             .flatten()
             .chain(self.config.stated.settings())

@@ -46,28 +46,18 @@ pub(super) struct Baseline {
 struct SubjectCosts(BTreeMap<ModelInCondition, f64>);
 
 impl SubjectCosts {
-    /// The costs of joined runs. A trial that several runs share counts once, at the prices of the first one.
+    /// The costs of joined runs.
     ///
     /// # Errors
     /// If the prices in a manifest are broken.
     fn from_joined(combined: &CombinedRuns) -> Result<Self> {
         let mut costs = Self::default();
-        let mut is_counted = vec![false; combined.trials.len()];
-        for run in &combined.runs {
-            let mut priced = PricedRun::new(&run.manifest)?;
-            for place in run.trials.iter() {
-                if !std::mem::replace(&mut is_counted[place], true) {
-                    let trial = combined.trials.at(place);
-                    let model = combined.model_names.original_name(trial.model());
-                    costs.add(trial, priced.trial_cost(model, trial));
-                }
-            }
-        }
+        combined.each_cost(|trial, cost| costs.add(trial, cost))?;
         Ok(costs)
     }
 
     fn add(&mut self, trial: TrialRef<'_>, cost: Option<TrialCost>) {
-        for dollars in cost.into_iter().flat_map(|cost| [cost.reply, cost.lost]).flatten() {
+        if let Some(dollars) = cost.and_then(TrialCost::all) {
             *self.0.entry(ModelInCondition::from_trial(trial)).or_default() += dollars;
         }
     }

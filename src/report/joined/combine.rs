@@ -5,20 +5,26 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
+use super::cost::{PricedRun, TrialCost};
 use super::join::{Joined, JoinedRun, join};
 use super::listing::listing;
+use crate::ask::prompts::Prompts;
 use crate::error::{Error, Result};
-use crate::report::page::{self, PageInputs};
+use crate::report::page::{self, PageInputs, RunPrompts};
 use crate::runs::stored::StoredRun;
-use crate::runs::{EXPOSURE_VALUE, LUX_AT_L0};
+use crate::runs::{EXPOSURE_VALUE, LUX_AT_L0, PROMPTS};
 use crate::types::manifests::RunManifest;
-use crate::types::{ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, Trials, Truths, shell_word};
+use crate::types::{ChoiceDetail, QuestionId, RunQuestion, SetLight, TextPlace, TrialRef, Trials, Truths, shell_word};
 use darkqa_score::accuracies::OfferedChoices;
 use darkqa_score::cluster::{ClusterUnit, Clusters, FrameTies};
 use darkqa_score::findings::Findings;
 use darkqa_score::grid::Grid;
 use darkqa_score::model_in_condition::without_run;
 use darkqa_score::photographs::{PhotographedSet, lux_of_exposure_value};
+
+/// Fields of a run's identity: the digest of the prompt templates, and whether images precede the text.
+const IDENTITY_PROMPTS: &str = "--prompts";
+const IMAGE_FIRST: &str = "--image-first";
 
 /// Joined runs of questions with choices.
 pub(super) type CombinedRuns = Joined<ChoiceDetail>;
@@ -116,8 +122,62 @@ impl CombinedRuns {
                 Ok(found)
             }),
             thumbnails: &self.thumbnails,
+            costs: Box::new(|| {
+                let mut costs = HashMap::new();
+                self.each_cost(|trial, cost| {
+                    costs.extend(cost.and_then(TrialCost::all).map(|dollars| (trial.text(), dollars)));
+                })?;
+                Ok(costs)
+            }),
+            prompts: self.prompts(),
             texts: Box::new(|place: TextPlace| self.texts[place.log()].text(place)),
         }
+    }
+
+    /// Calls `each` with every trial and its cost; `None` if the price of its model is unknown. A trial that several
+    /// runs share comes once, at the prices of the first one.
+    ///
+    /// # Errors
+    /// If the prices in a manifest are broken.
+    pub(super) fn each_cost<'c>(&'c self, mut each: impl FnMut(TrialRef<'c>, Option<TrialCost>)) -> Result<()> {
+        let mut is_counted = vec![false; self.trials.len()];
+        for run in &self.runs {
+            let mut priced = PricedRun::new(&run.manifest)?;
+            for place in run.trials.iter() {
+                if !std::mem::replace(&mut is_counted[place], true) {
+                    let trial = self.trials.at(place);
+                    let model = self.model_names.original_name(trial.model());
+                    each(trial, priced.trial_cost(model, trial));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The prompts of the runs; `None` if a run does not store its templates, the runs have different prompts, or no model
+    /// is at an endpoint.
+    fn prompts(&self) -> Option<RunPrompts> {
+        let (first, others) = self.runs.split_first()?;
+        let identity = |run: &'_ JoinedRun, name: &str| run.manifest.identity.get(name).cloned();
+        let is_same = |other: &JoinedRun| {
+            [IDENTITY_PROMPTS, IMAGE_FIRST].iter().all(|name| identity(other, name) == identity(first, name))
+        };
+        if !others.iter().all(is_same) {
+            return None;
+        }
+        let digest = identity(first, IDENTITY_PROMPTS)?;
+        let templates = Prompts::from_stored(digest.as_str()?, first.manifest.settings.get(PROMPTS))?;
+        let models: BTreeSet<&str> = self.trials.asked().into_iter().flatten().map(|(model, _)| model).collect();
+        let sent = |model: &str| {
+            let name = self.model_names.original_name(model);
+            let column = self.runs.iter().find_map(|run| run.manifest.columns.get("model")?.get(name))?;
+            // Built-in models are sent no prompt.
+            column.get("--wire")?;
+            Some((model.to_owned(), column.get("--system").and_then(Value::as_str).map(str::to_owned)))
+        };
+        let models: BTreeMap<String, Option<String>> = models.into_iter().filter_map(sent).collect();
+        let image_first = identity(first, IMAGE_FIRST).is_some();
+        (!models.is_empty()).then_some(RunPrompts { templates, image_first, models })
     }
 
     /// The manifest and the folder of each run.

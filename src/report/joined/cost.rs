@@ -80,6 +80,14 @@ pub(super) struct TrialCost {
 }
 
 impl TrialCost {
+    /// The cost of the reply and of attempts without a usable one; `None` if neither is known.
+    pub(super) fn all(self) -> Option<f64> {
+        match (self.reply, self.lost) {
+            (None, None) => None,
+            (reply, lost) => Some(reply.unwrap_or(0.0) + lost.unwrap_or(0.0)),
+        }
+    }
+
     /// The cost of a trial: as the server states it, else at a price. `batch` is the price of a batch request as a
     /// fraction of the direct price. `None` if neither is known.
     fn new<D: Detail>(price: Option<Price>, batch: f64, trial: TrialRef<'_, D>) -> Option<Self> {

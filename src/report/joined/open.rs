@@ -172,6 +172,8 @@ impl OpenQuestionRun {
                 .collect(),
             questions: Box::new(|_| Ok(HashMap::new())),
             thumbnails: &[],
+            costs: Box::new(|| Ok(HashMap::new())),
+            prompts: None,
             texts: Box::new(|_| Ok(String::new())),
         }
     }

@@ -9,6 +9,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use serde::Serialize;
 
+use super::prompts::PagePrompts;
 use crate::error::{Error, Result};
 use crate::report::text::words;
 use crate::types::questions::PixelBox;
@@ -100,7 +101,7 @@ pub(crate) struct PageData<'a> {
 }
 
 /// Facts about the requests of each subject and item; 0 is not known.
-#[derive(Serialize)]
+#[derive(Clone, Serialize)]
 pub(crate) struct PageRequests {
     /// Duration of the last request, in milliseconds.
     pub(crate) latency: Vec<Vec<u64>>,
@@ -110,6 +111,11 @@ pub(crate) struct PageRequests {
     pub(crate) reply: Vec<Vec<u64>>,
     /// Number of requests.
     pub(crate) attempts: Vec<Vec<u32>>,
+    /// Cost in nanodollars; empty if no cost is known.
+    pub(crate) cost: Vec<Vec<u64>>,
+    /// Prompts; omitted if they are not known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) prompts: Option<PagePrompts>,
 }
 
 /// Subject of the report: a model in a condition.

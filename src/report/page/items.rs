@@ -8,6 +8,7 @@ use super::data::{
     ABSENT, DistinctList, FAILED, PageConfusion, PageData, PageItem, PageKind, PageQuestion, PageRequests, PageSubject,
     SizeLimit, UNREAD, levels, packed_by, shortened, sizes, thumbnails,
 };
+use super::prompts::PagePrompts;
 use super::run_usage::PageInputs;
 use crate::error::Result;
 use crate::report::text::words::{self, family};
@@ -30,7 +31,8 @@ pub(crate) fn packed<'a>(
     let grid = sample.as_ref().unwrap_or(grid);
     let replies = Replies::read(grid, inputs)?;
     let questions = questions(grid, inputs)?;
-    packed_by(|limit| data(grid, confusions, inputs, &questions, &replies, limit))
+    let requests = requests(grid, inputs, &questions)?;
+    packed_by(|limit| data(grid, confusions, inputs, &questions, &replies, requests.clone(), limit))
 }
 
 fn data<'a>(
@@ -39,6 +41,7 @@ fn data<'a>(
     inputs: &PageInputs<'a>,
     run_questions: &'a RunQuestions,
     replies: &Replies,
+    requests: Option<PageRequests>,
     limit: SizeLimit,
 ) -> PageData<'a> {
     let (mut frames, mut families) = (DistinctList::new(), DistinctList::new());
@@ -98,25 +101,36 @@ fn data<'a>(
         why,
         texts: shortened(&replies.texts(), limit.text),
         replies: replies.indices.clone(),
-        requests: requests(grid),
+        requests,
         confusions: confusion_data(grid, confusions),
     }
 }
 
 /// The requests behind the replies; `None` if no reply came from an endpoint.
-fn requests(grid: &Grid<'_>) -> Option<PageRequests> {
+fn requests(grid: &Grid<'_>, inputs: &PageInputs<'_>, questions: &RunQuestions) -> Result<Option<PageRequests>> {
     let is_endpoint = |trial: TrialRef<'_>| trial.latency_ms().is_some() || trial.usage().is_some();
     let places = (0..grid.subjects.len()).flat_map(|subject| (0..grid.items.len()).map(move |item| (subject, item)));
     if !places.into_iter().any(|(subject, item)| grid.trial(subject, item).is_some_and(is_endpoint)) {
-        return None;
+        return Ok(None);
     }
+    let costs = (inputs.costs)()?;
     let tokens = |trial: TrialRef<'_>| trial.usage().unwrap_or_default();
-    Some(PageRequests {
+    let asked = grid.items.iter().map(|item| {
+        let text = questions.get(&*item.asked.question).map_or("", |question| &question.text);
+        (text, item.asked.choices.as_slice())
+    });
+    Ok(Some(PageRequests {
         latency: trial_values(grid, |trial| trial.latency_ms().unwrap_or(0)),
         prompt: trial_values(grid, |trial| tokens(trial).prompt_tokens.unwrap_or(0)),
         reply: trial_values(grid, |trial| tokens(trial).completion_tokens.unwrap_or(0)),
         attempts: trial_values(grid, |trial| if is_endpoint(trial) { trial.attempts() } else { 0 }),
-    })
+        cost: if costs.values().any(|dollars| *dollars > 0.0) {
+            trial_values(grid, |trial| costs.get(&trial.text()).map_or(0, |dollars| (dollars * 1e9).round() as u64))
+        } else {
+            Vec::new()
+        },
+        prompts: inputs.prompts.as_ref().map(|prompts| PagePrompts::new(prompts, asked)),
+    }))
 }
 
 /// A value of each trial, with a row for each subject and a column for each item; the default without a trial.

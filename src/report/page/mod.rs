@@ -11,6 +11,7 @@
 pub(super) mod data;
 mod head;
 mod items;
+mod prompts;
 mod run_usage;
 
 use serde::Serialize;
@@ -37,6 +38,7 @@ use darkqa_score::significance::Verdict;
 pub(crate) use data::fitting_thumbnails;
 pub(crate) use head::PageHead;
 pub(crate) use items::{note as items_note, packed as packed_items};
+pub(crate) use prompts::RunPrompts;
 pub(crate) use run_usage::{PageRun, RunUsage};
 
 pub use run_usage::PageInputs;

@@ -4,6 +4,7 @@
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
+use super::prompts::RunPrompts;
 use crate::error::Result;
 use crate::report::sentences::with_separators;
 use crate::types::manifests::RunManifest;
@@ -128,6 +129,10 @@ pub struct PageInputs<'a> {
     pub questions: ReadQuestions<'a>,
     /// Thumbnails of the images; empty if the runs do not store them.
     pub thumbnails: &'a [Thumbnail],
+    /// Cost of the trials in US dollars, as far as it is known, by the place of their texts.
+    pub costs: Box<dyn Fn() -> Result<HashMap<TextPlace, f64>> + 'a>,
+    /// Prompts of the runs; `None` if the runs do not store them, or have different ones.
+    pub prompts: Option<RunPrompts>,
     /// Reads the text of a reply, of a refusal, or of an error message.
     pub texts: Box<dyn Fn(TextPlace) -> Result<String> + 'a>,
 }

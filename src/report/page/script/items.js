@@ -316,6 +316,7 @@ const reply = (subject, i) => {
     $("r-mark").textContent = "not asked";
     $("r-mark").className = "m-none";
     $("r-reading").textContent = "";
+    $("r-asked").hidden = true;
     $("r-judged").hidden = true;
     return;
   }
@@ -331,7 +332,28 @@ const reply = (subject, i) => {
   const said = (code) => code < UNREAD ? letter(code) : "nothing";
   const read = lenient < FAILED ? [`strict parsing: ${said(chosen(subject, i))}`, `lenient: ${said(lenient)}`] : [];
   $("r-reading").textContent = [...read, ...requestOf(subject, i)].join(" · ");
+  const prompt = promptOf(subject, i);
+  $("r-asked").hidden = !prompt;
+  reveal($("r-prompt"), prompt || "");
 };
+
+// The prompt as it was sent, with the place of the images; empty if it is not known or nothing was sent.
+const FILLED = /[\ue000-\ue01a]/g;
+const promptOf = (subject, i) => {
+  const { prompts, attempts } = data.requests ?? {};
+  const { model, light } = data.subjects[subject];
+  if (!prompts || !(model in prompts.models) || !attempts[subject][i]) return "";
+  const item = data.items[i], isBlind = light === "blind";
+  const texts = [data.questions[item.question].text, ...data.choices[item.choices]];
+  const sent = prompts.forms[prompts.items[i][isBlind ? 1 : 0]].replace(FILLED, (mark) => texts[mark.charCodeAt(0) - 0xe000] ?? mark);
+  if (!sent) return "";
+  const images = isBlind ? [] : ["[the image]"];
+  const message = prompts.image_first ? [...images, sent] : [sent, ...images];
+  return [...(prompts.models[model] ? ["[system] " + prompts.models[model]] : []), ...message].join("\n\n");
+};
+
+// An amount in dollars with two digits, however small.
+const dollars = (amount) => "$" + amount.toFixed(Math.min(9, Math.max(2, 1 - Math.floor(Math.log10(amount)))));
 
 // The request behind a reply: its time, tokens and attempts, as far as they are known.
 const requestOf = (subject, i) => {
@@ -342,6 +364,8 @@ const requestOf = (subject, i) => {
   const tokens = [[prompt, "prompt"], [given, "reply"]].filter(([count]) => count).map(([count, kind]) => `${count} ${kind}`);
   if (tokens.length) facts.push(tokens.join(" and ") + " tokens");
   if (attempts > 1) facts.push(`${attempts} attempts`);
+  const cost = data.requests.cost[subject]?.[i];
+  if (cost) facts.push(dollars(cost / 1e9));
   return facts;
 };
 

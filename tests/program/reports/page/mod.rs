@@ -6,6 +6,7 @@
 mod access;
 mod open;
 mod people;
+mod trial;
 
 use crate::support::browser::{Browser, chromium};
 use crate::support::run::{Bench, words};

@@ -71,7 +71,7 @@ impl<T> Interner<T> {
 }
 
 /// The byte offset of a trial's line in the file of its run; for records in memory, the number of the record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct TextPlace {
     log: u16,
     high: u16,
