@@ -53,8 +53,12 @@ pub(super) const STYLE: &str = include_str!("page.css");
 const CHART_SCRIPT: &str = concat!(include_str!("script/base.js"), include_str!("script/charts.js"));
 
 /// Script of the items and their images.
-const SCRIPT: &str =
-    concat!(include_str!("script/images.js"), include_str!("script/open.js"), include_str!("script/items.js"));
+const SCRIPT: &str = concat!(
+    include_str!("script/images.js"),
+    include_str!("script/open.js"),
+    include_str!("script/filters.js"),
+    include_str!("script/items.js")
+);
 
 /// Values of the template. They are not converted to JSON first, because a large run has 100,000 cells.
 #[derive(Serialize)]

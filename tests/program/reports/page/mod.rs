@@ -138,6 +138,16 @@ fn filters(browser: &mut Browser) {
     assert_eq!(count(browser), "3 of 40 items");
     browser.choose("#f-state", "wrong");
     assert_eq!(count(browser), "0 of 40 items");
+    // A combination without items cannot be chosen: only one reply is wrong, at the darkest level with noise.
+    let possible = |browser: &mut Browser, filter: &str| {
+        browser.evaluate(&format!(
+            "[...document.querySelector('#f-{filter}').options].filter(o => !o.disabled).map(o => o.textContent)"
+        ))
+    };
+    assert_eq!(possible(browser, "level"), json!(["L0 (0)", "L5"]));
+    assert_eq!(possible(browser, "light"), json!(["untouched (0)", "with noise"]));
+    assert_eq!(possible(browser, "state"), json!(["all", "right", "wrong (0)", "not read", "models differ"]));
+    assert_eq!(possible(browser, "family"), json!(["all (0)"]));
     browser.choose("#f-light", "with noise");
     browser.choose("#f-level", "L5");
     assert_eq!(count(browser), "1 of 40 items");
