@@ -42,7 +42,7 @@ const FONT_SIZES: std::ops::RangeInclusive<f64> = 4.0..=24.0;
 /// The flags of `figures`.
 #[derive(Debug, Args)]
 pub(crate) struct FiguresArgs {
-    /// The folders of the runs; several runs are drawn together
+    /// The folders of the runs, or ZIP files of bundles; several runs are drawn together
     #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// Where the figures and their captions go

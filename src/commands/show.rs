@@ -14,6 +14,7 @@ use std::sync::Arc;
 use clap::Args;
 
 use crate::data::inputs::stem;
+use crate::data::ready_made::is_zip_file;
 use crate::engine::image_rebuilder::{ImageRebuilder, RebuildArgs};
 use crate::engine::images::notes::montage;
 use crate::error::{Error, Result};
@@ -53,6 +54,9 @@ pub(crate) fn show(args: ShowArgs) -> Result<Outcome> {
     let conditions = conditions(&item.answers, &args)?;
     let target = match &args.out {
         Some(out) => ImageFolder { trusted: out.clone(), out: out.clone() },
+        None if is_zip_file(&folder) => {
+            return Err(Error::usage("--out", "missing: the run is a ZIP file, so name a folder for the images"));
+        }
         None => ImageFolder { trusted: folder.clone(), out: folder.join("shown") },
     };
     let mut rebuilder = ImageRebuilder::open(args.rebuild, &manifest, &folder, &conditions)?;
@@ -304,7 +308,7 @@ fn reply_excerpt<D>(record: &Record<D>) -> String {
 /// The flags of `show`.
 #[derive(Debug, Args)]
 pub(crate) struct ShowArgs {
-    /// The folder of a run
+    /// The folder of a run, or the ZIP file of a bundle
     #[arg(value_name = "RUN", add = Decides::Nothing)]
     pub run: PathBuf,
     /// The id of a question

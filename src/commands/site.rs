@@ -21,7 +21,7 @@ use crate::types::manifests::Status;
 /// The flags of `site`.
 #[derive(Debug, Args)]
 pub(crate) struct SiteArgs {
-    /// The folders of the runs, of either kind
+    /// The folders of the runs, of either kind, or ZIP files of bundles
     #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// Where the site goes: a new or empty folder, or one with a site, whose files are replaced

@@ -18,6 +18,7 @@ pub(crate) mod shard_records;
 pub(crate) mod sharded_run;
 pub(crate) mod stored;
 pub(crate) mod training;
+mod zipped_run;
 
 pub(crate) use outcome::{
     EXPOSURE_VALUE, LLIE_BUDGET, LUX_AT_L0, Outcome, PROMPTS, PrintArgs, StatedArgs, StdoutFormat, Syntax,

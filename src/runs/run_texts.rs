@@ -4,6 +4,8 @@ use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use tempfile::TempDir;
+
 use crate::error::{Error, Result};
 use crate::store::{RecordLog, each_question};
 use crate::types::{QuestionId, Record, RunQuestion, TextPlace};
@@ -16,6 +18,8 @@ pub(crate) enum RunTexts<D> {
     Stored(Arc<StoredTexts>),
     /// The files of the shards, by [`TextPlace::log`].
     Shards(Vec<Self>),
+    /// The files of a run, unpacked into a temporary folder.
+    Unpacked { texts: Box<Self>, _folder: Arc<TempDir> },
     /// Records in memory, by [`TextPlace::start`].
     InMemory(Arc<InMemoryTexts<D>>),
 }
@@ -73,6 +77,7 @@ impl<D: Detail> RunTexts<D> {
                 let line = texts.log.line_from(place.start())?;
                 texts.log.record(&line)
             }
+            Self::Unpacked { texts, .. } => texts.record(place),
             Self::Shards(parts) => match parts.get(place.log()) {
                 Some(part) => part.record(place),
                 None => Err(Error::data("records", format_args!("there is no part {}", place.log()))),
@@ -112,6 +117,7 @@ impl<D: Detail> RunTexts<D> {
         };
         match self {
             Self::Stored(texts) => each_question(&texts.folder, add),
+            Self::Unpacked { texts, .. } => texts.questions(wanted, found),
             Self::Shards(parts) => parts.iter().try_for_each(|part| part.questions(wanted, found)),
             Self::InMemory(texts) => {
                 texts.questions.iter().cloned().for_each(&mut add);

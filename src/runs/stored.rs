@@ -6,6 +6,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::data::ready_made::is_zip_file;
 use crate::error::{Error, Result};
 use crate::runs::renamed;
 use crate::runs::run_texts::InMemoryTexts;
@@ -35,6 +36,8 @@ pub(crate) enum RunLayout {
     Whole,
     /// The folders of the shards, inside the folder of the run.
     Shards,
+    /// A ZIP file, which is not changed.
+    Zip,
 }
 
 /// A run with the data that reports need.
@@ -214,10 +217,11 @@ pub(crate) fn sort_trials<'q, D: Detail>(
     trials.sort(|question| places.get(question).copied(), |model| listing.place(model));
 }
 
-/// Name of the run in a folder, which is the name of the folder.
+/// Name of the run in a folder or ZIP file: the name of the folder, or of the file without its ending.
 pub(crate) fn run_name(folder: &Path) -> String {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-    let name = whole.file_name().unwrap_or(whole.as_os_str());
+    let name = if is_zip_file(&whole) { whole.file_stem() } else { whole.file_name() };
+    let name = name.unwrap_or(whole.as_os_str());
     name.to_string_lossy().into_owned()
 }
 
@@ -330,14 +334,17 @@ fn list_runs(folder: &Path) -> Vec<String> {
     runs
 }
 
+/// The command that unpacks a ZIP file beside it.
+pub(crate) fn unpack_command(zip: &Path) -> String {
+    let [zip, target] = [zip, &zip.with_extension("")].map(|path| path.display().to_string());
+    format!("python3 -m zipfile -e {} {}", shell_word(&zip), shell_word(&target))
+}
+
 fn no_run(folder: &Path) -> Error {
-    let is_zip = folder.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("zip"));
-    if is_zip && folder.is_file() {
-        let [zip, target] = [folder, &folder.with_extension("")].map(|path| path.display().to_string());
+    if is_zip_file(folder) {
         let problem = format!(
-            "a ZIP file; unpack it and name the folder of the run in it: python3 -m zipfile -e {} {}",
-            shell_word(&zip),
-            shell_word(&target)
+            "a ZIP file, which only report, show, figures and site read; for others unpack it and name the folder of the run in it: {}",
+            unpack_command(folder)
         );
         return Error::Run { path: folder.to_owned(), problem };
     }

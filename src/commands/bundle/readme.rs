@@ -30,7 +30,7 @@ pub(super) struct ReadmeInputs<'a> {
 pub(super) fn readme(inputs: &ReadmeInputs<'_>) -> String {
     let mut text = inputs.findings.to_owned();
     let name = shell_word(inputs.name);
-    text += "\n## Read it again\n\nBeside the unpacked folder:\n\n";
+    text += "\n## Read it again\n\nBeside the unpacked folder, or with the ZIP file in its place:\n\n";
     text += &fenced(&format!("darkqa-eval report {name}"));
     text += "\nIn the folder, to check that nothing changed on the way:\n\n";
     text += &fenced("sha256sum --check SHA256SUMS");

@@ -49,12 +49,12 @@ use pictures::{Ids, ImageForm, Scenes, SetFrames};
 use summary::Summary;
 
 pub(super) use choices::one_line;
-pub(super) use container::{Archive, is_set_folder, is_zip_file};
+pub(super) use container::is_set_folder;
 pub(super) use pictures::{EmbeddedImage, SceneNames, Series};
 pub(super) use preset::{is_known as is_known_set, names as known_sets};
 pub(super) use summary::LEFT_OUT;
 
-pub(crate) use container::{ParquetColumns, cached_snapshot, refuse_lfs_pointer};
+pub(crate) use container::{Archive, ParquetColumns, cached_snapshot, is_zip_file, refuse_lfs_pointer};
 pub(crate) use omissions::SkipBad;
 
 pub use settings::SetArgs;

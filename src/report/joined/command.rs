@@ -28,7 +28,7 @@ use crate::report::outputs::{PAGE, files as report_files, printed, write_first_f
 use crate::report::page::PageInputs;
 use crate::report::text::alert::Alert;
 use crate::runs::sharded_run::{open_any_run, open_choice_run};
-use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name};
+use crate::runs::stored::{AnyRun, RunLayout, ShownModels, StoredRun, run_name, unpack_command};
 use crate::runs::{LUX_AT_L0, Outcome, PrintArgs, StatedArgs, StdoutFormat, Syntax, record_table};
 use crate::store::{AddressChange, Store, now};
 use crate::types::manifests::{Counts, RunManifest, Status};
@@ -40,14 +40,14 @@ use darkqa_score::answers::record::{self, Detail as _};
 #[derive(Debug, Args)]
 #[group(arg = "runs")]
 pub(crate) struct ReportArgs {
-    /// Run folders, or all shards of a run; several runs are compared
+    /// Run folders, ZIP files of bundles, or all shards of a run; several runs are compared
     #[arg(value_name = "RUN", required = true, add = Decides::Nothing)]
     pub runs: Vec<PathBuf>,
     /// Read all stored replies again by the rules of this version; asks nothing, and stores the readings that changed
     #[arg(long, add = Decides::Nothing)]
     pub rescore: bool,
     /// Where the report goes: report.html, tables as CSV and LaTeX, figures as SVG; default: the folder of the run if
-    /// it is one, else nowhere
+    /// it is one, else nowhere, as for a ZIP file
     #[arg(long, value_name = "DIR", add = Decides::Nothing)]
     pub out: Option<PathBuf>,
     /// Report only on the items that all models with images answered
@@ -332,12 +332,20 @@ fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicat
 /// returns a text about the change.
 ///
 /// # Errors
-/// If the run is in shards, or one of its files cannot be read or written.
+/// If the run is in shards or a ZIP file, or one of its files cannot be read or written.
 fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
     if run.layout == RunLayout::Shards {
         let problem = format!(
             "{} holds the parts of a run, and their readings are stored in each: name the parts, or merge them with report merge, which reads all replies again",
             run.folder.display()
+        );
+        return Err(Error::usage("--rescore", problem));
+    }
+    if run.layout == RunLayout::Zip {
+        let problem = format!(
+            "{} is a ZIP file, which is not changed; unpack it and name the folder of the run in it: {}",
+            run.folder.display(),
+            unpack_command(&run.folder)
         );
         return Err(Error::usage("--rescore", problem));
     }

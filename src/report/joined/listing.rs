@@ -124,8 +124,8 @@ fn refuse_link(folder: &Path, path: &Path) -> Result<()> {
     }
 }
 
-/// Calls `write` with the folder of a run; returns the text for standard output, or `None` with a warning if the folder
-/// cannot be written to.
+/// Calls `write` with the folder of a run; returns the text for standard output, `None` with a warning if the folder
+/// cannot be written to, or `None` for a run in a ZIP file.
 ///
 /// # Errors
 /// If `write` fails for a run that could be opened for writing.
@@ -142,6 +142,7 @@ pub(super) fn write_in_place<D: Detail>(
             Err(error) => Err(error),
         },
         RunLayout::Shards => write(&ReportFolder::Shards(folder)),
+        RunLayout::Zip => return Ok(None),
     };
     Ok(match written {
         Ok(text) => Some(text),

@@ -5,20 +5,25 @@ use std::path::{Path, PathBuf};
 
 use super::ShardedRun;
 use super::coverage::{MissingShards, no_shard_error};
+use crate::data::ready_made::is_zip_file;
 use crate::error::{Error, Result};
 use crate::runs::missing_thumbnails::MissingThumbnails;
 use crate::runs::run_texts::RunTexts;
 use crate::runs::stored::{AnyRun, ExperimentKind, RunLayout, StoredRun, open_questions_error, read_run_manifest};
+use crate::runs::zipped_run::open_zip;
 use crate::store;
 use crate::types::{ChoiceDetail, Trials};
 use darkqa_score::answers::record::Detail;
 
-/// Opens the run in a folder. If the folder itself has no run, joins all shards in it, with a warning about missing
-/// ones.
+/// Opens the run in a folder or a ZIP file. If the folder itself has no run, joins all shards in it, with a warning
+/// about missing ones.
 ///
 /// # Errors
-/// If the folder has neither, or the shards belong to different runs.
+/// If the folder or the file has none, or the shards belong to different runs.
 pub(crate) fn open_any_run(folder: &Path) -> Result<AnyRun> {
+    if is_zip_file(folder) {
+        return open_zip(folder);
+    }
     let Some(parts) = shard_folders_in(folder)? else {
         return AnyRun::open(folder);
     };
@@ -33,6 +38,12 @@ pub(crate) fn open_any_run(folder: &Path) -> Result<AnyRun> {
 /// # Errors
 /// Also if the questions are open. That error tells the user what to do `instead`.
 pub(crate) fn open_choice_run(folder: &Path, instead: &str) -> Result<StoredRun<ChoiceDetail>> {
+    if is_zip_file(folder) {
+        return match open_zip(folder)? {
+            AnyRun::Choice(run) => Ok(run),
+            AnyRun::Open(_) => Err(open_questions_error(folder, instead)),
+        };
+    }
     let Some(parts) = shard_folders_in(folder)? else {
         return StoredRun::open_choices(folder, instead);
     };

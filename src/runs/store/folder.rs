@@ -32,7 +32,8 @@ pub fn now() -> String {
     Timestamp::now().strftime("%Y-%m-%dT%H:%M:%SZ").to_string()
 }
 
-pub(super) const MANIFEST: &str = "manifest.json";
+/// The file of a run's manifest.
+pub const MANIFEST: &str = "manifest.json";
 pub(super) const RECORDS: &str = "records.jsonl";
 
 /// The file of a run's questions, with their texts and scenes.
@@ -43,6 +44,9 @@ pub(super) const THUMBNAILS: &str = "thumbnails.jsonl";
 
 /// The file of similarities of images to their clean frames.
 pub(super) const FIDELITY: &str = "fidelity.jsonl";
+
+/// The files of a run that reports read.
+pub const RUN_FILES: [&str; 5] = [MANIFEST, RECORDS, QUESTIONS, THUMBNAILS, FIDELITY];
 
 /// The subfolder of a run for Batch API files.
 pub const BATCH: &str = "batch";

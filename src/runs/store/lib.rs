@@ -42,9 +42,9 @@ use record_log::UnlockedLog;
 
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
 pub use folder::{
-    AddressChange, BATCH, BATCH_STATE, PLAN, check_same_run, each_placed_question, each_question, find, has_batches,
-    is_locked, is_run, manifest_damage, now, read_columns, read_fidelity, read_manifest, read_questions, read_records,
-    read_settings, read_thumbnails, read_trials, reply_count, restore_manifest, schema,
+    AddressChange, BATCH, BATCH_STATE, MANIFEST, PLAN, RUN_FILES, check_same_run, each_placed_question, each_question,
+    find, has_batches, is_locked, is_run, manifest_damage, now, read_columns, read_fidelity, read_manifest,
+    read_questions, read_records, read_settings, read_thumbnails, read_trials, reply_count, restore_manifest, schema,
 };
 pub use image_notes::{missing_fidelity, missing_thumbnails};
 pub use lines::set_file_aside;

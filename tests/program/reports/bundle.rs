@@ -4,7 +4,6 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::io::{Cursor, Read};
 use std::path::Path;
-use std::process::Command;
 
 use crate::support::endpoint::{Answer, MockEndpoint};
 use crate::support::house::House;
@@ -294,16 +293,83 @@ fn open_runs_can_be_bundled() {
     );
 }
 
+/// The zip of `bundle` is read as its unpacked run is; nothing is written beside it.
 #[test]
-fn a_bundle_that_is_named_as_a_run_states_how_to_unpack_it() {
+fn bundles_are_read_without_unpacking() {
+    let bench = Bench::new();
+    bench.rooms("frames", 4, "96x72");
+    bench.complete(&words("--model observer --data frames --levels L0,L3 --out run"));
+    bench.complete(&words("bundle run --out sent.zip"));
+    let said = bench.complete(&words("report sent.zip"));
+    assert!(said.contains("report: not written; --out DIR writes one"), "{said}");
+    bench.complete(&words("report sent.zip --out of-zip"));
+    unpack(&bench.path("sent.zip"), &bench.path("unpacked"));
+    std::fs::rename(bench.path("unpacked/run"), bench.path("sent")).unwrap();
+    bench.complete(&words("report sent --out of-folder"));
+    let all = files(&bench.path("of-folder"));
+    assert!(all.len() > 10, "{all:?}");
+    for path in all {
+        let name = path.strip_prefix(bench.path("of-folder")).unwrap();
+        let [folder, zip] = [&path, &bench.path("of-zip").join(name)].map(|path| fs::read_to_string(path).unwrap());
+        // Only the file that the commands on the page read has another name.
+        let folder = if name == Path::new("report.html") { zip.clone() } else { folder };
+        assert_eq!(folder, zip.replace("sent.zip", "sent"), "{}", name.display());
+    }
+    let question = records(&bench.path("run"))[0]["question"].as_str().unwrap().to_owned();
+    let refused = bench.call(&["show", "sent.zip", &question, "--data", "frames"]);
+    assert!(refused.code == Some(2) && refused.stderr.contains("--out: missing: the run is a ZIP file"), "{refused:?}");
+    let shown = bench.complete(&["show", "sent.zip", &question, "--data", "frames", "--out", "images"]);
+    assert!(shown.contains("the same bytes as were sent"), "{shown}");
+    bench.complete(&words("report run --baseline sent.zip"));
+    bench.complete(&words("site sent.zip --out site"));
+    assert!(bench.path("site/runs/sent.html").exists());
+    let rescored = bench.call(&words("report sent.zip --rescore"));
+    assert!(rescored.stderr.contains("is a ZIP file, which is not changed; unpack it"), "{rescored:?}");
+    // Other commands change a run, so they need its folder. The message names the command that unpacks it.
+    let refused = bench.call(&words("bundle sent.zip --out again.zip"));
+    let command = refused.stderr.replace("\n   ", "").split("in it: ").nth(1).unwrap().trim().to_owned();
+    assert_eq!((refused.code, &*command), (Some(2), "python3 -m zipfile -e sent.zip sent"), "{refused:?}");
+}
+
+#[test]
+fn hostile_zip_files_are_no_runs() {
     let bench = Bench::new();
     bench.complete(&words("--model random --data rooms:frames=2,size=96x72 --levels L0,L3 --out run"));
-    bench.complete(&words("bundle run --out sent.zip"));
-    let refused = bench.call(&words("report sent.zip"));
-    assert_eq!(refused.code, Some(2), "{refused:?}");
-    let command = refused.stderr.split("in it: ").nth(1).unwrap().trim().to_owned();
-    assert_eq!(command, "python3 -m zipfile -e sent.zip sent");
-    let unpacked = Command::new("sh").args(["-c", &command]).current_dir(bench.path("")).status().unwrap();
-    assert!(unpacked.success());
-    bench.complete(&words("report sent/run"));
+    let run: Vec<(&str, Vec<u8>)> = ["manifest.json", "records.jsonl", "questions.jsonl"]
+        .map(|name| (name, fs::read(bench.path(&format!("run/{name}"))).unwrap()))
+        .to_vec();
+    let zip = |name: &str, entries: &[(String, &[u8])]| {
+        let mut writer = zip::ZipWriter::new(fs::File::create(bench.path(name)).unwrap());
+        for (name, content) in entries {
+            writer.start_file(name, zip::write::SimpleFileOptions::default()).unwrap();
+            std::io::Write::write_all(&mut writer, content).unwrap();
+        }
+        writer.finish().unwrap();
+        bench.call(&words(&format!("report {name}")))
+    };
+    let under = |folder: &str| -> Vec<(String, &[u8])> {
+        run.iter().map(|(name, content)| (format!("{folder}{name}"), &**content)).collect()
+    };
+    // At the top level, and in nested folders beside files of others, of which nothing is unpacked.
+    for (file, folder) in [("top.zip", ""), ("nested.zip", "a/b/")] {
+        let mut entries = under(folder);
+        entries.push(("photos/large.bin".to_owned(), &[0; 4096]));
+        assert_eq!(zip(file, &entries).code, Some(0));
+    }
+    let outside = [under(""), vec![("../records.jsonl".to_owned(), &b"x"[..])]].concat();
+    for (file, entries, problem) in [
+        ("outside.zip", outside, "leads out of the file, or is a link"),
+        ("two.zip", [under("a/"), under("b/")].concat(), "2 runs are in this ZIP file; unpack it"),
+        ("none.zip", under("")[1..].to_vec(), "no run in this ZIP file: it has no manifest.json"),
+    ] {
+        let refused = zip(file, &entries);
+        let said = refused.stderr.replace("\n   ", "");
+        assert!(refused.code == Some(2) && said.contains(problem), "{refused:?}");
+    }
+    let bomb = vec![b' '; (1 << 30) + 1];
+    let refused = zip("bomb.zip", &[under(""), vec![("thumbnails.jsonl".to_owned(), &*bomb)]].concat());
+    assert!(refused.code == Some(2) && refused.stderr.contains("longer than 10"), "{refused:?}");
+    bench.file("text.zip", "no ZIP file");
+    let refused = bench.call(&words("report text.zip"));
+    assert!(refused.code == Some(2) && refused.stderr.contains("not a whole ZIP file"), "{refused:?}");
 }

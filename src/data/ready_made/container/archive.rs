@@ -3,7 +3,7 @@
 //! Decompression of files up to a limit: [`decompress_gzip`], [`max_decompressed_size`].
 
 use std::collections::BTreeMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, BufReader, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -134,6 +134,26 @@ impl Archive {
         Ok(bytes)
     }
 
+    /// Folders that have a file of this name, each with its last `/`; empty for the top level.
+    pub(crate) fn folders_with(&self, file: &str) -> Vec<String> {
+        let folders = self.indices.keys().filter_map(|name| name.strip_suffix(file));
+        folders.filter(|folder| folder.is_empty() || folder.ends_with('/')).map(str::to_owned).collect()
+    }
+
+    /// Decompresses files to new paths, each given with its name. All together have a maximum length.
+    ///
+    /// # Errors
+    /// If a file cannot be read or written, or the files are too long, whatever sizes the directory states.
+    pub(crate) fn unpack(&self, files: impl Iterator<Item = (String, PathBuf)>) -> Result<()> {
+        let compressed = fs::metadata(&self.path).map_err(|e| Error::file(&self.path, "read", e))?.len();
+        let mut remaining = max_decompressed_size(compressed);
+        for (name, path) in files {
+            let mut file = File::create_new(&path).map_err(|e| Error::file(&path, "write", e))?;
+            remaining -= self.copy(&name, remaining, &mut file)?;
+        }
+        Ok(())
+    }
+
     /// Decompresses a file to a temporary copy.
     pub(super) fn decompress(&self, name: &str) -> Result<NamedTempFile> {
         let mut file = NamedTempFile::new().map_err(|e| Error::file(std::env::temp_dir(), "write", e))?;
@@ -167,8 +187,8 @@ impl Archive {
         Ok(entry.compressed_size())
     }
 
-    /// Decompresses a file of at most `max` bytes.
-    fn copy(&self, name: &str, max: u64, to: &mut impl std::io::Write) -> Result<()> {
+    /// Decompresses a file of at most `max` bytes; returns its length.
+    fn copy(&self, name: &str, max: u64, to: &mut impl std::io::Write) -> Result<u64> {
         let index = self.index(name)?;
         let mut zip = self.zip.lock().unwrap_or_else(PoisonError::into_inner);
         let entry = zip.by_index(index).map_err(|e| Error::data(self.place(name), e))?;
@@ -178,7 +198,7 @@ impl Archive {
             let problem = format_args!("longer than {} MB", max >> 20);
             return Err(Error::data(self.place(name), problem));
         }
-        Ok(())
+        Ok(copied)
     }
 
     /// Finds the image of a path in the data, relative to a folder of the archive. Returns its full name.

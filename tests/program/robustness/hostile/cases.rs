@@ -136,6 +136,7 @@ pub(crate) const CASES: &[Case] = &[
     Case::new("report run --rescore", &["run"], &[]),
     Case::new("report run --baseline other --json", &["run", "other"], &[]),
     Case::new("report walked", &["walked"], &[]),
+    Case::new("report sent.zip --out out", &["sent.zip"], &[]),
     Case::new("figures run other --out out", &["run"], &["other"]),
     Case::new("bundle run --out out.zip", &["run"], &[]),
     Case::new("site run other --out out", &["run"], &["other"]),

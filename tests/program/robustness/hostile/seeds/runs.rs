@@ -24,6 +24,7 @@ pub(super) fn make(bench: &Bench) {
     bench.complete(&words("synthesize asked --levels L3 --variant ev --out dark"));
     bench.complete(&words("synthesize a.png --levels L3 --variant ev --out made"));
     bench.complete(&words("report run --out old --no-parquet"));
+    bench.complete(&words("bundle run --out sent.zip"));
     fs::create_dir_all(bench.path("site")).unwrap();
     batches(bench);
     submitted(bench);
