@@ -81,6 +81,11 @@ impl BoardCell {
         Self { class, ..self }
     }
 
+    /// Adds a link.
+    pub(super) fn with_link(self, link: String) -> Self {
+        Self { link, ..self }
+    }
+
     /// Makes the cell a row header with a link.
     pub(super) fn into_header(self, link: String) -> Self {
         Self { link, is_header: true, ..self }

@@ -7,7 +7,7 @@ use super::open::{GroupDigests, RunLink};
 use crate::report::tables::missing_threshold_reason;
 use crate::report::text::table::ColumnKind::{self, Count, Points, Share, Text, Threshold};
 use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::points;
+use crate::report::text::words::{light, points};
 use crate::types::{AxisLevel, Variant, View};
 use darkqa_score::accuracies::Curve;
 use darkqa_score::choice::ParsingMode;
@@ -27,6 +27,8 @@ pub(crate) struct ModelRunRow {
     pub(crate) rank: Option<RankRange>,
     /// Accuracy at L0; `None` without a reply.
     clean: Option<Estimate>,
+    /// The variant of the degraded levels, as the page of the run names it.
+    light: String,
     /// Accuracy of raw images at each degraded level.
     levels: BTreeMap<AxisLevel, Option<Estimate>>,
     /// Mean accuracy from L0 to the darkest level.
@@ -121,6 +123,7 @@ fn row(findings: &Findings<'_>, variant: &Variant, model: &str, run: &RunLink) -
         run: run.clone(),
         rank: None,
         clean,
+        light: light(variant, None),
         levels: levels.filter(|(level, _)| *level != AxisLevel::L0).collect(),
         area: curve.and_then(|curve| curve.summary.area),
         darkest,
@@ -231,10 +234,11 @@ fn board_row(row: &ModelRunRow, levels: &BTreeSet<AxisLevel>) -> BoardRow {
         rank.with_class("rank"),
         BoardCell::text(&row.model).with_line(&run).into_header(row.run.path()),
         BoardCell::new(Count, &TableCell::from(n)),
-        BoardCell::new(Share, &TableCell::from(row.clean)),
+        row.run.level_cell(&row.model, &row.light, AxisLevel::L0, row.clean),
     ];
-    let by_level =
-        levels.iter().map(|level| BoardCell::new(Share, &TableCell::from(row.levels.get(level).copied().flatten())));
+    let by_level = levels
+        .iter()
+        .map(|level| row.run.level_cell(&row.model, &row.light, *level, row.levels.get(level).copied().flatten()));
     let last = [
         BoardCell::new(Share, &TableCell::from(row.area)),
         change,

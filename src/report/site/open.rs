@@ -4,13 +4,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 use serde::Serialize;
 
 use super::board::{BoardCell, BoardRow, BoardTable};
 use crate::report::text::table::ColumnKind::{Count, Share, Text};
 use crate::report::text::table::{Table, TableBuilder, TableCell};
-use crate::report::text::words::light;
-use crate::types::{AxisLevel, View};
+use crate::report::text::words;
+use crate::types::{AxisLevel, Variant, View};
 use darkqa_score::estimate::Estimate;
 use darkqa_score::open::{Group, OpenCell, OpenSummary};
 
@@ -73,7 +74,7 @@ pub(crate) fn open_rows(summary: &OpenSummary, run: &RunLink) -> Vec<OpenRow> {
         rows.push(OpenRow {
             model: (*model).clone(),
             run: run.clone(),
-            light: light(variant, *enhancer),
+            light: words::light(variant, *enhancer),
             levels,
             blind: blind.and_then(|cell| cell.score),
         });
@@ -141,11 +142,10 @@ fn board_row(row: &OpenRow, levels: &BTreeSet<AxisLevel>, has_blind: bool) -> Bo
         BoardCell::text(&format!("{scored} of {planned}")).with_key(scored.to_string()).with_class(""),
     ];
     for level in levels {
-        let cell = match row.levels.get(level) {
-            Some(level) => TableCell::from(level.score),
-            None => TableCell::Absent,
-        };
-        cells.push(BoardCell::new(Share, &cell));
+        cells.push(match row.levels.get(level) {
+            Some(score) => row.run.level_cell(&row.model, &row.light, *level, score.score),
+            None => BoardCell::new(Share, &TableCell::Absent),
+        });
     }
     if has_blind {
         cells.push(BoardCell::new(Share, &TableCell::from(row.blind)));
@@ -175,6 +175,21 @@ impl RunLink {
     /// Path of the page relative to the leaderboard.
     pub(crate) fn path(&self) -> String {
         format!("{PAGES}/{}", self.page)
+    }
+
+    /// Cell with an accuracy or a score, which leads to its items on the page of the run. `light` is named as there;
+    /// that of L0 is always untouched. A cell without a number has no link.
+    pub(super) fn level_cell(&self, model: &str, light: &str, level: AxisLevel, share: Option<Estimate>) -> BoardCell {
+        let cell = BoardCell::new(Share, &TableCell::from(share));
+        if share.is_none() {
+            return cell;
+        }
+        let untouched = words::light(&Variant::NONE, None);
+        let light = if level == AxisLevel::L0 { &untouched } else { light };
+        let level = level.to_string();
+        let filters = [("model", model), ("light", light), ("level", &*level)]
+            .map(|(name, value)| format!("{name}={}", utf8_percent_encode(value, NON_ALPHANUMERIC)));
+        cell.with_link(format!("{}#{}", self.path(), filters.join("&")))
     }
 }
 

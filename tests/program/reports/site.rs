@@ -158,6 +158,21 @@ fn site_ranks_models_and_links_pages() {
     let good = text.split("<tr data-words=\"script:good.jsonl one\">").nth(1).unwrap();
     let cells: Vec<&str> = good.split("data-key=\"").skip(1).map(|cell| &cell[..cell.find('"').unwrap()]).collect();
     assert_eq!(cells[3..6], ["1", "1", "0"], "{cells:?}");
+    // The model leads to the page of its run, each of its accuracies to the items there.
+    let links: Vec<&str> = good[..good.find("</tr>").unwrap()]
+        .split("href=\"")
+        .skip(1)
+        .map(|link| &link[..link.find('"').unwrap()])
+        .collect();
+    let items = "runs/one.html#model=script%3Agood%2Ejsonl&amp;light=";
+    let links: Vec<String> = links.iter().map(|link| link.replace("&#x2f;", "/")).collect();
+    let expected = [
+        "runs/one.html",
+        &format!("{items}untouched&amp;level=L0"),
+        &format!("{items}with%20noise&amp;level=L3"),
+        &format!("{items}with%20noise&amp;level=L5"),
+    ];
+    assert_eq!(links, expected);
     // A site is made again byte for byte.
     bench.complete(&words("site one two --out site"));
     assert!(fs::read(bench.path("site/index.html")).unwrap() == index);
