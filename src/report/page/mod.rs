@@ -17,7 +17,7 @@ mod run_usage;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::tables::ENHANCERS;
+use super::tables::{ACCURACY, ENHANCERS};
 use crate::error::Result;
 use crate::report::charts::chart::Figure;
 use crate::report::charts::samples::{SampleTable, samples_of};
@@ -271,14 +271,15 @@ fn page_sections<'a>(
     figures: &'a [Figure],
     thumbnails: &[Thumbnail],
 ) -> Vec<PageSection<'a>> {
+    // Without an enhancer, the images are those of the accuracies.
+    let has_enhanced = thumbnails.iter().any(|thumbnail| thumbnail.condition.enhancer.is_some());
+    let is_of_accuracy = !has_enhanced && sections.iter().any(|section| section.0 == ACCURACY);
+    let section_of_samples = if is_of_accuracy { ACCURACY } else { ENHANCERS };
     sections
         .iter()
         .filter_map(|&(id, title, note, figure_names)| {
             let figures: Vec<&Figure> = figures.iter().filter(|figure| figure_names.contains(&figure.name)).collect();
-            let samples = match id {
-                ENHANCERS => samples_of(thumbnails),
-                _ => Vec::new(),
-            };
+            let samples = if id == section_of_samples { samples_of(thumbnails) } else { Vec::new() };
             let tables = page_tables(tables, id);
             let has_content = !tables.is_empty() || !figures.is_empty() || !samples.is_empty();
             has_content.then_some(PageSection { id, title, note, figures, samples, tables })

@@ -59,12 +59,9 @@ impl RunUsage {
         usage
     }
 
-    /// Facts about the usage: names and values.
+    /// Facts about the usage: names and values. Unknown ones are left out.
     pub(super) fn facts(&self) -> Vec<(String, String)> {
-        let [median, quantile_95] = match self.latency {
-            None => ["–".to_owned(), "–".to_owned()],
-            Some(latency) => latency.map(|ms| format!("{ms} ms")),
-        };
+        let latency = self.latency.map(|[median, most]| format!("median {median} ms, 95 % within {most} ms"));
         let served: Vec<&str> = self.served.iter().map(String::as_str).collect();
         let trials = counted(self.trials, "trial");
         let rows = [
@@ -81,17 +78,20 @@ impl RunUsage {
             ),
             (
                 "tokens",
-                format!(
-                    "{} of prompts, {} of replies",
-                    with_separators(self.prompt_tokens),
-                    with_separators(self.completion_tokens)
-                ),
+                match [self.prompt_tokens, self.completion_tokens] {
+                    [0, 0] => String::new(),
+                    tokens => {
+                        let [prompts, replies] = tokens.map(with_separators);
+                        format!("{prompts} of prompts, {replies} of replies")
+                    }
+                },
             ),
-            ("image bytes", with_separators(self.image_bytes)),
-            ("latency", format!("median {median}, 95 % within {quantile_95}")),
+            ("image bytes", if self.image_bytes == 0 { String::new() } else { with_separators(self.image_bytes) }),
+            ("latency", latency.unwrap_or_default()),
             ("served as", served.join(", ")),
         ];
-        rows.into_iter().map(|(name, value)| (name.to_owned(), value)).collect()
+        let known = rows.into_iter().filter(|(_, value)| !value.is_empty());
+        known.map(|(name, value)| (name.to_owned(), value)).collect()
     }
 }
 

@@ -3,6 +3,7 @@
 //! Table of accuracy by family, with a row for each model in a condition. An accuracy is marked if it is detected to be
 //! below that of a model without images.
 
+use super::sections::ACCURACY;
 use crate::report::text::ladder::{Ladder, LadderRow};
 use crate::report::text::latex::escape;
 use crate::report::text::table::ColumnKind::{self, Count, Percent, Text};
@@ -66,7 +67,7 @@ fn axis_table(
         .table(LEVELS, &findings.grid.listing, |cell| {
             cell.map_or(TableCell::Blank, |cell| accuracy_cell(summary, cell))
         })
-        .page("accuracy", &caption)
+        .page(ACCURACY, &caption)
         .column(Count, "terminal n", |line| replies(line))
         .column(Count, "terminal unparsed", |line| {
             let strict = line.sum(|cell| cell.unparsed).to_string();

@@ -40,7 +40,7 @@ pub(crate) use enhancer_use::{EnhancerRow, enhancer_effects, enhancers, help_for
 pub(crate) use levels::{LEVELS, unread_note};
 pub(crate) use observer::{control_text, notes as observer_notes};
 pub(crate) use pooled::baseline;
-pub(crate) use sections::{BASELINE, ENHANCERS, SECTIONS, Section, with_training};
+pub(crate) use sections::{ACCURACY, BASELINE, ENHANCERS, SECTIONS, Section, with_training};
 pub(crate) use strict_groups::strict_groups;
 pub(crate) use thresholds::{in_lux, missing_threshold_reason};
 

@@ -25,7 +25,7 @@ pub(crate) const SECTIONS: [Section; 16] = [
          costs are of all trials.",
         &[],
     ),
-    ("accuracy", "Accuracy in the dark", "", &["accuracy", "variants", "photographed"]),
+    (ACCURACY, "Accuracy in the dark", "", &["accuracy", "variants", "photographed"]),
     (
         "thresholds",
         "Darkness threshold",
@@ -143,12 +143,15 @@ pub(crate) const REAL: &str = "real";
 /// Id of the section on paired differences.
 pub(super) const COMPARISONS: &str = "comparisons";
 
+/// Id of the section on accuracy, which also has the sample images if no enhancer ran.
+pub(crate) const ACCURACY: &str = "accuracy";
+
 /// Id of the section on enhancers, which also has the sample images.
 pub(crate) const ENHANCERS: &str = "enhancers";
 
 pub(super) fn subjects(summary: &AccuracySummary) -> Table {
     let builder = TableBuilder::new("subjects", summary.family_cells(None, ParsingMode::Strict))
-        .page("accuracy", "Accuracy of every subject, all families together")
+        .page(ACCURACY, "Accuracy of every subject, all families together")
         .column(Text, "page model", |cell| cell.subject.model.clone())
         .column(Text, "page condition", |cell| match cell.subject.view {
             None => "guessing".to_owned(),

@@ -6,6 +6,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::sections::ACCURACY;
 use crate::report::text::table::ColumnKind::{Count, Number, Percent, Share, Text, Threshold};
 use crate::report::text::table::{ColumnHeads, Table, TableBuilder, TableCell};
 use crate::report::text::words::{family as family_name, light, lux, lux_at, points};
@@ -356,7 +357,7 @@ struct FrameRow<'f> {
 fn frames(findings: &Findings<'_>) -> Table {
     let rows = findings.grid.variants().into_iter().flat_map(|variant| frame_rows(findings, variant));
     let mut table = TableBuilder::new("frames_first", rows)
-        .page("accuracy", "Frames with the fewest right answers of L0 kept in the dark: a list, not a finding")
+        .page(ACCURACY, "Frames with the fewest right answers of L0 kept in the dark: a list, not a finding")
         .group(|row| Some(light(row.variant, None)))
         .column(Text, "terminal frame | page frame", |row| row.frame.to_string())
         .column(Count, "terminal right at L0 | page right at L0", |row| row.answers.right)

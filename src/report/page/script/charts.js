@@ -116,20 +116,26 @@ class Chart {
     if (this.slider) this.table();
   }
 
-  // The values at the cursor: a row for each line, a column for each panel.
+  // The values at the cursor: a row for each line, a column for each panel. Panels that share their lines, such as
+  // "with noise (1 of 3)", share a column.
   table() {
     this.figure.querySelector(".cursor output").textContent = this.levels[this.at] ?? "";
     const panels = this.panels.filter((panel) => !modelsOff.has(panel.model));
-    const heads = ["line", ...panels.map((panel) => panel.title.textContent)].map((text) => make("th", text));
+    const columns = new Map();
+    for (const panel of panels) {
+      const title = panel.title.textContent.replace(/ \(\d+ of \d+\)$/, "");
+      columns.set(title, [...(columns.get(title) ?? []), panel]);
+    }
+    const heads = ["line", ...columns.keys()].map((text) => make("th", text));
     heads.forEach((head) => { head.scope = "col"; });
     const table = make("table"), row = make("tr"), head = make("thead"), body = make("tbody");
     table.append(make("caption", this.level ? `${this.measure} at ${this.level}, with both ends of its band` : this.measure));
     row.append(...heads);
     head.append(row);
     for (const [name, short] of this.names) {
-      const cells = panels.map((panel) => {
-        const line = panel.lines.find((line) => line.name === name);
-        if (!line || !this.isOn(line, panel)) return undefined;
+      const cells = [...columns.values()].map((parts) => {
+        const line = parts.flatMap((panel) => panel.lines.filter((line) => line.name === name && this.isOn(line, panel)))[0];
+        if (!line) return undefined;
         return line.isCurve ? line.values.get(this.level) : line.everywhere.join(", ");
       });
       if (cells.every((cell) => cell === undefined)) continue;
