@@ -104,6 +104,19 @@ fn guessed_commands_show_their_name_here_and_it_works() {
     one/nowhere
       error: unrecognized subcommand 'one/nowhere'
     ");
+    // A recording is no data set, whether or not it is named as one.
+    bench.file("drive.mcap", "");
+    let lines = ["drive.mcap", "import drive.mcap", "import drive.bag --src a --out b", "import clip.mp4"];
+    insta::assert_snapshot!(each(lines.map(str::to_owned).to_vec(), |line| refused(&bench, line)), @"
+    drive.mcap
+      error: no command drive.mcap: to take frames of it: darkqa-eval import mcap drive.mcap
+    import drive.mcap
+      error: no kind of data set drive.mcap: to take frames of it: darkqa-eval import mcap drive.mcap
+    import drive.bag --src a --out b
+      error: no kind of data set drive.bag: to take frames of it: darkqa-eval import rosbag drive.bag
+    import clip.mp4
+      error: no kind of data set clip.mp4: to take frames of it: darkqa-eval import video clip.mp4
+    ");
     bench.complete(&words("rooms --out photos --frames 1 --size 64x48"));
     insta::assert_snapshot!(
         refused(&bench, "photos"),

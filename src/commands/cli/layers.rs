@@ -452,10 +452,25 @@ fn guessed_word(word: &str) -> Option<String> {
     if path.join("manifest.json").is_file() {
         Some(format!("it is a run; to read it: darkqa-eval report {place}"))
     } else if path.exists() {
+        if let Some(advice) = import_advice(word) {
+            return Some(advice);
+        }
         Some(format!("it is a file or folder; to ask about it: darkqa-eval --model NAME --data {place}"))
     } else {
         None
     }
+}
+
+/// Command that takes frames of a recording or a video, by the ending of its name; `None` for other files.
+fn import_advice(word: &str) -> Option<String> {
+    let ending = Path::new(word).extension()?.to_str()?.to_lowercase();
+    let form = match &*ending {
+        "mcap" => "mcap",
+        "bag" | "db3" => "rosbag",
+        "mp4" | "mov" | "mkv" | "avi" | "webm" => "video",
+        _ => return None,
+    };
+    Some(format!("to take frames of it: darkqa-eval import {form} {}", shell_word(word)))
 }
 
 fn with_origin(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error {
@@ -463,6 +478,13 @@ fn with_origin(error: &clap::Error, origins: &BTreeMap<String, String>) -> Error
         && let Some(advice) = guessed_word(word)
     {
         return Error::CommandLine(format!("no command {word}: {advice}"));
+    }
+    if let Some(ContextValue::String(arg)) = error.get(ContextKind::InvalidArg)
+        && let Some(ContextValue::String(word)) = error.get(ContextKind::InvalidValue)
+        && arg == "<KIND>"
+        && let Some(advice) = import_advice(word)
+    {
+        return Error::CommandLine(format!("no kind of data set {word}: {advice}"));
     }
     let flag = match error.get(ContextKind::InvalidArg) {
         Some(ContextValue::String(flag)) => flag.trim_start_matches("--"),
