@@ -42,19 +42,23 @@ fn components(found: &RunVariation) -> Table {
             "csv question_order question_order_low question_order_high | page question × order",
             Source::QuestionFacet(Facet::Order),
         ),
-        ("csv combination combination_low combination_high | page combination", Source::Combination),
+        ("csv combination combination_low combination_high", Source::Combination),
         ("csv rest rest_low rest_high | terminal rest | page rest", Source::Rest),
     ];
     for (heads, source) in sources {
         table = table.column(Share, heads, move |row| row.components.deviation(source));
     }
+    let wording = "csv wording_range wording_range_low wording_range_high \
+                   | terminal best less worst wording, 95 % interval | page best less worst wording [95 %]";
+    // The page has room for one of the two.
+    let order = if found.wordings.is_empty() {
+        "csv order_range order_range_low order_range_high | page best less worst order [95 %]"
+    } else {
+        "csv order_range order_range_low order_range_high"
+    };
     let table = table
-        .column(Points, "csv wording_range wording_range_low wording_range_high | terminal best less worst wording, 95 % interval | page best less worst wording [95 %]", |row| {
-            range(row, Facet::Wording)
-        })
-        .column(Points, "csv order_range order_range_low order_range_high | page best less worst order [95 %]", |row| {
-            range(row, Facet::Order)
-        });
+        .column(Points, wording, |row| range(row, Facet::Wording))
+        .column(Points, order, |row| range(row, Facet::Order));
     let mut table = table.build();
     table.heading = Some(format!("Where the variation comes from ({}), in % of accuracy", found.asked()));
     table
