@@ -1,9 +1,10 @@
-//! Planned runs: [`Design`].
+//! Planned runs: [`Design`], and the half of the combinations under which a question is asked: [`random_half`].
 
 use super::components::{Components, Source};
 use super::observation::Facet;
 use crate::comparisons::paired::Spread;
 use crate::significance::ALPHA;
+use darkqa_base::types::Digest;
 
 /// Design of a run: how many questions of how many scenes, under how many levels of each facet. All numbers are at
 /// least 1.
@@ -16,8 +17,7 @@ pub struct Design {
     pub orders: usize,
     pub draws: usize,
     pub repeats: usize,
-    /// True if each question has a random half of the combinations of wording, order and draw, in which the levels of
-    /// each facet are as equally frequent as possible.
+    /// True if each question has a random half of the combinations of wording, order and draw ([`random_half`]).
     pub is_half: bool,
 }
 
@@ -85,4 +85,70 @@ pub fn cheapest(differences: &Components, designs: &[Design], difference: f64) -
         .filter(|design| differences.spread(design).detectable(ALPHA) <= difference)
         .min_by_key(|design| design.requests())
         .copied()
+}
+
+/// A random half of the combinations of wordings, orders and draws, given by their numbers, in which the levels of each
+/// facet are as equally frequent as possible; of an odd number, the larger half.
+///
+/// The levels of each facet are put in random order by the digest of `key`, and the combinations are taken whose places
+/// have an even sum, as in the half fraction of a two-level design (Box, Hunter and Hunter 2005, Statistics for
+/// Experimenters, chapter 6). Over many keys, every combination is equally frequent.
+#[must_use]
+pub fn random_half(levels: [usize; 3], key: &str) -> Vec<[u16; 3]> {
+    let places = Facet::ALL.map(|facet| {
+        let facet = facet as usize;
+        let mut order: Vec<usize> = (0..levels[facet]).collect();
+        order.sort_by_cached_key(|level| {
+            let parts = [b"half".as_slice(), key.as_bytes(), &[facet as u8], &(*level as u64).to_le_bytes()];
+            *Digest::from_parts(parts).as_bytes()
+        });
+        let mut places = vec![0; levels[facet]];
+        for (place, level) in order.into_iter().enumerate() {
+            places[level] = place;
+        }
+        places
+    });
+    let mut half = Vec::new();
+    for (wording, first) in (0..).zip(&places[0]) {
+        for (order, second) in (0..).zip(&places[1]) {
+            let draws = (0..).zip(&places[2]).filter(|(_, third)| (first + second + **third) % 2 == 0);
+            half.extend(draws.map(|(draw, _)| [wording, order, draw]));
+        }
+    }
+    half
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_half_is_balanced() {
+        for levels in [[1, 1, 1], [3, 1, 1], [3, 2, 1], [2, 2, 2], [3, 3, 2], [3, 3, 3], [1, 4, 5]] {
+            let all: usize = levels.iter().product();
+            for key in 0..20 {
+                let half = random_half(levels, &key.to_string());
+                assert_eq!(half.len(), all.div_ceil(2));
+                for facet in 0..3 {
+                    let mut counts = vec![0_usize; levels[facet]];
+                    half.iter().for_each(|combination| counts[usize::from(combination[facet])] += 1);
+                    let ends = counts.iter().min().zip(counts.iter().max());
+                    assert!(ends.is_some_and(|(least, most)| most - least <= 1), "{levels:?} {half:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn halves_differ_by_key_and_have_every_combination_equally_often() {
+        let mut counts = [0_usize; 9];
+        for key in 0..900 {
+            for [wording, order, _] in random_half([3, 3, 1], &key.to_string()) {
+                counts[usize::from(3 * wording + order)] += 1;
+            }
+        }
+        // 500 on average, with a standard deviation of 15.
+        assert!(counts.iter().all(|count| count.abs_diff(500) < 60), "{counts:?}");
+        assert_eq!(random_half([3, 3, 2], "a"), random_half([3, 3, 2], "a"));
+    }
 }

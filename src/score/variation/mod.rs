@@ -10,7 +10,7 @@
 //! - [`FacetedDifference::new`]: a difference, with an interval for other questions and other levels of the facets, and
 //!   the number of combinations in which it has the same sign.
 //! - [`rank_agreement`]: Kendall's W of the ranks of models over the levels of a facet.
-//! - [`Design`]: standard error, power and number of requests of a planned run.
+//! - [`Design`]: standard error, power and number of requests of a planned run; [`random_half`] of its combinations.
 //!
 //! ```
 //! use darkqa_score::variation::{Components, Design, FacetedDifference, Observation, facet_ranges, paired};
@@ -56,7 +56,7 @@ mod ranks;
 #[cfg(test)]
 mod tests;
 
-pub use advice::{Design, cheapest};
+pub use advice::{Design, cheapest, random_half};
 pub use by_run::{AccuracyVariation, DifferenceVariation, RunVariation};
 pub use components::{Component, Components, Source};
 pub use difference::{FacetedDifference, SignCount};

@@ -7,12 +7,11 @@
 use std::collections::BTreeMap;
 
 use rand::rngs::StdRng;
-use rand::seq::SliceRandom as _;
 use rand::{RngExt as _, SeedableRng as _};
 use rand_distr::{Distribution as _, StandardNormal};
 use statrs::distribution::{ContinuousCDF as _, Normal};
 
-use crate::variation::{Design, Observation, Source};
+use crate::variation::{Design, Observation, Source, random_half};
 
 /// A model whose variance is shared out among the sources, given in the order of [`Source::ALL`].
 #[derive(Debug, Clone, Copy)]
@@ -102,11 +101,11 @@ impl Simulation {
                 all.extend((0..design.draws as u16).map(|draw| [wording, order, draw]));
             }
         }
+        let levels = [design.wordings, design.orders, design.draws];
         for question in 0..design.questions as u32 {
             let scene = question % design.scenes as u32;
-            let mut combinations = all.clone();
-            combinations.shuffle(&mut random);
-            for [wording, order, draw] in combinations.into_iter().take(design.combinations()) {
+            let half = design.is_half.then(|| random_half(levels, &format!("{seed} {question}")));
+            for &[wording, order, draw] in half.as_ref().unwrap_or(&all) {
                 for repeat in 0..design.repeats as u16 {
                     let place = Observation { question, scene, wording, order, draw, repeat, value: 0.0 };
                     for (side, observations) in sides.iter_mut().enumerate() {
