@@ -173,28 +173,29 @@ pub fn table(drop: Severity) -> [u8; 256] {
     std::array::from_fn(|code| (code as f64 * factor + 0.5 + TIE).floor() as u8)
 }
 
-/// Makes degraded images of one frame. Caches one [`Negative`] per noise profile, and the last blurred frame.
+/// Makes degraded images of one frame. Caches the last [`Negative`] of each noise profile, and the last blurred frame.
 #[derive(Debug, Default)]
 pub struct Exposures {
-    negatives: BTreeMap<ProfileName, Negative>,
+    /// The key of each negative is that of its noise.
+    negatives: BTreeMap<ProfileName, (NoiseKey, Negative)>,
     /// Blurred light of the last path; levels with equal exposure time share it.
     blurred: Option<(Streak, Light)>,
 }
 
 impl Exposures {
-    /// Applies a degradation to the frame. Frame, key and noise profiles must be the same in each call.
+    /// Applies a degradation to the frame. Frame and noise profiles must be the same in each call. Images of one key are
+    /// made fastest in sequence.
     #[must_use]
     pub fn degrade(&mut self, clean: Clean<'_>, degradation: &AppliedDegradation, key: &NoiseKey) -> Rgb {
         match degradation {
             AppliedDegradation::Exposure(severity) => expose(clean, *severity),
             AppliedDegradation::Sensor { severity, reading, synthesis } => {
-                let negative = self
-                    .negatives
-                    .remove(reading)
-                    .filter(|negative| negative.can_develop(*severity))
-                    .unwrap_or_else(|| Negative::new(clean, key, synthesis, *severity));
+                let cached = self.negatives.remove(reading);
+                let negative = cached
+                    .filter(|(known, negative)| known == key && negative.can_develop(*severity))
+                    .map_or_else(|| Negative::new(clean, key, synthesis, *severity), |(_, negative)| negative);
                 let degraded = negative.develop(*severity);
-                self.negatives.insert(reading.clone(), negative);
+                self.negatives.insert(reading.clone(), (*key, negative));
                 degraded
             }
             AppliedDegradation::Auto { shot, streak, synthesis } => {
@@ -642,6 +643,18 @@ mod tests {
             let applied = applied(how, "gain=4", "speed=30");
             let found = exposures.degrade((&picture()).into(), &applied, &key("a"));
             assert_eq!(found, image(how, "gain=4", "speed=30"), "{how}");
+        }
+    }
+
+    /// Images of several draws of the noise share an instance.
+    #[test]
+    fn each_key_has_its_own_noise() {
+        let mut exposures = Exposures::default();
+        for how in ["L1-noise", "L3-noise", "L3-auto"] {
+            let applied = applied(how, "gain=4", "speed=0");
+            let [first, second, again] =
+                ["a", "b", "a"].map(|name| exposures.degrade((&picture()).into(), &applied, &key(name)));
+            assert!(first == again && first != second, "{how}");
         }
     }
 

@@ -1,6 +1,8 @@
 //! Levels, kinds and noise of degradations: flags ([`LightArgs`], [`SensorArgs`]) and resolved settings
 //! ([`LightSettings`], [`SensorSettings`]).
 
+use std::num::NonZeroU16;
+
 use clap::{Args, ValueEnum};
 use serde::Serialize;
 
@@ -165,6 +167,8 @@ pub struct LightSettings {
     pub variants: KindSet,
     /// Settings of each kind.
     pub kinds: KindSettings,
+    /// Number of draws of the noise of each noisy image.
+    pub draws: NonZeroU16,
 }
 
 /// Settings of each kind of degradation.
@@ -200,6 +204,7 @@ impl LightSettings {
             matches: levels.matches(args.variant, &kinds.sensor.readings)?,
             variants: args.variant,
             kinds,
+            draws: NonZeroU16::MIN,
         };
         for how in light.degradations().iter().flatten() {
             light.kinds.check(how)?;
@@ -221,8 +226,19 @@ impl LightSettings {
         Err(Error::usage("--levels", problem))
     }
 
-    /// All degradations of a frame, level by level: each kind with each of its noise profiles; `None` stands for L0.
+    /// All degradations of a frame, level by level: each kind with each of its noise profiles; `None` stands for L0. The
+    /// further draws of the noise follow, draw by draw, because the levels of a draw share its noise.
     pub fn degradations(&self) -> Vec<Option<Degradation>> {
+        let mut all = self.first_draws();
+        let noisy: Vec<Degradation> = all.iter().flatten().filter(|how| how.kind().has_noise()).cloned().collect();
+        for draw in 1..self.draws.get() {
+            all.extend(noisy.iter().map(|how| Some(how.clone().with_draw(draw))));
+        }
+        all
+    }
+
+    /// The degradations in the first draw of the noise.
+    fn first_draws(&self) -> Vec<Option<Degradation>> {
         let mut all = Vec::new();
         for level in &self.levels {
             let Some(severity) = level.severity() else {

@@ -218,7 +218,7 @@ fn distances(grid: &Grid<'_>, subject: usize) -> Vec<(u32, f64)> {
         .enumerate()
         .filter_map(|(index, item)| {
             let seen = usable_probabilities(grid.trial(subject, index))?;
-            let unseen = usable_probabilities(grid.trial(blind, index))?;
+            let unseen = usable_probabilities(grid.compared_trial(blind, index))?;
             Some((item.cluster, distance(&seen.p, &unseen.p)))
         })
         .collect()

@@ -50,7 +50,7 @@ pub struct Findings<'a> {
     pub lenient_best: Option<BestInTheDark>,
     /// Paired differences between subjects.
     pub comparisons: Vec<Comparison>,
-    /// Variation over wordings and orders; `None` if every question was asked in one of each.
+    /// Variation over wordings, orders and draws; `None` if every question was asked in one of each.
     pub variation: Option<RunVariation>,
     /// Thresholds and areas, for all families together and for each family.
     pub curves: Vec<Curve>,

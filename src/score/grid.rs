@@ -54,11 +54,13 @@ impl TrialResult {
     }
 }
 
-/// One repeat of a question in one wording, with its choices in one order.
+/// One repeat of a question in one wording, with its choices in one order, about one draw of the noise.
 #[derive(Debug, Clone, Copy)]
 pub struct GridItem<'a> {
     /// The question as asked.
     pub asked: &'a AskedItem,
+    /// Draw of the noise, from 0. Replies to images without drawn noise belong to draw 0.
+    pub draw: u16,
     /// Index of its cluster.
     pub cluster: u32,
 }
@@ -78,18 +80,25 @@ impl GridItem<'_> {
 }
 
 /// Results of every subject on every item.
+///
+/// A subject without drawn noise, such as a model at L0, is asked about draw 0 alone. Beside a subject that has draws,
+/// its reply stands for all of them ([`Grid::results`], [`Grid::compared_trial`]); alone, it counts once
+/// ([`Grid::result`], [`Grid::trial`]).
 #[derive(Debug)]
 pub struct Grid<'a> {
     /// Subjects (model and condition), in the order of the models in `listing`, then sorted.
     pub subjects: Vec<ModelInCondition>,
     /// Order, groups and labels of the models.
     pub listing: ModelListing,
-    /// Items, sorted by frame, question, repeat, wording and choices.
+    /// Items, sorted by frame, question, repeat, wording, choices and draw.
     pub items: Vec<GridItem<'a>>,
     /// Number of clusters.
     pub clusters: usize,
-    /// Results of all items for the first subject, then for the next one, and so on.
+    /// Results of all items for the first subject, then for the next one, and so on. Without drawn noise, those of draw
+    /// 0 are repeated for the other draws.
     results: Vec<TrialResult>,
+    /// Whether each subject has drawn noise.
+    has_draws: Vec<bool>,
     /// Index of each subject.
     indices: BTreeMap<ModelInCondition, usize>,
     trials: &'a Trials<ChoiceDetail>,
@@ -153,23 +162,24 @@ impl<'a> Grid<'a> {
         let mut items: Vec<GridItem<'a>> = scope
             .items
             .iter()
-            .filter_map(|number| {
-                let asked = trials.item(*number);
+            .filter_map(|&(number, draw)| {
+                let asked = trials.item(number);
                 let cluster = clusters.get(&asked.frame, &asked.question)?;
-                seen.insert(asked.key()).then_some(GridItem { asked, cluster })
+                seen.insert((asked.key(), draw)).then_some(GridItem { asked, draw, cluster })
             })
             .collect();
-        items.sort_by(|a, b| sort_key(a.asked).cmp(&sort_key(b.asked)));
-        let index_by_key: HashMap<_, u32> = items.iter().map(|item| item.asked.key()).zip(0..).collect();
-        let mut index_by_item = vec![NO_INDEX; trials.item_count()];
-        for number in &scope.items {
-            index_by_item[*number] = index_by_key[&trials.item(*number).key()];
+        items.sort_by(|a, b| sort_key(a).cmp(&sort_key(b)));
+        let index_by_key: HashMap<_, u32> = items.iter().map(|item| (item.asked.key(), item.draw)).zip(0..).collect();
+        let draws = scope.draws;
+        let mut index_by_item = vec![NO_INDEX; trials.item_count() * draws.count];
+        for &(number, draw) in &scope.items {
+            index_by_item[draws.place(number, draw)] = index_by_key[&(trials.item(number).key(), draw)];
         }
         let size = subjects.len() * items.len();
         let mut results = vec![TrialResult::Absent; size];
         let mut trial_indices = vec![NO_INDEX; size];
         for (index, trial) in (0..).zip(trials.iter()) {
-            let item = index_by_item[trial.item_number()];
+            let item = index_by_item[draws.place(trial.item_number(), draws.of(trial.asked_number()))];
             let subject = index_by_asked[trial.asked_number()].filter(|_| item != NO_INDEX);
             // An item can be in the table because of one model, and still not be shown for another model.
             if let Some(subject) = subject.filter(|_| is_shown(trial.item(), trial.model())) {
@@ -178,7 +188,17 @@ impl<'a> Grid<'a> {
                 trial_indices[cell] = index;
             }
         }
+        let has_draws: Vec<bool> = subjects.iter().map(has_drawn_noise).collect();
+        for (index, item) in items.iter().enumerate().filter(|(_, item)| item.draw > 0) {
+            let Some(first) = index_by_key.get(&(item.asked.key(), 0)) else { continue };
+            for subject in (0..subjects.len()).filter(|subject| !has_draws[*subject]) {
+                let [cell, first] = [index, *first as usize].map(|item| subject * items.len() + item);
+                results[cell] = results[first];
+                trial_indices[cell] = trial_indices[first];
+            }
+        }
         Self {
+            has_draws,
             subjects,
             listing: listing.clone(),
             indices,
@@ -190,15 +210,41 @@ impl<'a> Grid<'a> {
         }
     }
 
-    /// Result of an item for a subject, both by index.
+    /// Result of an item for a subject alone, both by index.
     #[must_use]
     pub fn result(&self, subject: usize, item: usize) -> TrialResult {
+        self.results([subject], item)[0]
+    }
+
+    /// Results of an item for subjects that are compared, all by index: each subject without drawn noise has its reply
+    /// of draw 0 in all draws. If no subject has drawn noise, only draw 0 is asked.
+    #[must_use]
+    pub fn results<const N: usize>(&self, subjects: [usize; N], item: usize) -> [TrialResult; N] {
+        let is_asked = self.has_item(subjects, item);
+        subjects.map(|subject| if is_asked { self.compared_result(subject, item) } else { TrialResult::Absent })
+    }
+
+    /// True if an item counts for subjects that are compared: it is of draw 0, or one of them has drawn noise.
+    #[must_use]
+    pub fn has_item(&self, subjects: impl IntoIterator<Item = usize>, item: usize) -> bool {
+        self.items[item].draw == 0 || subjects.into_iter().any(|subject| self.has_draws[subject])
+    }
+
+    /// Result of an item for a subject beside others of which one has drawn noise.
+    #[must_use]
+    pub fn compared_result(&self, subject: usize, item: usize) -> TrialResult {
         self.results[subject * self.items.len() + item]
     }
 
-    /// The trial of an item and a subject, both by index; `None` if the item was not asked.
+    /// The trial of an item and a subject alone, both by index; `None` if the item was not asked.
     #[must_use]
     pub fn trial(&self, subject: usize, item: usize) -> Option<TrialRef<'a>> {
+        if self.has_item([subject], item) { self.compared_trial(subject, item) } else { None }
+    }
+
+    /// The trial of an item and a subject beside others of which one has drawn noise.
+    #[must_use]
+    pub fn compared_trial(&self, subject: usize, item: usize) -> Option<TrialRef<'a>> {
         let index = self.trial_indices[subject * self.items.len() + item];
         self.trials.get(index as usize)
     }
@@ -206,15 +252,10 @@ impl<'a> Grid<'a> {
     /// True if the strict and the lenient parsing of any reply of a subject differ.
     #[must_use]
     pub fn parsings_differ(&self, subject: usize) -> bool {
-        self.row(subject)
+        let start = subject * self.items.len();
+        self.results[start..start + self.items.len()]
             .iter()
             .any(|result| matches!(result, TrialResult::Read { strict, lenient } if strict != lenient))
-    }
-
-    /// Results of a subject for all items.
-    fn row(&self, subject: usize) -> &[TrialResult] {
-        let start = subject * self.items.len();
-        &self.results[start..start + self.items.len()]
     }
 
     /// Index of a subject; `None` if the grid does not contain it.
@@ -253,7 +294,8 @@ impl<'a> Grid<'a> {
         subject: usize,
         family: Option<&'s Family>,
     ) -> impl Iterator<Item = (&'s GridItem<'a>, TrialResult)> + 's {
-        self.items.iter().zip(self.row(subject).iter().copied()).filter(move |(item, _)| item.is_in_family(family))
+        let items = self.items.iter().enumerate().filter(move |(_, item)| item.is_in_family(family));
+        items.map(move |(index, item)| (item, self.result(subject, index)))
     }
 
     /// Number of replies and of right replies of a subject in each cluster.
@@ -306,6 +348,7 @@ impl<'a> Grid<'a> {
             items: kept_items.iter().map(|item| self.items[*item]).collect(),
             clusters: self.clusters,
             results: cells.iter().map(|cell| self.results[*cell]).collect(),
+            has_draws: self.has_draws.clone(),
             trials: self.trials,
             trial_indices: cells.iter().map(|cell| self.trial_indices[*cell]).collect(),
         }
@@ -329,33 +372,69 @@ impl<'a> Grid<'a> {
 struct GridScope {
     /// True for each included pair of model and condition, by its index in [`Trials::asked`].
     asked: Vec<bool>,
-    /// Indices of the included items in [`Trials::items`], in the order of their first shown trials.
-    items: Vec<usize>,
+    /// Numbers of the included items with their draws, in the order of their first shown trials.
+    items: Vec<(usize, u16)>,
+    draws: AskedDraws,
+}
+
+/// Draws of the noise in a table of trials.
+struct AskedDraws {
+    /// Draw of each pair of model and condition.
+    by_asked: Vec<u16>,
+    /// Number of draws.
+    count: usize,
+}
+
+impl AskedDraws {
+    fn new(trials: &Trials<ChoiceDetail>) -> Self {
+        let asked = trials.asked().into_iter();
+        let by_asked: Vec<u16> =
+            asked.map(|asked| asked.and_then(|(_, condition)| condition?.draw()).unwrap_or(0)).collect();
+        let count = by_asked.iter().copied().max().map_or(1, |last| usize::from(last) + 1);
+        Self { by_asked, count }
+    }
+
+    fn of(&self, asked: usize) -> u16 {
+        self.by_asked[asked]
+    }
+
+    /// Place of an item in a draw among those of all items.
+    fn place(&self, item: usize, draw: u16) -> usize {
+        item * self.count + usize::from(draw)
+    }
 }
 
 impl GridScope {
     fn new(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
-        let mut scope = Self { asked: vec![false; trials.asked().len()], items: Vec::new() };
-        let mut is_included = vec![false; trials.item_count()];
+        let draws = AskedDraws::new(trials);
+        let mut is_included = vec![false; trials.item_count() * draws.count];
+        let mut scope = Self { asked: vec![false; trials.asked().len()], items: Vec::new(), draws };
         for trial in trials.iter() {
             let (item, asked) = (trial.item_number(), trial.asked_number());
+            let draw = scope.draws.of(asked);
+            let place = scope.draws.place(item, draw);
             // Most trials add neither a subject nor an item; `is_shown` is not called for them.
-            let adds_nothing = is_included[item] && scope.asked[asked];
+            let adds_nothing = is_included[place] && scope.asked[asked];
             if adds_nothing || !is_shown(trial.item(), trial.model()) {
                 continue;
             }
             scope.asked[asked] = true;
-            if !is_included[item] {
-                is_included[item] = true;
-                scope.items.push(item);
+            if !is_included[place] {
+                is_included[place] = true;
+                scope.items.push((item, draw));
             }
         }
         scope
     }
 }
 
-fn sort_key(asked: &AskedItem) -> impl Ord + '_ {
-    (&asked.frame, asked.key())
+fn sort_key<'i>(item: &'i GridItem<'_>) -> impl Ord + 'i {
+    (&item.asked.frame, item.asked.key(), item.draw)
+}
+
+/// True if the images of a subject differ by draw of the noise.
+fn has_drawn_noise(subject: &ModelInCondition) -> bool {
+    subject.variant.kind.is_some_and(Kind::has_noise)
 }
 
 fn trial_result(trial: TrialRef<'_>) -> TrialResult {

@@ -392,6 +392,16 @@ impl NoEffect {
             let why = "no model at an endpoint is shown an image";
             self.because(why, &["image_first".to_owned()]);
         }
+        if !args.asks_in_several_ways() {
+            let why = "every question is asked in one wording, order and draw";
+            self.because(why, &["design".to_owned()]);
+        }
+        let light = &args.job.light;
+        if light.levels(SetLight::Lit).0.iter().all(|level| *level == AxisLevel::L0)
+            || !light.variant.kinds().any(Kind::has_noise)
+        {
+            self.because("no image has noise", &["noise_seeds".to_owned()]);
+        }
         if args.scene.pairs.is_some() {
             self.because("--pairs names the data", &["data".to_owned()]);
         }

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use serde_json::{Value, json};
 
 use super::samples::Sample;
-use super::settings::{ImagePlace, shown_questions};
+use super::settings::{DesignShare, ImagePlace, shown_questions};
 use super::setup::{ChoiceSetup, is_other_room};
 use super::write_plan::{power_forecast, run_contents};
 use crate::ask::{ImagePlaces, Query, Wording};
@@ -33,6 +33,7 @@ use crate::types::{
 };
 use darkqa_questions::rules::Rules;
 use darkqa_score::model_in_condition::is_reference;
+use darkqa_score::variation::random_half;
 
 impl Experiment for ChoiceSetup<'_> {
     type Item = ChoiceItem;
@@ -225,6 +226,20 @@ struct QuestionPrompts {
     blind: Prompt,
     /// Position of the question among all selected ones.
     place: usize,
+    /// Draws of the noise under which it is asked in this wording and order; `None` for all.
+    draws: Option<Vec<u16>>,
+}
+
+impl QuestionPrompts {
+    /// True if the question is asked in a condition in this wording and order. A condition without drawn noise is
+    /// asked for all draws at once.
+    fn is_asked_in(&self, condition: Option<&Condition>) -> bool {
+        match (&self.draws, condition.and_then(Condition::draw)) {
+            (None, _) => true,
+            (Some(draws), Some(draw)) => draws.contains(&draw),
+            (Some(draws), None) => !draws.is_empty(),
+        }
+    }
 }
 
 /// The questions asked with the images of one frame.
@@ -267,10 +282,21 @@ fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
 fn prompts(setup: &ChoiceSetup<'_>, sample: &Sample, shown_frame: Option<&FrameId>) -> Result<Vec<QuestionPrompts>> {
     let (order, repeats, question) = (setup.config.order, setup.config.repeats, &sample.question);
     let is_of_several = !setup.dataset.image_series(&question.frame).is_empty();
+    let shown_questions = shown_questions(question, order, repeats, setup.recipe.seed)?;
+    let half = (order.design == Some(DesignShare::Half)).then(|| {
+        let orders = shown_questions.iter().map(|shown| shown.order + 1).max().unwrap_or(1) as usize;
+        let draws = usize::from(setup.config.job.light.draws.get());
+        let key = format!("{} {}", setup.recipe.seed, question.id);
+        random_half([setup.config.wordings.len(), orders, draws], &key)
+    });
     let mut prompts = Vec::new();
-    for shown in shown_questions(question, order, repeats, setup.recipe.seed)? {
+    for shown in shown_questions {
         let question = Arc::new(shown.question);
-        for wording in &setup.config.wordings {
+        for (number, wording) in (0..).zip(&setup.config.wordings) {
+            let draws = half.as_ref().map(|half| {
+                let own = half.iter().filter(|levels| levels[..2] == [number, shown.order as u16]);
+                own.map(|levels| levels[2]).collect()
+            });
             let prompt = |view| {
                 let words = wording.prompts.render(view, &question)?;
                 let prompt = match (view, setup.config.image_place) {
@@ -286,6 +312,7 @@ fn prompts(setup: &ChoiceSetup<'_>, sample: &Sample, shown_frame: Option<&FrameI
                 image: prompt(View::Image)?,
                 blind: prompt(View::Blind)?,
                 place: sample.place,
+                draws,
                 item: ChoiceItem {
                     question: Arc::clone(&question),
                     wording: wording.name.clone(),
@@ -322,7 +349,8 @@ fn group(
     // Wordings may share their words without an image: the same request is sent once, for the first of them.
     let has_wordings = setup.config.wordings.len() > 1;
     let mut keys = HashSet::new();
-    for (shown, is_of_other) in own.chain(others).filter(|(shown, _)| shown.item.repeat < times) {
+    let asked = own.chain(others).filter(|(shown, _)| shown.item.repeat < times && shown.is_asked_in(condition));
+    for (shown, is_of_other) in asked {
         let prompt = match view {
             View::Image => &shown.image,
             View::Blind => &shown.blind,

@@ -4,10 +4,10 @@
 //!
 //! Settings that a run must share with its plan: [`plan_identity`].
 
-use std::num::NonZeroU32;
+use std::num::{NonZeroU16, NonZeroU32};
 use std::path::Path;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde_json::{Value, json};
 
 use crate::ask::{Constrain, PromptSet, Wording};
@@ -43,6 +43,9 @@ pub(crate) struct EvaluateArgs {
     /// The order in which choices are shown.
     #[command(flatten)]
     pub order: ChoiceOrder,
+    /// The draws of the noise.
+    #[command(flatten)]
+    pub noise: NoiseDraws,
     /// The reading of images.
     #[command(flatten)]
     pub decode: DecodeArgs,
@@ -81,6 +84,15 @@ pub(crate) struct ChoiceArgs {
     /// asked)
     #[arg(long, add = Decides::Trials)]
     pub observer_controls: bool,
+}
+
+/// The flag for draws of the noise.
+#[derive(Debug, Clone, Copy, Args)]
+#[command(next_help_heading = "Light")]
+pub(crate) struct NoiseDraws {
+    /// Ask about N draws of the noise of every noisy image, made with --seed and the N − 1 seeds after it; default: 1
+    #[arg(long, value_name = "N", add = Decides::Trials)]
+    pub noise_seeds: Option<NonZeroU16>,
 }
 
 /// The place of the image in a message.
@@ -131,6 +143,12 @@ pub(super) struct Evaluation {
 }
 
 impl EvaluateArgs {
+    /// True if a question may be asked in several wordings, orders or draws.
+    pub(crate) fn asks_in_several_ways(&self) -> bool {
+        let has_orders = self.order.circular || self.order.shuffle_options > Some(NonZeroU32::MIN);
+        self.choice.prompts.len() > 1 || has_orders || self.noise.noise_seeds > Some(NonZeroU16::MIN)
+    }
+
     /// Validates the flags, and reads the files and environment variables that they name.
     ///
     /// # Errors
@@ -146,6 +164,8 @@ impl EvaluateArgs {
         let truths = bank.as_ref().map_or(Truths::Known, |_| Truths::Unknown);
         let max_cost = self.job.money.max_cost;
         let mut job = self.job.resolve(&experiment)?;
+        job.light.draws = self.noise.noise_seeds.unwrap_or(NonZeroU16::MIN);
+        check_draws(&job, truths)?;
         let plan = job.place.plan()?;
         if let (Some(plan), Some(whole), true) = (&plan, max_cost, job.shard.is_part()) {
             job.money.max_cost = Some(whole * plan.cost_share(job.shard));
@@ -226,6 +246,25 @@ fn check_without_truths(job: &JobSettings) -> Result<()> {
     Ok(())
 }
 
+/// Checks that several draws of the noise can be made and evaluated.
+///
+/// # Errors
+/// If true answers are unknown, or images were enhanced by other programs, which have one draw.
+fn check_draws(job: &JobSettings, truths: Truths) -> Result<()> {
+    let flag = "--noise seeds";
+    if job.light.draws == NonZeroU16::MIN {
+        return Ok(());
+    }
+    if truths == Truths::Unknown {
+        return Err(Error::usage(flag, "--ask compares a model with its own answers under one draw: leave seeds out"));
+    }
+    if !job.enhancers.enhanced.is_empty() {
+        let problem = "the images of --enhanced are of one draw: leave seeds out, or enhance with --llie FILE.onnx";
+        return Err(Error::usage(flag, problem));
+    }
+    Ok(())
+}
+
 /// The flags for the order of choices and for repeats.
 #[derive(Debug, Clone, Copy, Args)]
 #[command(next_help_heading = "Data")]
@@ -240,6 +279,18 @@ pub(crate) struct ChoiceOrder {
     /// Ask everything N times; default: once, and with --ask the untouched images twice
     #[arg(long, value_name = "N", add = Decides::Trials)]
     pub repeats: Option<NonZeroU32>,
+    /// Combinations of wording, order and draw under which a question is asked: all, or a random half, in which all
+    /// wordings, orders and draws are equally frequent; default: all
+    #[arg(long, value_enum, value_name = "all|half", add = Decides::Trials)]
+    pub design: Option<DesignShare>,
+}
+
+/// Share of the combinations of wording, order and draw under which a question is asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum DesignShare {
+    All,
+    /// A random half of them ([`random_half`]).
+    Half,
 }
 
 /// Number of times that each order of choices is asked.
@@ -307,9 +358,10 @@ pub(super) fn shown_questions(
     seed: u64,
 ) -> Result<Vec<ShownQuestion>> {
     let choices = &question.choices;
+    let orders = orders(question, choice_order, seed);
     let mut shown = Vec::new();
     for repeat in 0..repeats.max().get() {
-        for (number, order) in (0..).zip(orders(question, choice_order, seed)) {
+        for (number, order) in (0..).zip(&orders) {
             let texts = order.iter().map(|&index| choices.texts()[index].clone());
             let truth = order.iter().position(|&index| Some(index) == choices.truth());
             shown.push(ShownQuestion {
@@ -442,7 +494,7 @@ mod tests {
 
     fn shown(id: usize, shuffles: u32, circular: bool, repeats: u32) -> Vec<(String, u32)> {
         let [shuffle_options, repeats] = [shuffles, repeats].map(NonZeroU32::new);
-        let choice_order = ChoiceOrder { shuffle_options, circular, repeats };
+        let choice_order = ChoiceOrder { shuffle_options, circular, repeats, design: None };
         let repeats = choice_order.repeats(Truths::Known);
         shown_questions(&question(id), choice_order, repeats, 7)
             .unwrap()
@@ -489,7 +541,8 @@ mod tests {
     }
 
     fn times(repeats: Option<u32>, truths: Truths, condition: Option<&str>) -> u32 {
-        let order = ChoiceOrder { shuffle_options: None, circular: false, repeats: repeats.and_then(NonZeroU32::new) };
+        let repeats = repeats.and_then(NonZeroU32::new);
+        let order = ChoiceOrder { shuffle_options: None, circular: false, repeats, design: None };
         let condition = condition.map(|name| name.parse::<Condition>().unwrap());
         order.repeats(truths).times(condition.as_ref())
     }

@@ -31,7 +31,8 @@ use darkqa_light::{AppliedDegradation, Exposures, FrameView, NoiseKey};
 pub(crate) struct FrameWork<'a> {
     pub(crate) steps: ImageSteps<'a>,
     frame: FrameId,
-    key: NoiseKey,
+    /// Source of the frame, which may share its camera state.
+    source: FrameId,
     /// Digest of the file when the plan was made; `None` if any file is accepted.
     planned_digest: Option<Digest>,
     /// Name of the source and its frame, for the store keys; `None` without a store or a plan.
@@ -57,26 +58,24 @@ pub(crate) struct FrameWork<'a> {
 impl<'a> FrameWork<'a> {
     /// The steps of a frame of a planned source. The file is read on first use, and must still have the same digest.
     pub(crate) fn for_source(steps: ImageSteps<'a>, source: &Source, frame: &SourceFrame) -> Self {
-        let key = steps.recipe.noise_key(&source.name, &frame.id);
         Self {
             origin: steps.stored.map(|_| Box::new((source.name.clone(), frame.clone()))),
             size: Some(frame.size),
             photographs: frame.photographs.clone(),
-            ..Self::new(steps, frame.id.clone(), key, Some(frame.digest))
+            ..Self::new(steps, frame.id.clone(), source.name.clone(), Some(frame.digest))
         }
     }
 
     /// The steps of a frame without a plan; the digest of its file is not checked.
     pub(crate) fn for_frame(steps: ImageSteps<'a>, frame: FrameId) -> Self {
-        let key = NoiseKey::new(steps.recipe.seed, &frame);
-        Self::new(steps, frame, key, None)
+        Self::new(steps, frame.clone(), frame, None)
     }
 
-    fn new(steps: ImageSteps<'a>, frame: FrameId, key: NoiseKey, planned_digest: Option<Digest>) -> Self {
+    fn new(steps: ImageSteps<'a>, frame: FrameId, source: FrameId, planned_digest: Option<Digest>) -> Self {
         Self {
             steps,
             frame,
-            key,
+            source,
             planned_digest,
             origin: None,
             size: None,
@@ -197,11 +196,17 @@ impl<'a> FrameWork<'a> {
         Ok(Arc::clone(self.clean_as_sent.insert(scaled)))
     }
 
+    /// The key of the noise of a degradation of this frame.
+    fn noise_key(&self, how: &Degradation) -> NoiseKey {
+        self.steps.recipe.noise_key(&self.source, &self.frame, how.draw())
+    }
+
     /// The parameters of a degradation for this frame.
     pub(crate) fn apply(&mut self, how: &Degradation) -> Result<AppliedDegradation> {
         let recipe = self.steps.recipe;
+        let key = self.noise_key(how);
         let view = if how.kind().has_motion() { self.view()? } else { FrameView::default() };
-        recipe.kinds.apply(how, view, &self.key).map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
+        recipe.kinds.apply(how, view, &key).map_err(|e| Error::data(format_args!("{} at {how}", self.frame), e))
     }
 
     /// The camera's exposure in a condition; `None` for a kind that leaves it open.
@@ -236,13 +241,14 @@ impl<'a> FrameWork<'a> {
         };
         let applied = self.apply(how)?;
         self.pixels()?;
-        let Self { steps, frame, key, pixels, exposures, degraded, .. } = self;
+        let key = self.noise_key(how);
+        let Self { steps, frame, pixels, exposures, degraded, .. } = self;
         if degraded.as_ref().is_some_and(|(cached, _)| cached != how) {
             *degraded = None;
         }
         let (_, image) = get_or_try_insert(degraded, || {
             let pixels = pixels.as_ref().ok_or_else(|| Error::data(&*frame, "the frame was not read"))?;
-            let image = steps.timings.time(TimedStep::Degrade, || exposures.degrade(pixels.into(), &applied, key));
+            let image = steps.timings.time(TimedStep::Degrade, || exposures.degrade(pixels.into(), &applied, &key));
             Ok((how.clone(), Arc::new(image)))
         })?;
         Ok(image)
@@ -331,15 +337,15 @@ impl<'a> FrameWork<'a> {
         Ok(facts)
     }
 
-    /// The steps of a photograph of the frame. Their noise key is never used, because a photograph is not degraded.
+    /// The steps of a photograph of the frame. They have no noise, because a photograph is not degraded.
     fn photograph_work(&mut self, name: &PhotoName) -> Result<&mut Self> {
         let planned = self.photographs[self.photograph_index(name)?].digest;
-        let (steps, of, key) = (self.steps, &self.frame, self.key);
+        let (steps, of, source) = (self.steps, &self.frame, &self.source);
         Ok(self.photograph_works.entry(name.clone()).or_insert_with(|| {
             let label = FrameId(format!("{of} ({name})"));
             Box::new(Self {
                 photograph: Some((of.clone(), name.clone())),
-                ..Self::new(steps, label, key, Some(planned))
+                ..Self::new(steps, label, source.clone(), Some(planned))
             })
         }))
     }

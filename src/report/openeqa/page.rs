@@ -242,6 +242,8 @@ fn results<'a>(report: &'a MarkedAnswers<'_>, subjects: &[&model_in_condition::M
                 question: number,
                 choices: 0,
                 truth: None,
+                combination: String::new(),
+                draw: 0,
             });
             for (subject, answers) in answers.iter().enumerate() {
                 let answer = answers.get(time).copied();

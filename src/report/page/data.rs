@@ -183,6 +183,17 @@ pub(crate) struct PageItem {
     pub(crate) choices: usize,
     /// Index of the true choice; `None` if the truth is unknown.
     pub(crate) truth: Option<usize>,
+    /// Wording, order and draw in words; empty for a run with one of each.
+    #[serde(skip_serializing_if = "String::is_empty")]
+    pub(crate) combination: String,
+    /// Draw of the noise; absent for the first.
+    #[serde(skip_serializing_if = "is_first")]
+    pub(crate) draw: u16,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_first(draw: &u16) -> bool {
+    *draw == 0
 }
 
 #[derive(Serialize)]

@@ -216,7 +216,7 @@ impl Strip {
             .items
             .iter()
             .enumerate()
-            .filter(|(_, item)| *item.asked.frame == *frame)
+            .filter(|(_, item)| *item.asked.frame == *frame && item.draw == 0)
             .map(|(index, _)| index)
             .rev()
             .max_by_key(|item| {
@@ -290,6 +290,7 @@ impl<'a> ImageRow<'a> {
     fn contains(&self, thumbnail: &Thumbnail, level: AxisLevel) -> bool {
         let condition = &thumbnail.condition;
         condition.level() == level
+            && condition.draw().unwrap_or(0) == 0
             && condition.enhancer.as_ref() == self.enhancer
             && (condition.variant() == self.variant || level == AxisLevel::L0)
     }

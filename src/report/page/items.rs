@@ -15,7 +15,7 @@ use crate::report::text::words::{self, family};
 use crate::types::{AxisLevel, Digest, FailureKind, Family, QuestionId, RunQuestion, TrialRef, UnreadReason};
 use darkqa_score::answers::confusion;
 use darkqa_score::choice::ParsingMode;
-use darkqa_score::grid::{Grid, TrialResult};
+use darkqa_score::grid::{Grid, GridItem, TrialResult};
 use darkqa_score::model_in_condition::ModelInCondition;
 
 /// Packs the data of the script as compressed JSON in base64.
@@ -78,6 +78,8 @@ fn data<'a>(
             question: number,
             choices: choices.index_of(asked.choices.as_slice()),
             truth: asked.truth,
+            combination: combination(item),
+            draw: item.draw,
         });
     }
     let (reasons, why) = reasons(grid);
@@ -104,6 +106,15 @@ fn data<'a>(
         requests,
         confusions: confusion_data(grid, confusions),
     }
+}
+
+/// Wording, order and draw of an item, as `terse, order 1, draw 2`; empty for the first order and draw of a run with one
+/// set of prompts. The numbers are those of the records.
+fn combination(item: &GridItem<'_>) -> String {
+    let wording = item.asked.key().wording.map(str::to_owned);
+    let order = (item.asked.order > 0).then(|| format!("order {}", item.asked.order));
+    let draw = (item.draw > 0).then(|| format!("draw {}", item.draw));
+    [wording, order, draw].into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
 /// The requests behind the replies; `None` if no reply came from an endpoint.
@@ -154,7 +165,7 @@ fn questions(grid: &Grid<'_>, inputs: &PageInputs<'_>) -> Result<RunQuestions> {
 /// Result codes with a row for each subject and a column for each item.
 fn codes(grid: &Grid<'_>, mode: ParsingMode) -> Vec<Vec<u8>> {
     (0..grid.subjects.len())
-        .map(|subject| (0..grid.items.len()).map(|item| code(grid.result(subject, item), mode)).collect())
+        .map(|subject| (0..grid.items.len()).map(|item| code(grid.compared_result(subject, item), mode)).collect())
         .collect()
 }
 
@@ -221,7 +232,7 @@ fn reasons(grid: &Grid<'_>) -> (Vec<String>, Vec<Vec<usize>>) {
     let mut indices = Vec::new();
     for subject in 0..grid.subjects.len() {
         let row = (0..grid.items.len())
-            .map(|item| reasons.index_of(NoAnswerReason::new(grid.trial(subject, item))))
+            .map(|item| reasons.index_of(NoAnswerReason::new(grid.compared_trial(subject, item))))
             .collect();
         indices.push(row);
     }
@@ -244,7 +255,7 @@ impl Replies {
         for subject in 0..grid.subjects.len() {
             let mut row = Vec::with_capacity(grid.items.len());
             for item in 0..grid.items.len() {
-                let text = match grid.trial(subject, item) {
+                let text = match grid.compared_trial(subject, item) {
                     None => String::new(),
                     Some(trial) => (inputs.texts)(trial.text())?,
                 };
@@ -369,7 +380,11 @@ fn answer_changes(grid: &Grid<'_>) -> Vec<AnswerChange> {
             continue;
         };
         for (item, change) in changes.iter_mut().enumerate() {
-            match [base, subject].map(|subject| is_right(grid, subject, item)) {
+            let right = grid.results([base, subject], item).map(|result| {
+                let answer = result.parsed(ParsingMode::Strict)?;
+                Some(grid.items[item].is_right(answer))
+            });
+            match right {
                 [Some(true), Some(false)] => *change = (*change).min(if_lost),
                 [Some(false), Some(true)] => *change = (*change).min(if_gained),
                 _ => {}
@@ -377,10 +392,4 @@ fn answer_changes(grid: &Grid<'_>) -> Vec<AnswerChange> {
         }
     }
     changes
-}
-
-/// True if a reply is right by strict parsing; `None` without a reply.
-fn is_right(grid: &Grid<'_>, subject: usize, item: usize) -> Option<bool> {
-    let answer = grid.result(subject, item).parsed(ParsingMode::Strict)?;
-    Some(grid.items[item].is_right(answer))
 }

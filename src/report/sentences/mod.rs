@@ -58,7 +58,7 @@ pub(crate) use sentence::{EffectDirection, Sentence, capitalised, level_runs, wi
 pub(crate) fn how_to_read(sentences: &[Sentence]) -> String {
     let has_variation = sentences.iter().any(|sentence| sentence.kind == "variation");
     let asked = if has_variation {
-        "the wordings and orders that were asked; the table of wordings and orders has intervals for others, too"
+        "the wordings, orders and draws that were asked; the table of their variation has intervals for others, too"
     } else {
         "one wording of the prompt, one order of the choices and one draw of the noise; how far others move the results is unknown"
     };

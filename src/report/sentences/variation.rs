@@ -1,13 +1,13 @@
-//! The sentence about wordings and orders: whether the change in the dark holds in all of them ([`variation`]).
+//! The sentence about wordings, orders and draws: whether the change in the dark holds in all of them ([`variation`]).
 
 use super::sentence::{EffectDirection, NamedNumbers, Sentence};
 use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
 use darkqa_score::variation::{DifferenceVariation, Facet, RunVariation};
 
-/// The change from L0 at the darkest level of the main variant: the number of combinations of wording and order with
+/// The change from L0 at the darkest level of the main variant: the number of combinations of wording, order and draw with
 /// its sign, and its range over the wordings. Of several models, it is about the one whose change depends most on them.
-/// `None` if every question was asked in one wording and one order.
+/// `None` if every question was asked in one wording, one order and one draw.
 pub(super) fn variation(findings: &Findings<'_>) -> Option<Sentence> {
     let found = findings.variation.as_ref()?;
     let main = findings.grid.main_variant()?;
@@ -39,11 +39,11 @@ pub(super) fn variation(findings: &Findings<'_>) -> Option<Sentence> {
     let at_light = wording_range(found, change).map_or_else(String::new, |wording| {
         format!("; at L0 the best wording is {} points above the worst", numbers.size("wording_at_L0", wording))
     });
-    let detail = format!("{interval} for other wordings and orders, too{at_light}");
+    let detail = format!("{interval} for other wordings, orders and draws, too{at_light}");
     Some(numbers.sentence("variation", EffectDirection::Note, text, detail))
 }
 
-/// How much a change depends on wordings and orders: the share of combinations with another sign, then the range over
+/// How much a change depends on wordings, orders and draws: the share of combinations with another sign, then the range over
 /// the wordings.
 fn dependence(row: &DifferenceVariation) -> (f64, f64) {
     let signs = row.found.signs;

@@ -366,14 +366,23 @@ pub(crate) fn write_flips(findings: &Findings<'_>, out: &mut dyn Write) -> Resul
 /// Part of the file: the rows of one curve for some items.
 fn part(findings: &Findings<'_>, failure: &FirstFailure, items: Range<usize>) -> Table {
     let grid = &findings.grid;
-    let rows = items.map(|item| (grid.items[item].asked, failure.first(grid, item)));
+    let rows = items
+        .filter(|item| failure.has_item(grid, *item))
+        .map(|item| (grid.items[item].asked, grid.items[item].draw, failure.first(grid, item)));
     let curve = &failure.curve;
-    TableBuilder::new("flips", rows)
-        .column(Text, "csv question", |(asked, _)| asked.question.to_string())
-        .column(Text, "csv frame", |(asked, _)| asked.frame.to_string())
-        .family(|(asked, _)| Some(&*asked.family))
-        .column(Count, "csv repeat", |(asked, _)| asked.repeat as usize)
+    let mut table = TableBuilder::new("flips", rows)
+        .column(Text, "csv question", |(asked, ..)| asked.question.to_string())
+        .column(Text, "csv frame", |(asked, ..)| asked.frame.to_string())
+        .family(|(asked, ..)| Some(&*asked.family))
+        .column(Count, "csv repeat", |(asked, ..)| asked.repeat as usize);
+    if findings.variation.is_some() {
+        table = table
+            .column(Text, "csv wording", |(asked, ..)| asked.key().wording.map(str::to_owned))
+            .column(Count, "csv order", |(asked, ..)| asked.order as usize)
+            .column(Count, "csv draw", |(_, draw, _)| usize::from(*draw));
+    }
+    table
         .curve(|_| (&curve.model, &curve.variant, curve.enhancer.as_ref()))
-        .column(Text, "csv first_failing", |(_, first)| first.map(|level| level.to_string()))
+        .column(Text, "csv first_failing", |(.., first)| first.map(|level| level.to_string()))
         .build()
 }

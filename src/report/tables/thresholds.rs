@@ -404,10 +404,10 @@ fn answers<'f>(findings: &'f Findings<'_>, variant: &Variant) -> BTreeMap<&'f Fr
         }
         for (index, item) in grid.items.iter().enumerate() {
             let is_right = |subject: usize| {
-                let answer = grid.result(subject, index).parsed(ParsingMode::Strict);
+                let answer = grid.compared_result(subject, index).parsed(ParsingMode::Strict);
                 answer.is_some_and(|choice| item.is_right(choice))
             };
-            if is_right(*clean) {
+            if failure.has_item(grid, index) && is_right(*clean) {
                 let answers = by_frame.entry(&*item.asked.frame).or_default();
                 answers.right += 1;
                 for (level, subject) in dark {

@@ -1,4 +1,4 @@
-//! Tables of a run that asked in several wordings or orders: where the variation comes from, and whether each
+//! Tables of a run that asked in several wordings, orders or draws: where the variation comes from, and whether each
 //! difference holds in all of them.
 
 use crate::report::text::table::ColumnKind::{Count, Points, Share, Text};
@@ -10,7 +10,7 @@ use darkqa_score::variation::{AccuracyVariation, Facet, FacetRange, RunVariation
 /// Id of the section on the page.
 pub(super) const VARIATION: &str = "variation";
 
-/// Builds the tables; none if every question was asked in one wording and one order.
+/// Builds the tables; none if every question was asked in one wording, one order and one draw.
 pub(super) fn variation(findings: &Findings<'_>) -> Vec<Table> {
     let Some(found) = &findings.variation else {
         return Vec::new();
@@ -26,53 +26,56 @@ fn components(found: &RunVariation) -> Table {
         .subject(|row| &row.subject, ToString::to_string)
         .column(Text, "terminal model", |row| row.subject.model.clone())
         .column(Text, "terminal condition", |row| row.subject.condition());
-    let sources = [
-        ("csv scene scene_low scene_high | page scene", Source::Scene),
-        ("csv question question_low question_high | terminal question | page question", Source::Question),
-        (
-            "csv wording wording_low wording_high | terminal wording | page wording [95 %]",
-            Source::Facet(Facet::Wording),
-        ),
-        ("csv order order_low order_high | terminal order | page order [95 %]", Source::Facet(Facet::Order)),
-        (
-            "csv question_wording question_wording_low question_wording_high | page question × wording",
-            Source::QuestionFacet(Facet::Wording),
-        ),
-        (
-            "csv question_order question_order_low question_order_high | page question × order",
-            Source::QuestionFacet(Facet::Order),
-        ),
-        ("csv combination combination_low combination_high", Source::Combination),
-        ("csv rest rest_low rest_high | terminal rest | page rest", Source::Rest),
-    ];
-    for (heads, source) in sources {
-        table = table.column(Share, heads, move |row| row.components.deviation(source));
+    for (source, csv, shown) in SOURCES {
+        let is_shown = match source {
+            Source::Facet(facet) | Source::QuestionFacet(facet) => found.levels(facet) > 1,
+            _ => true,
+        };
+        let mut heads = format!("csv {csv} {csv}_low {csv}_high");
+        if is_shown && !shown.is_empty() {
+            heads.push_str(shown);
+        }
+        table = table.column(Share, &*heads, move |row| row.components.deviation(source));
     }
-    let wording = "csv wording_range wording_range_low wording_range_high \
-                   | terminal best less worst wording, 95 % interval | page best less worst wording [95 %]";
-    // The page has room for one of the two.
-    let order = if found.wordings.is_empty() {
-        "csv order_range order_range_low order_range_high | page best less worst order [95 %]"
-    } else {
-        "csv order_range order_range_low order_range_high"
-    };
-    let table = table
-        .column(Points, wording, |row| range(row, Facet::Wording))
-        .column(Points, order, |row| range(row, Facet::Order));
+    // The page has room for one of them.
+    let widest = Facet::ALL.into_iter().find(|facet| found.levels(*facet) > 1);
+    for (facet, name) in [(Facet::Wording, "wording"), (Facet::Order, "order"), (Facet::Draw, "draw")] {
+        let mut heads = format!("csv {name}_range {name}_range_low {name}_range_high");
+        if widest == Some(facet) {
+            heads.push_str(&format!(
+                " | terminal best less worst {name}, 95 % interval | page best less worst {name} [95 %]"
+            ));
+        }
+        table = table.column(Points, &*heads, move |row| range(row, facet));
+    }
     let mut table = table.build();
     table.heading = Some(format!("Where the variation comes from ({}), in % of accuracy", found.asked()));
     table
 }
 
+/// Sources of variation, with the stem of their columns in the file and their heads in the terminal and on the page.
+const SOURCES: [(Source, &str, &str); 10] = [
+    (Source::Scene, "scene", " | page scene"),
+    (Source::Question, "question", " | terminal question | page question"),
+    (Source::Facet(Facet::Wording), "wording", " | terminal wording | page wording [95 %]"),
+    (Source::Facet(Facet::Order), "order", " | terminal order | page order [95 %]"),
+    (Source::Facet(Facet::Draw), "draw", " | terminal draw | page draw [95 %]"),
+    (Source::QuestionFacet(Facet::Wording), "question_wording", " | page question × wording"),
+    (Source::QuestionFacet(Facet::Order), "question_order", " | page question × order"),
+    (Source::QuestionFacet(Facet::Draw), "question_draw", " | page question × draw"),
+    (Source::Combination, "combination", ""),
+    (Source::Rest, "rest", " | terminal rest | page rest"),
+];
+
 fn range(row: &AccuracyVariation, facet: Facet) -> TableCell {
     row.ranges.iter().find(|range: &&FacetRange| range.facet == facet).map(|range| range.range).into()
 }
 
-/// Differences with intervals for other wordings and orders, and the combinations in which they hold.
+/// Differences with intervals for other wordings, orders and draws, and the combinations in which they hold.
 fn differences(found: &RunVariation) -> Table {
     let difference = "csv difference low high | terminal difference, 95 % interval | page difference [95 %]";
     let mut table = TableBuilder::new("variation_differences", &found.differences)
-        .page(VARIATION, "Does each difference hold in other wordings and orders?")
+        .page(VARIATION, "Does each difference hold in other wordings, orders and draws?")
         .column(Text, "csv kind | page kind", |row| row.kind.name())
         .column(Text, "csv model | terminal model | page model", |row| row.first.model.clone())
         .column(Text, "csv condition | terminal condition | page condition", |row| row.first.condition())
@@ -89,7 +92,7 @@ fn differences(found: &RunVariation) -> Table {
             format!("{} of {}", row.found.signs.same, row.found.signs.of)
         })
         .build();
-    table.heading = Some("Differences, with intervals for other wordings and orders too".to_owned());
+    table.heading = Some("Differences, with intervals for other wordings, orders and draws too".to_owned());
     if let Some(ranks) = found.ranks {
         let [value, low, high] = [ranks.value, ranks.low, ranks.high].map(|value| format!("{value:.2}"));
         table.foot = Some(format!(

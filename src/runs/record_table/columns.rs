@@ -18,7 +18,9 @@ use crate::store::Presence::{self, Always, MayBeNull};
 use crate::store::{Cell, Column, each_record};
 use crate::types::flags::read_word;
 use crate::types::manifests::{RecordedNames, RunManifest};
-use crate::types::{ChoiceDetail, Failure, Finish, OpenDetail, ParsedAnswer, Record, RunQuestion, Step, Usage};
+use crate::types::{
+    ChoiceDetail, Condition, Failure, Finish, OpenDetail, ParsedAnswer, Record, RunQuestion, Step, Usage,
+};
 use darkqa_score::choice::llm_match::{Protocol, mark};
 use darkqa_score::open::AnswerOutcome;
 
@@ -131,10 +133,18 @@ impl TableDetail for ChoiceDetail {
     type Extra = ();
 
     fn columns() -> Vec<Column<RecordRow<Self>>> {
-        let own = vec![column("shown_frame", Text, MayBeNull, |row: &RecordRow<Self>| {
-            let shown = row.record.detail.shown_frame.as_ref();
-            Cell::text(shown.map(|frame| &*frame.0))
-        })];
+        let own = vec![
+            column("shown_frame", Text, MayBeNull, |row: &RecordRow<Self>| {
+                let shown = row.record.detail.shown_frame.as_ref();
+                Cell::text(shown.map(|frame| &*frame.0))
+            }),
+            column("wording", Text, MayBeNull, |row| Cell::text(row.record.detail.wording.as_deref())),
+            column("order", Int32, MayBeNull, |row| Cell::int(Some(row.record.detail.order))),
+            column("draw", Int32, MayBeNull, |row| {
+                let draw = row.record.condition.as_ref().and_then(Condition::draw);
+                Cell::int(Some(draw.unwrap_or(0)))
+            }),
+        ];
         let parts = [
             leading_columns(),
             question_columns(),
@@ -182,8 +192,6 @@ fn question_columns() -> Vec<Column<ChoiceRow>> {
         column("truth", Int8, MayBeNull, |row: &ChoiceRow| Cell::int(row.record.detail.truth)),
         column("choice_count", Int8, Always, |row| Cell::int(Some(row.record.detail.choices.len()))),
         column("repeat", Int32, MayBeNull, |row| Cell::int(Some(row.record.detail.repeat))),
-        column("wording", Text, MayBeNull, |row| Cell::text(row.record.detail.wording.as_deref())),
-        column("order", Int32, MayBeNull, |row| Cell::int(Some(row.record.detail.order))),
         column("answer", Text, MayBeNull, |row| choice_text(row, row.record.detail.truth)),
         column("choices", Text, Always, |row| {
             let choices = serde_json::to_string(&row.record.detail.choices);

@@ -308,7 +308,7 @@ pub fn shared_items(grid: &Grid<'_>) -> Vec<bool> {
         }
         let replied = models.entry(&subject.model).or_insert_with(|| vec![false; grid.items.len()]);
         for (item, replied) in replied.iter_mut().enumerate() {
-            *replied |= grid.result(index, item).is_reply();
+            *replied |= grid.compared_result(index, item).is_reply();
         }
     }
     models.retain(|_, replied| replied.contains(&true));

@@ -236,12 +236,18 @@ pub(crate) fn first_failures(grid: &Grid<'_>) -> Vec<FirstFailure> {
 }
 
 impl FirstFailure {
+    /// True if an item of the grid was asked on the curve.
+    #[must_use]
+    pub fn has_item(&self, grid: &Grid<'_>, item: usize) -> bool {
+        grid.has_item(self.curve.subjects.iter().map(|(_, subject)| *subject), item)
+    }
+
     /// First level at which an item of the grid is not answered correctly. `None` if no level fails, or if an earlier
     /// level has no reply.
     #[must_use]
     pub fn first(&self, grid: &Grid<'_>, item: usize) -> Option<AxisLevel> {
         for &(level, subject) in &self.curve.subjects {
-            let chosen = grid.result(subject, item).parsed(ParsingMode::Strict)?;
+            let chosen = grid.compared_result(subject, item).parsed(ParsingMode::Strict)?;
             if !grid.items[item].is_right(chosen) {
                 return Some(level);
             }

@@ -107,7 +107,11 @@ impl LevelCoverage {
                 .into_iter()
                 .map(|(level, subjects)| {
                     let items = (0..grid.items.len())
-                        .map(|item| is_about(item) && subjects.iter().all(|side| grid.result(*side, item).is_reply()))
+                        .map(|item| {
+                            is_about(item)
+                                && grid.has_item(subjects.iter().copied(), item)
+                                && subjects.iter().all(|side| grid.compared_result(*side, item).is_reply())
+                        })
                         .collect();
                     (level, items)
                 })

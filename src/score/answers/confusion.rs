@@ -139,7 +139,7 @@ impl AgainstClean {
             if !item.is_in_family(Some(family)) {
                 continue;
             }
-            let [a, b] = [subject, clean].map(|side| grid.result(side, index).parsed(ParsingMode::Strict));
+            let [a, b] = grid.results([subject, clean], index).map(|result| result.parsed(ParsingMode::Strict));
             let (Some(a), Some(b)) = (a, b) else { continue };
             for given in [a, b].into_iter().flatten() {
                 if let Some(text) = item.asked.choices.get(usize::from(given)) {

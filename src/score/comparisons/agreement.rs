@@ -80,7 +80,7 @@ fn agreement(grid: &Grid<'_>, first: usize, second: usize) -> Option<Agreement> 
     let mut same = vec![ClusterCount::default(); grid.clusters];
     let mut counts = vec![AgreementCounts::default(); grid.clusters];
     for (index, item) in grid.items.iter().enumerate() {
-        let [a, b] = [first, second].map(|subject| grid.result(subject, index).parsed(ParsingMode::Strict));
+        let [a, b] = grid.results([first, second], index).map(|result| result.parsed(ParsingMode::Strict));
         let (Some(a), Some(b)) = (a, b) else {
             continue;
         };

@@ -52,7 +52,7 @@ pub fn baseline_rows(
         .filter_map(|&(new, old)| {
             let has_other_image: Vec<bool> = (0..grid.items.len())
                 .map(|item| {
-                    let [new, old] = [new, old].map(|subject| grid.trial(subject, item)?.sent_digest());
+                    let [new, old] = [new, old].map(|subject| grid.compared_trial(subject, item)?.sent_digest());
                     new.zip(old).is_some_and(|(new, old)| new != old)
                 })
                 .collect();

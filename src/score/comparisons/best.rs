@@ -355,12 +355,16 @@ impl CommonScores {
             all_clusters: grid.clusters,
         };
         for (index, item) in grid.items.iter().enumerate() {
-            let is_asked = |levels: &Vec<usize>| levels.iter().all(|subject| grid.result(*subject, index).is_asked());
+            if !grid.has_item(subjects.iter().flatten().copied(), index) {
+                continue;
+            }
+            let is_asked =
+                |levels: &Vec<usize>| levels.iter().all(|subject| grid.compared_result(*subject, index).is_asked());
             let right = subjects.iter().map(|levels| {
                 levels
                     .iter()
                     .map(|subject| {
-                        let reading = grid.result(*subject, index).parsed(mode);
+                        let reading = grid.compared_result(*subject, index).parsed(mode);
                         reading.map(|chosen| item.is_right(chosen))
                     })
                     .collect()
@@ -371,7 +375,7 @@ impl CommonScores {
                 blind: blind
                     .iter()
                     .map(|subject| {
-                        let reading = grid.result((*subject)?, index).parsed(mode)?;
+                        let reading = grid.compared_result((*subject)?, index).parsed(mode)?;
                         Some(item.is_right(reading))
                     })
                     .collect(),

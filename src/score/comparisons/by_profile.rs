@@ -344,10 +344,10 @@ impl SharedItems {
         let subjects: BTreeSet<usize> = pairs.iter().flatten().flat_map(|(first, second)| [*first, *second]).collect();
         let mut shared = Self { answered: Vec::new(), missing: Vec::new(), dropped: 0 };
         for (index, item) in grid.items.iter().enumerate() {
-            if !item.is_in_family(family) {
+            if !item.is_in_family(family) || !grid.has_item(subjects.iter().copied(), index) {
                 continue;
             }
-            let mut results = subjects.iter().map(|subject| grid.result(*subject, index));
+            let mut results = subjects.iter().map(|subject| grid.compared_result(*subject, index));
             if results.clone().all(TrialResult::is_reply) {
                 shared.answered.push(index);
             } else if results.clone().all(TrialResult::is_asked) {
@@ -370,7 +370,7 @@ impl SharedItems {
             let item = &grid.items[index];
             net_bounds(pairs.iter().map(|(first, second)| {
                 [*first, *second].map(|subject| {
-                    let reading = grid.result(subject, index).parsed(ParsingMode::Strict);
+                    let reading = grid.compared_result(subject, index).parsed(ParsingMode::Strict);
                     reading.map(|chosen| item.is_right(chosen))
                 })
             }))

@@ -78,7 +78,7 @@ impl PairedComparison {
             if !has(index, item) {
                 continue;
             }
-            let results = [first, second].map(|subject| grid.result(subject, index));
+            let results = grid.results([first, second], index);
             let counts = results.map(|result| {
                 let chosen = result.parsed(mode)?;
                 Some(counts(item, chosen))

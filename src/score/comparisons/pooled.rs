@@ -316,7 +316,7 @@ fn items(grid: &Grid<'_>, set: &PooledFamily, models: &[[&str; 2]], level: AxisL
             let mut is_asked = false;
             let mut state = PooledState::Answered;
             for &(first, second) in &pairs {
-                let results = [first, second].map(|subject| grid.result(subject, index));
+                let results = grid.results([first, second], index);
                 let is_asked_on_both = results.iter().all(|result| result.is_asked());
                 is_asked |= is_asked_on_both;
                 let has_reply = results.iter().any(|result| result.is_reply());

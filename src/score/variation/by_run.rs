@@ -1,6 +1,8 @@
-//! Variation of the results of a run that asked in several wordings or orders: [`RunVariation`].
+//! Variation of the results of a run that asked in several wordings, orders or draws: [`RunVariation`].
 
-use super::{Components, Facet, FacetRange, FacetedDifference, Observation, facet_ranges, paired, rank_agreement};
+use std::collections::BTreeSet;
+
+use super::{Components, Facet, FacetRange, FacetedDifference, Observation, facet_ranges, rank_agreement};
 use crate::choice::ParsingMode;
 use crate::comparisons::{Comparison, ComparisonKind};
 use crate::estimate::Estimate;
@@ -8,13 +10,16 @@ use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, is_reference};
 use darkqa_base::types::text::counted;
 
-/// How far wordings of the prompt and orders of the choices move the results of a run, in the strict parsing.
+/// How far wordings of the prompt, orders of the choices and draws of the noise move the results of a run, in the strict
+/// parsing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunVariation {
     /// Names of the wordings, sorted; empty if there is one.
     pub wordings: Vec<String>,
     /// Number of orders of the choices; 1 if each question has one.
     pub orders: usize,
+    /// Number of draws of the noise.
+    pub draws: usize,
     /// Accuracy of each subject.
     pub accuracies: Vec<AccuracyVariation>,
     /// Differences over all families, in the order of the comparisons.
@@ -29,7 +34,7 @@ pub struct RunVariation {
 pub struct AccuracyVariation {
     pub subject: ModelInCondition,
     pub components: Components,
-    /// How far apart the wordings and the orders are.
+    /// How far apart the levels of each facet are.
     pub ranges: Vec<FacetRange>,
 }
 
@@ -54,24 +59,35 @@ impl DifferenceVariation {
 }
 
 impl RunVariation {
-    /// Wordings and orders in words: `3 wordings, 2 orders`.
+    /// Number of levels of a facet.
     #[must_use]
-    pub fn asked(&self) -> String {
-        format!("{}, {}", counted(self.wordings.len().max(1), "wording"), counted(self.orders, "order"))
+    pub fn levels(&self, facet: Facet) -> usize {
+        match facet {
+            Facet::Wording => self.wordings.len().max(1),
+            Facet::Order => self.orders,
+            Facet::Draw => self.draws,
+        }
     }
 
-    /// Computes the variation; `None` if every question was asked in one wording and one order.
+    /// Wordings, orders and draws in words: `3 wordings, 2 orders, 1 draw`.
+    #[must_use]
+    pub fn asked(&self) -> String {
+        let of = |facet, one| counted(self.levels(facet), one);
+        [of(Facet::Wording, "wording"), of(Facet::Order, "order"), of(Facet::Draw, "draw")].join(", ")
+    }
+
+    /// Computes the variation; `None` if every question was asked in one wording, one order and one draw.
     #[must_use]
     pub fn new(grid: &Grid<'_>, comparisons: &[Comparison]) -> Option<Self> {
-        let mut wordings: Vec<&str> = grid.items.iter().filter_map(|item| item.asked.key().wording).collect();
-        wordings.sort_unstable();
-        wordings.dedup();
+        let wordings: BTreeSet<&str> = grid.items.iter().filter_map(|item| item.asked.key().wording).collect();
         let orders = grid.items.iter().map(|item| item.asked.order as usize + 1).max().unwrap_or(1);
-        if wordings.len() < 2 && orders < 2 {
+        let draws = grid.items.iter().map(|item| usize::from(item.draw) + 1).max().unwrap_or(1);
+        if wordings.len() < 2 && orders < 2 && draws < 2 {
             return None;
         }
+        let places = places(grid, &wordings);
         let observations: Vec<Vec<Observation>> =
-            (0..grid.subjects.len()).map(|subject| observations(grid, &wordings, subject)).collect();
+            (0..grid.subjects.len()).map(|subject| observations(grid, &places, subject)).collect();
         let accuracies = grid.subjects.iter().zip(&observations).filter(|(_, replies)| !replies.is_empty());
         let accuracies = accuracies.map(|(subject, replies)| AccuracyVariation {
             subject: subject.clone(),
@@ -80,9 +96,8 @@ impl RunVariation {
         });
         let differences =
             comparisons.iter().filter(|comparison| comparison.family.is_none()).filter_map(|comparison| {
-                let [first, second] = [&comparison.first, &comparison.second]
-                    .map(|side| grid.find(side).map(|index| &observations[index]));
-                let pairs = paired(first?, second?);
+                let [first, second] = [&comparison.first, &comparison.second].map(|side| grid.find(side));
+                let pairs = pairs(grid, &places, [first?, second?]);
                 Some(DifferenceVariation {
                     kind: comparison.kind,
                     first: comparison.first.clone(),
@@ -93,6 +108,7 @@ impl RunVariation {
             });
         Some(Self {
             orders,
+            draws,
             accuracies: accuracies.collect(),
             differences: differences.collect(),
             ranks: ranks(grid, &observations),
@@ -101,30 +117,48 @@ impl RunVariation {
     }
 }
 
-/// The replies of a subject.
-fn observations(grid: &Grid<'_>, wordings: &[&str], subject: usize) -> Vec<Observation> {
-    let mut observations = Vec::new();
+/// The place of each item in the design, with a value of 0.
+fn places(grid: &Grid<'_>, wordings: &BTreeSet<&str>) -> Vec<Observation> {
     let mut question = 0;
+    let mut places = Vec::with_capacity(grid.items.len());
     for (index, item) in grid.items.iter().enumerate() {
         // Items are sorted by frame and question.
         if index > 0 && grid.items[index - 1].asked.question != item.asked.question {
             question += 1;
         }
-        let Some(chosen) = grid.result(subject, index).parsed(ParsingMode::Strict) else {
-            continue;
-        };
-        let wording = item.asked.key().wording.and_then(|name| wordings.binary_search(&name).ok()).unwrap_or(0);
-        observations.push(Observation {
+        let wording = item.asked.key().wording.and_then(|name| wordings.iter().position(|other| *other == name));
+        places.push(Observation {
             question,
             scene: item.cluster,
-            wording: wording as u16,
+            wording: wording.unwrap_or(0) as u16,
             order: item.asked.order as u16,
-            draw: 0,
+            draw: item.draw,
             repeat: item.asked.repeat as u16,
-            value: f64::from(u8::from(item.is_right(chosen))),
+            value: 0.0,
         });
     }
-    observations
+    places
+}
+
+/// The replies of a subject.
+fn observations(grid: &Grid<'_>, places: &[Observation], subject: usize) -> Vec<Observation> {
+    let replies = places.iter().enumerate().filter_map(|(index, place)| {
+        let chosen = grid.result(subject, index).parsed(ParsingMode::Strict)?;
+        Some(Observation { value: f64::from(u8::from(grid.items[index].is_right(chosen))), ..*place })
+    });
+    replies.collect()
+}
+
+/// The differences of two subjects on the items to which both replied.
+fn pairs(grid: &Grid<'_>, places: &[Observation], subjects: [usize; 2]) -> Vec<Observation> {
+    let pairs = places.iter().enumerate().filter_map(|(index, place)| {
+        let [first, second] = grid.results(subjects, index).map(|result| {
+            let chosen = result.parsed(ParsingMode::Strict)?;
+            Some(f64::from(u8::from(grid.items[index].is_right(chosen))))
+        });
+        Some(Observation { value: first? - second?, ..*place })
+    });
+    pairs.collect()
 }
 
 /// Mean difference in each wording with pairs.
@@ -168,7 +202,7 @@ mod tests {
         let mut records = records(model, condition, answers);
         for record in &mut records {
             record.detail.wording = Some(wording.to_owned());
-            record.key = Digest::from_bytes(format!("{wording} {:?}", record.key).as_bytes()).into();
+            record.key = Digest::from_bytes(format!("{wording} {}", record.key).as_bytes()).into();
         }
         records
     }
@@ -197,7 +231,7 @@ mod tests {
             run.unwrap()
         };
         let found = of([half, right]);
-        assert_eq!((&*found.asked(), found.ranks), ("2 wordings, 1 order", None));
+        assert_eq!((&*found.asked(), found.ranks), ("2 wordings, 1 order, 1 draw", None));
         let loss = &found.differences[0];
         assert_eq!((loss.found.difference.value, loss.by_wording()), (-0.25, Some([-0.5, 0.0])));
         assert_eq!((loss.found.signs.same, loss.found.signs.of), (1, 2));
@@ -210,6 +244,28 @@ mod tests {
         let loss = &control.differences[0];
         assert_eq!((loss.found.signs.same, loss.by_wording()), (2, Some([-0.5, -0.5])));
         assert!(wording(&control, 1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_reply_in_the_light_is_compared_with_each_draw_and_counts_once() {
+        let run = [
+            records("m", "L0", |_| Some(true)),
+            records("m", "L5-noise", |item| Some(item % 2 == 0)),
+            records("m", "L5-noise~1", |_| Some(true)),
+        ];
+        with_grid(&run.concat(), |grid| {
+            let found = RunVariation::new(grid, &comparisons(grid)).unwrap();
+            assert_eq!(&*found.asked(), "1 wording, 1 order, 2 draws");
+            let loss = &found.differences[0];
+            let [light, dark] = [&loss.second, &loss.first].map(|side| grid.find(side).unwrap());
+            let counted =
+                |subject| grid.counts(subject, None, ParsingMode::Strict).iter().map(|one| one.replies).sum::<u32>();
+            assert_eq!(counted(dark), 2 * counted(light));
+            assert_eq!(loss.found.difference.n as u32, counted(dark));
+            assert_eq!((loss.found.difference.value, loss.found.signs.same, loss.found.signs.of), (-0.25, 1, 2));
+            assert!(found.accuracies[dark].components.deviation(Source::Facet(Facet::Draw)).unwrap().value > 0.2);
+            assert_eq!(found.accuracies[light].components.deviation(Source::Facet(Facet::Draw)), None);
+        });
     }
 
     #[test]

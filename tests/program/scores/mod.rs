@@ -2,6 +2,7 @@
 
 mod confidence;
 mod coverage;
+mod draws;
 mod fair;
 mod fidelity;
 mod flattered;

@@ -57,9 +57,9 @@ impl fmt::Display for EnhancerName {
 
 /// A treatment with or without an enhancer: the state in which a frame is shown.
 ///
-/// It is written `LABEL-KIND[@READING][+ENHANCER]` or `L0[+ENHANCER]`; a photograph in the dark is `NAME[+ENHANCER]`,
-/// and a synthetic image that is as dark as it is `match-KIND[@READING][+ENHANCER]`. READING is a noise profile. `&` is
-/// reserved for several degradations in sequence.
+/// It is written `LABEL-KIND[@READING][~DRAW][+ENHANCER]` or `L0[+ENHANCER]`; a photograph in the dark is `NAME[+ENHANCER]`,
+/// and a synthetic image that is as dark as it is `match-KIND[@READING][+ENHANCER]`. READING is a noise profile, DRAW the number
+/// of a draw of the noise after the first. `&` is reserved for several degradations in sequence.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
     /// Treatment of the frame before it is enhanced.
@@ -96,6 +96,12 @@ impl Condition {
     #[must_use]
     pub fn photograph(&self) -> Option<&PhotoName> {
         self.pair().and_then(PairDark::photograph)
+    }
+
+    /// The draw of the noise, from 0; `None` for images without drawn noise.
+    #[must_use]
+    pub fn draw(&self) -> Option<u16> {
+        self.degradation().filter(|how| how.kind().has_noise()).map(Degradation::draw)
     }
 
     /// The value of the column `level`.
@@ -436,6 +442,9 @@ pub struct ConditionColumns<'a> {
     pub reading: Option<&'a ProfileName>,
     /// The enhancer; `None` for a raw image.
     pub enhancer: Option<&'a EnhancerName>,
+    /// The draw of the noise after the first; `None` for the first, and for images without drawn noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub draw: Option<u16>,
 }
 
 impl<'a> ConditionColumns<'a> {
@@ -461,6 +470,7 @@ impl<'a> ConditionColumns<'a> {
                 .and_then(Degradation::reading)
                 .or_else(|| condition.and_then(Condition::pair).and_then(PairDark::reading)),
             enhancer: condition.and_then(|condition| condition.enhancer.as_ref()),
+            draw: condition.and_then(Condition::draw).filter(|draw| *draw > 0),
         }
     }
 }
@@ -519,6 +529,9 @@ mod tests {
             "L3-noise@physical",
             "E3.3-noise@eld+zerodce",
             "E0.01-noise@my-own.reading_2+a",
+            "L5-noise~1",
+            "L5-auto~12",
+            "L5-noise@eld~2+zerodce",
             "dark",
             "dark-2+zero-dce.v2",
             "match-noise@eld",
@@ -544,6 +557,10 @@ mod tests {
             ("L3-noise@paper", "without its name"),
             ("L3-noise@", "not a valid name of a noise profile"),
             ("L3-noise@a&b", "not a valid name of a noise profile"),
+            ("L3-noise~0", "not a number from 1"),
+            ("L3-noise~01", "not a number from 1"),
+            ("L3-noise~", "not a number from 1"),
+            ("L3-ev~1", "ev has no noise"),
             ("E6-noise", "is written L3"),
             ("E3.30-ev", "is written E3.3"),
             ("E3.333-ev", "two decimals"),

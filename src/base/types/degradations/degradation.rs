@@ -13,7 +13,8 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use crate::error::Error;
 use crate::types::text::words::written_as_text;
 
-/// A kind of degradation at one severity, in one noise profile ("reading") if the kind has several.
+/// A kind of degradation at one severity, in one noise profile ("reading") if the kind has several, and in one draw of
+/// the noise.
 ///
 /// The untouched frame, L0, is not a degradation: it is the `None` of an `Option`.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -21,6 +22,7 @@ pub struct Degradation {
     severity: Severity,
     kind: Kind,
     reading: Option<ProfileName>,
+    draw: u16,
 }
 
 impl Degradation {
@@ -48,7 +50,13 @@ impl Degradation {
             return Err(Error::usage("condition", problem));
         }
         let reading = reading.or_else(|| kind.has_profiles().then_some(ProfileName::PAPER));
-        Ok(Self { severity, kind, reading })
+        Ok(Self { severity, kind, reading, draw: 0 })
+    }
+
+    /// The same degradation with another draw of the noise, counted from 0; unchanged for a kind without noise.
+    #[must_use]
+    pub fn with_draw(self, draw: u16) -> Self {
+        Self { draw: if self.kind.has_noise() { draw } else { 0 }, ..self }
     }
 
     /// The kind of degradation, as exposure drop or noise.
@@ -69,6 +77,12 @@ impl Degradation {
         self.reading.as_ref()
     }
 
+    /// The draw of the noise, from 0. Draw `n` is made with the seed of the run plus `n`.
+    #[must_use]
+    pub fn draw(&self) -> u16 {
+        self.draw
+    }
+
     /// The name of the severity: `L3`, or `E3.3` for 3.3 EV.
     #[must_use]
     pub fn label(&self) -> String {
@@ -77,9 +91,10 @@ impl Degradation {
 }
 
 impl Ord for Degradation {
-    /// Compares axis, severity, kind and noise profile.
+    /// Compares axis, severity, kind, noise profile and draw.
     fn cmp(&self, other: &Self) -> Ordering {
-        let [one, two] = [self, other].map(|how| (how.kind.first_of_axis(), how.severity, how.kind, &how.reading));
+        let [one, two] =
+            [self, other].map(|how| (how.kind.first_of_axis(), how.severity, how.kind, &how.reading, how.draw));
         one.cmp(&two)
     }
 }
@@ -93,10 +108,10 @@ impl PartialOrd for Degradation {
 impl fmt::Display for Degradation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}-{}", self.label(), self.kind)?;
-        match &self.reading {
-            Some(reading) if *reading != ProfileName::PAPER => write!(f, "@{reading}"),
-            _ => Ok(()),
+        if let Some(reading) = self.reading.as_ref().filter(|reading| **reading != ProfileName::PAPER) {
+            write!(f, "@{reading}")?;
         }
+        if self.draw > 0 { write!(f, "~{}", self.draw) } else { Ok(()) }
     }
 }
 
@@ -104,8 +119,12 @@ impl FromStr for Degradation {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self, Error> {
-        let (plain, reading) = match text.split_once('@') {
-            None => (text, None),
+        let (first, draw) = match text.split_once('~') {
+            None => (text, 0),
+            Some((first, number)) => (first, draw(number).map_err(|problem| syntax_error(text, problem))?),
+        };
+        let (plain, reading) = match first.split_once('@') {
+            None => (first, None),
             Some((plain, reading)) => (plain, Some(ProfileName::new(reading)?)),
         };
         let (label, word) = plain.split_once('-').ok_or_else(|| syntax_error(text, "not of that form"))?;
@@ -115,13 +134,22 @@ impl FromStr for Degradation {
             let problem = "the reading paper is written without its name";
             return Err(syntax_error(text, problem));
         }
+        if draw > 0 && !kind.has_noise() {
+            return Err(syntax_error(text, format_args!("{kind} has no noise, and no draws")));
+        }
         let severity = kind.severity(label).map_err(|e| syntax_error(text, e))?;
-        Self::new(kind, severity, reading)
+        Ok(Self::new(kind, severity, reading)?.with_draw(draw))
     }
 }
 
+/// The number of a draw after the first, as it is written.
+fn draw(number: &str) -> Result<u16, &'static str> {
+    let draw: Option<u16> = number.parse().ok().filter(|draw| *draw > 0);
+    draw.filter(|draw| draw.to_string() == number).ok_or("the draw after ~ is not a number from 1")
+}
+
 fn syntax_error(text: &str, problem: impl fmt::Display) -> Error {
-    let form = "the form is L0, L3-ev, L3-noise, E3.3-noise, L3-noise@READING or T33.33-motion";
+    let form = "the form is L0, L3-ev, L3-noise, E3.3-noise, L3-noise@READING, L3-noise~DRAW or T33.33-motion";
     Error::usage("condition", format_args!("{text:?}: {problem}; {form}"))
 }
 

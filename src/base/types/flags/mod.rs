@@ -47,7 +47,7 @@ pub struct KeyedSetting {
 }
 
 /// All keyed flags. A command has a keyed flag if it has hidden flags for any of the keys.
-pub const KEYED_FLAGS: [KeyedFlag; 14] = [
+pub const KEYED_FLAGS: [KeyedFlag; 15] = [
     KeyedFlag {
         name: "noise",
         heading: "Light",
@@ -62,6 +62,7 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
             ("tone", "tone"),
             ("draws", "draws"),
             ("coupling", "coupling"),
+            ("seeds", "noise-seeds"),
         ],
     },
     KeyedFlag {
@@ -96,6 +97,13 @@ pub const KEYED_FLAGS: [KeyedFlag; 14] = [
         about: "Order of the choices; default: as in the data",
         alone: Some("1"),
         keys: &[("shuffle", "shuffle-options"), ("circular", "circular")],
+    },
+    KeyedFlag {
+        name: "repeats",
+        heading: "Data",
+        about: "",
+        alone: None,
+        keys: &[("", "repeats"), ("design", "design")],
     },
     KeyedFlag {
         name: "ask",

@@ -84,12 +84,18 @@ impl Recipe {
         Self { scaling: walk.side, degraded_at: walk.degraded_at, camera_scope: walk.camera, ..self }
     }
 
-    /// The key that seeds the noise of a frame.
-    pub(crate) fn noise_key(&self, source: &FrameId, frame: &FrameId) -> NoiseKey {
-        let own = NoiseKey::new(self.seed, frame);
+    /// The seed of a draw of the noise: draw `n` has the images that a run with the next but `n` seed would have.
+    pub(crate) fn seed(&self, draw: u16) -> u64 {
+        self.seed.wrapping_add(u64::from(draw))
+    }
+
+    /// The key of a draw of the noise of a frame.
+    pub(crate) fn noise_key(&self, source: &FrameId, frame: &FrameId, draw: u16) -> NoiseKey {
+        let seed = self.seed(draw);
+        let own = NoiseKey::new(seed, frame);
         match self.camera_scope {
             CameraScope::Frame => own,
-            CameraScope::Episode => own.with_camera_of(&NoiseKey::new(self.seed, source)),
+            CameraScope::Episode => own.with_camera_of(&NoiseKey::new(seed, source)),
         }
     }
 
@@ -183,7 +189,8 @@ impl Recipe {
                 for condition in enhanced {
                     let how = frame.degradation(condition)?;
                     let applied = how.as_ref().map(|how| self.apply(&source.name, frame, how)).transpose()?;
-                    let key = self.noise_key(&source.name, &frame.id);
+                    let draw = how.as_ref().map_or(0, Degradation::draw);
+                    let key = self.noise_key(&source.name, &frame.id, draw);
                     images.push(DarkImage {
                         frame,
                         condition,
@@ -194,7 +201,7 @@ impl Recipe {
                             how.as_ref(),
                             applied.as_ref(),
                             &key,
-                            self.seed,
+                            self.seed(draw),
                         ),
                     });
                 }
@@ -204,7 +211,7 @@ impl Recipe {
     }
 
     fn apply(&self, source: &FrameId, frame: &SourceFrame, how: &Degradation) -> Result<AppliedDegradation> {
-        let key = self.noise_key(source, &frame.id);
+        let key = self.noise_key(source, &frame.id, how.draw());
         let view = self.view(frame.size, frame.focal);
         self.kinds.apply(how, view, &key).map_err(|e| Error::data(format_args!("{} at {how}", frame.id), e))
     }
@@ -224,7 +231,7 @@ impl Recipe {
             severity: how.severity(),
             version: darkqa_light::version(kind),
             reading: applied.synthesis().cloned(),
-            seed: is_random.then_some(self.seed),
+            seed: is_random.then(|| self.seed(how.draw())),
             frame: is_random.then_some(&frame.id),
             camera_of: shares_camera.then_some(source),
             exposure: applied.exposure(),

@@ -46,7 +46,14 @@ const toTheObject = () => {
   show();
 };
 
-const pictures = (question) => {
+// The name of a condition in a draw of the noise, as L5-noise~1+zerodce; itself if its noise is not drawn.
+const drawn = (kept, condition, draw) => {
+  const [light, ...enhancer] = condition.split("+");
+  const hasDraws = Object.keys(kept).some((name) => name.startsWith(light + "~"));
+  return hasDraws && draw ? [light + "~" + draw, ...enhancer].join("+") : condition;
+};
+
+const pictures = (question, draw = 0) => {
   const kept = data.thumbnails[question.frame], box = $("i-images");
   box.replaceChildren();
   const there = everyLevel();
@@ -64,14 +71,14 @@ const pictures = (question) => {
   $("i-boxes").parentElement.hidden = !outlines.length;
   const conditions = unique(data.subjects.filter((s) => s.level === level).map((s) => s.condition));
   for (const condition of level === "L0" ? conditions : ["L0", ...conditions]) {
-    const image = kept[condition];
+    const name = drawn(kept, condition, draw), image = kept[name];
     if (!image) continue;
     const figure = make("figure"), frame = make("div", undefined, "frame"), whole = make("img", undefined, "whole"), crop = make("img", undefined, "crop");
     whole.src = image.small;
     whole.draggable = false;
     // Of a walk, small copies of all frames, or of many the one in the middle.
     const walk = isOpen() ? ", frames of the walk (of many, that in the middle)" : "";
-    whole.alt = condition + " of " + data.frames[question.frame] + walk;
+    whole.alt = name + " of " + data.frames[question.frame] + walk;
     frame.append(whole);
     for (const at of $("i-boxes").checked ? outlines : []) {
       const outline = make("span", undefined, "box");
@@ -84,7 +91,7 @@ const pictures = (question) => {
     const part = object ? "the thing asked about" : isOpen() ? "the middle of the middle one" : "its middle";
     crop.alt = part + ", " + whole.alt;
     const gain = image.stops > 0 ? "light × " + Math.round(2 ** image.stops) + " (" + image.stops + " EV)" : "as it is";
-    figure.append(frame, crop, make("figcaption", condition + walk + "; below, " + part + ", " + gain));
+    figure.append(frame, crop, make("figcaption", name + walk + "; below, " + part + ", " + gain));
     box.append(figure);
   }
   show();

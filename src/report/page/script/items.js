@@ -279,7 +279,7 @@ const draw = () => {
   const i = state.item, item = data.items[i], question = data.questions[item.question];
   const subject = subjectNow();
   reveal($("i-question"), question.text || question.id);
-  $("i-id").textContent = item.name + " · " + data.frames[question.frame] + " · " + data.families[question.family][1];
+  $("i-id").textContent = item.name + (item.combination ? " · " + item.combination : "") + " · " + data.frames[question.frame] + " · " + data.families[question.family][1];
   $("i-link").href = link();
   if (hasActed) history.replaceState(null, "", link());
   const list = data.choices[item.choices].map((choice, index) => {
@@ -302,7 +302,7 @@ const draw = () => {
     }));
   }
   $("i-choices").replaceChildren(...list);
-  pictures(question);
+  pictures(question, item.draw);
   marks(i);
   unread(i);
   answers(i);

@@ -36,8 +36,6 @@ _CONDITION = {
 }
 _READINGS = {
     "repeat": "Int16",
-    "wording": "category",
-    "order": "Int16",
     "choices": "object",
     "choice_count": "Int16",
     "truth": "Int16",
@@ -96,9 +94,16 @@ _OBSERVED = {
     "observed_explained_ppm": "Int64",
 }
 
+# The combination of wording, order and draw in which a question was asked.
+_COMBINATION = {
+    "wording": "category",
+    "order": "Int16",
+    "draw": "Int16",
+}
+
 # The columns of each kind of run, in the order of the table.
 COLUMNS = {
-    CHOICE: {**_QUESTION, **_CONDITION, **_READINGS, **_REPLY, **_IMAGE, **_OBSERVED},
+    CHOICE: {**_QUESTION, **_CONDITION, **_READINGS, **_REPLY, **_IMAGE, **_OBSERVED, **_COMBINATION},
     OPEN: {**_QUESTION, **_CONDITION, **_MARK, **_REPLY, "image_count": "Int64", **_IMAGE},
 }
 # The columns whose values stand only in questions.jsonl.
@@ -120,7 +125,7 @@ def add_question(record: Record, question: Record) -> None:
 def add_readings(record: Record) -> None:
     """Add the choices as texts, and what the strict and the lenient parsing found in the reply."""
     choices, truth = record["choices"], record["truth"]
-    for name, default in (("repeat", 0), ("wording", None), ("order", 0)):
+    for name, default in (("repeat", 0), ("wording", None), ("order", 0), ("draw", 0)):
         record.setdefault(name, default)
     record.setdefault("shown_frame", None)
     observed = record.get("observed") or {}
