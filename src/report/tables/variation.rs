@@ -1,9 +1,10 @@
 //! Tables of a run that asked in several wordings, orders or draws: where the variation comes from, and whether each
 //! difference holds in all of them.
 
-use crate::report::text::table::ColumnKind::{Count, Points, Share, Text};
+use crate::report::text::table::ColumnKind::{Count, P, Percent, Points, Share, Text};
 use crate::report::text::table::{Table, TableBuilder, TableCell};
 use crate::report::text::words::name;
+use crate::types::questions::letter;
 use darkqa_score::findings::Findings;
 use darkqa_score::variation::{AccuracyVariation, Facet, FacetRange, RunVariation, Source};
 
@@ -15,7 +16,30 @@ pub(super) fn variation(findings: &Findings<'_>) -> Vec<Table> {
     let Some(found) = &findings.variation else {
         return Vec::new();
     };
-    vec![components(found), differences(found)]
+    vec![components(found), differences(found), positions(found)]
+}
+
+/// The position of the choices that each subject prefers.
+fn positions(found: &RunVariation) -> Table {
+    let excess = "csv excess excess_low excess_high | terminal excess, 95 % interval | page excess [95 %]";
+    let change = "csv change change_low change_high | terminal less L0, 95 % interval | page given less L0 [95 %]";
+    let mut table = TableBuilder::new("positions", &found.positions)
+        .page(VARIATION, "The letter that each model prefers: given more often than it is right, over all orders")
+        .subject(|row| &row.subject, ToString::to_string)
+        .column(Text, "terminal model", |row| row.subject.model.clone())
+        .column(Text, "terminal condition", |row| row.subject.condition())
+        .column(Text, "csv letter | terminal letter | page letter", |row| letter(row.position).to_string())
+        .column(Percent, "csv given | terminal given | page given in %", |row| row.given)
+        .column(Percent, "csv truth | terminal right | page right in %", |row| row.truth)
+        .column(Points, excess, |row| row.excess)
+        .column(P, "csv p | terminal p | page p", |row| row.p)
+        .column(Points, change, |row| row.change)
+        .column(P, "csv change_p | page p of the change", |row| row.change_p)
+        .column(Count, "csv n | page n", |row| row.excess.n)
+        .build();
+    table.foot = Some("p: corrected over the letters of a row".to_owned());
+    table.heading = Some("The letter that each model prefers, over all orders of the choices".to_owned());
+    table
 }
 
 /// Standard deviations by source, with a row for each subject.

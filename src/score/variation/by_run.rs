@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::{Components, Facet, FacetRange, FacetedDifference, Observation, facet_ranges, rank_agreement};
+use super::{
+    Components, Facet, FacetRange, FacetedDifference, Observation, PositionPreference, facet_ranges, rank_agreement,
+};
 use crate::choice::ParsingMode;
 use crate::comparisons::{Comparison, ComparisonKind};
 use crate::estimate::Estimate;
@@ -27,6 +29,8 @@ pub struct RunVariation {
     /// Agreement of the wordings on the order of the models at the darkest level of the main variant (Kendall's W);
     /// `None` with one wording or one model.
     pub ranks: Option<Estimate>,
+    /// Preference of each subject for a position of the choices; empty if each question has one order.
+    pub positions: Vec<PositionPreference>,
 }
 
 /// Variation of the accuracy of one subject.
@@ -112,6 +116,7 @@ impl RunVariation {
             accuracies: accuracies.collect(),
             differences: differences.collect(),
             ranks: ranks(grid, &observations),
+            positions: if orders > 1 { PositionPreference::all(grid) } else { Vec::new() },
             wordings: wordings.into_iter().map(str::to_owned).collect(),
         })
     }

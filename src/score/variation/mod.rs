@@ -9,6 +9,7 @@
 //! - [`facet_ranges`]: how far apart the levels of a [`Facet`] are.
 //! - [`FacetedDifference::new`]: a difference, with an interval for other questions and other levels of the facets, and
 //!   the number of combinations in which it has the same sign.
+//! - [`PositionPreference`]: the position of the choices that a model prefers, and its change in the dark.
 //! - [`rank_agreement`]: Kendall's W of the ranks of models over the levels of a facet.
 //! - [`Design`]: standard error, power and number of requests of a planned run; [`random_half`] of its combinations.
 //!
@@ -52,6 +53,7 @@ mod difference;
 mod facets;
 mod matrix;
 mod observation;
+mod positions;
 mod ranks;
 #[cfg(test)]
 mod tests;
@@ -62,4 +64,5 @@ pub use components::{Component, Components, Source};
 pub use difference::{FacetedDifference, SignCount};
 pub use facets::{FacetRange, facet_ranges};
 pub use observation::{Facet, Observation, paired};
+pub use positions::PositionPreference;
 pub use ranks::rank_agreement;

@@ -74,6 +74,7 @@ fn chance_follows_asked_questions() {
     insta::assert_snapshot!(lines_with(&table, "33.3"), @"
      script:script.jsonl   untouched            33.3   6          0        0   −33.0 +65.2
     chance: 33.33 over 6 orders of choices
+     script:script.jsonl   L0          A        100.0    33.3    +66.7   −100.0 to +100.0   1.000         –
     ");
     insta::assert_snapshot!(lines_with(&table, "chance"), @"
     chance: 33.33 over 6 orders of choices
