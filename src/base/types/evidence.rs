@@ -26,7 +26,7 @@ impl Evidence {
     /// The value; `Null` if the data set states none.
     #[must_use]
     pub fn value(&self) -> Value {
-        self.0.as_deref().and_then(|text| serde_json::from_str(text.get()).ok()).unwrap_or_default()
+        self.text().and_then(|text| serde_json::from_str(text).ok()).unwrap_or_default()
     }
 
     /// The name of a question that is asked about every image; `None` for other questions.
@@ -37,8 +37,7 @@ impl Evidence {
             #[serde(borrow)]
             bank_id: Cow<'a, str>,
         }
-        let text = self.0.as_deref()?.get();
-        serde_json::from_str::<Named<'_>>(text).ok().map(|named| named.bank_id)
+        serde_json::from_str::<Named<'_>>(self.text()?).ok().map(|named| named.bank_id)
     }
 
     fn text(&self) -> Option<&str> {

@@ -550,10 +550,17 @@ impl RunQuestion {
     /// The smallest box around all of [`Self::outlines`]; `None` if there are none.
     #[must_use]
     pub fn object(&self) -> Option<PixelBox> {
-        self.outlines().into_iter().reduce(|one, other| {
-            [one[0].min(other[0]), one[1].min(other[1]), one[2].max(other[2]), one[3].max(other[3])]
-        })
+        around(&self.outlines())
     }
+}
+
+/// The smallest box around all of these; `None` if there are none.
+#[must_use]
+pub fn around(boxes: &[PixelBox]) -> Option<PixelBox> {
+    boxes
+        .iter()
+        .copied()
+        .reduce(|one, other| [one[0].min(other[0]), one[1].min(other[1]), one[2].max(other[2]), one[3].max(other[3])])
 }
 
 /// Parses a box of evidence; `None` if the value is not a box.

@@ -12,6 +12,7 @@ use super::prompts::PagePrompts;
 use super::run_usage::PageInputs;
 use crate::error::Result;
 use crate::report::text::words::{self, family};
+use crate::types::questions::around;
 use crate::types::{AxisLevel, Digest, FailureKind, Family, QuestionId, RunQuestion, TrialRef, UnreadReason};
 use darkqa_score::answers::confusion;
 use darkqa_score::choice::ParsingMode;
@@ -54,13 +55,14 @@ fn data<'a>(
         let number = question_ids.index_of(&*asked.question);
         if number == questions.len() {
             let run_question = run_questions.get(&*asked.question);
+            let outlines = run_question.map_or_else(Vec::new, RunQuestion::outlines);
             questions.push(PageQuestion {
                 id: &asked.question.0,
                 frame: frames.index_of(&*asked.frame.0),
                 family: families.index_of([asked.family.name(), family(Some(&asked.family))]),
                 text: run_question.map_or("", |run_question| &run_question.text),
-                outlines: run_question.map_or_else(Vec::new, RunQuestion::outlines),
-                object: run_question.and_then(RunQuestion::object),
+                object: around(&outlines),
+                outlines,
                 answer: None,
                 also_right: &[],
                 evidence: run_question

@@ -59,6 +59,7 @@ struct Texts {
     frames: Distinct<FrameId>,
     families: Distinct<Family>,
     choices: Distinct<Vec<String>>,
+    wordings: Distinct<String>,
 }
 
 impl<D: StoredDetail> Default for Trials<D> {
@@ -282,6 +283,9 @@ impl<D: StoredDetail> Trials<D> {
         self.texts.frames.share(&mut item.frame);
         self.texts.families.share(&mut item.family);
         self.texts.choices.share(&mut item.choices);
+        if let Some(wording) = &mut item.wording {
+            self.texts.wordings.share(wording);
+        }
         item
     }
 
