@@ -7,34 +7,49 @@ use std::str::FromStr;
 use super::prompts::Prompts;
 use crate::error::{Error, Result};
 use crate::types::Shared;
+use crate::types::text::is_in_names;
 
 /// The flag that names prompts.
 const FLAG: &str = "--prompts";
 
-/// Prompts by name: built in, or in a folder.
+/// One value of `--prompts`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct PromptSet {
-    /// `None` for a folder without a name.
-    name: Option<String>,
-    /// `None` for built-in prompts.
-    folder: Option<PathBuf>,
+pub(crate) enum PromptSet {
+    /// Built-in prompts by their name.
+    BuiltIn(&'static str),
+    /// Prompts in a folder, which has a name if it is one of several.
+    Folder { name: Option<String>, folder: PathBuf },
 }
 
 impl PromptSet {
     /// The folder of the prompts; `None` if they are built in.
     #[must_use]
     pub(crate) fn folder(&self) -> Option<&Path> {
-        self.folder.as_deref()
+        match self {
+            Self::BuiltIn(_) => None,
+            Self::Folder { folder, .. } => Some(folder),
+        }
+    }
+
+    fn name(&self) -> Option<&str> {
+        match self {
+            Self::BuiltIn(name) => Some(name),
+            Self::Folder { name, .. } => name.as_deref(),
+        }
     }
 
     /// Reads the prompts.
     ///
     /// # Errors
-    /// As [`Prompts::load`].
-    pub(crate) fn open(&self) -> Result<Prompts> {
-        match (&self.folder, &self.name) {
-            (Some(folder), _) => Prompts::load(folder),
-            (None, name) => Prompts::built_in(name.as_deref().unwrap_or(Prompts::DEFAULT)),
+    /// As [`Prompts::load`]; a folder that does not exist may be a mistyped name, so that the built-in ones are listed.
+    fn open(&self) -> Result<Prompts> {
+        match self {
+            Self::BuiltIn(name) => Prompts::built_in(name),
+            Self::Folder { folder, .. } if !folder.exists() => {
+                let (folder, built_in) = (folder.display(), Prompts::BUILT_IN.join(", "));
+                Err(Error::usage(FLAG, format_args!("no folder {folder}, and the built-in prompts are {built_in}")))
+            }
+            Self::Folder { folder, .. } => Prompts::load(folder),
         }
     }
 }
@@ -48,24 +63,22 @@ impl FromStr for PromptSet {
         if text.is_empty() {
             return Err(format!("a folder or one of {} expected", Prompts::BUILT_IN.join(", ")));
         }
-        if Prompts::BUILT_IN.contains(&text) {
-            return Ok(Self { name: Some(text.to_owned()), folder: None });
+        if let Some(name) = Prompts::BUILT_IN.into_iter().find(|name| *name == text) {
+            return Ok(Self::BuiltIn(name));
         }
         let named = text.split_once('=').filter(|(name, folder)| is_name(name) && !folder.is_empty());
         Ok(match named {
             Some((name, folder)) if !Path::new(text).exists() => {
-                Self { name: Some(name.to_owned()), folder: Some(folder.into()) }
+                Self::Folder { name: Some(name.to_owned()), folder: folder.into() }
             }
-            _ => Self { name: None, folder: Some(text.into()) },
+            _ => Self::Folder { name: None, folder: text.into() },
         })
     }
 }
 
-/// True for a name of letters, digits, `_`, `-` and `.` that begins with a letter or digit: it needs no quotes in
-/// tables, files and shells.
+/// True for the name of a wording, which begins with a letter or digit.
 fn is_name(name: &str) -> bool {
-    let is_inner = |c: char| c.is_ascii_alphanumeric() || "_-.".contains(c);
-    name.starts_with(|c: char| c.is_ascii_alphanumeric()) && name.chars().all(is_inner)
+    name.starts_with(|c: char| c.is_ascii_alphanumeric()) && name.chars().all(is_in_names)
 }
 
 /// One set of prompts of a run.
@@ -94,9 +107,9 @@ impl Wording {
     fn open_several(sets: &[PromptSet]) -> Result<Vec<Self>> {
         let (mut names, mut wordings) = (BTreeSet::new(), Vec::<Self>::new());
         for set in sets {
-            let Some(name) = &set.name else {
-                let folder = set.folder.clone().unwrap_or_default();
-                let problem = format_args!("each of several wordings needs a name: {FLAG} NAME={}", folder.display());
+            let Some(name) = set.name() else {
+                let folder = set.folder().unwrap_or(Path::new("")).display();
+                let problem = format_args!("each of several wordings needs a name: {FLAG} NAME={folder}");
                 return Err(Error::usage(FLAG, problem));
             };
             if !names.insert(name) {
@@ -108,7 +121,7 @@ impl Wording {
                 let problem = format_args!("{other} and {name} are the same text: leave one of them out");
                 return Err(Error::usage(FLAG, problem));
             }
-            wordings.push(Self { name: Some(name.clone().into()), prompts });
+            wordings.push(Self { name: Some(name.to_owned().into()), prompts });
         }
         Ok(wordings)
     }
@@ -124,9 +137,11 @@ mod tests {
 
     #[test]
     fn names_and_folders_are_told_apart() {
-        let folder =
-            |name: Option<&str>, folder: &str| PromptSet { name: name.map(str::to_owned), folder: Some(folder.into()) };
-        assert_eq!(set("terse"), PromptSet { name: Some("terse".into()), folder: None });
+        let folder = |name: Option<&str>, folder: &str| PromptSet::Folder {
+            name: name.map(str::to_owned),
+            folder: folder.into(),
+        };
+        assert_eq!(set("terse"), PromptSet::BuiltIn("terse"));
         assert_eq!(set("./terse"), folder(None, "./terse"));
         assert_eq!(set("mine=own/a=b"), folder(Some("mine"), "own/a=b"));
         assert_eq!(set("a b=own"), folder(None, "a b=own"));
@@ -160,6 +175,7 @@ mod tests {
             (["terse", "terse"].map(str::to_owned), "two wordings are named terse"),
             (["terse".to_owned(), path.to_string()], "needs a name: --prompts NAME="),
             (["paper".to_owned(), format!("mine={path}")], "paper and mine are the same text"),
+            (["paper".to_owned(), "mine=ters".to_owned()], "no folder ters, and the built-in prompts are paper, terse"),
         ] {
             let sets: Vec<PromptSet> = sets.iter().map(|text| set(text)).collect();
             let problem = Wording::open(&sets).unwrap_err().to_string();

@@ -26,7 +26,7 @@ use crate::conventions::preset::{Preset, PresetOutputs};
 use crate::conventions::sidecar::{self, ModelSidecar, OutputChoice};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files;
-use darkqa_base::types::text::nearest;
+use darkqa_base::types::text::{is_in_names, nearest};
 use darkqa_base::types::{Digest, EnhancerName};
 use darkqa_models::{BUILT_IN, BuiltIn};
 
@@ -180,11 +180,10 @@ impl ModelFile {
 /// A stem that is not ASCII gets a suffix, the first 6 hexadecimal digits of its digest, because such stems often
 /// differ only in the replaced characters.
 fn enhancer_name(stem: &str) -> Result<EnhancerName> {
-    if stem.chars().all(is_allowed_in_name) {
+    if stem.chars().all(is_in_names) {
         return EnhancerName::new(stem);
     }
-    let mut name =
-        stem.split(|c: char| !is_allowed_in_name(c)).filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-");
+    let mut name = stem.split(|c: char| !is_in_names(c)).filter(|word| !word.is_empty()).collect::<Vec<_>>().join("-");
     if !stem.is_ascii() {
         let digest = Digest::from_bytes(stem.as_bytes()).to_string();
         let digits = digest.rsplit(':').next().unwrap_or_default();
@@ -192,10 +191,6 @@ fn enhancer_name(stem: &str) -> Result<EnhancerName> {
         name = [name, suffix].join("-");
     }
     EnhancerName::new(name.trim_matches('-'))
-}
-
-fn is_allowed_in_name(c: char) -> bool {
-    c.is_ascii_alphanumeric() || "_-.".contains(c)
 }
 
 /// Input of an enhancer's digest: everything that determines an enhanced image, except the image before enhancement.

@@ -113,6 +113,31 @@ fn half_of_the_combinations_are_asked_and_the_rest_later() {
     assert!(before < mock.requests().len());
 }
 
+/// Each command is refused with a remedy, and runs with it.
+#[test]
+fn remedies_of_refused_wordings_and_draws_work() {
+    let bench = Bench::with_questions(2);
+    for name in ["one", "two"] {
+        fs::create_dir(bench.path(name)).unwrap();
+        let text = format!(
+            "{name}: {{{{ question }}}}\n{{% for c in choices %}}{{{{ c.letter }}}} {{{{ c.text }}}}\n{{% endfor %}}"
+        );
+        fs::write(bench.path(name).join("choice.txt"), text).unwrap();
+    }
+    let run = |more: &str| bench.call(&[words(NOISE), words("--model random --out run"), words(more)].concat());
+    for (wrong, said, right) in [
+        ("--prompts one --prompts two", "--prompts NAME=one", "--prompts NAME=one --prompts b=two"),
+        ("--prompts a=one --prompts a=two", "name each differently", "--prompts a=one --prompts b=two"),
+        ("--prompts paper --prompts x=one --prompts y=one", "leave one of them out", "--prompts paper --prompts x=one"),
+        ("--prompts ters", "paper, terse, letter", "--prompts terse"),
+    ] {
+        let refused = run(wrong);
+        assert!(refused.code == Some(2) && refused.stderr.contains(said), "{}", refused.stderr);
+        assert_eq!(run(right).code, Some(0), "{right}");
+        fs::remove_dir_all(bench.path("run")).unwrap();
+    }
+}
+
 #[test]
 fn draws_are_refused_where_they_cannot_be_made_or_compared() {
     let bench = Bench::with_questions(2);

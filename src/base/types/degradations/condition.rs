@@ -19,6 +19,7 @@ use super::degradation::{Axis, Degradation, Kind, ProfileName, Severity};
 use super::pair_dark::PhotoName;
 use crate::error::Error;
 use crate::types::PairDark;
+use crate::types::text::is_in_names;
 use crate::types::text::words::{as_text, written_as_text};
 
 /// The name of an enhancement model in tables and records: letters, digits, `_`, `-` and `.`.
@@ -31,7 +32,7 @@ impl EnhancerName {
     /// # Errors
     /// If it is empty or has other characters than letters, digits, `_`, `-` and `.`.
     pub fn new(name: &str) -> Result<Self, Error> {
-        if name.is_empty() || !name.chars().all(|c: char| c.is_ascii_alphanumeric() || "_-.".contains(c)) {
+        if name.is_empty() || !name.chars().all(is_in_names) {
             return Err(Error::usage(
                 "--llie",
                 format_args!(

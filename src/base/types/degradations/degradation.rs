@@ -11,6 +11,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::error::Error;
+use crate::types::text::is_in_names;
 use crate::types::text::words::written_as_text;
 
 /// A kind of degradation at one severity, in one noise profile ("reading") if the kind has several, and in one draw of
@@ -365,7 +366,7 @@ impl ProfileName {
     /// # Errors
     /// If it is empty or has other characters.
     pub fn new(name: &str) -> Result<Self, Error> {
-        if name.is_empty() || !name.chars().all(|c: char| c.is_ascii_alphanumeric() || "_.-".contains(c)) {
+        if name.is_empty() || !name.chars().all(is_in_names) {
             let problem = format_args!(
                 "{name:?} is not a valid name of a noise profile: only letters, digits, '_', '.' and '-' are allowed"
             );

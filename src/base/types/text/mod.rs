@@ -25,6 +25,13 @@ use std::fmt::Write as _;
 
 use strsim::{damerau_levenshtein, jaro_winkler};
 
+/// True for the characters of names of enhancers, noise profiles and wordings: letters, digits, `_`, `-` and `.`. Such a
+/// name needs no quotes in tables, files and shells.
+#[must_use]
+pub fn is_in_names(c: char) -> bool {
+    c.is_ascii_alphanumeric() || "_-.".contains(c)
+}
+
 /// A count with its noun; the plural adds an s: `1 pair`, `2 pairs`.
 #[must_use]
 pub fn counted(number: usize, noun: &str) -> String {

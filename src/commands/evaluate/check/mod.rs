@@ -229,8 +229,11 @@ fn check_settings(args: &EvaluateArgs, findings: &mut ImageFindings) {
     }
     let rulebook = args.selection.rules.as_deref();
     add(findings, rules(rulebook).map(|_| file_line("rules", rulebook)));
-    let folders = args.choice.prompts.iter().find_map(PromptSet::folder);
-    add(findings, Wording::open(&args.choice.prompts).map(|_| file_line("prompts", folders)));
+    let folders = || args.choice.prompts.iter().filter_map(PromptSet::folder);
+    match Wording::open(&args.choice.prompts) {
+        Ok(_) => folders().for_each(|folder| findings.ok(format!("prompts: {}", folder.display()))),
+        Err(e) => findings.problem(e.to_string()),
+    }
     if !args.job.models.is_empty() {
         let models = args
             .job
