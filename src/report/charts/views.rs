@@ -6,6 +6,8 @@
 //! Figure of photographs in the dark compared with synthetic images of the same darkness: [`real_spec`].
 //!
 //! Reliability diagram, accuracy over confidence: [`reliability_spec`].
+//!
+//! Standard deviations of a reply by source of variation: [`variation_spec`].
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -24,7 +26,8 @@ use darkqa_score::photographs::{ConditionFidelity, PairDarkness};
 
 /// The figures that have data.
 pub(crate) fn figure_specs(findings: &Findings<'_>) -> impl Iterator<Item = FigureSpec> {
-    [fidelity_spec(findings), real_spec(findings), reliability_spec(findings)].into_iter().flatten()
+    let specs = [fidelity_spec(findings), real_spec(findings), reliability_spec(findings), variation_spec(findings)];
+    specs.into_iter().flatten()
 }
 
 /// Variant, and enhancer if there is one.
@@ -165,6 +168,37 @@ fn bars(findings: &Findings<'_>, pair: &PairDarkness, model: &str) -> Vec<PlotLi
         }
     }
     bars
+}
+
+/// Maximum number of models with a panel of their variation (chosen).
+const MAX_VARIATIONS: usize = 6;
+
+/// Standard deviation of a reply by source, at L0 and at the darkest level of the main variant, a panel for each; `None`
+/// if every question was asked in one wording, one order and one draw.
+fn variation_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
+    let found = findings.variation.as_ref()?;
+    let changes = found.darkest_changes(&findings.grid);
+    let subjects = changes.iter().take(MAX_VARIATIONS).flat_map(|change| [&change.second, &change.first]);
+    let panels: Vec<Panel> = subjects
+        .filter_map(|subject| {
+            let row = found.accuracies.iter().find(|row| row.subject == *subject)?;
+            let bars = row.components.components.iter().enumerate().map(|(style, component)| {
+                PlotLine::bar(component.source.name().to_owned(), LineStyle(style), component.deviation)
+            });
+            let title = format!("{} {}: standard deviation in %", subject.model, subject.condition());
+            let panel = Panel::from_bars(title, bars.collect(), None);
+            Some(Panel { model: Some(subject.model.clone()), ..panel })
+        })
+        .collect();
+    if panels.is_empty() {
+        return None;
+    }
+    let note = format!("lines are 95 % intervals; {}; strict parsing", found.asked());
+    Some(FigureSpec {
+        name: "variation",
+        caption: "Where the variation of a reply (0 or 1) comes from, at L0 and in the dark.".to_owned(),
+        chart: Chart { panels, columns: 1, note },
+    })
 }
 
 /// Maximum number of levels in a panel (chosen).

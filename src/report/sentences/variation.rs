@@ -1,7 +1,6 @@
 //! The sentence about wordings, orders and draws: whether the change in the dark holds in all of them ([`variation`]).
 
 use super::sentence::{EffectDirection, NamedNumbers, Sentence};
-use darkqa_score::comparisons::ComparisonKind;
 use darkqa_score::findings::Findings;
 use darkqa_score::variation::{DifferenceVariation, Facet, RunVariation};
 
@@ -12,12 +11,9 @@ pub(super) fn variation(findings: &Findings<'_>) -> Option<Sentence> {
     let found = findings.variation.as_ref()?;
     let main = findings.grid.main_variant()?;
     let models = findings.models_of(&main);
-    let changes = found.differences.iter().filter(|row| {
-        row.kind == ComparisonKind::Level && row.first.variant == main && models.contains(&&*row.first.model)
-    });
-    let darkest = changes.clone().map(|row| row.first.level).max()?;
+    let changes = found.darkest_changes(&findings.grid).into_iter();
     let change = changes
-        .filter(|row| row.first.level == darkest)
+        .filter(|row| models.contains(&&*row.first.model))
         .reduce(|most, next| if dependence(next) > dependence(most) { next } else { most })?;
     let mut numbers = NamedNumbers::new(findings.unit);
     let level = change.first.level.map_or_else(String::new, |level| level.to_string());

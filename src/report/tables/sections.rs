@@ -109,7 +109,7 @@ pub(crate) const SECTIONS: [Section; 16] = [
         "How much of it is the darkness, and how much the wording of the prompt, the order of the choices or the draw of the noise? The standard deviation \
          that each source adds to a reply (0 or 1), in % of accuracy, by a crossed random-effects decomposition; two or three wordings say \
          little about all others, and their intervals show it. The intervals of the differences hold for other scenes, wordings, orders and draws.",
-        &[],
+        &["variation"],
     ),
     (
         "fidelity",

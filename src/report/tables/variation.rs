@@ -16,7 +16,38 @@ pub(super) fn variation(findings: &Findings<'_>) -> Vec<Table> {
     let Some(found) = &findings.variation else {
         return Vec::new();
     };
-    vec![components(found), differences(found), positions(found)]
+    vec![components(found), differences(found), positions(found), plans(found)]
+}
+
+/// Designs of a further run, with what each needs.
+fn plans(found: &RunVariation) -> Table {
+    let mut table =
+        TableBuilder::new("design", &found.plans)
+            .page(VARIATION, "What a further run needs to detect a change of 5 points from L0, fewest requests first")
+            .subject(|plan| &plan.subject, ToString::to_string)
+            .column(Text, "terminal model", |plan| plan.subject.model.clone())
+            .column(Text, "terminal condition", |plan| plan.subject.condition())
+            .column(Count, "csv wordings | terminal wordings | page wordings", |plan| plan.design.wordings)
+            .column(Count, "csv orders | terminal orders | page orders", |plan| plan.design.orders)
+            .column(Count, "csv draws | terminal draws | page draws", |plan| plan.design.draws)
+            .column(Text, "csv design | terminal design | page design", |plan| {
+                if plan.design.is_half { "half" } else { "all" }
+            })
+            .column(Count, "csv scenes | terminal scenes | page scenes", |plan| {
+                plan.requests.map(|_| plan.design.scenes)
+            })
+            .column(Count, "csv questions | terminal questions | page questions", |plan| {
+                plan.requests.map(|_| plan.design.questions)
+            })
+            .column(Count, "csv requests | terminal requests | page requests", |plan| plan.requests)
+            .build();
+    table.foot = Some(
+        "With 80 % power, for this level and L0, and the variation found here, which few levels say little about; empty: not with any \
+         number of scenes, because another wording, order or draw may change as much"
+            .to_owned(),
+    );
+    table.heading = Some("What a further run needs to detect a change of 5 points from L0".to_owned());
+    table
 }
 
 /// The position of the choices that each subject prefers.
@@ -50,46 +81,35 @@ fn components(found: &RunVariation) -> Table {
         .subject(|row| &row.subject, ToString::to_string)
         .column(Text, "terminal model", |row| row.subject.model.clone())
         .column(Text, "terminal condition", |row| row.subject.condition());
-    for (source, csv, shown) in SOURCES {
-        let is_shown = match source {
-            Source::Facet(facet) | Source::QuestionFacet(facet) => found.levels(facet) > 1,
-            _ => true,
+    for source in Source::ALL {
+        let name = source.name();
+        let stem = name.replace(" × ", "_");
+        let shown = match source {
+            Source::Facet(facet) if found.levels(facet) > 1 => format!(" | terminal {name} | page {name} [95 %]"),
+            Source::QuestionFacet(facet) if found.levels(facet) > 1 => format!(" | page {name}"),
+            Source::Scene => format!(" | page {name}"),
+            Source::Question | Source::Rest => format!(" | terminal {name} | page {name}"),
+            Source::Facet(_) | Source::QuestionFacet(_) | Source::Combination => String::new(),
         };
-        let mut heads = format!("csv {csv} {csv}_low {csv}_high");
-        if is_shown && !shown.is_empty() {
-            heads.push_str(shown);
-        }
+        let heads = format!("csv {stem} {stem}_low {stem}_high{shown}");
         table = table.column(Share, &*heads, move |row| row.components.deviation(source));
     }
     // The page has room for one of them.
     let widest = Facet::ALL.into_iter().find(|facet| found.levels(*facet) > 1);
-    for (facet, name) in [(Facet::Wording, "wording"), (Facet::Order, "order"), (Facet::Draw, "draw")] {
-        let mut heads = format!("csv {name}_range {name}_range_low {name}_range_high");
-        if widest == Some(facet) {
-            heads.push_str(&format!(
-                " | terminal best less worst {name}, 95 % interval | page best less worst {name} [95 %]"
-            ));
-        }
+    for facet in Facet::ALL {
+        let name = facet.name();
+        let shown = if widest == Some(facet) {
+            format!(" | terminal best less worst {name}, 95 % interval | page best less worst {name} [95 %]")
+        } else {
+            String::new()
+        };
+        let heads = format!("csv {name}_range {name}_range_low {name}_range_high{shown}");
         table = table.column(Points, &*heads, move |row| range(row, facet));
     }
     let mut table = table.build();
     table.heading = Some(format!("Where the variation comes from ({}), in % of accuracy", found.asked()));
     table
 }
-
-/// Sources of variation, with the stem of their columns in the file and their heads in the terminal and on the page.
-const SOURCES: [(Source, &str, &str); 10] = [
-    (Source::Scene, "scene", " | page scene"),
-    (Source::Question, "question", " | terminal question | page question"),
-    (Source::Facet(Facet::Wording), "wording", " | terminal wording | page wording [95 %]"),
-    (Source::Facet(Facet::Order), "order", " | terminal order | page order [95 %]"),
-    (Source::Facet(Facet::Draw), "draw", " | terminal draw | page draw [95 %]"),
-    (Source::QuestionFacet(Facet::Wording), "question_wording", " | page question × wording"),
-    (Source::QuestionFacet(Facet::Order), "question_order", " | page question × order"),
-    (Source::QuestionFacet(Facet::Draw), "question_draw", " | page question × draw"),
-    (Source::Combination, "combination", ""),
-    (Source::Rest, "rest", " | terminal rest | page rest"),
-];
 
 fn range(row: &AccuracyVariation, facet: Facet) -> TableCell {
     row.ranges.iter().find(|range: &&FacetRange| range.facet == facet).map(|range| range.range).into()

@@ -76,15 +76,37 @@ impl Components {
     }
 }
 
-/// The design with the fewest requests that detects a difference with a power of 80 % at a level of 5 %, and the first
-/// of equal ones; `None` if none does. `differences` has the components of the differences of such a comparison.
-#[must_use]
-pub fn cheapest(differences: &Components, designs: &[Design], difference: f64) -> Option<Design> {
-    designs
-        .iter()
-        .filter(|design| differences.spread(design).detectable(ALPHA) <= difference)
-        .min_by_key(|design| design.requests())
-        .copied()
+/// Largest number of scenes of a planned run (chosen): a design that needs more is out of reach.
+const MOST_SCENES: usize = 100_000;
+
+impl Components {
+    /// The design with the fewest scenes that detects a difference with a power of 80 % at a level of 5 %, with as many
+    /// questions in each scene as `design`; `None` if no number of scenes suffices. These are the components of the
+    /// differences of such a comparison.
+    ///
+    /// A facet that is not asked under several levels may still vary: with one wording, the difference must be larger
+    /// than what another wording could change.
+    #[must_use]
+    pub fn smallest(&self, design: &Design, difference: f64) -> Option<Design> {
+        let of = |scenes: usize| {
+            let questions = (scenes * design.questions).div_ceil(design.scenes.max(1));
+            Design { scenes, questions, ..*design }
+        };
+        let detects = |scenes: usize| self.spread(&of(scenes)).detectable(ALPHA) <= difference;
+        if !detects(MOST_SCENES) {
+            return None;
+        }
+        let (mut too_few, mut enough) = (1, MOST_SCENES);
+        while enough - too_few > 1 {
+            let middle = usize::midpoint(too_few, enough);
+            if detects(middle) {
+                enough = middle;
+            } else {
+                too_few = middle;
+            }
+        }
+        Some(of(enough))
+    }
 }
 
 /// A random half of the combinations of wordings, orders and draws, given by their numbers, in which the levels of each
@@ -123,6 +145,21 @@ mod tests {
     use super::*;
 
     #[test]
+    fn the_smallest_design_detects_the_difference_and_one_scene_less_does_not() {
+        use crate::variation::tests::known;
+        // 10 points between questions, 5 between wordings.
+        let components = known([0.0, 0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3]);
+        let one = Design { scenes: 10, questions: 40, wordings: 1, orders: 1, draws: 1, repeats: 1, is_half: false };
+        assert_eq!(components.smallest(&one, 0.05), None, "another wording may change as much");
+        let many = Design { wordings: 12, ..one };
+        let found = components.smallest(&many, 0.05).unwrap();
+        let detects = |design| components.spread(&design).detectable(ALPHA) <= 0.05;
+        assert_eq!(found.questions, 4 * found.scenes);
+        assert!(detects(found));
+        assert!(!detects(Design { scenes: found.scenes - 1, questions: found.questions - 4, ..found }));
+    }
+
+    #[test]
     fn a_half_is_balanced() {
         for levels in [[1, 1, 1], [3, 1, 1], [3, 2, 1], [2, 2, 2], [3, 3, 2], [3, 3, 3], [1, 4, 5]] {
             let all: usize = levels.iter().product();
@@ -131,7 +168,9 @@ mod tests {
                 assert_eq!(half.len(), all.div_ceil(2));
                 for facet in 0..3 {
                     let mut counts = vec![0_usize; levels[facet]];
-                    half.iter().for_each(|combination| counts[usize::from(combination[facet])] += 1);
+                    for combination in &half {
+                        counts[usize::from(combination[facet])] += 1;
+                    }
                     let ends = counts.iter().min().zip(counts.iter().max());
                     assert!(ends.is_some_and(|(least, most)| most - least <= 1), "{levels:?} {half:?}");
                 }

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::{
-    Components, Facet, FacetRange, FacetedDifference, Observation, PositionPreference, facet_ranges, rank_agreement,
+    Components, Design, Facet, FacetRange, FacetedDifference, Observation, PositionPreference, facet_ranges,
+    rank_agreement,
 };
 use crate::choice::ParsingMode;
 use crate::comparisons::{Comparison, ComparisonKind};
@@ -31,6 +32,23 @@ pub struct RunVariation {
     pub ranks: Option<Estimate>,
     /// Preference of each subject for a position of the choices; empty if each question has one order.
     pub positions: Vec<PositionPreference>,
+    /// Designs of a further run that detect a change of 5 points from L0 at the darkest level of the main
+    /// variant, for each model; those with the fewest requests first.
+    pub plans: Vec<Plan>,
+}
+
+/// Change that a planned run shall detect: 5 points (chosen).
+const PLANNED_CHANGE: f64 = 0.05;
+
+/// Design of a further run for one model.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    /// The model at the dark level.
+    pub subject: ModelInCondition,
+    /// What is asked. Without a number of scenes that suffices, those of this run.
+    pub design: Design,
+    /// Requests about the dark level and L0; `None` if no number of scenes suffices.
+    pub requests: Option<usize>,
 }
 
 /// Variation of the accuracy of one subject.
@@ -49,6 +67,8 @@ pub struct DifferenceVariation {
     pub first: ModelInCondition,
     pub second: ModelInCondition,
     pub found: FacetedDifference,
+    /// Standard deviations of the difference of a pair by source.
+    pub components: Components,
     /// The difference in each wording in which both sides have replies.
     by_wording: Vec<f64>,
 }
@@ -98,8 +118,10 @@ impl RunVariation {
             components: Components::new(replies),
             ranges: facet_ranges(replies),
         });
-        let differences =
-            comparisons.iter().filter(|comparison| comparison.family.is_none()).filter_map(|comparison| {
+        let differences: Vec<DifferenceVariation> = comparisons
+            .iter()
+            .filter(|comparison| comparison.family.is_none())
+            .filter_map(|comparison| {
                 let [first, second] = [&comparison.first, &comparison.second].map(|side| grid.find(side));
                 let pairs = pairs(grid, &places, [first?, second?]);
                 Some(DifferenceVariation {
@@ -107,18 +129,83 @@ impl RunVariation {
                     first: comparison.first.clone(),
                     second: comparison.second.clone(),
                     found: FacetedDifference::new(&pairs)?,
+                    components: Components::new(&pairs),
                     by_wording: if wordings.len() > 1 { means(&pairs, wordings.len()) } else { Vec::new() },
                 })
-            });
-        Some(Self {
+            })
+            .collect();
+        let mut found = Self {
             orders,
             draws,
             accuracies: accuracies.collect(),
-            differences: differences.collect(),
+            differences,
             ranks: ranks(grid, &observations),
             positions: if orders > 1 { PositionPreference::all(grid) } else { Vec::new() },
             wordings: wordings.into_iter().map(str::to_owned).collect(),
-        })
+            plans: Vec::new(),
+        };
+        found.plans = found.plans(grid);
+        Some(found)
+    }
+
+    /// Changes from L0 at the darkest level of the main variant, with raw images, of the models under test.
+    #[must_use]
+    pub fn darkest_changes(&self, grid: &Grid<'_>) -> Vec<&DifferenceVariation> {
+        let Some(main) = grid.main_variant() else {
+            return Vec::new();
+        };
+        let changes = self.differences.iter().filter(|row| {
+            row.kind == ComparisonKind::Level && row.first.variant == main && !is_reference(&row.first.model)
+        });
+        let darkest = changes.clone().map(|row| row.first.level).max();
+        changes.filter(|row| Some(row.first.level) == darkest).collect()
+    }
+
+    fn plans(&self, grid: &Grid<'_>) -> Vec<Plan> {
+        let questions = places(grid, &BTreeSet::new()).last().map_or(0, |last| last.question as usize + 1);
+        let scenes: BTreeSet<u32> = grid.items.iter().map(|item| item.cluster).collect();
+        let here = Design {
+            scenes: scenes.len(),
+            questions,
+            wordings: self.levels(Facet::Wording),
+            orders: self.orders,
+            draws: self.draws,
+            repeats: 1,
+            is_half: false,
+        };
+        let mut plans = Vec::new();
+        for change in self.darkest_changes(grid) {
+            let mut own: Vec<Plan> = smaller(&here).into_iter().map(|design| Plan::new(change, design)).collect();
+            own.sort_by_key(|plan| (plan.requests.is_none(), plan.requests));
+            plans.extend(own);
+        }
+        plans
+    }
+}
+
+/// The designs that ask under all levels of a facet or under one, whole and by half; without repetitions.
+fn smaller(whole: &Design) -> Vec<Design> {
+    let mut designs = Vec::new();
+    for wordings in BTreeSet::from([whole.wordings, 1]) {
+        for orders in BTreeSet::from([whole.orders, 1]) {
+            for draws in BTreeSet::from([whole.draws, 1]) {
+                let design = Design { wordings, orders, draws, ..*whole };
+                designs.push(design);
+                if design.combinations() > 1 {
+                    designs.push(Design { is_half: true, ..design });
+                }
+            }
+        }
+    }
+    designs
+}
+
+impl Plan {
+    fn new(change: &DifferenceVariation, design: Design) -> Self {
+        let found = change.components.smallest(&design, PLANNED_CHANGE);
+        // L0 has one draw of the noise.
+        let requests = found.map(|found| found.requests() + Design { draws: 1, ..found }.requests());
+        Self { subject: change.first.clone(), design: found.unwrap_or(design), requests }
     }
 }
 

@@ -41,6 +41,21 @@ impl Source {
         Self::Combination,
         Self::Rest,
     ];
+
+    /// The name in tables and charts.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Scene => "scene",
+            Self::Question => "question",
+            Self::Facet(facet) => facet.name(),
+            Self::QuestionFacet(Facet::Wording) => "question × wording",
+            Self::QuestionFacet(Facet::Order) => "question × order",
+            Self::QuestionFacet(Facet::Draw) => "question × draw",
+            Self::Combination => "combination",
+            Self::Rest => "rest",
+        }
+    }
 }
 
 /// Variation that one source adds to a reply.

@@ -58,8 +58,8 @@ mod ranks;
 #[cfg(test)]
 mod tests;
 
-pub use advice::{Design, cheapest, random_half};
-pub use by_run::{AccuracyVariation, DifferenceVariation, RunVariation};
+pub use advice::{Design, random_half};
+pub use by_run::{AccuracyVariation, DifferenceVariation, Plan, RunVariation};
 pub use components::{Component, Components, Source};
 pub use difference::{FacetedDifference, SignCount};
 pub use facets::{FacetRange, facet_ranges};

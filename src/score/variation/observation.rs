@@ -30,6 +30,16 @@ pub enum Facet {
 
 impl Facet {
     pub const ALL: [Self; 3] = [Self::Wording, Self::Order, Self::Draw];
+
+    /// The name in tables and charts.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wording => "wording",
+            Self::Order => "order",
+            Self::Draw => "draw",
+        }
+    }
 }
 
 impl Observation {

@@ -19,7 +19,7 @@ fn holds(estimate: Estimate, truth: f64) -> bool {
 }
 
 /// Components with these standard deviations, in the order of [`Source::ALL`].
-fn known(deviations: [f64; 10]) -> Components {
+pub(super) fn known(deviations: [f64; 10]) -> Components {
     let components = Source::ALL.into_iter().zip(deviations);
     let component = |(source, deviation)| Component { source, deviation: Estimate::exact(deviation, 1) };
     Components { components: components.map(component).collect() }
@@ -219,31 +219,9 @@ fn half_of_the_combinations_needs_about_half_of_the_requests() {
 }
 
 #[test]
-fn the_cheapest_design_detects_the_difference() {
+fn repeats_help_where_they_were_found_to_vary() {
     let components = known([0.0, 0.15, 0.0, 0.0, 0.0, 0.1, 0.1, 0.0, 0.0, 0.35]);
-    let mut designs = Vec::new();
-    for questions in [60, 120, 240, 480] {
-        for wordings in [1, 3] {
-            for is_half in [false, true] {
-                designs.push(Design {
-                    scenes: questions,
-                    questions,
-                    wordings,
-                    orders: 3,
-                    draws: 2,
-                    repeats: 1,
-                    is_half,
-                });
-            }
-        }
-    }
-    let found = cheapest(&components, &designs, 0.05).unwrap();
-    for design in &designs {
-        let detects = components.spread(design).detectable(0.05) <= 0.05;
-        assert!(!detects || design.requests() >= found.requests(), "{design:?} {found:?}");
-    }
-    assert!(components.spread(&found).detectable(0.05) <= 0.05);
-    assert_eq!(cheapest(&components, &designs, 0.001), None);
+    let found = Design { scenes: 120, questions: 120, wordings: 3, orders: 3, draws: 2, repeats: 1, is_half: true };
     // One repeat does not tell how much others would help.
     let once = Components {
         components: components.components.iter().copied().filter(|c| c.source != Source::Combination).collect(),
