@@ -33,17 +33,23 @@ fn plans(found: &RunVariation) -> Table {
             .column(Text, "csv design | terminal design | page design", |plan| {
                 if plan.design.is_half { "half" } else { "all" }
             })
-            .column(Count, "csv scenes | terminal scenes | page scenes", |plan| {
-                plan.requests.map(|_| plan.design.scenes)
-            })
+            .column(Count, "csv scenes", |plan| plan.asked.map(|needed| needed.scenes))
             .column(Count, "csv questions | terminal questions | page questions", |plan| {
-                plan.requests.map(|_| plan.design.questions)
+                plan.asked.map(|needed| needed.questions)
             })
-            .column(Count, "csv requests | terminal requests | page requests", |plan| plan.requests)
+            .column(Count, "csv requests | terminal requests | page requests", |plan| {
+                plan.asked.map(|needed| needed.requests)
+            })
+            .column(Count, "csv others_questions | page questions, others too", |plan| {
+                plan.others.map(|needed| needed.questions)
+            })
+            .column(Count, "csv others_requests | terminal others too | page requests, others too", |plan| {
+                plan.others.map(|needed| needed.requests)
+            })
             .build();
     table.foot = Some(
-        "With 80 % power, for this level and L0, and the variation found here, which few levels say little about; empty: not with any \
-         number of scenes, because another wording, order or draw may change as much"
+        "With 80 % power, about this level and L0, by the variation found here. Others too: the change also exceeds what other wordings, orders and \
+         draws would move it, of which few levels say little; empty: no number of questions suffices"
             .to_owned(),
     );
     table.heading = Some("What a further run needs to detect a change of 5 points from L0".to_owned());

@@ -80,6 +80,13 @@ impl Components {
 const MOST_SCENES: usize = 100_000;
 
 impl Components {
+    /// The same components, for the wordings, orders and draws that are asked: their own effects are no error.
+    #[must_use]
+    pub fn of_asked_levels(&self) -> Self {
+        let others = self.components.iter().filter(|component| !matches!(component.source, Source::Facet(_)));
+        Self { components: others.copied().collect() }
+    }
+
     /// The design with the fewest scenes that detects a difference with a power of 80 % at a level of 5 %, with as many
     /// questions in each scene as `design`; `None` if no number of scenes suffices. These are the components of the
     /// differences of such a comparison.
@@ -151,6 +158,7 @@ mod tests {
         let components = known([0.0, 0.1, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3]);
         let one = Design { scenes: 10, questions: 40, wordings: 1, orders: 1, draws: 1, repeats: 1, is_half: false };
         assert_eq!(components.smallest(&one, 0.05), None, "another wording may change as much");
+        assert!(components.of_asked_levels().smallest(&one, 0.05).is_some());
         let many = Design { wordings: 12, ..one };
         let found = components.smallest(&many, 0.05).unwrap();
         let detects = |design| components.spread(&design).detectable(ALPHA) <= 0.05;

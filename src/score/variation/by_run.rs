@@ -7,7 +7,7 @@ use super::{
     rank_agreement,
 };
 use crate::choice::ParsingMode;
-use crate::comparisons::{Comparison, ComparisonKind};
+use crate::comparisons::{Comparison, ComparisonKind, pool};
 use crate::estimate::Estimate;
 use crate::grid::Grid;
 use crate::model_in_condition::{ModelInCondition, is_reference};
@@ -40,15 +40,25 @@ pub struct RunVariation {
 /// Change that a planned run shall detect: 5 points (chosen).
 const PLANNED_CHANGE: f64 = 0.05;
 
-/// Design of a further run for one model.
+/// Design of a further run for one model, with what it needs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plan {
     /// The model at the dark level.
     pub subject: ModelInCondition,
-    /// What is asked. Without a number of scenes that suffices, those of this run.
+    /// Numbers of wordings, orders and draws, and whether half of their combinations are asked.
     pub design: Design,
-    /// Requests about the dark level and L0; `None` if no number of scenes suffices.
-    pub requests: Option<usize>,
+    /// What detects the change in these wordings, orders and draws; `None` if no number of scenes suffices.
+    pub asked: Option<Needed>,
+    /// What detects it whatever the wordings, orders and draws are.
+    pub others: Option<Needed>,
+}
+
+/// Size of a run about one level and L0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Needed {
+    pub scenes: usize,
+    pub questions: usize,
+    pub requests: usize,
 }
 
 /// Variation of the accuracy of one subject.
@@ -148,14 +158,15 @@ impl RunVariation {
         Some(found)
     }
 
-    /// Changes from L0 at the darkest level of the main variant, with raw images, of the models under test.
+    /// Changes from L0 at the darkest level of the main variant, with raw images, of the models that findings are about.
     #[must_use]
     pub fn darkest_changes(&self, grid: &Grid<'_>) -> Vec<&DifferenceVariation> {
         let Some(main) = grid.main_variant() else {
             return Vec::new();
         };
+        let models = pool(grid);
         let changes = self.differences.iter().filter(|row| {
-            row.kind == ComparisonKind::Level && row.first.variant == main && !is_reference(&row.first.model)
+            row.kind == ComparisonKind::Level && row.first.variant == main && models.contains(&&*row.first.model)
         });
         let darkest = changes.clone().map(|row| row.first.level).max();
         changes.filter(|row| Some(row.first.level) == darkest).collect()
@@ -175,37 +186,53 @@ impl RunVariation {
         };
         let mut plans = Vec::new();
         for change in self.darkest_changes(grid) {
-            let mut own: Vec<Plan> = smaller(&here).into_iter().map(|design| Plan::new(change, design)).collect();
-            own.sort_by_key(|plan| (plan.requests.is_none(), plan.requests));
+            let mut own: Vec<Plan> = candidates(&here).into_iter().map(|design| Plan::new(change, design)).collect();
+            own.sort_by_key(|plan| plan.asked.map_or(usize::MAX, |needed| needed.requests));
             plans.extend(own);
         }
         plans
     }
 }
 
-/// The designs that ask under all levels of a facet or under one, whole and by half; without repetitions.
-fn smaller(whole: &Design) -> Vec<Design> {
-    let mut designs = Vec::new();
-    for wordings in BTreeSet::from([whole.wordings, 1]) {
-        for orders in BTreeSet::from([whole.orders, 1]) {
-            for draws in BTreeSet::from([whole.draws, 1]) {
-                let design = Design { wordings, orders, draws, ..*whole };
-                designs.push(design);
-                if design.combinations() > 1 {
-                    designs.push(Design { is_half: true, ..design });
-                }
-            }
-        }
+/// Designs to choose from: one level of each facet, all levels of one of them, all of all, and half of those; and four
+/// times the wordings.
+fn candidates(whole: &Design) -> Vec<Design> {
+    let one = Design { wordings: 1, orders: 1, draws: 1, ..*whole };
+    let mut designs = vec![
+        one,
+        Design { wordings: whole.wordings, ..one },
+        Design { orders: whole.orders, ..one },
+        Design { draws: whole.draws, ..one },
+        *whole,
+        Design { is_half: true, ..*whole },
+    ];
+    if whole.wordings > 1 {
+        designs.push(Design { wordings: 4 * whole.wordings, ..one });
     }
+    let mut seen = Vec::new();
+    designs.retain(|design| {
+        let is_new = !seen.contains(design);
+        seen.push(*design);
+        is_new
+    });
     designs
 }
 
 impl Plan {
     fn new(change: &DifferenceVariation, design: Design) -> Self {
-        let found = change.components.smallest(&design, PLANNED_CHANGE);
-        // L0 has one draw of the noise.
-        let requests = found.map(|found| found.requests() + Design { draws: 1, ..found }.requests());
-        Self { subject: change.first.clone(), design: found.unwrap_or(design), requests }
+        let needed = |components: &Components| {
+            let found = components.smallest(&design, PLANNED_CHANGE)?;
+            // L0 has one draw of the noise, and every wording and order of which half of several draws is asked.
+            let light = Design { draws: 1, is_half: found.is_half && found.draws < 2, ..found };
+            let requests = found.requests() + light.requests();
+            Some(Needed { scenes: found.scenes, questions: found.questions, requests })
+        };
+        Self {
+            subject: change.first.clone(),
+            design,
+            asked: needed(&change.components.of_asked_levels()),
+            others: needed(&change.components),
+        }
     }
 }
 

@@ -59,7 +59,7 @@ mod ranks;
 mod tests;
 
 pub use advice::{Design, random_half};
-pub use by_run::{AccuracyVariation, DifferenceVariation, Plan, RunVariation};
+pub use by_run::{AccuracyVariation, DifferenceVariation, Needed, Plan, RunVariation};
 pub use components::{Component, Components, Source};
 pub use difference::{FacetedDifference, SignCount};
 pub use facets::{FacetRange, facet_ranges};
