@@ -183,7 +183,8 @@ fn variation_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
         .filter_map(|subject| {
             let row = found.accuracies.iter().find(|row| row.subject == *subject)?;
             let bars = row.components.components.iter().enumerate().map(|(style, component)| {
-                PlotLine::bar(component.source.name().to_owned(), LineStyle(style), component.deviation)
+                let name = component.source.name().replace("question × ", "× ");
+                PlotLine::bar(name, LineStyle(style), component.deviation)
             });
             let title = format!("{} {}: standard deviation in %", subject.model, subject.condition());
             let panel = Panel::from_bars(title, bars.collect(), None);
@@ -196,7 +197,8 @@ fn variation_spec(findings: &Findings<'_>) -> Option<FigureSpec> {
     let note = format!("lines are 95 % intervals; {}; strict parsing", found.asked());
     Some(FigureSpec {
         name: "variation",
-        caption: "Where the variation of a reply (0 or 1) comes from, at L0 and in the dark.".to_owned(),
+        caption: "Where the variation of a reply (0 or 1) comes from, at L0 and in the dark. ×: what differs from question to question."
+            .to_owned(),
         chart: Chart { panels, columns: 1, note },
     })
 }

@@ -87,27 +87,30 @@ fn components(found: &RunVariation) -> Table {
         .subject(|row| &row.subject, ToString::to_string)
         .column(Text, "terminal model", |row| row.subject.model.clone())
         .column(Text, "terminal condition", |row| row.subject.condition());
+    // The page has room for eight sources, or for seven and one range.
+    let has_room = Facet::ALL.into_iter().any(|facet| found.levels(facet) < 2);
     for source in Source::ALL {
         let name = source.name();
         let stem = name.replace(" × ", "_");
         let shown = match source {
             Source::Facet(facet) if found.levels(facet) > 1 => format!(" | terminal {name} | page {name} [95 %]"),
             Source::QuestionFacet(facet) if found.levels(facet) > 1 => format!(" | page {name}"),
-            Source::Scene => format!(" | page {name}"),
+            Source::Scene if has_room => format!(" | page {name}"),
             Source::Question | Source::Rest => format!(" | terminal {name} | page {name}"),
-            Source::Facet(_) | Source::QuestionFacet(_) | Source::Combination => String::new(),
+            Source::Scene | Source::Facet(_) | Source::QuestionFacet(_) | Source::Combination => String::new(),
         };
         let heads = format!("csv {stem} {stem}_low {stem}_high{shown}");
         table = table.column(Share, &*heads, move |row| row.components.deviation(source));
     }
-    // The page has room for one of them.
     let widest = Facet::ALL.into_iter().find(|facet| found.levels(*facet) > 1);
     for facet in Facet::ALL {
         let name = facet.name();
-        let shown = if widest == Some(facet) {
-            format!(" | terminal best less worst {name}, 95 % interval | page best less worst {name} [95 %]")
-        } else {
-            String::new()
+        let shown = match widest {
+            Some(widest) if widest == facet && has_room => {
+                format!(" | terminal best less worst {name}, 95 % interval | page best less worst {name} [95 %]")
+            }
+            Some(widest) if widest == facet => format!(" | terminal best less worst {name}, 95 % interval"),
+            _ => String::new(),
         };
         let heads = format!("csv {name}_range {name}_range_low {name}_range_high{shown}");
         table = table.column(Points, &*heads, move |row| range(row, facet));

@@ -47,7 +47,7 @@ const toTheObject = () => {
 };
 
 // The name of a condition in a draw of the noise, as L5-noise~1+zerodce; itself if its noise is not drawn.
-const drawn = (kept, condition, draw) => {
+const inDraw = (kept, condition, draw) => {
   const [light, ...enhancer] = condition.split("+");
   const hasDraws = Object.keys(kept).some((name) => name.startsWith(light + "~"));
   return hasDraws && draw ? [light + "~" + draw, ...enhancer].join("+") : condition;
@@ -71,7 +71,7 @@ const pictures = (question, draw = 0) => {
   $("i-boxes").parentElement.hidden = !outlines.length;
   const conditions = unique(data.subjects.filter((s) => s.level === level).map((s) => s.condition));
   for (const condition of level === "L0" ? conditions : ["L0", ...conditions]) {
-    const name = drawn(kept, condition, draw), image = kept[name];
+    const name = inDraw(kept, condition, draw), image = kept[name];
     if (!image) continue;
     const figure = make("figure"), frame = make("div", undefined, "frame"), whole = make("img", undefined, "whole"), crop = make("img", undefined, "crop");
     whole.src = image.small;
