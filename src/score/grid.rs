@@ -8,7 +8,7 @@ use super::estimate::{ClusterCount, Estimate};
 use super::model_in_condition::ModelInCondition;
 use darkqa_base::types::degradations::Kind;
 use darkqa_base::types::{
-    AskedItem, ChoiceDetail, Family, ModelListing, ParsedAnswer, TrialOutcome, TrialRef, Trials, Variant,
+    AskedItem, ChoiceDetail, Condition, Family, ModelListing, ParsedAnswer, TrialOutcome, TrialRef, Trials, Variant,
 };
 
 /// Marks a missing index.
@@ -145,9 +145,9 @@ impl<'a> Grid<'a> {
         let subject_by_asked: Vec<Option<ModelInCondition>> = trials
             .asked()
             .into_iter()
-            .zip(scope.asked)
+            .zip(&scope.asked)
             .map(|(asked, is_in_scope)| {
-                let (model, condition) = asked.filter(|_| is_in_scope)?;
+                let (model, condition) = asked.filter(|_| *is_in_scope)?;
                 Some(ModelInCondition::new(model, condition))
             })
             .collect();
@@ -170,16 +170,18 @@ impl<'a> Grid<'a> {
             .collect();
         items.sort_by(|a, b| sort_key(a).cmp(&sort_key(b)));
         let index_by_key: HashMap<_, u32> = items.iter().map(|item| (item.asked.key(), item.draw)).zip(0..).collect();
-        let draws = scope.draws;
-        let mut index_by_item = vec![NO_INDEX; trials.item_count() * draws.count];
+        let mut index_by_item = vec![NO_INDEX; trials.item_count() + scope.later.len()];
         for &(number, draw) in &scope.items {
-            index_by_item[draws.place(number, draw)] = index_by_key[&(trials.item(number).key(), draw)];
+            if let Some(place) = scope.place(number, draw) {
+                index_by_item[place] = index_by_key[&(trials.item(number).key(), draw)];
+            }
         }
         let size = subjects.len() * items.len();
         let mut results = vec![TrialResult::Absent; size];
         let mut trial_indices = vec![NO_INDEX; size];
         for (index, trial) in (0..).zip(trials.iter()) {
-            let item = index_by_item[draws.place(trial.item_number(), draws.of(trial.asked_number()))];
+            let place = scope.place(trial.item_number(), scope.draws[trial.asked_number()]);
+            let item = place.map_or(NO_INDEX, |place| index_by_item[place]);
             let subject = index_by_asked[trial.asked_number()].filter(|_| item != NO_INDEX);
             // An item can be in the table because of one model, and still not be shown for another model.
             if let Some(subject) = subject.filter(|_| is_shown(trial.item(), trial.model())) {
@@ -374,57 +376,49 @@ struct GridScope {
     asked: Vec<bool>,
     /// Numbers of the included items with their draws, in the order of their first shown trials.
     items: Vec<(usize, u16)>,
-    draws: AskedDraws,
-}
-
-/// Draws of the noise in a table of trials.
-struct AskedDraws {
-    /// Draw of each pair of model and condition.
-    by_asked: Vec<u16>,
-    /// Number of draws.
-    count: usize,
-}
-
-impl AskedDraws {
-    fn new(trials: &Trials<ChoiceDetail>) -> Self {
-        let asked = trials.asked().into_iter();
-        let by_asked: Vec<u16> =
-            asked.map(|asked| asked.and_then(|(_, condition)| condition?.draw()).unwrap_or(0)).collect();
-        let count = by_asked.iter().copied().max().map_or(1, |last| usize::from(last) + 1);
-        Self { by_asked, count }
-    }
-
-    fn of(&self, asked: usize) -> u16 {
-        self.by_asked[asked]
-    }
-
-    /// Place of an item in a draw among those of all items.
-    fn place(&self, item: usize, draw: u16) -> usize {
-        item * self.count + usize::from(draw)
-    }
+    /// Draw of the noise of each pair of model and condition.
+    draws: Vec<u16>,
+    /// Places of the included items in draws after the first.
+    later: HashMap<(usize, u16), usize>,
 }
 
 impl GridScope {
     fn new(trials: &Trials<ChoiceDetail>, is_shown: impl Fn(&AskedItem, &str) -> bool) -> Self {
-        let draws = AskedDraws::new(trials);
-        let mut is_included = vec![false; trials.item_count() * draws.count];
-        let mut scope = Self { asked: vec![false; trials.asked().len()], items: Vec::new(), draws };
+        let draw = |asked: Option<(&str, Option<&Condition>)>| asked.and_then(|(_, condition)| condition?.draw());
+        let mut scope = Self {
+            asked: vec![false; trials.asked().len()],
+            items: Vec::new(),
+            draws: trials.asked().into_iter().map(|asked| draw(asked).unwrap_or(0)).collect(),
+            later: HashMap::new(),
+        };
+        let mut is_included = vec![false; trials.item_count()];
         for trial in trials.iter() {
             let (item, asked) = (trial.item_number(), trial.asked_number());
-            let draw = scope.draws.of(asked);
-            let place = scope.draws.place(item, draw);
+            let draw = scope.draws[asked];
             // Most trials add neither a subject nor an item; `is_shown` is not called for them.
-            let adds_nothing = is_included[place] && scope.asked[asked];
+            let is_known = scope.place(item, draw).is_some_and(|place| draw > 0 || is_included[place]);
+            let adds_nothing = is_known && scope.asked[asked];
             if adds_nothing || !is_shown(trial.item(), trial.model()) {
                 continue;
             }
             scope.asked[asked] = true;
-            if !is_included[place] {
-                is_included[place] = true;
+            if !is_known {
+                if draw == 0 {
+                    is_included[item] = true;
+                } else {
+                    let place = trials.item_count() + scope.later.len();
+                    scope.later.insert((item, draw), place);
+                }
                 scope.items.push((item, draw));
             }
         }
         scope
+    }
+
+    /// Place of an item in a draw: its number for the first draw, and a place after all numbers for others; `None` if it
+    /// is not included in a later draw.
+    fn place(&self, item: usize, draw: u16) -> Option<usize> {
+        if draw == 0 { Some(item) } else { self.later.get(&(item, draw)).copied() }
     }
 }
 

@@ -37,6 +37,9 @@ pub struct RunVariation {
     pub plans: Vec<Plan>,
 }
 
+/// Largest number of wordings, orders and draws together (chosen): memory grows with its square, times the scenes.
+const MOST_LEVELS: usize = 100;
+
 /// Change that a planned run shall detect: 5 points (chosen).
 const PLANNED_CHANGE: f64 = 0.05;
 
@@ -110,13 +113,14 @@ impl RunVariation {
         [of(Facet::Wording, "wording"), of(Facet::Order, "order"), of(Facet::Draw, "draw")].join(", ")
     }
 
-    /// Computes the variation; `None` if every question was asked in one wording, one order and one draw.
+    /// Computes the variation; `None` if every question was asked in one wording, one order and one draw, or in more than
+    /// [`MOST_LEVELS`] of them.
     #[must_use]
     pub fn new(grid: &Grid<'_>, comparisons: &[Comparison]) -> Option<Self> {
         let wordings: BTreeSet<&str> = grid.items.iter().filter_map(|item| item.asked.key().wording).collect();
         let orders = grid.items.iter().map(|item| item.asked.order as usize + 1).max().unwrap_or(1);
         let draws = grid.items.iter().map(|item| usize::from(item.draw) + 1).max().unwrap_or(1);
-        if wordings.len() < 2 && orders < 2 && draws < 2 {
+        if (wordings.len() < 2 && orders < 2 && draws < 2) || wordings.len() + orders + draws > MOST_LEVELS {
             return None;
         }
         let places = places(grid, &wordings);
