@@ -12,7 +12,7 @@ use crate::types::questions::PixelBox;
 use crate::types::{Condition, FrameId, ImageFidelity, Rgb, Shared, Thumbnail};
 use darkqa_score::answers::record::Detail;
 use darkqa_score::photographs::realism::psnr;
-use darkqa_score::photographs::realism::ssim::ssim;
+use darkqa_score::photographs::realism::ssim::sampled_ssim;
 
 /// The notes about one image; `None` for a note that is not wanted or exists already.
 #[derive(Debug, Default)]
@@ -82,7 +82,7 @@ pub(crate) fn similarity(image: &Rgb, clean: &Rgb) -> Result<Similarity> {
     Ok(Similarity {
         psnr: psnr.is_finite().then_some(psnr),
         // An error means that the image is smaller than the SSIM window.
-        ssim: ssim(image, clean).ok(),
+        ssim: sampled_ssim(image, clean).ok(),
     })
 }
 
