@@ -28,6 +28,7 @@ use crate::pictures::png;
 use crate::runs::Outcome;
 use crate::runs::resolved_shard::{ShardArgs, keep_shard};
 use crate::runs::shard::Shard;
+use crate::types::manifests::PngForm;
 use crate::types::manifests::Status;
 use crate::types::questions::letter;
 use crate::types::text::counted;
@@ -128,7 +129,14 @@ pub(crate) fn export(args: &ExportArgs, progress: &Progress) -> Result<Outcome> 
     recipe.check(&sources, &conditions)?;
     let mut sets = open_sets(args, shard, &dataset, &conditions, &questions)?;
     let timings = Timings::default();
-    let steps = ImageSteps { frames: &dataset, recipe: &recipe, limit: None, timings: &timings, stored: None };
+    let steps = ImageSteps {
+        frames: &dataset,
+        recipe: &recipe,
+        limit: None,
+        timings: &timings,
+        png: PngForm::NEWEST,
+        stored: None,
+    };
     let enhancers = EnhancerModels::load(files, &args.loading)?.take()?;
     let mut pipeline = ImagePipeline::new(steps, enhancers, args.loading.probe.implausible());
     workers.install(|| pipeline.probe_sources(&sources))?;

@@ -353,6 +353,7 @@ fn people_manifest(run: &RunManifest, args: &ReadArgs) -> RunManifest {
         part: None,
         settings: BTreeMap::new(),
         images: run.images.clone(),
+        png: run.png,
         reply_reading: ChoiceDetail::REPLY_READING.map(str::to_owned),
         counts: Counts::default(),
     }

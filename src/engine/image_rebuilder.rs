@@ -17,7 +17,7 @@ use crate::engine::images::trials::ASK;
 use crate::engine::images::workers::ThreadArgs;
 use crate::error::{Error, Result};
 use crate::pictures::Payload;
-use crate::types::manifests::RunManifest;
+use crate::types::manifests::{PngForm, RunManifest};
 use crate::types::{Condition, Decides, FrameId};
 use darkqa_enhance::{EnhancedFolder, Enhancer, Implausible, ProbeArgs, RuntimeArgs};
 use darkqa_light::KindSettings;
@@ -49,6 +49,7 @@ pub(crate) struct RebuildArgs {
 pub(crate) struct ImageRebuilder {
     data: FrameData,
     recipe: Recipe,
+    png: PngForm,
     enhancers: Vec<Enhancer>,
 }
 
@@ -111,7 +112,7 @@ impl ImageRebuilder {
             runtime: args.runtime,
             threads: args.threads,
         };
-        Ok(Self { data, recipe, enhancers: EnhancerModels::load(files, &loading)?.take()? })
+        Ok(Self { data, recipe, png: manifest.png, enhancers: EnhancerModels::load(files, &loading)?.take()? })
     }
 
     /// The images of a frame or walk in each of these conditions, in the order in which they would be sent.
@@ -131,7 +132,8 @@ impl ImageRebuilder {
             photographs::measure(frames, std::slice::from_mut(&mut source))?;
         }
         let timings = Timings::default();
-        let steps = ImageSteps { frames, recipe: &self.recipe, limit: None, timings: &timings, stored: None };
+        let steps =
+            ImageSteps { frames, recipe: &self.recipe, limit: None, timings: &timings, png: self.png, stored: None };
         let enhancers = std::mem::take(&mut self.enhancers);
         let mut pipeline = ImagePipeline::new(steps, enhancers, Implausible::NotLookedFor);
         let conditions: Vec<&Condition> = conditions.iter().collect();

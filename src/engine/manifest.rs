@@ -20,7 +20,7 @@ use crate::runs::renamed::{self, SettingsChange, is_kept};
 use crate::runs::shard::tasks_setting;
 use crate::store::now;
 use crate::types::degradations::Kind;
-use crate::types::manifests::{Columns, Counts, RunManifest, RunPart, Status};
+use crate::types::manifests::{Columns, Counts, PngForm, RunManifest, RunPart, Status};
 use crate::types::{Degradation, Digest, InputSummary, ListedModel, PairDark, ProfileName, StoredDetail as _};
 use darkqa_enhance::{self, SizeArgs, Tiling};
 use darkqa_light::{KindSettings, Synthesis, version};
@@ -60,6 +60,7 @@ pub(crate) fn run_manifest<E: Experiment>(experiment: &E, stored: Option<RunMani
         part: experiment.part().map(|place| RunPart { place, trials: vec![0; place.count] }),
         settings,
         images: job.image_flags.clone(),
+        png: PngForm::NEWEST,
         reply_reading: DetailOf::<E>::REPLY_READING.map(str::to_owned),
         counts: Counts::default(),
     };
@@ -82,6 +83,7 @@ pub(crate) fn run_manifest<E: Experiment>(experiment: &E, stored: Option<RunMani
             enhancers: stored.enhancers,
             inputs: manifest.inputs.or(stored.inputs),
             images,
+            png: stored.png,
             // Stored replies keep their parsed answers until they are parsed again.
             reply_reading: stored.reply_reading,
             ..manifest

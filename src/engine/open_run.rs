@@ -36,7 +36,7 @@ use crate::runs::shard::{Shard, ShardBudget};
 use crate::runs::shard_records::OtherShards;
 use crate::runs::stored::StoredRun;
 use crate::store::{self, Store, StoredTrial, now};
-use crate::types::manifests::{Counts, RunManifest};
+use crate::types::manifests::{Counts, PngForm, RunManifest};
 use crate::types::text::{counted, money, plural};
 use crate::types::{Digest, EnhancerName, TrialKey, View};
 use darkqa_enhance::{Enhancer, Usage};
@@ -283,7 +283,8 @@ impl<E: Experiment> OpenRun<'_, E> {
         let maker = Maker::new(self.enhancers.version(), &settings.loading.size);
         let images = self.images.as_ref();
         let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
-        pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
+        pipeline.steps.png = self.manifest.png;
+        pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker, self.manifest.png));
         workers.shared.install(|| {
             if shows_images {
                 dark_already::warn(experiment);
@@ -442,14 +443,21 @@ pub(crate) fn every_model<E: Experiment>(experiment: &E) -> Vec<&ModelUnderTest>
     phases.flat_map(|phase| experiment.models(phase)).collect()
 }
 
-/// The image pipeline of an experiment, without an image store.
+/// The image pipeline of an experiment, without an image store, and with the PNG files of a new run.
 pub(crate) fn pipeline<'a, E: Experiment>(
     experiment: &'a E,
     enhancers: Vec<Enhancer>,
     limit: Option<ImageLimit>,
     timings: &'a Timings,
 ) -> ImagePipeline<'a> {
-    let steps = ImageSteps { frames: experiment.frames(), recipe: experiment.recipe(), limit, timings, stored: None };
+    let steps = ImageSteps {
+        frames: experiment.frames(),
+        recipe: experiment.recipe(),
+        limit,
+        timings,
+        png: PngForm::NEWEST,
+        stored: None,
+    };
     let implausible = experiment.settings().loading.probe.implausible();
     let mut pipeline = ImagePipeline::new(steps, enhancers, implausible);
     pipeline.whole_run = experiment.probe_sources();

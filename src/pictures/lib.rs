@@ -14,6 +14,7 @@ mod colour;
 pub mod decode_rule;
 pub mod hdf5;
 pub mod image_file;
+mod noise_png;
 pub mod npy;
 mod payload;
 pub mod raw_image;

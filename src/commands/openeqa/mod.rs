@@ -64,7 +64,7 @@ fn pack(setup: &OpenSetup<'_>, files: Vec<ModelFile>, folder: &Path, progress: &
     let mut pipeline = pipeline(setup, enhancers.take()?, limit, &timings);
     let maker = Maker::new(enhancers.version(), &settings.loading.size);
     let stored = images.as_ref();
-    pipeline.steps.stored = stored.map(|images| StoredImages::new(images, &maker));
+    pipeline.steps.stored = stored.map(|images| StoredImages::new(images, &maker, pipeline.steps.png));
     let workers = pool(settings.loading.threads.threads)?;
     let conditions: Vec<&Condition> = setup.conditions.iter().collect();
     let bar = progress.bar("walks", setup.sources.len());

@@ -28,6 +28,7 @@ use crate::files;
 use crate::report::text::words::first_names;
 use crate::runs::Outcome;
 use crate::runs::resolved_shard::{ShardArgs, keep_shard};
+use crate::types::manifests::PngForm;
 use crate::types::text::counted;
 use crate::types::{Condition, Decides, Degradation, FrameId, Rgb, SetLight};
 use darkqa_light::{LightArgs, LightSettings, NoiseKey};
@@ -210,7 +211,14 @@ fn write_files(
     let frames = OneFrame { frames, entry };
     let recipe = Recipe::lossless(&making.light.kinds, &[]);
     let timings = Timings::default();
-    let steps = ImageSteps { frames: &frames, recipe: &recipe, limit: None, timings: &timings, stored: None };
+    let steps = ImageSteps {
+        frames: &frames,
+        recipe: &recipe,
+        limit: None,
+        timings: &timings,
+        png: PngForm::NEWEST,
+        stored: None,
+    };
     let mut work = SynthesisWork { making, entry, frame: FrameWork::for_frame(steps, entry.id.clone()) };
     match work.frame.note() {
         Ok(note) => tally.add(&entry.id, &note),

@@ -453,7 +453,8 @@ pub(super) fn write<E: Experiment>(
     let maker = Maker::new(run.enhancers.version(), &settings.loading.size);
     let images = run.images.as_ref();
     let mut pipeline = pipeline(experiment, Vec::new(), limit, &timings);
-    pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker));
+    pipeline.steps.png = run.manifest.png;
+    pipeline.steps.stored = images.map(|images| StoredImages::new(images, &maker, run.manifest.png));
     let missing = missing_notes(experiment, run.store.folder());
     let sources = experiment.sources();
     workers.install(|| {

@@ -14,6 +14,7 @@ use super::stored::{Needed, Similarity, StoredImage, StoredImages, StoredNotes, 
 use crate::ask::{HeldBack, ImageLimit};
 use crate::error::Result;
 use crate::pictures::Payload;
+use crate::types::manifests::PngForm;
 use crate::types::{ExposureFacts, InputNote, Rgb};
 
 /// A step of the image pipeline, or a state of the request queue.
@@ -144,6 +145,8 @@ pub(crate) struct ImageSteps<'a> {
     /// Largest image that the endpoint accepts; `None` if all models are built in.
     pub(crate) limit: Option<ImageLimit>,
     pub(crate) timings: &'a Timings,
+    /// The form of PNG files.
+    pub(crate) png: PngForm,
     /// The image store; `None` without one.
     pub(crate) stored: Option<StoredImages<'a>>,
 }
@@ -190,7 +193,7 @@ impl ImageSteps<'_> {
     ) -> Result<(Arc<Payload>, Arc<Rgb>)> {
         let (payload, encoded) = self.timings.time(TimedStep::Encode, || {
             let encoded = self.scaled(image)?;
-            let payload = Payload::encode(&encoded, self.recipe.format)?;
+            let payload = Payload::encode_as(&encoded, self.recipe.format, self.png)?;
             let payload = payload.with_orientation(note.orientation);
             Ok((payload.with_exposure(exposure), encoded))
         })?;

@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::alerts::run_alerts;
 use super::combine::{CombinedRuns, check_comparable, clusters};
 use super::cost::{PricedRun, TrialCost};
+use super::image_groups::has_same_image_settings;
 use super::join::join;
 use crate::error::{Error, Result};
 use crate::report::content::Report;
@@ -78,7 +79,16 @@ impl Baseline {
         runs.push(old.clone());
         check_comparable(&runs)?;
         // Models and conditions are matched by name: a new model is compared with the old one of the same name.
-        let alerts = run_alerts(&join(runs, |_| true)?);
+        let has_other_form = new_of(&runs).iter().any(|run| !run.manifest.has_same_image_bytes(&old.manifest));
+        let takes_as_same =
+            has_other_form && new_of(&runs).iter().all(|run| has_same_image_settings(&run.manifest, &old.manifest));
+        let mut alerts = run_alerts(&join(runs, |_| true)?);
+        if takes_as_same {
+            let text = format!(
+                "The PNG files of {name} have an earlier form: images count as the same because their settings are, and their bytes are not compared."
+            );
+            alerts.push(Alert::new(AlertKind::Images, text));
+        }
         let (mut trials, mut old_trials) = (combined.trials.clone(), old.trials);
         old_trials.rename(|model| Some(baseline_name(&name, model)));
         let logs = trials.logs();
@@ -110,7 +120,9 @@ impl Baseline {
             let model = marked.strip_suffix(&suffix).unwrap_or(marked);
             costs.add(trial, old_run.trial_cost(model, trial));
         }
-        let rows = baseline_rows(&grid, &healths(&grid), &pairs, |index| costs.0.get(&grid.subjects[index]).copied());
+        let rows = baseline_rows(&grid, &healths(&grid), &pairs, !takes_as_same, |index| {
+            costs.0.get(&grid.subjects[index]).copied()
+        });
         let compared: BTreeSet<usize> = pairs
             .iter()
             .filter(|(new, _)| rows.iter().any(|row| row.subject == grid.subjects[*new]))
@@ -219,6 +231,11 @@ impl Baseline {
 fn refuse(problem: &str) -> Result<bool> {
     let problem = format!("{problem}; leave the flag out to see the report");
     Err(Error::usage(FAIL_IF_WORSE, problem))
+}
+
+/// The new runs in a list that ends with the old one.
+fn new_of(runs: &[StoredRun<ChoiceDetail>]) -> &[StoredRun<ChoiceDetail>] {
+    runs.split_last().map_or(&[], |(_, new)| new)
 }
 
 fn baseline_name(name: &str, model: &str) -> String {

@@ -68,8 +68,8 @@ pub(super) struct SplitCurve {
 
 /// Groups of runs with the same images, for each curve.
 ///
-/// Two runs have the same images if the digests of all images that both sent are equal. If they share none, their
-/// manifests decide.
+/// Two runs have the same images if the digests of all images that both sent are equal. If they share none, or the forms
+/// of their PNG files differ, their manifests decide.
 #[derive(Debug, Default)]
 pub(super) struct ImageGroups {
     /// The group of each run, for the curves that are split.
@@ -224,6 +224,9 @@ impl CurveAgreement {
         for ((condition, _), digests) in images {
             for (place, (one, digest)) in digests.iter().enumerate() {
                 for (other, other_digest) in &digests[place + 1..] {
+                    if !runs[*one].manifest.has_same_image_bytes(&runs[*other].manifest) {
+                        continue;
+                    }
                     let pair = pairs.entry((condition, *one, *other)).or_default();
                     pair.shared += 1;
                     pair.differing += usize::from(digest != other_digest);
@@ -249,6 +252,16 @@ fn image<D: Detail>(trial: TrialRef<'_, D>) -> Option<(&Condition, &str, Option<
     let is_image = !trial.failed() && !is_control(trial.model());
     let condition = trial.condition().filter(|_| is_image)?;
     Some((condition, trial.source(), trial.sent_digest()))
+}
+
+/// True if the settings that decide images are the same in two runs.
+pub(super) fn has_same_image_settings(one: &RunManifest, other: &RunManifest) -> bool {
+    differing_settings(&[one, other].map(|run| {
+        let mut all = identity_fields(run, &settings::ENCODING);
+        all.extend(settings::pixel_settings(run));
+        Some(all)
+    }))
+    .is_empty()
 }
 
 /// True if two runs have the same images on a curve according to their manifests.

@@ -238,6 +238,10 @@ fn difference(one: &RunManifest, other: &RunManifest) -> Option<(String, String,
     if let Some((field, first, second)) = differences(&one.identity, &other.identity).next() {
         return Some((setting_spelling(field), first, second));
     }
+    if !one.has_same_image_bytes(other) {
+        let [first, second] = [one, other].map(|run| serde_json::json!(run.png).to_string());
+        return Some(("form of PNG files".to_owned(), first, second));
+    }
     let column = one.column_differences(other).into_iter().next()?;
     let setting = setting_spelling(&column.field);
     let field = format!("{setting} of the {} {}", column.column, column.value);

@@ -2,7 +2,7 @@ use super::*;
 use std::collections::BTreeMap;
 use std::fs;
 
-use darkqa_base::types::manifests::{Counts, Status};
+use darkqa_base::types::manifests::{Counts, PngForm, Status};
 use darkqa_base::types::{Digest, Family, FrameId, QuestionId, StoredDetail as _, TrialOutcome};
 
 type Store = super::Store;
@@ -24,6 +24,7 @@ fn manifest(seed: u64) -> RunManifest {
         inputs: None,
         shard: None,
         part: None,
+        png: PngForm::NEWEST,
         reply_reading: None,
         counts: Counts::default(),
     }

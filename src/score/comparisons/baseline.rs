@@ -39,12 +39,14 @@ pub struct BaselineSide {
 }
 
 /// Compares the subjects of a grid. `pairs` lists the indices of a new subject and the old one, `health` has one entry
-/// for each subject, and `cost` returns the cost of a subject.
+/// for each subject, and `cost` returns the cost of a subject. If `compares_bytes` is false, equal images of both sides
+/// have other bytes, and all count as the same.
 #[must_use]
 pub fn baseline_rows(
     grid: &Grid<'_>,
     health: &[Health],
     pairs: &[(usize, usize)],
+    compares_bytes: bool,
     cost: impl Fn(usize) -> Option<f64>,
 ) -> Vec<BaselineRow> {
     let mut rows: Vec<BaselineRow> = pairs
@@ -53,7 +55,7 @@ pub fn baseline_rows(
             let has_other_image: Vec<bool> = (0..grid.items.len())
                 .map(|item| {
                     let [new, old] = [new, old].map(|subject| grid.compared_trial(subject, item)?.sent_digest());
-                    new.zip(old).is_some_and(|(new, old)| new != old)
+                    compares_bytes && new.zip(old).is_some_and(|(new, old)| new != old)
                 })
                 .collect();
             let mode = ParsingMode::Strict;

@@ -69,6 +69,6 @@ fn open_questions_with_marks_and_enhancer() {
     assert_eq!(digest(&house.0, "run"), OPENEQA);
 }
 
-const EVALUATION: &str = "8e01800e9ace7c5f";
-const READINGS: &str = "52b5a71d75add28e";
-const OPENEQA: &str = "67d50e1da3f5fbd7";
+const EVALUATION: &str = "08c5d4ff0e1991ff";
+const READINGS: &str = "32b13a1062b74890";
+const OPENEQA: &str = "993be9b76e08b0d4";

@@ -7,6 +7,7 @@ mod openeqa;
 mod parts_of_commands;
 mod pins;
 mod plan;
+mod png_form;
 mod remedies;
 mod shards;
 #[cfg(unix)]

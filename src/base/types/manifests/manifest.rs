@@ -110,6 +110,13 @@ impl RunManifest {
         self.status = if counts.answered == counts.trials { Status::Complete } else { Status::Incomplete };
     }
 
+    /// False if equal images of both runs have other bytes, because their PNG files have other forms.
+    #[must_use]
+    pub fn has_same_image_bytes(&self, other: &Self) -> bool {
+        let sends_png = |run: &Self| run.identity.get("--image").is_none_or(|format| format == "png");
+        self.png == other.png || !sends_png(self) || !sends_png(other)
+    }
+
     /// True if a model is built into this program; false if it runs at an endpoint or is unknown to the run.
     #[must_use]
     pub fn is_built_in(&self, model: &str) -> bool {
@@ -176,6 +183,29 @@ pub struct RunPart {
     pub trials: Vec<usize>,
 }
 
+/// The form of the PNG files that are made for requests. The pixels are the same in all forms, the bytes are not. A run
+/// keeps its form.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PngForm {
+    /// Each row has its own filter, and all images share one Huffman code; in runs of version 0.2.0 and earlier.
+    #[default]
+    Adaptive,
+    /// Each image has one filter and its own Huffman code: half the time, and smaller files of dark and noisy images.
+    Noise,
+}
+
+impl PngForm {
+    /// The form of new runs.
+    pub const NEWEST: Self = Self::Noise;
+
+    /// True for the form of runs whose manifest names none.
+    #[must_use]
+    pub fn is_first(&self) -> bool {
+        *self == Self::Adaptive
+    }
+}
+
 /// The version of the lenient reply parser in runs whose manifest does not record one: they predate that field.
 pub const FIRST_REPLY_READING: &str = "lenient/1";
 
@@ -226,6 +256,9 @@ pub struct RunManifest {
     /// The flags that determine the images, as the user wrote them; empty in runs of earlier versions.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub images: BTreeMap<String, Value>,
+    /// The form of the PNG files that were made for requests.
+    #[serde(default, skip_serializing_if = "PngForm::is_first")]
+    pub png: PngForm,
     /// The version of the lenient reply parser that produced the records, such as `lenient/5`.
     ///
     /// `None` in runs of open-ended questions, and in runs of earlier versions of this program, which used

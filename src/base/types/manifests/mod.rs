@@ -11,7 +11,7 @@ pub use enhancer_note::{
 };
 pub use input_note::{ColourHandling, ColourNote, DepthNote, Flaw, InputNote, InputSummary};
 pub use manifest::{
-    ColumnDifference, Columns, Counts, FIRST_REPLY_READING, Fit, Identity, JUDGES, PartPlace, RecordedNames,
+    ColumnDifference, Columns, Counts, FIRST_REPLY_READING, Fit, Identity, JUDGES, PartPlace, PngForm, RecordedNames,
     RunManifest, RunPart, Status, StoredViews, Views, differences, judge_flag,
 };
 pub use model_listing::{ListedModel, ModelColumn, ModelListing};

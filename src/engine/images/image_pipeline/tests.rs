@@ -9,6 +9,7 @@ use crate::engine::images::notes::WantedNotes;
 use crate::engine::images::recipes::Recipe;
 use crate::engine::images::timings::Timings;
 use crate::pictures::{PayloadFormat, Scaling};
+use crate::types::manifests::PngForm;
 use darkqa_light::KindSettings;
 
 /// A folder with one frame as a plain PNG file, and the frame as a source.
@@ -43,8 +44,14 @@ fn pipeline_output(
         enhancers: Vec::new(),
         enhanced_images: Vec::new(),
     };
-    let steps =
-        ImageSteps { frames: &dataset, recipe: &recipe, limit: None, timings: &Timings::default(), stored: None };
+    let steps = ImageSteps {
+        frames: &dataset,
+        recipe: &recipe,
+        limit: None,
+        timings: &Timings::default(),
+        png: PngForm::NEWEST,
+        stored: None,
+    };
     let mut pipeline = ImagePipeline::new(steps, Vec::new(), Implausible::default());
     let mut work = FrameWork::for_source(steps, &source, &source.frames[0]);
     let condition = condition.parse().unwrap();

@@ -17,7 +17,8 @@ use crate::engine::images::frames::{Source, SourceFrame};
 use crate::engine::images::notes::{self, ShownObjects};
 use crate::engine::images::recipes::{ImageKeyFacts, Maker, Recipe};
 use crate::error::Result;
-use crate::pictures::Payload;
+use crate::pictures::{Payload, PayloadFormat};
+use crate::types::manifests::PngForm;
 use crate::types::questions::PixelBox;
 use crate::types::{Condition, Digest, FrameId, Thumbnail};
 use darkqa_enhance::{self, ImageUse, ProbeFindings};
@@ -27,6 +28,7 @@ use darkqa_enhance::{self, ImageUse, ProbeFindings};
 pub(crate) struct StoredImages<'a> {
     store: &'a ImageStore,
     maker: &'a Maker,
+    png: PngForm,
 }
 
 /// The facts that decide the file of an image.
@@ -37,13 +39,16 @@ struct StoredRecipe<'a> {
     content: Option<EntryType>,
     image: ImageKeyFacts<'a>,
     program: &'static str,
+    /// The form of a PNG file; `None` for the first one, and for JPEG.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    png: Option<PngForm>,
     /// `None` without an enhancer, because a degraded image depends neither on the machine nor on the runtime.
     enhanced_with: Option<&'a Maker>,
 }
 
 impl<'a> StoredImages<'a> {
-    pub(crate) fn new(store: &'a ImageStore, maker: &'a Maker) -> Self {
-        Self { store, maker }
+    pub(crate) fn new(store: &'a ImageStore, maker: &'a Maker, png: PngForm) -> Self {
+        Self { store, maker, png }
     }
 
     /// The findings about enhancers in the same store.
@@ -89,6 +94,7 @@ impl<'a> StoredImages<'a> {
                 content: (content != EntryType::Image).then_some(content),
                 image: recipe.key_facts(source, frame, condition)?,
                 program: self.maker.program(),
+                png: (recipe.format == PayloadFormat::Png && !self.png.is_first()).then_some(self.png),
                 enhanced_with: condition.enhancer.is_some().then_some(self.maker),
             })
         };

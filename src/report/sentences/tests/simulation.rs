@@ -297,7 +297,7 @@ fn false_alarms(models: usize, conditions: usize, runs: usize) -> usize {
                 let old = ModelInCondition { model: format!("m{:02}", number + models), ..subject.clone() };
                 Some((index, grid.find(&old)?))
             });
-            let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), |_| None);
+            let rows = baseline_rows(&grid, &healths(&grid), &pairs.collect::<Vec<_>>(), true, |_| None);
             rows.iter().any(|row| row.paired.tested.verdict == Verdict::Worse)
         })
         .count()

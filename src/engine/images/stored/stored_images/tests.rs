@@ -41,7 +41,7 @@ fn key(recipe: &Recipe, frame: &SourceFrame, condition: &str, maker: &Maker) -> 
     let store = ImageStore::open(folder.path(), FolderAccess::Private, StoredKinds::All, 1 << 20).unwrap();
     let source = FrameId("walk".to_owned());
     let condition = condition.parse().unwrap();
-    let stored = StoredImages::new(&store, maker);
+    let stored = StoredImages::new(&store, maker, PngForm::NEWEST);
     let place = stored.place(recipe, &source, frame, &condition).unwrap();
     *place.image.digest()
 }
