@@ -63,7 +63,7 @@ fn report<D: Detail>(
     text: &str,
     write: impl FnOnce(&Store<D>, StoredRun<D>, StdoutFormat) -> Result<Outcome>,
 ) -> Result<Outcome> {
-    let mut run = StoredRun::reread(store.folder(), manifest)?;
+    let mut run = StoredRun::reread(store.folder(), manifest, store.indexed().cloned())?;
     let trials = run.manifest.counts.trials.max(run.trials.len());
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.set_counts(Counts::new(trials, failed));

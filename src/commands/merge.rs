@@ -70,7 +70,7 @@ fn merge_all<D: Detail>(
     drop(folders);
     // The trials are read again from the merged run.
     let manifest = shards.into_manifest();
-    let run = StoredRun::reread(&args.out, manifest)?;
+    let run = StoredRun::reread(&args.out, manifest, None)?;
     let outcome = write(&store, run, args.show.format())?;
     record_table::update(&args.out, args.show.record_table())?;
     Ok(outcome)

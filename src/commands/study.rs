@@ -274,7 +274,7 @@ pub(crate) fn read(args: &ReadArgs) -> Result<Outcome> {
     }
     store.sync()?;
     warn_of_no_choice(&counts.no_choice);
-    let mut run = StoredRun::reread(&args.out, people_manifest)?;
+    let mut run = StoredRun::reread(&args.out, people_manifest, None)?;
     let failed = run.trials.iter().map(TrialRef::failed);
     run.manifest.set_counts(Counts::new(run.trials.len(), failed));
     let mut outcome = written::write(&store, run, args.show.format())?;

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use crate::engine::images::frames::{Frames, Source};
 use crate::engine::images::recipes::Recipe;
-use crate::engine::images::trials::{Item, SourcePlan};
+use crate::engine::images::trials::{Item, Plan, SourcePlan};
 use crate::engine::models::ModelUnderTest;
 use crate::engine::settings::JobSettings;
 use crate::error::Result;
@@ -12,8 +12,8 @@ use crate::runs::forecast::PowerForecast;
 use crate::runs::outcome::{Outcome, StdoutFormat};
 use crate::runs::stored::StoredRun;
 use crate::store::Store;
-use crate::types::manifests::{Columns, Identity, PartPlace};
-use crate::types::{Record, RunQuestion};
+use crate::types::manifests::{Columns, Identity, PartPlace, RunManifest};
+use crate::types::{Record, RunQuestion, TrialKey};
 use darkqa_score::choice::llm_match::Protocol;
 
 /// Record type of an experiment's trials.
@@ -109,18 +109,53 @@ pub(crate) trait Experiment: Sync {
         &[]
     }
 
-    /// All trials of a phase, including those that already have a reply. `records` reads the records so far; it is
-    /// called only if the trials depend on replies of an earlier phase.
+    /// Calls `add` with the trials of a phase, source by source, including those that already have a reply. `records`
+    /// reads the records so far; it is called only if the trials depend on replies of an earlier phase.
+    fn each_source(
+        &self,
+        phase: usize,
+        records: impl FnOnce() -> Result<Vec<RecordOf<Self>>>,
+        add: &mut dyn FnMut(SourcePlan<Self::Item>),
+    ) -> Result<()>;
+
+    /// All trials of a phase, as for [`each_source`](Self::each_source).
     fn plan(
         &self,
         phase: usize,
         records: impl FnOnce() -> Result<Vec<RecordOf<Self>>>,
-    ) -> Result<Vec<SourcePlan<Self::Item>>>;
+    ) -> Result<Vec<SourcePlan<Self::Item>>> {
+        let mut sources = Vec::new();
+        self.each_source(phase, records, &mut |source| sources.push(source))?;
+        Ok(sources)
+    }
+
+    /// The plan of a phase without the trials that `is_excluded` accepts, which are never in memory together.
+    fn plan_without(
+        &self,
+        phase: usize,
+        records: impl FnOnce() -> Result<Vec<RecordOf<Self>>>,
+        is_excluded: impl Fn(&TrialKey) -> bool,
+    ) -> Result<Plan<Self::Item>> {
+        let mut plan = Plan::new(Vec::new());
+        self.each_source(phase, records, &mut |source| plan.add(source, &is_excluded))?;
+        Ok(plan)
+    }
 
     /// Requests of later phases that cannot be planned yet, such as the judge's marks for answers that have not
     /// arrived.
     fn expected_requests(&self, _remaining: &[SourcePlan<Self::Item>]) -> Vec<ExpectedRequest> {
         Vec::new()
+    }
+
+    /// The outcome of [`report`](Self::report) on the run with this manifest, if the report in its folder is made from
+    /// the same records and settings; otherwise `None`.
+    fn unchanged_report(
+        &self,
+        _store: &Store<DetailOf<Self>>,
+        _manifest: &RunManifest,
+        _show: StdoutFormat,
+    ) -> Result<Option<Outcome>> {
+        Ok(None)
     }
 
     /// Scores a run, and writes the report and the manifest into the run folder. The outcome is incomplete if a reply

@@ -20,7 +20,8 @@ use crate::engine::images::recipes::Maker;
 use crate::engine::images::stored::StoredFindings;
 use crate::engine::images::timings::Timings;
 use crate::engine::images::trials::Plan;
-use crate::engine::open_run::{OpenRun, answered, lost_for_good, pipeline, truncated};
+use crate::engine::open_run::{OpenRun, pipeline};
+use crate::engine::stored_keys::{answered, lost_for_good, truncated};
 use crate::engine::{dark_already, manifest};
 use crate::error::{Error, Result};
 use crate::report::forecast::{forecast_json, render};
@@ -93,7 +94,7 @@ impl<'a, E: Experiment> Job<'a, E> {
         let experiment = self.experiment;
         let settings = experiment.settings();
         self.check_same_run()?;
-        let stored = store::read_trials(&self.folder)?;
+        let stored = store::read_trials::<DetailOf<E>>(&self.folder)?;
         let mut answered = answered(&stored);
         answered.extend(lost_for_good(&stored, settings));
         let (mut plans, mut measured) = (Vec::new(), Vec::new());
@@ -176,7 +177,17 @@ impl<'a, E: Experiment> Job<'a, E> {
                 store.append(record)?;
             }
         }
-        Ok(OpenRun { experiment, progress, enhancers, store, lacks_notes, manifest, keys: HashSet::new(), images })
+        Ok(OpenRun {
+            experiment,
+            progress,
+            enhancers,
+            store,
+            lacks_notes,
+            manifest,
+            keys: HashSet::new(),
+            images,
+            unasked: None,
+        })
     }
 }
 
@@ -184,8 +195,7 @@ impl<'a, E: Experiment> Job<'a, E> {
 fn planned_keys<E: Experiment>(experiment: &E, folder: &Path) -> Result<HashSet<TrialKey>> {
     let mut keys = HashSet::new();
     for phase in 0..E::PHASES.len() {
-        let plan = experiment.plan(phase, || store::read_records(folder))?;
-        keys.extend(Plan::new(plan).keys);
+        keys.extend(experiment.plan_without(phase, || store::read_records(folder), |_| true)?.keys);
     }
     Ok(keys)
 }
@@ -198,7 +208,7 @@ fn planned_keys<E: Experiment>(experiment: &E, folder: &Path) -> Result<HashSet<
 /// If a stored reply belongs to a trial that this command does not plan.
 fn restore_manifest<E: Experiment>(experiment: &E, folder: &Path, manifest: &RunManifest, damage: &str) -> Result<()> {
     let planned = planned_keys(experiment, folder)?;
-    let trials = store::read_trials(folder)?;
+    let trials = store::read_trials::<DetailOf<E>>(folder)?;
     let (own, others) =
         trials.iter().filter(|trial| !trial.failed()).partition::<Vec<_>, _>(|trial| planned.contains(&trial.key));
     if !others.is_empty() {
@@ -252,7 +262,7 @@ fn automatic<E: Experiment>(experiment: &E) -> Result<PathBuf> {
         "identity": experiment.identity(),
         "columns": experiment.columns(),
         "shard": settings.shard.to_string(),
-        "trials": Plan::new(experiment.plan(0, || Ok(Vec::new()))?).keys,
+        "trials": experiment.plan_without(0, || Ok(Vec::new()), |_| true)?.keys,
         "notes": experiment.notes(),
     });
     let hash = &Digest::canonical("darkqa.command/2", &facts)?.to_string()[..8];

@@ -25,6 +25,7 @@ pub(crate) mod open_run;
 pub(crate) mod refusals;
 pub(crate) mod reply_checks;
 pub(crate) mod settings;
+pub(crate) mod stored_keys;
 
 pub(crate) use job::Job;
 pub(crate) use open_run::{image_limit, pipeline};

@@ -2,7 +2,7 @@
 //!
 //! The source at which a process starts in its plan: [`first_source`].
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::{BTreeMap, HashSet};
 use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
@@ -27,6 +27,7 @@ use crate::engine::images::workers::Workers;
 use crate::engine::models::{self, ModelUnderTest};
 use crate::engine::reply_checks::ReplyChecks;
 use crate::engine::settings::JobSettings;
+use crate::engine::stored_keys::{self, lost_for_good, truncated};
 use crate::engine::{dark_already, manifest};
 use crate::error::Result;
 use crate::runs::missing_thumbnails::MissingThumbnails;
@@ -62,6 +63,8 @@ pub(crate) struct OpenRun<'a, E: Experiment> {
     pub(crate) keys: HashSet<TrialKey>,
     /// The image store; `None` without one.
     pub(crate) images: Option<ImageStore>,
+    /// Numbers of the stored trials, if this command had none to ask; otherwise `None`.
+    pub(crate) unasked: Option<Counts>,
 }
 
 /// The trials of a phase that still have to be asked.
@@ -76,13 +79,19 @@ impl<E: Experiment> OpenRun<'_, E> {
     /// Asks the remaining trials, phase by phase.
     pub(crate) fn ask(mut self) -> Result<Outcome> {
         let (mut end, mut stopped) = (EndReason::AllAsked, Vec::new());
+        let mut has_asked = false;
         for phase in 0..E::PHASES.len() {
             let mut remaining = self.remaining(phase)?;
             self.warn_of_batches(remaining.in_batch);
             self.add_lost_notes(phase, &mut remaining.plan)?;
             if remaining.plan.sources.is_empty() {
+                if !has_asked {
+                    let trials = remaining.stored.iter();
+                    self.unasked = Some(self.counts(trials.map(|trial| (trial.key, trial.failed()))));
+                }
                 continue;
             }
+            (has_asked, self.unasked) = (true, None);
             match self.ask_phase(phase, remaining)? {
                 EndReason::AllAsked => {}
                 // The next phases continue with the answers of the other models.
@@ -168,19 +177,24 @@ impl<E: Experiment> OpenRun<'_, E> {
     /// have are copied first.
     pub(crate) fn remaining(&mut self, phase: usize) -> Result<Remaining<E>> {
         let mut stored = self.store.trials()?;
-        let mut plan = Plan::new(self.experiment.plan(phase, || self.store.records())?);
+        let mut answered = stored_keys::answered(&stored);
+        let mut again = truncated(&stored, self.experiment.models(phase));
+        let mut plan = self.experiment.plan_without(
+            phase,
+            || self.store.records(),
+            |key| answered.contains(key) && !again.contains(key),
+        )?;
         if let Some(part) = &mut self.manifest.part {
             for (source, trials) in &plan.by_source {
                 part.trials[*source] += trials;
             }
         }
-        let mut answered = answered(&stored);
         if self.copy_from_other_shards(&plan.keys, &answered)? {
             stored = self.store.trials()?;
-            answered = self::answered(&stored);
+            answered = stored_keys::answered(&stored);
+            again = truncated(&stored, self.experiment.models(phase));
+            plan.exclude(|key| answered.contains(key) && !again.contains(key));
         }
-        let again = truncated(&stored, self.experiment.models(phase));
-        plan.exclude(|key| answered.contains(key) && !again.contains(key));
         let asked_again = plan.remaining_where(|key| again.contains(key));
         if asked_again > 0 {
             let replies = plural(asked_again, "truncated reply is", "truncated replies are");
@@ -391,17 +405,41 @@ impl<E: Experiment> OpenRun<'_, E> {
         Counts { trials: self.keys.len() + unplanned, answered, failed }
     }
 
-    /// Scores the run, and writes the report into its folder.
-    pub(crate) fn finish(self, end: EndReason) -> Result<Outcome> {
-        let mut run = StoredRun::reread(self.store.folder(), self.manifest.clone())?;
-        let trials = run.trials.iter();
-        let counts = self.counts(trials.map(|trial| (trial.key(), trial.failed())));
+    /// The manifest at the end of this command.
+    fn final_manifest(&self, end: &EndReason, counts: Counts) -> RunManifest {
+        let mut manifest = self.manifest.clone();
         let status = end.status(counts);
-        let manifest = &mut run.manifest;
         if (status, counts) != (manifest.status, manifest.counts) {
             (manifest.status, manifest.counts) = (status, counts);
             manifest.updated = now();
         }
+        manifest
+    }
+
+    /// The outcome if nothing was asked and the report in the folder is that of the records; otherwise `None`.
+    fn finish_unchanged(&self, end: &EndReason) -> Result<Option<Outcome>> {
+        let (EndReason::AllAsked, Some(counts)) = (end, self.unasked) else {
+            return Ok(None);
+        };
+        let settings = self.experiment.settings();
+        let manifest = self.final_manifest(end, counts);
+        let outcome = self.experiment.unchanged_report(&self.store, &manifest, settings.show)?;
+        if outcome.is_some() {
+            self.store.write_manifest(&manifest)?;
+            record_table::update(self.store.folder(), settings.table)?;
+        }
+        Ok(outcome)
+    }
+
+    /// Scores the run, and writes the report into its folder, unless it has the report already.
+    pub(crate) fn finish(self, end: EndReason) -> Result<Outcome> {
+        if let Some(outcome) = self.finish_unchanged(&end)? {
+            return Ok(outcome);
+        }
+        let mut run = StoredRun::reread(self.store.folder(), self.manifest.clone(), self.store.indexed().cloned())?;
+        let trials = run.trials.iter();
+        let counts = self.counts(trials.map(|trial| (trial.key(), trial.failed())));
+        run.manifest = self.final_manifest(&end, counts);
         let settings = self.experiment.settings();
         let mut outcome = self.experiment.report(&self.store, run, settings.show)?;
         record_table::update(self.store.folder(), settings.table)?;
@@ -510,32 +548,6 @@ fn warn_of_timeouts(trials: usize) {
              --request wire permits, and given up at the next timeout"
         );
     }
-}
-
-/// Keys of the trials without a reply that were charged as often as `--retries paid` allows.
-pub(crate) fn lost_for_good(stored: &[StoredTrial], settings: &JobSettings) -> HashSet<TrialKey> {
-    let Some(max_lost) = settings.ask.servers().into_iter().map(|server| server.sending.paid_retries).max() else {
-        return HashSet::new();
-    };
-    stored.iter().filter(|trial| trial.failed() && trial.lost_attempts() > max_lost).map(|trial| trial.key).collect()
-}
-
-/// Keys of the trials whose reply was truncated at a lower limit than the current one of their model.
-pub(crate) fn truncated(stored: &[StoredTrial], models: &[ModelUnderTest]) -> HashSet<TrialKey> {
-    let limits: HashMap<&str, (u32, u32)> =
-        models.iter().filter_map(|model| Some((&*model.name, model.model.token_limits()?))).collect();
-    stored
-        .iter()
-        .filter(|trial| {
-            limits.get(trial.model.as_str()).is_some_and(|&(limit, first)| trial.is_truncated_below(limit, first))
-        })
-        .map(|trial| trial.key)
-        .collect()
-}
-
-/// Keys of the trials that have a reply.
-pub(crate) fn answered(stored: &[StoredTrial]) -> HashSet<TrialKey> {
-    stored.iter().filter(|record| !record.failed()).map(|record| record.key).collect()
 }
 
 /// The index of the first source that a process works on, in a plan of `count` sources. It depends on the models and

@@ -83,15 +83,16 @@ pub(crate) fn first_failures(report: &Report<'_>) -> Result<Option<(String, Vec<
     Ok(Some((FLIPS.to_owned(), rows)))
 }
 
-/// Writes the file with one row for each item and curve into a folder, if there are such rows.
+/// Writes the file with one row for each item and curve into a folder, and returns its name; `None` without such rows.
 ///
 /// # Errors
 /// If the file cannot be written.
-pub(crate) fn write_first_failures(report: &Report<'_>, folder: &Path) -> Result<()> {
-    match report.measure.first_failures() {
-        Some(findings) => write_with(&folder.join(FLIPS), |out| write_flips(findings, out)),
-        None => Ok(()),
-    }
+pub(crate) fn write_first_failures(report: &Report<'_>, folder: &Path) -> Result<Option<&'static str>> {
+    let Some(findings) = report.measure.first_failures() else {
+        return Ok(None);
+    };
+    write_with(&folder.join(FLIPS), |out| write_flips(findings, out))?;
+    Ok(Some(FLIPS))
 }
 
 /// The report for standard output. `folders` are those of its runs.

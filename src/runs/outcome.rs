@@ -136,14 +136,14 @@ impl PrintArgs {
 }
 
 /// Format of a report on standard output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) struct StdoutFormat {
     pub(crate) syntax: Syntax,
     pub(crate) length: ReportLength,
 }
 
 /// Syntax of a report on standard output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) enum Syntax {
     Text,
     Markdown,
@@ -174,7 +174,7 @@ pub(crate) enum RecordTable {
 }
 
 /// Parts of a report that are printed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(crate) enum ReportLength {
     /// Summary, main finding of each group, and table by level.
     Summary,

@@ -10,11 +10,11 @@ use crate::data::ready_made::is_zip_file;
 use crate::error::{Error, Result};
 use crate::runs::renamed;
 use crate::runs::run_texts::InMemoryTexts;
-use crate::store;
+use crate::store::{self, Answers, IndexedStart};
 use crate::types::manifests::{Counts, RunManifest, Status};
 use crate::types::{
     ChoiceDetail, FailureKind, Finish, ImageFidelity, ListedModel, ModelListing, OpenDetail, QuestionId, Record, Reply,
-    RunQuestion, StoredDetail as _, TextPlace, Thumbnail, TrialRef, Trials, shell_word,
+    RunQuestion, StoredDetail as _, Thumbnail, TrialRef, Trials, shell_word,
 };
 use darkqa_score::answers::record::{Detail, answered};
 
@@ -65,11 +65,8 @@ impl<D: Detail> StoredRun<D> {
     pub(crate) fn open(folder: &Path) -> Result<Self> {
         let manifest = store::read_manifest(folder, D::SCHEMA)?;
         let manifest = manifest.ok_or_else(|| no_run(folder))?;
-        let mut trials = Ok(Trials::default());
-        store::each_record(folder, |record, place| {
-            add_trial(&mut trials, record, TextPlace::new(place.start));
-        })?;
-        let trials = trials?;
+        let indexed = IndexedStart::check::<D>(folder);
+        let trials = store::read_log(folder, indexed, Answers::Stored, refused_as_filtered)?;
         let mut run = Self::from_trials(folder, manifest, trials)?;
         if run.manifest.status == Status::Started {
             let failed = run.trials.iter().map(TrialRef::failed);
@@ -78,16 +75,14 @@ impl<D: Detail> StoredRun<D> {
         Ok(run)
     }
 
-    /// Reads a run folder except its manifest, and parses its replies again by the rules of this version.
+    /// Reads a run folder except its manifest, and parses its replies again by the rules of this version. `indexed` is
+    /// the beginning of its records that has an index.
     ///
     /// # Errors
     /// If a line of a file is broken.
-    pub(crate) fn reread(folder: &Path, manifest: RunManifest) -> Result<Self> {
-        let mut trials = Ok(Trials::default());
-        store::each_reread_record(folder, |record, place| {
-            add_trial(&mut trials, record, TextPlace::new(place.start));
-        })?;
-        Self::from_trials(folder, manifest, trials?)
+    pub(crate) fn reread(folder: &Path, manifest: RunManifest, indexed: Option<IndexedStart>) -> Result<Self> {
+        let trials = store::read_log(folder, indexed, Answers::Reread, refused_as_filtered)?;
+        Self::from_trials(folder, manifest, trials)
     }
 
     /// The run in a folder, given its manifest and trials. The records themselves stay on disk.
@@ -167,19 +162,6 @@ impl<D: Detail> StoredRun<D> {
     /// Name of the run, which is the name of its folder.
     pub(crate) fn name(&self) -> String {
         run_name(&self.folder)
-    }
-}
-
-/// Adds the trial of a record; the first error replaces all trials.
-fn add_trial<D: Detail>(trials: &mut Result<Trials<D>>, record: Record<D>, text: TextPlace) {
-    match refused_as_filtered(record) {
-        Ok(record) => {
-            if let Ok(trials) = trials {
-                trials.add(record, text);
-            }
-        }
-        Err(e) if trials.is_ok() => *trials = Err(e),
-        Err(_) => {}
     }
 }
 

@@ -18,10 +18,12 @@ use zip::{CompressionMethod, DateTime, ZipWriter};
 
 use crate::error::{Error, Result};
 use crate::files;
+use crate::report::joined::stamp::STAMP;
 use crate::report::joined::whole_report;
 use crate::runs::Outcome;
 use crate::runs::record_table::RECORDS_PARQUET;
 use crate::runs::stored::run_name;
+use crate::store::INDEX;
 use crate::types::Decides;
 use crate::types::manifests::Status;
 use readme::{ReadmeInputs, command, readme};
@@ -68,6 +70,8 @@ pub(crate) fn bundle(args: &BundleArgs) -> Result<Outcome> {
         changes.push(format!("{} of {all} small images are left out", thumbnails[1]));
     }
     let mut others = other_entries(&args.run, &files)?;
+    // They are made again from the records.
+    others.retain(|name| ![INDEX, STAMP].contains(&&**name));
     if let Some(table) = others.iter().position(|name| name == RECORDS_PARQUET) {
         // The table is not redacted.
         others.remove(table);

@@ -27,7 +27,7 @@ use crate::runs::forecast::PowerForecast;
 use crate::runs::stored::StoredRun;
 use crate::runs::{EXPOSURE_VALUE, Outcome, PROMPTS, StdoutFormat};
 use crate::store::Store;
-use crate::types::manifests::{Columns, Identity, PartPlace};
+use crate::types::manifests::{Columns, Identity, PartPlace, RunManifest};
 use crate::types::{
     ChoiceDetail, Condition, Digest, FrameId, Question, Record, RunQuestion, SetLight, Shared, TrialOutcome, View,
 };
@@ -148,8 +148,17 @@ impl Experiment for ChoiceSetup<'_> {
         manifest::columns(&self.models, &self.recipe, &self.config.job)
     }
 
-    fn plan(&self, _: usize, _: impl FnOnce() -> Result<Vec<Record>>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
-        plan_trials(self)
+    fn each_source(
+        &self,
+        _: usize,
+        _: impl FnOnce() -> Result<Vec<Record>>,
+        add: &mut dyn FnMut(SourcePlan<ChoiceItem>),
+    ) -> Result<()> {
+        plan_trials(self, add)
+    }
+
+    fn unchanged_report(&self, store: &Store, manifest: &RunManifest, show: StdoutFormat) -> Result<Option<Outcome>> {
+        joined::stamp::unchanged(store, manifest, show)
     }
 
     fn report(&self, store: &Store<ChoiceDetail>, run: StoredRun<ChoiceDetail>, show: StdoutFormat) -> Result<Outcome> {
@@ -251,8 +260,8 @@ struct FrameQuestions {
     others: Vec<QuestionPrompts>,
 }
 
-/// All trials, grouped by frame: first the trials without an image, then those of each condition.
-fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
+/// Adds all trials, grouped by frame: first the trials without an image, then those of each condition.
+fn plan_trials(setup: &ChoiceSetup<'_>, add: &mut dyn FnMut(SourcePlan<ChoiceItem>)) -> Result<()> {
     let mut by_source = Vec::new();
     by_source.resize_with(setup.sources.len(), FrameQuestions::default);
     for sample in &setup.samples {
@@ -263,18 +272,15 @@ fn plan_trials(setup: &ChoiceSetup<'_>) -> Result<Vec<SourcePlan<ChoiceItem>>> {
             by_source[shown].others.extend(prompts(setup, sample, Some(&setup.sources[shown].name))?);
         }
     }
-    by_source
-        .into_iter()
-        .enumerate()
-        .map(|(source, questions)| {
-            let shown = setup.conditions.iter().filter(|condition| setup.sources[source].can_show(condition));
-            let groups = std::iter::once(None)
-                .chain(shown.map(Some))
-                .filter_map(|condition| group(setup, source, condition, &questions).transpose())
-                .collect::<Result<_>>()?;
-            Ok(SourcePlan { source, groups })
-        })
-        .collect()
+    for (source, questions) in by_source.into_iter().enumerate() {
+        let shown = setup.conditions.iter().filter(|condition| setup.sources[source].can_show(condition));
+        let groups = std::iter::once(None)
+            .chain(shown.map(Some))
+            .filter_map(|condition| group(setup, source, condition, &questions).transpose())
+            .collect::<Result<_>>()?;
+        add(SourcePlan { source, groups });
+    }
+    Ok(())
 }
 
 /// A question in each wording and order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of

@@ -151,15 +151,18 @@ impl Experiment for OpenSetup<'_> {
         &self.file_answers
     }
 
-    fn plan(
+    fn each_source(
         &self,
         phase: usize,
         records: impl FnOnce() -> Result<Vec<Record<OpenDetail>>>,
-    ) -> Result<Vec<SourcePlan<OpenItem>>> {
-        Ok(match phase {
+        add: &mut dyn FnMut(SourcePlan<OpenItem>),
+    ) -> Result<()> {
+        let sources = match phase {
             0 => plan_answers(self)?,
             _ => plan_marks(self, &records()?)?,
-        })
+        };
+        sources.into_iter().for_each(add);
+        Ok(())
     }
 
     fn expected_requests(&self, remaining: &[SourcePlan<OpenItem>]) -> Vec<ExpectedRequest> {

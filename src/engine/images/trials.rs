@@ -138,6 +138,14 @@ impl<I> SourcePlan<I> {
         self.groups.iter().filter_map(|group| group.condition.as_ref())
     }
 
+    /// Removes trials, and the groups that have none.
+    fn exclude(&mut self, is_excluded: impl Fn(&TrialKey) -> bool) {
+        for group in &mut self.groups {
+            group.trials.retain(|trial| !is_excluded(&trial.key));
+        }
+        self.groups.retain(|group| !group.trials.is_empty());
+    }
+
     fn trial_count(&self) -> usize {
         self.groups.iter().map(|group| group.trials.len()).sum()
     }
@@ -157,29 +165,28 @@ pub(crate) struct Plan<I> {
 impl<I> Plan<I> {
     /// A plan in which all trials remain to be asked.
     pub(crate) fn new(sources: Vec<SourcePlan<I>>) -> Self {
-        let keys = sources
-            .iter()
-            .flat_map(|source| &source.groups)
-            .flat_map(|group| &group.trials)
-            .map(|trial| trial.key)
-            .collect();
-        let mut by_source = BTreeMap::new();
-        for part in &sources {
-            *by_source.entry(part.source).or_default() += part.trial_count();
+        let mut plan = Self { keys: Vec::new(), by_source: BTreeMap::new(), sources: Vec::new() };
+        for source in sources {
+            plan.add(source, |_| false);
         }
-        let mut plan = Self { keys, by_source, sources };
-        plan.exclude(|_| false);
         plan
+    }
+
+    /// Adds the trials about a source. Those that `is_excluded` accepts need not be asked.
+    pub(crate) fn add(&mut self, mut source: SourcePlan<I>, is_excluded: impl Fn(&TrialKey) -> bool) {
+        self.keys.extend(source.groups.iter().flat_map(|group| &group.trials).map(|trial| trial.key));
+        *self.by_source.entry(source.source).or_default() += source.trial_count();
+        source.exclude(is_excluded);
+        if !source.groups.is_empty() {
+            self.sources.push(source);
+        }
     }
 
     /// Removes the trials that need not be asked; returns their number.
     pub(crate) fn exclude(&mut self, is_excluded: impl Fn(&TrialKey) -> bool) -> usize {
         let before = self.remaining();
         for source in &mut self.sources {
-            for group in &mut source.groups {
-                group.trials.retain(|trial| !is_excluded(&trial.key));
-            }
-            source.groups.retain(|group| !group.trials.is_empty());
+            source.exclude(&is_excluded);
         }
         self.sources.retain(|source| !source.groups.is_empty());
         before - self.remaining()

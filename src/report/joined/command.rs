@@ -215,7 +215,8 @@ fn report_choices(
                 write_in_place(&run.folder, run.layout, &run.manifest, |target: &ReportFolder<'_, ChoiceDetail>| {
                     let scored = Scored::new(&combined);
                     let report = scored.report(&combined, &[]);
-                    write_report(&report, target, &run.manifest, &combined.page_inputs(), args.format())
+                    let inputs = combined.page_inputs();
+                    write_report(&report, target, &run.manifest, &inputs, args.format()).map(|(text, _)| text)
                 })?;
             text.map(|text| (run.folder.clone(), run.layout, text))
         }
@@ -316,7 +317,8 @@ fn report_open(args: &ReportArgs, mut runs: Vec<StoredRun<OpenDetail>>, duplicat
     let run = &scores.run;
     if is_single && args.out.is_none() {
         let text = write_in_place(&run.folder, run.layout, &run.manifest, |target: &ReportFolder<'_, OpenDetail>| {
-            write_report(&scores.report(), target, &run.manifest, &run.page_inputs(), args.format())
+            let inputs = run.page_inputs();
+            write_report(&scores.report(), target, &run.manifest, &inputs, args.format()).map(|(text, _)| text)
         })?;
         if let Some(text) = text {
             if run.layout == RunLayout::Whole {
@@ -371,7 +373,7 @@ fn reread(run: &mut StoredRun<ChoiceDetail>) -> Result<String> {
         store.write_manifest(&run.manifest)?;
     }
     if changed > 0 {
-        *run = StoredRun::reread(&run.folder, run.manifest.clone())?;
+        *run = StoredRun::reread(&run.folder, run.manifest.clone(), None)?;
     }
     Ok(lines)
 }

@@ -14,6 +14,7 @@ mod model_names;
 pub(crate) mod open;
 mod settings;
 pub(crate) mod site;
+pub(crate) mod stamp;
 pub(crate) mod written;
 
 pub(crate) use command::{ReportArgs, report, story_curves};

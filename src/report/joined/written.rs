@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::alerts::{alerts, alerts_without_truths};
 use super::combine::{CombinedRuns, combine, frame_ties};
 use super::listing::ReportFolder;
-use super::{enhancers, open};
+use super::{enhancers, open, stamp};
 use crate::error::{Error, Result};
 use crate::report::content::Report;
 use crate::report::json::SummaryRuns;
@@ -107,7 +107,8 @@ pub(crate) fn write(store: &Store, mut run: StoredRun<ChoiceDetail>, show: Stdou
     let combined = combine(vec![run])?;
     let scored = Scored::new(&combined);
     let report = scored.report(&combined, &[]);
-    let text = write_report(&report, &ReportFolder::Run(store), &manifest, &combined.page_inputs(), show)?;
+    let (text, files) = write_report(&report, &ReportFolder::Run(store), &manifest, &combined.page_inputs(), show)?;
+    stamp::write(store, &manifest, show, files, &text)?;
     Ok(Outcome::wrote(store.folder(), manifest.status, text).in_format(show))
 }
 
@@ -123,11 +124,11 @@ pub(crate) fn write_open(
         scores.run.manifest.status = Status::Incomplete;
     }
     let run = &scores.run;
-    let text = write_report(&scores.report(), &ReportFolder::Run(store), &run.manifest, &run.page_inputs(), show)?;
+    let (text, _) = write_report(&scores.report(), &ReportFolder::Run(store), &run.manifest, &run.page_inputs(), show)?;
     Ok(Outcome::wrote(store.folder(), run.manifest.status, text).in_format(show))
 }
 
-/// Writes the report of one run into its folder; returns the text for standard output.
+/// Writes the report of one run into its folder; returns the text for standard output, and the names of the files.
 ///
 /// # Errors
 /// If a file cannot be written.
@@ -137,14 +138,15 @@ pub(super) fn write_report<D: Detail>(
     manifest: &RunManifest,
     inputs: &PageInputs<'_>,
     show: StdoutFormat,
-) -> Result<String> {
+) -> Result<(String, Vec<String>)> {
     let folder = target.path();
     let files = files(report, SummaryRuns::One(manifest, None), inputs)?;
-    write_first_failures(report, folder)?;
+    let first_failures = write_first_failures(report, folder)?;
     target.write(&files, manifest)?;
+    let names = files.into_iter().map(|(name, _)| name).chain(first_failures.map(str::to_owned)).collect();
     let text = printed(report, SummaryRuns::One(manifest, Some(folder)), &[folder], show)?;
     if show.is_document() {
-        return Ok(text);
+        return Ok((text, names));
     }
     let cost = inputs.runs.iter().find_map(|run| run.cost.as_ref());
     let cost = cost.map_or_else(String::new, |cost| format!("cost: {cost}\n"));
@@ -160,7 +162,7 @@ pub(super) fn write_report<D: Detail>(
             times.chain(help.map(|help| format!("{name}, {help}\n")))
         })
         .collect();
-    Ok(text + &latencies + &cost + &format!("report: {}\n", folder.join(PAGE).display()))
+    Ok((text + &latencies + &cost + &format!("report: {}\n", folder.join(PAGE).display()), names))
 }
 
 /// Removes the models that a report leaves out by default.

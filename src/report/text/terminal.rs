@@ -342,7 +342,7 @@ const MIN: usize = 60;
 
 /// The width of the output in columns: the variable `COLUMNS`, otherwise the width of the terminal, otherwise 80; at
 /// least 60.
-fn terminal_columns() -> usize {
+pub(crate) fn terminal_columns() -> usize {
     std::env::var("COLUMNS")
         .ok()
         .and_then(|columns| columns.trim().parse().ok())

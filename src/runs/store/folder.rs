@@ -48,6 +48,9 @@ pub(super) const FIDELITY: &str = "fidelity.jsonl";
 /// The files of a run that reports read.
 pub const RUN_FILES: [&str; 5] = [MANIFEST, RECORDS, QUESTIONS, THUMBNAILS, FIDELITY];
 
+/// The files of a run that reports read, besides its manifest and its records.
+pub const NOTE_FILES: [&str; 3] = [QUESTIONS, THUMBNAILS, FIDELITY];
+
 /// The subfolder of a run for Batch API files.
 pub const BATCH: &str = "batch";
 
@@ -108,20 +111,13 @@ pub fn read_records<D: Detail>(folder: &Path) -> Result<Vec<Record<D>>> {
     Ok(merged)
 }
 
-/// The last state of each trial in a run folder, in the order of [`read_records`].
-pub fn read_trials(folder: &Path) -> Result<Vec<StoredTrial>> {
-    let mut models = Distinct::default();
-    let mut trials: Vec<StoredTrial> = Vec::new();
-    each_line(&folder.join(RECORDS), |mut trial: StoredTrial| {
-        models.share(&mut trial.model);
-        trials.push(trial);
-    })?;
-    Ok(merge_by_key(trials, |trial| trial.key, StoredTrial::add_earlier))
-}
-
 /// Keeps the last line of each key, at the place of the first line of that key. `add_earlier` merges each earlier line
 /// of the key into it, the latest first.
-fn merge_by_key<T>(mut all: Vec<T>, key: impl Fn(&T) -> TrialKey, add_earlier: impl Fn(&mut T, &T)) -> Vec<T> {
+pub(super) fn merge_by_key<T>(
+    mut all: Vec<T>,
+    key: impl Fn(&T) -> TrialKey,
+    add_earlier: impl Fn(&mut T, &T),
+) -> Vec<T> {
     // Sorted keys take a fifth of the memory of a map.
     let mut keys: Vec<(TrialKey, u32)> = all.iter().map(key).zip(0..).collect();
     keys.par_sort_unstable();

@@ -4,7 +4,7 @@
 //! reply arrives, so that a killed run loses nothing. `manifest.json` describes the run, `questions.jsonl` contains its
 //! questions, `thumbnails.jsonl` small copies of its images, and `fidelity.jsonl` their similarity to the clean frames.
 //! All other files are derived from these, such as `records.parquet` with the records as a table for other programs
-//! ([`ColumnFile`]).
+//! ([`ColumnFile`]), and `records.index`, by which large runs are read fast ([`IndexedStart`]).
 
 #![cfg_attr(test, allow(clippy::unwrap_used, reason = "a test may panic"))]
 
@@ -13,6 +13,7 @@ pub(crate) mod column_file;
 mod folder;
 mod image_notes;
 mod lines;
+mod log_index;
 mod pieces;
 mod record_log;
 mod stored_trial;
@@ -38,18 +39,20 @@ use darkqa_base::types::{
 use darkqa_score::answers::record::Detail;
 use folder::{FIDELITY, QUESTIONS, RECORDS, THUMBNAILS, check_own, create_run, write, write_manifest};
 use lines::{append, each_line, each_readable_line, json_lines, lines, repair, repair_notes, set_aside};
+use log_index::trials_after;
 use record_log::UnlockedLog;
 
 pub use column_file::{CREATED_BY, Cell, CellKind, Column, ColumnFile, FileMetadata, Presence};
 pub use folder::{
-    AddressChange, BATCH, BATCH_STATE, MANIFEST, PLAN, RUN_FILES, check_same_run, each_placed_question, each_question,
-    find, has_batches, is_locked, is_run, manifest_damage, now, read_columns, read_fidelity, read_manifest,
-    read_questions, read_records, read_settings, read_thumbnails, read_trials, reply_count, restore_manifest, schema,
+    AddressChange, BATCH, BATCH_STATE, MANIFEST, NOTE_FILES, PLAN, RUN_FILES, check_same_run, each_placed_question,
+    each_question, find, has_batches, is_locked, is_run, manifest_damage, now, read_columns, read_fidelity,
+    read_manifest, read_questions, read_records, read_settings, read_thumbnails, reply_count, restore_manifest, schema,
 };
 pub use image_notes::{missing_fidelity, missing_thumbnails};
 pub use lines::set_file_aside;
+pub use log_index::{Answers, INDEX, IndexedStart, program_build, read_log, read_trials};
 pub use pieces::LinePlace;
-pub use record_log::{LogMark, QuestionFile, RecordLog, each_record, each_reread_record, each_trial};
+pub use record_log::{LogMark, QuestionFile, RecordLog, each_record, each_trial};
 pub use stored_trial::StoredTrial;
 
 /// The trials that were sent in batches.
@@ -72,6 +75,8 @@ pub struct Store<D = ChoiceDetail> {
     synced: Instant,
     /// The names of models in records and tables.
     names: RecordedNames,
+    /// The beginning of the records that has an index.
+    indexed: Option<IndexedStart>,
     kind: PhantomData<D>,
 }
 
@@ -86,8 +91,10 @@ impl<D: Detail> Store<D> {
     /// process has locked it.
     pub fn open(folder: &Path, manifest: &RunManifest, address_change: AddressChange) -> Result<Self> {
         let store = Self::open_checked(folder, manifest, address_change)?;
-        set_aside::<Record<D>>(&folder.join(RECORDS), &folder.join(SET_ASIDE))?;
-        Ok(store)
+        let indexed = IndexedStart::check::<D>(folder);
+        let from = indexed.as_ref().map(IndexedStart::end).unwrap_or_default();
+        set_aside::<Record<D>>(&folder.join(RECORDS), from, &folder.join(SET_ASIDE))?;
+        Ok(Self { indexed, ..store })
     }
 
     /// Opens a run folder as [`open`](Self::open) does, without checking its records, which the caller has read without
@@ -123,6 +130,7 @@ impl<D: Detail> Store<D> {
             unlocked,
             synced: Instant::now(),
             names: RecordedNames::from_manifest(manifest),
+            indexed: None,
             kind: PhantomData,
         })
     }
@@ -147,7 +155,7 @@ impl<D: Detail> Store<D> {
 
     /// The last state of each trial, in the order of [`records`](Self::records).
     pub fn trials(&self) -> Result<Vec<StoredTrial>> {
-        let mut trials = read_trials(&self.folder)?;
+        let mut trials = trials_after::<D>(&self.folder, self.indexed.as_ref())?;
         let mut models = Distinct::default();
         for trial in &mut trials {
             let name = self.names.table_name(&trial.model);
@@ -157,6 +165,11 @@ impl<D: Detail> Store<D> {
             }
         }
         Ok(trials)
+    }
+
+    /// The beginning of the records that has an index. Its lines do not change while the run is open.
+    pub fn indexed(&self) -> Option<&IndexedStart> {
+        self.indexed.as_ref()
     }
 
     /// The records with the names of models in tables.

@@ -10,7 +10,7 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use serde::Serialize;
 use serde::de::Error as _;
 
-use super::pieces::{LinePlace, Pieces};
+use super::pieces::{LinePlace, LineStart, Pieces};
 use super::stored_trial::{RereadRecord, StoredTrial, TrialLine};
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files::{self, write_synced};
@@ -54,11 +54,23 @@ pub(super) fn each_line<T: StoredLine>(path: &Path, mut take: impl FnMut(T)) -> 
 }
 
 /// Calls `take` with each complete line as [`each_line`] does, and with its place.
-pub(super) fn each_placed_line<T: StoredLine>(path: &Path, mut take: impl FnMut(T, LinePlace)) -> Result<()> {
-    let Some(mut pieces) = Pieces::open(path)? else {
-        return Ok(());
+pub(super) fn each_placed_line<T: StoredLine>(path: &Path, take: impl FnMut(T, LinePlace)) -> Result<()> {
+    each_placed_line_after(path, LineStart::default(), |_| {}, take).map(drop)
+}
+
+/// Calls `take` with each complete line after a place, and `see` with all bytes of these lines, in order. Returns the
+/// place after them.
+pub(super) fn each_placed_line_after<T: StoredLine>(
+    path: &Path,
+    from: LineStart,
+    mut see: impl FnMut(&[u8]),
+    mut take: impl FnMut(T, LinePlace),
+) -> Result<LineStart> {
+    let Some(mut pieces) = Pieces::open_at(path, from)? else {
+        return Ok(from);
     };
     while let Some(piece) = pieces.next()? {
+        see(piece.bytes());
         let lines = piece.lines();
         let parsed: Vec<serde_json::Result<T>> = lines
             .par_iter()
@@ -76,19 +88,19 @@ pub(super) fn each_placed_line<T: StoredLine>(path: &Path, mut take: impl FnMut(
             take(value, LinePlace { start, length });
         }
     }
-    Ok(())
+    Ok(pieces.place())
 }
 
-/// Moves the lines that are not a `T` to the file `aside`, and replaces them by spaces. A damaged line thus affects
-/// only its own trial, and its content is kept.
+/// Moves the lines after a place that are not a `T` to the file `aside`, and replaces them by spaces. A damaged line
+/// thus affects only its own trial, and its content is kept.
 ///
 /// # Errors
 /// If no line is a `T`, so that this is probably another file.
-pub(super) fn set_aside<T: StoredLine>(path: &Path, aside: &Path) -> Result<()> {
-    let Some(mut pieces) = Pieces::open(path)? else {
+pub(super) fn set_aside<T: StoredLine>(path: &Path, from: LineStart, aside: &Path) -> Result<()> {
+    let Some(mut pieces) = Pieces::open_at(path, from)? else {
         return Ok(());
     };
-    let mut good = 0_usize;
+    let mut good = from.lines;
     let mut bad: Vec<BadLine> = Vec::new();
     while let Some(piece) = pieces.next()? {
         let lines = piece.lines();
@@ -200,7 +212,10 @@ impl<D: Detail> StoredLine for RereadRecord<D> {
     const REMEDY: &str = RECORD_REMEDY;
 
     fn parse(line: &[u8]) -> serde_json::Result<Self> {
-        reread(D::parse_record(line)?).map(Self).map_err(serde_json::Error::custom)
+        let record = D::parse_record(line)?;
+        let stored = record.detail.reading();
+        let record = reread(record).map_err(serde_json::Error::custom)?;
+        Ok(Self { is_changed: record.detail.reading() != stored, record })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Reader of the lines of a file in pieces, so that the file may be larger than the memory: [`Pieces`].
 
 use std::fs::File;
-use std::io::{ErrorKind, Read};
+use std::io::{ErrorKind, Read, Seek as _, SeekFrom};
 use std::path::Path;
 
 use darkqa_base::error::{Error, Result};
@@ -23,6 +23,15 @@ pub(super) struct Pieces<'p> {
     start: u64,
     /// The number of lines before the next line.
     lines: usize,
+}
+
+/// A place between two lines of a file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct LineStart {
+    /// Number of bytes before it.
+    pub(super) bytes: u64,
+    /// Number of lines before it.
+    pub(super) lines: usize,
 }
 
 /// Some complete lines of a file.
@@ -75,7 +84,21 @@ pub(super) fn open_if_exists(path: &Path) -> Result<Option<File>> {
 impl<'p> Pieces<'p> {
     /// Opens a file; `None` if it does not exist.
     pub(super) fn open(path: &'p Path) -> Result<Option<Self>> {
-        Ok(open_if_exists(path)?.map(|file| Self { path, file, rest: Vec::new(), start: 0, lines: 0 }))
+        Self::open_at(path, LineStart::default())
+    }
+
+    /// Opens a file to read the lines after a place; `None` if it does not exist.
+    pub(super) fn open_at(path: &'p Path, from: LineStart) -> Result<Option<Self>> {
+        let Some(mut file) = open_if_exists(path)? else {
+            return Ok(None);
+        };
+        file.seek(SeekFrom::Start(from.bytes)).map_err(|e| Error::file(path, "read", e))?;
+        Ok(Some(Self { path, file, rest: Vec::new(), start: from.bytes, lines: from.lines }))
+    }
+
+    /// The place after the lines that were read.
+    pub(super) fn place(&self) -> LineStart {
+        LineStart { bytes: self.start, lines: self.lines }
     }
 
     /// The next complete lines; `None` after the last. An incomplete last line is skipped.
@@ -114,6 +137,11 @@ impl<'p> Pieces<'p> {
 }
 
 impl LineBlock {
+    /// All bytes of the lines, blank ones included.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+
     /// The lines that are not blank, in order.
     pub(super) fn lines(&self) -> Vec<FileLine<'_>> {
         let (mut start, mut lines) = (self.start, Vec::new());

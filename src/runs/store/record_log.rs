@@ -13,7 +13,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use super::folder::{MANIFEST, QUESTIONS, RECORDS};
 use super::lines::each_placed_line;
 use super::pieces::{LinePlace, open_if_exists};
-use super::stored_trial::{RereadRecord, TrialLine};
+use super::stored_trial::TrialLine;
 use darkqa_base::error::{Error, Result};
 use darkqa_base::files;
 use darkqa_base::types::{Digest, Record};
@@ -146,17 +146,6 @@ pub fn each_trial(folder: &Path, take: impl FnMut(TrialLine, LinePlace)) -> Resu
 /// If a line is not a record.
 pub fn each_record<D: Detail>(folder: &Path, take: impl FnMut(Record<D>, LinePlace)) -> Result<()> {
     each_placed_line(&folder.join(RECORDS), take)
-}
-
-/// Calls `take` with each record as [`each_record`] does, after its reply was parsed again by the rules of this
-/// version.
-///
-/// # Errors
-/// If a line is not a record, or the choices of a record are not valid.
-pub fn each_reread_record<D: Detail>(folder: &Path, mut take: impl FnMut(Record<D>, LinePlace)) -> Result<()> {
-    each_placed_line(&folder.join(RECORDS), |line: RereadRecord<D>, place| {
-        take(line.0, place);
-    })
 }
 
 /// The marker file in a run folder, which names the process that last began to write.

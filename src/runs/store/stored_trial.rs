@@ -8,9 +8,10 @@ use std::num::NonZeroU32;
 
 use serde::{Deserialize, Deserializer};
 
-use darkqa_base::types::records::{SmallNumber, Tokens};
+use darkqa_base::types::records::{SmallNumber, Stopped, Tokens};
 use darkqa_base::types::{
-    Condition, FailureKind, Finish, LostAttempts, QuestionId, Record, Shared, TrialKey, Usage, Via,
+    Condition, FailureKind, Finish, LostAttempts, QuestionId, Record, Shared, StoredDetail, TrialKey, TrialRef, Usage,
+    Via,
 };
 
 /// A trial of a run, without question and answer: 72 bytes.
@@ -25,7 +26,7 @@ pub struct StoredTrial {
     pub via: Via,
     failure: Option<StoredFailure>,
     #[serde(default, rename = "finish", deserialize_with = "read_end")]
-    end: End,
+    end: Stopped,
     /// The token limit of the reply, if it differs from that of the run's first call.
     max_tokens: Option<NonZeroU32>,
     #[serde(default)]
@@ -62,6 +63,22 @@ impl From<FailureFacts> for StoredFailure {
 }
 
 impl StoredTrial {
+    /// The trial of a record, with the name of its model.
+    pub(super) fn from_trial<D: StoredDetail>(trial: TrialRef<'_, D>, model: Shared<String>) -> Self {
+        let lost = trial.lost();
+        Self {
+            key: trial.key(),
+            model,
+            via: trial.via(),
+            failure: trial.failure().map(|(kind, status)| FailureFacts { kind: Some(kind), status }.into()),
+            end: trial.stopped(),
+            max_tokens: trial.max_tokens().and_then(NonZeroU32::new),
+            usage: trial.tokens(),
+            latency_ms: trial.latency_ms().into(),
+            lost: (!lost.is_none()).then(|| Box::new(lost)),
+        }
+    }
+
     /// True if no reply came, so that the trial is asked again.
     pub fn failed(&self) -> bool {
         self.failure.is_some()
@@ -74,12 +91,12 @@ impl StoredTrial {
 
     /// True if the reply was truncated at a token limit below this one; `first` is that of the run's first call.
     pub fn is_truncated_below(&self, limit: u32, first: u32) -> bool {
-        self.end == End::Length && !self.failed() && self.limit().unwrap_or(first) < limit
+        self.end == Stopped::Length && !self.failed() && self.limit().unwrap_or(first) < limit
     }
 
     /// True if a reply came that does not count, because another try may end in another way.
     pub fn may_heal(&self) -> bool {
-        self.failed() && self.end != End::Unknown
+        self.failed() && self.end != Stopped::Unknown
     }
 
     fn limit(&self) -> Option<u32> {
@@ -129,26 +146,10 @@ impl StoredTrial {
     }
 }
 
-/// The reason why a model stopped, as far as a resumed run needs it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-enum End {
-    /// No reason: no reply came.
-    #[default]
-    Unknown,
-    /// The token limit.
-    Length,
-    /// Another reason.
-    Other,
-}
-
 /// Deserializes the reason why a model stopped.
-fn read_end<'de, D: Deserializer<'de>>(deserializer: D) -> Result<End, D::Error> {
+fn read_end<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Stopped, D::Error> {
     let finish = Option::<Finish>::deserialize(deserializer)?;
-    Ok(match finish {
-        None => End::Unknown,
-        Some(Finish::Length) => End::Length,
-        Some(_) => End::Other,
-    })
+    Ok(finish.as_ref().into())
 }
 
 /// Fields of a record's line that identify the trial.
@@ -168,7 +169,11 @@ pub struct TrialLine {
 }
 
 /// A record whose reply is parsed again when its line is read.
-pub(super) struct RereadRecord<D>(pub(super) Record<D>);
+pub(super) struct RereadRecord<D> {
+    pub(super) record: Record<D>,
+    /// True if the stored answer was another one.
+    pub(super) is_changed: bool,
+}
 
 #[cfg(test)]
 mod tests {

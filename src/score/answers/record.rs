@@ -4,6 +4,7 @@
 //! ([`CheckAgreement`]).
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::{self, BufRead, ErrorKind, Write};
 
 use crate::choice::llm_match::{Protocol, mark};
 use crate::choice::option_probabilities::option_probabilities;
@@ -13,8 +14,8 @@ use crate::estimate::{ClusterCount, Estimate};
 use darkqa_base::error::Result;
 use darkqa_base::types::records::Record;
 use darkqa_base::types::{
-    Answer, ChoiceDetail, Choices, Family, Finish, OpenDetail, OptionProbabilities, QuestionId, Reply, Step,
-    StoredDetail, TrialOutcome, UnreadReason,
+    Answer, ChoiceDetail, Choices, Family, Finish, OpenDetail, OptionProbabilities, ParsedAnswer, QuestionId, Reply,
+    Step, StoredDetail, TrialOutcome, Trials, UnreadReason,
 };
 
 /// Part of a record that stores the answer parsed from a reply.
@@ -31,12 +32,37 @@ pub trait Detail: StoredDetail {
     /// Index of the choice in the lenient parsing; `None` if no choice was found.
     fn chosen(&self) -> Option<usize>;
 
+    /// Everything that [`read`](Self::read) stores.
+    type Reading: PartialEq;
+
+    /// The answer as it is stored.
+    fn reading(&self) -> Self::Reading;
+
     /// Parses the line of a record. Each kind has its own function, so that this crate compiles it, for speed, and not
     /// the caller.
     ///
     /// # Errors
     /// If the line is not a record of this kind.
     fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>>;
+
+    /// True if trials with these details can be written as bytes.
+    const HAS_BYTES: bool = false;
+
+    /// Writes trials as bytes.
+    ///
+    /// # Errors
+    /// If `out` cannot be written, or these details have no bytes.
+    fn write_trials(_trials: &Trials<Self>, _out: &mut dyn Write) -> io::Result<()> {
+        Err(ErrorKind::Unsupported.into())
+    }
+
+    /// Reads what [`write_trials`](Self::write_trials) has written.
+    ///
+    /// # Errors
+    /// If `from` cannot be read or has other bytes, or these details have no bytes.
+    fn read_trials(_from: &mut dyn BufRead) -> io::Result<Trials<Self>> {
+        Err(ErrorKind::Unsupported.into())
+    }
 }
 
 impl Detail for ChoiceDetail {
@@ -80,8 +106,24 @@ impl Detail for ChoiceDetail {
         self.lenient?.chosen
     }
 
+    type Reading = (Option<ParsedAnswer>, Option<ParsedAnswer>, TrialOutcome);
+
+    fn reading(&self) -> Self::Reading {
+        (self.strict, self.lenient, self.outcome)
+    }
+
     fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>> {
         serde_json::from_slice(line)
+    }
+
+    const HAS_BYTES: bool = true;
+
+    fn write_trials(trials: &Trials<Self>, out: &mut dyn Write) -> io::Result<()> {
+        trials.write_to(out)
+    }
+
+    fn read_trials(from: &mut dyn BufRead) -> io::Result<Trials<Self>> {
+        Trials::read_from(from)
     }
 }
 
@@ -99,6 +141,12 @@ impl Detail for OpenDetail {
 
     fn chosen(&self) -> Option<usize> {
         None
+    }
+
+    type Reading = (Option<i64>, Option<i64>);
+
+    fn reading(&self) -> Self::Reading {
+        (self.upstream, self.tolerant)
     }
 
     fn parse_record(line: &[u8]) -> serde_json::Result<Record<Self>> {

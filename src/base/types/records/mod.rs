@@ -11,5 +11,6 @@ pub use record::{
 };
 pub use small_number::{SmallNumber, Tokens};
 pub use trials::{
-    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, ItemKey, KeptTrial, SentImages, TextPlace, TrialRef, Trials,
+    AskedItem, AskedParts, ChoiceFacts, ChoiceTables, ItemKey, KeptTrial, SentImages, Stopped, TextPlace, TrialRef,
+    Trials,
 };

@@ -533,6 +533,22 @@ impl From<Digest> for TrialKey {
 }
 
 impl TrialKey {
+    /// The key as four numbers.
+    pub(super) fn to_words(self) -> [u32; 4] {
+        let word = |start: usize| {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|place| self.0[start + place]);
+            u32::from_le_bytes([a, b, c, d])
+        };
+        [0, 4, 8, 12].map(word)
+    }
+
+    /// The key from [`to_words`](Self::to_words).
+    pub(super) fn from_words(words: [u32; 4]) -> Self {
+        let mut key = [0; 16];
+        key.copy_from_slice(words.map(u32::to_le_bytes).as_flattened());
+        Self(key)
+    }
+
     /// The key as 16 bytes.
     #[must_use]
     pub fn as_bytes(&self) -> &[u8; 16] {

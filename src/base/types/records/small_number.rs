@@ -12,6 +12,16 @@ impl SmallNumber {
     /// An unknown number.
     pub const UNKNOWN: Self = Self(u32::MAX);
 
+    /// The number as it is kept in memory.
+    pub(super) fn to_word(self) -> u32 {
+        self.0
+    }
+
+    /// The number from [`to_word`](Self::to_word).
+    pub(super) fn from_word(word: u32) -> Self {
+        Self(word)
+    }
+
     /// The number; `None` if it is not known.
     pub fn get(self) -> Option<u64> {
         (self != Self::UNKNOWN).then_some(u64::from(self.0))
@@ -68,7 +78,42 @@ impl From<Option<Usage>> for Tokens {
     }
 }
 
+/// All tiers, by their numbers in [`Tokens::to_words`].
+const TIERS: [ServiceTier; ServiceTier::COUNT] = [
+    ServiceTier::Standard,
+    ServiceTier::Flex,
+    ServiceTier::Priority,
+    ServiceTier::Scale,
+    ServiceTier::Performance,
+    ServiceTier::Other,
+];
+
 impl Tokens {
+    /// The tokens and the cost as numbers; the last one has 1 if there is a cost, and twice the number of the tier,
+    /// from 1.
+    pub(super) fn to_words(self) -> [u32; 6] {
+        let [lower, upper] = self.cost;
+        let tier = self.tier.and_then(|tier| TIERS.iter().position(|known| *known == tier));
+        let tier = tier.map_or(0, |place| place as u32 + 1);
+        let Self { prompt, completion, cached, has_cost, .. } = self;
+        [prompt.0, completion.0, cached.0, lower, upper, u32::from(has_cost) + 2 * tier]
+    }
+
+    /// The tokens from [`to_words`](Self::to_words); `None` if the numbers are none of these.
+    pub(super) fn from_words([prompt, completion, cached, lower, upper, cost_and_tier]: [u32; 6]) -> Option<Self> {
+        Some(Self {
+            prompt: SmallNumber(prompt),
+            completion: SmallNumber(completion),
+            cached: SmallNumber(cached),
+            cost: [lower, upper],
+            has_cost: cost_and_tier % 2 == 1,
+            tier: match cost_and_tier / 2 {
+                0 => None,
+                number => Some(*TIERS.get(number as usize - 1)?),
+            },
+        })
+    }
+
     /// The tokens; `None` if the server stated no number.
     pub fn usage(self) -> Option<Usage> {
         let usage = Usage {

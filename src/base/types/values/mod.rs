@@ -35,6 +35,11 @@ impl Digest {
         Self(*blake3::hash(bytes).as_bytes())
     }
 
+    /// The digest of the bytes that a hasher was given.
+    pub fn from_hasher(hasher: &blake3::Hasher) -> Self {
+        Self(*hasher.finalize().as_bytes())
+    }
+
     /// The digest of a value as canonical JSON: keys sorted, nulls and absent fields left out at every depth. `domain`
     /// names the kind of value and its version, as `darkqa.trial/2`, so that equal values of two kinds have different
     /// digests.

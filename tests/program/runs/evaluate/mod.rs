@@ -4,6 +4,7 @@ mod adapted;
 mod conditions;
 mod failures;
 mod interruption;
+mod large;
 mod outputs;
 mod probabilities;
 mod requests;

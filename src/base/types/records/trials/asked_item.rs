@@ -3,10 +3,12 @@
 use std::borrow::Cow;
 use std::hash::{Hash, Hasher};
 
+use serde::{Deserialize, Serialize};
+
 use crate::types::{Family, FrameId, QuestionId, Shared};
 
 /// One question in one wording, one order of its choices and one repeat.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct AskedItem {
     /// The name of the question.
     pub question: Shared<QuestionId>,

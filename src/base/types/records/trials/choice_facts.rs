@@ -8,6 +8,8 @@
 use std::collections::BTreeMap;
 use std::hash::{Hash, Hasher};
 
+use serde::{Deserialize, Serialize};
+
 use super::TextPlace;
 use super::interner::Interner;
 use crate::types::degradations::PairFacts;
@@ -29,6 +31,15 @@ pub struct ChoiceFacts {
     /// Whether the reply is the letter of a choice and nothing else.
     pub(super) is_letter: bool,
 }
+
+/// True if a number is [`NONE`] or that of one of `count` entries.
+fn is_known(number: u32, count: usize) -> bool {
+    number == NONE || (number as usize) < count
+}
+
+/// All outcomes, by their numbers in [`ChoiceFacts::to_words`].
+const OUTCOMES: [TrialOutcome; 5] =
+    [TrialOutcome::Right, TrialOutcome::Wrong, TrialOutcome::Answered, TrialOutcome::Unparsed, TrialOutcome::Failed];
 
 /// An [`ParsedAnswer`] in two bytes.
 #[derive(Debug, Clone, Copy)]
@@ -56,15 +67,40 @@ impl From<PackedAnswer> for ParsedAnswer {
     }
 }
 
+impl PackedAnswer {
+    /// An answer as bytes: whether there is one, and its choice or reason.
+    fn to_bytes(answer: Option<Self>) -> [u8; 2] {
+        let number = |why: UnreadReason| UnreadReason::ALL.iter().position(|reason| *reason == why);
+        match answer {
+            None => [0, 0],
+            Some(Self::Chosen(index)) => [1, index],
+            Some(Self::Unread(None)) => [2, 0],
+            Some(Self::Unread(Some(why))) => [3, number(why).unwrap_or(UnreadReason::ALL.len()) as u8],
+        }
+    }
+
+    /// An answer from its bytes; the outer `None` if they are none of an answer.
+    #[expect(clippy::option_option, reason = "bytes that are no answer, and the bytes of no answer")]
+    fn from_bytes(bytes: [u8; 2]) -> Option<Option<Self>> {
+        Some(match bytes {
+            [0, 0] => None,
+            [1, index] => Some(Self::Chosen(index)),
+            [2, 0] => Some(Self::Unread(None)),
+            [3, why] => Some(Self::Unread(Some(*UnreadReason::ALL.get(usize::from(why))?))),
+            _ => return None,
+        })
+    }
+}
+
 /// Facts that few trials have, as indices: the observer's view, and the model's probability of each choice.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 struct RareFacts {
     observed: u32,
     options: u32,
 }
 
 /// Tables that the facts of trials with choices refer to.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct ChoiceTables {
     images: Interner<SentImages>,
     observed: Interner<Observed>,
@@ -120,6 +156,13 @@ impl ChoiceTables {
         self.rare.len() as u32 - 1
     }
 
+    /// True if all indices within the tables exist.
+    pub(super) fn is_complete(&self) -> bool {
+        self.rare
+            .iter()
+            .all(|rare| is_known(rare.observed, self.observed.len()) && is_known(rare.options, self.options.len()))
+    }
+
     /// The images that were sent.
     pub fn images(&self, facts: ChoiceFacts) -> Option<&SentImages> {
         (facts.images != NONE).then(|| self.images.get(facts.images))
@@ -144,6 +187,28 @@ impl ChoiceTables {
 }
 
 impl ChoiceFacts {
+    /// The facts as numbers, without the tables.
+    pub(super) fn to_words(self) -> [u32; 4] {
+        let [strict, lenient] = [self.strict, self.lenient].map(PackedAnswer::to_bytes);
+        let answers = u32::from_le_bytes([strict[0], strict[1], lenient[0], lenient[1]]);
+        let outcome = OUTCOMES.iter().position(|outcome| *outcome == self.outcome).unwrap_or(OUTCOMES.len());
+        [self.images, self.rare, answers, u32::from(self.is_letter) + 2 * outcome as u32]
+    }
+
+    /// The facts from [`to_words`](Self::to_words); `None` if the numbers are none of facts with these tables.
+    pub(super) fn from_words([images, rare, answers, ending]: [u32; 4], tables: &ChoiceTables) -> Option<Self> {
+        let [strict, why_strict, lenient, why_lenient] = answers.to_le_bytes();
+        let is_complete = is_known(images, tables.images.len()) && is_known(rare, tables.rare.len());
+        is_complete.then_some(Self {
+            images,
+            rare,
+            strict: PackedAnswer::from_bytes([strict, why_strict])?,
+            lenient: PackedAnswer::from_bytes([lenient, why_lenient])?,
+            outcome: *OUTCOMES.get(ending as usize / 2)?,
+            is_letter: ending % 2 == 1,
+        })
+    }
+
     /// The strict parsing of the reply; `None` if no reply came.
     pub(super) fn strict(self) -> Option<ParsedAnswer> {
         self.strict.map(ParsedAnswer::from)
@@ -174,7 +239,7 @@ fn is_letter(reply: &str, choices: usize) -> bool {
 }
 
 /// Facts about the images sent in one request.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SentImages {
     /// The digest of the first image file.
     pub first: Digest,

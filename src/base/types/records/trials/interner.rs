@@ -5,6 +5,7 @@
 use std::hash::{BuildHasher, Hash};
 
 use hashbrown::{DefaultHashBuilder, HashTable};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Distinct values in the order in which they were added. The number of a value is its index.
 #[derive(Debug, Clone)]
@@ -44,6 +45,23 @@ impl<T: Hash + Eq> Interner<T> {
         all.push(value);
         numbers.insert_unique(hash, number, |number| hashes.hash_one(&all[*number as usize]));
         number
+    }
+}
+
+/// Serialized as the list of its values.
+impl<T: Serialize> Serialize for Interner<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.all.serialize(serializer)
+    }
+}
+
+impl<'de, T: Deserialize<'de> + Hash + Eq> Deserialize<'de> for Interner<T> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let mut values = Self::default();
+        for value in Vec::<T>::deserialize(deserializer)? {
+            values.push(value);
+        }
+        Ok(values)
     }
 }
 

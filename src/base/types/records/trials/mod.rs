@@ -6,6 +6,7 @@
 mod asked_item;
 mod asked_model;
 mod choice_facts;
+mod encoding;
 mod interner;
 mod trial_ref;
 
@@ -24,6 +25,7 @@ use choice_facts::{TrialFacts, hash_reply};
 use interner::Interner;
 
 pub use asked_item::{AskedItem, AskedParts, ItemKey};
+pub use asked_model::Stopped;
 pub use choice_facts::{ChoiceFacts, ChoiceTables, SentImages};
 pub use interner::TextPlace;
 pub use trial_ref::TrialRef;
@@ -86,6 +88,7 @@ impl<D: StoredDetail> Trials<D> {
         let asked =
             self.asked.intern(AskedModel { model: record.model, view: record.view, condition: record.condition });
         let failure = record.failure.map(|failure| (failure.kind, failure.status));
+        let stopped = record.finish.as_ref().into();
         let ended_by = ended_by(record.finish, record.refusal.as_deref(), failure.is_some());
         let ending = self.endings.intern(Ending {
             served_model: record.served_model,
@@ -93,6 +96,7 @@ impl<D: StoredDetail> Trials<D> {
             via: record.via,
             failure,
             ended_by,
+            stopped,
             attempts: record.attempts,
             lost: record.lost,
             max_tokens: record.max_tokens,

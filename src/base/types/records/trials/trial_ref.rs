@@ -1,9 +1,10 @@
 //! [`TrialRef`]: one trial in a table.
 
-use super::asked_model::Ending;
+use super::asked_model::{Ending, Stopped};
 use super::choice_facts::TrialFacts;
 use super::{AskedItem, KeptTrial, SentImages, TextPlace, Trials};
 use crate::types::records::record::{FailureKind, StoredDetail, Via, View};
+use crate::types::records::small_number::Tokens;
 use crate::types::{
     ChoiceDetail, Condition, Digest, Family, FrameId, LostAttempts, Observed, OpenDetail, OptionProbabilities,
     ParsedAnswer, QuestionId, Record, Step, TrialKey, TrialOutcome, Usage,
@@ -139,6 +140,11 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
         self.ending().ended_by.as_deref().filter(|_| !self.failed())
     }
 
+    /// The reason why the model stopped, as far as it decides whether the trial is asked again.
+    pub fn stopped(self) -> Stopped {
+        self.ending().stopped
+    }
+
     /// Whether a reply or a refusal came.
     #[must_use]
     pub fn has_reply(self) -> bool {
@@ -172,6 +178,11 @@ impl<'t, D: StoredDetail> TrialRef<'t, D> {
     #[must_use]
     pub fn usage(self) -> Option<Usage> {
         self.facts().tokens.usage()
+    }
+
+    /// The tokens that the server charged, in the form that is kept in memory.
+    pub fn tokens(self) -> Tokens {
+        self.facts().tokens
     }
 
     /// The duration of the last try, in milliseconds.
