@@ -189,7 +189,7 @@ fn wrong_words_name_their_flag() {
       error: invalid value 'webp' for '--image <FORMAT>': png, or jpeg:QUALITY with a quality from 1 to 100, as
           jpeg:95, expected
     --model random --prompts nowhere
-      error: nowhere: cannot read: [OS ERROR]
+      error: --prompts: no folder nowhere, and the built-in prompts are paper, terse, letter
     --model script:nowhere.jsonl
       error: nowhere.jsonl: cannot read: [OS ERROR]
     --model random --data rooms:frames=100000 --llie nowhere.onnx

@@ -231,7 +231,7 @@ fn check_names_everything_that_is_wrong() {
     let called = bench.call(&words(&format!("{line} --model gpt-4o --llie none.onnx --prompts nowhere")));
     insta::assert_snapshot!(called.lines_with("problem"), @"
     exit code: 1
-    problem  nowhere: cannot read: [OS ERROR]
+    problem  --prompts: no folder nowhere, and the built-in prompts are paper, terse, letter
     problem  OPENAI_API_KEY: no key for https://api.openai.com/v1: set this variable, or name another with
         --api-key-env NAME or a file with --api-key-file FILE; name your own server with --base-url URL;
         --api-key-env none sends no key
@@ -277,7 +277,7 @@ fn template_checks_and_runs_unchanged() {
     ok       power: 6 questions in 3 frames detects no difference between two conditions; 5 points need about 453
         frames (one model; level 2.50 % after correction; assumed: 20 % of answers change without an effect,
         correlation 0.05 in a frame)
-    ok       3 images, 580 kB, 3 of 480×360
+    ok       3 images, 556 kB, 3 of 480×360
     ok       median brightness 127 of 255 (3 images)
     warning  no model is named: --model NAME adds it to the check, and what a run would take
     ok: 6 questions, 1 warning
@@ -323,7 +323,7 @@ fn template_checks_and_runs_unchanged() {
     ok       power: 6 questions in 3 frames detects no difference between two conditions; 5 points need about 453
         frames (one model; level 2.50 % after correction; assumed: 20 % of answers change without an effect,
         correlation 0.05 in a frame)
-    ok       3 images, 580 kB, 3 of 480×360
+    ok       3 images, 556 kB, 3 of 480×360
     ok       median brightness 127 of 255 (3 images)
     warning  no model is named: --model NAME adds it to the check, and what a run would take
     ok: 6 questions, 1 warning

@@ -146,8 +146,10 @@ fn a_run_says_what_was_turned() {
     assert_eq!(manifest.get("inputs"), None);
     assert_eq!(stated.len(), by_hand.len());
     for (one, other) in stated.iter().zip(&by_hand) {
-        assert_eq!(one["image"]["digest"], other["image"]["digest"]);
         let is_turned = one["frame"] == "a.png";
+        // The file that was turned by hand is sent as it is, in the bytes of another writer.
+        let is_rewritten = is_turned && one["condition"] == "L0";
+        assert_eq!(one["image"]["digest"] != other["image"]["digest"], is_rewritten, "{one}");
         // The same pixels, but results of a program that turned nothing must not stand in for these.
         assert_eq!(one["key"] != other["key"], is_turned, "{one}");
         let orientation = one["image"].get("orientation");
