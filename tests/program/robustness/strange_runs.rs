@@ -136,7 +136,7 @@ fn store_is_not_written_through_links() {
     let called = bench.call(&words(&line("2")));
     insta::assert_snapshot!(called.messages(), @"
     exit code: 0
-     WARN --images-cache: cannot write to store: store/v1/86 is a link; delete it; no more images are stored there
+     WARN --images-cache: cannot write to store: store/v1/62 is a link; delete it; no more images are stored there
     ");
     assert_eq!(fs::read_dir(bench.path("elsewhere")).unwrap().count(), 0);
 }

@@ -79,8 +79,8 @@ pub fn ssim(a: &Rgb, b: &Rgb) -> Result<f64> {
 /// [`ssim`] from every eighth row of windows. Of images with less than 1,034 rows it takes at least 128 rows of windows,
 /// and all if they have less than 266.
 ///
-/// Measured on 40 photographs at ten levels each, it differs from [`ssim`] by at most 6·10⁻⁴ at 640 × 480 and at
-/// 2560 × 1440, where it takes a seventh of the time.
+/// Measured on 37 photographs and 9 drawn rooms at ten levels each, it differs from [`ssim`] by at most 6·10⁻⁴ at
+/// 640 × 480 and at 2560 × 1440, where it takes a seventh of the time.
 ///
 /// # Errors
 /// See [`ssim`].
