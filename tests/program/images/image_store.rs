@@ -239,7 +239,7 @@ fn dry_run_estimates_image_store() {
     insta::assert_snapshot!(redacted(&roomy), @"
     Nothing was sent. 60 of 60 trials are left to ask.
     at no endpoint, built in: random 60
-    image store: enhanced images 0.1 MB, room [MEMORY]: the next model finds about 100 % of them
+    image store: enhanced images 0.0 MB, room [MEMORY]: the next model finds about 100 % of them
     power: 10 questions in 2 scenes detects no difference between two conditions; 5 points need about 276 scenes
         (one model; level 0.83 % after correction; assumed: 20 % of answers change without an effect, correlation
         0.05 in a scene)
@@ -249,7 +249,7 @@ fn dry_run_estimates_image_store() {
     insta::assert_snapshot!(redacted(&narrow), @"
     Nothing was sent. 60 of 60 trials are left to ask.
     at no endpoint, built in: random 60
-    image store: enhanced images 0.1 MB, room 0.0 MB: the next model finds about 19 % of them
+    image store: enhanced images 0.0 MB, room 0.0 MB: the next model finds about 19 % of them
     power: 10 questions in 2 scenes detects no difference between two conditions; 5 points need about 276 scenes
         (one model; level 0.83 % after correction; assumed: 20 % of answers change without an effect, correlation
         0.05 in a scene)
