@@ -276,7 +276,7 @@ fn open_fields_refuse_other_values() {
 type Addition = (&'static str, &'static str, usize);
 
 /// What may be added to an evaluation. A part of the noise model that is said makes another noise profile.
-const ADDITIONS: [Addition; 23] = [
+const ADDITIONS: [Addition; 24] = [
     ("", "--blind", 3),
     ("", "--model m --model n", 9),
     ("", "--model n", 9),
@@ -298,6 +298,7 @@ const ADDITIONS: [Addition; 23] = [
     ("--limit 2", "--limit 3", 3),
     ("--families presence", "--families presence,color", 3),
     ("", "--repeats 2", 9),
+    ("", "--noise-seeds 2", 3),
     // Of two images: without an image, at L0 twice, and at L3 twice.
     ("--ask bank.jsonl --ask-per-image 1", "--ask-per-image 2 --ask bank.jsonl", 10),
     // They come with the observer alone.
@@ -388,7 +389,7 @@ fn what_decides_nothing_asks_nothing() {
 const KEYS: &str = "by key";
 
 /// Flags that the tables here leave out, and where they are held.
-const ELSEWHERE: [(&str, &str); 60] = [
+const ELSEWHERE: [(&str, &str); 61] = [
     ("--noise", KEYS),
     ("--read", KEYS),
     ("--skip", KEYS),
@@ -398,6 +399,7 @@ const ELSEWHERE: [(&str, &str); 60] = [
     ("--request", KEYS),
     ("--allow", KEYS),
     ("--stop", KEYS),
+    ("--design", "tests/program/scores/draws.rs"),
     ("--map", "tests/program/data/ready_made.rs"),
     ("--config-name", "src/data/ready_made/tests/shapes.rs"),
     ("--split", "src/data/ready_made/tests/shapes.rs"),
