@@ -289,7 +289,7 @@ pub(crate) struct ChoiceOrder {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(crate) enum DesignShare {
     All,
-    /// A random half of them ([`random_half`]).
+    /// A random half of them, each level equally often.
     Half,
 }
 
