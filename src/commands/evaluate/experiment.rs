@@ -283,8 +283,8 @@ fn plan_trials(setup: &ChoiceSetup<'_>, add: &mut dyn FnMut(SourcePlan<ChoiceIte
     Ok(())
 }
 
-/// A question in each wording and order of its choices. `shown_frame` is the frame whose image is shown, if it is not the frame of
-/// the question.
+/// A question in each wording and order of its choices. `shown_frame` is the frame whose image is shown, if it is not
+/// the frame of the question.
 fn prompts(setup: &ChoiceSetup<'_>, sample: &Sample, shown_frame: Option<&FrameId>) -> Result<Vec<QuestionPrompts>> {
     let (order, repeats, question) = (setup.config.order, setup.config.repeats, &sample.question);
     let is_of_several = !setup.dataset.image_series(&question.frame).is_empty();

@@ -11,8 +11,9 @@ pub(super) fn variation(findings: &Findings<'_>) -> Option<Sentence> {
     let found = findings.variation.as_ref()?;
     let main = findings.grid.main_variant()?;
     let models = findings.models_of(&main);
-    let changes = found.darkest_changes(&findings.grid).into_iter();
-    let change = changes
+    let change = found
+        .darkest_changes(&findings.grid)
+        .into_iter()
         .filter(|row| models.contains(&&*row.first.model))
         .reduce(|most, next| if dependence(next) > dependence(most) { next } else { most })?;
     let mut numbers = NamedNumbers::new(findings.unit);

@@ -80,8 +80,6 @@ pub struct DifferenceVariation {
     pub first: ModelInCondition,
     pub second: ModelInCondition,
     pub found: FacetedDifference,
-    /// Standard deviations of the difference of a pair by source.
-    pub components: Components,
     /// The difference in each wording in which both sides have replies.
     by_wording: Vec<f64>,
 }
@@ -143,7 +141,6 @@ impl RunVariation {
                     first: comparison.first.clone(),
                     second: comparison.second.clone(),
                     found: FacetedDifference::new(&pairs)?,
-                    components: Components::new(&pairs),
                     by_wording: if wordings.len() > 1 { means(&pairs, wordings.len()) } else { Vec::new() },
                 })
             })
@@ -158,7 +155,7 @@ impl RunVariation {
             wordings: wordings.into_iter().map(str::to_owned).collect(),
             plans: Vec::new(),
         };
-        found.plans = found.plans(grid);
+        found.plans = found.plans(grid, &places);
         Some(found)
     }
 
@@ -176,8 +173,8 @@ impl RunVariation {
         changes.filter(|row| Some(row.first.level) == darkest).collect()
     }
 
-    fn plans(&self, grid: &Grid<'_>) -> Vec<Plan> {
-        let questions = places(grid, &BTreeSet::new()).last().map_or(0, |last| last.question as usize + 1);
+    fn plans(&self, grid: &Grid<'_>, places: &[Observation]) -> Vec<Plan> {
+        let questions = places.last().map_or(0, |last| last.question as usize + 1);
         let scenes: BTreeSet<u32> = grid.items.iter().map(|item| item.cluster).collect();
         let here = Design {
             scenes: scenes.len(),
@@ -190,7 +187,12 @@ impl RunVariation {
         };
         let mut plans = Vec::new();
         for change in self.darkest_changes(grid) {
-            let mut own: Vec<Plan> = candidates(&here).into_iter().map(|design| Plan::new(change, design)).collect();
+            let [Some(first), Some(second)] = [&change.first, &change.second].map(|side| grid.find(side)) else {
+                continue;
+            };
+            let components = Components::new(&pairs(grid, places, [first, second]));
+            let plan = |design| Plan::new(&change.first, design, &components);
+            let mut own: Vec<Plan> = candidates(&here).into_iter().map(plan).collect();
             own.sort_by_key(|plan| plan.asked.map_or(usize::MAX, |needed| needed.requests));
             plans.extend(own);
         }
@@ -223,19 +225,20 @@ fn candidates(whole: &Design) -> Vec<Design> {
 }
 
 impl Plan {
-    fn new(change: &DifferenceVariation, design: Design) -> Self {
+    /// `components` are those of the change of `subject` from L0.
+    fn new(subject: &ModelInCondition, design: Design, components: &Components) -> Self {
         let needed = |components: &Components| {
             let found = components.smallest(&design, PLANNED_CHANGE)?;
-            // L0 has one draw of the noise, and every wording and order of which half of several draws is asked.
+            // L0 has one draw. With half of several draws, each wording and order is asked in some draw, and at L0.
             let light = Design { draws: 1, is_half: found.is_half && found.draws < 2, ..found };
             let requests = found.requests() + light.requests();
             Some(Needed { scenes: found.scenes, questions: found.questions, requests })
         };
         Self {
-            subject: change.first.clone(),
+            subject: subject.clone(),
             design,
-            asked: needed(&change.components.of_asked_levels()),
-            others: needed(&change.components),
+            asked: needed(&components.of_asked_levels()),
+            others: needed(components),
         }
     }
 }

@@ -141,8 +141,14 @@ fn remedies_of_refused_wordings_and_draws_work() {
 #[test]
 fn draws_are_refused_where_they_cannot_be_made_or_compared() {
     let bench = Bench::with_questions(2);
-    let ask = bench.call(&words("--data set.jsonl --ask home --model random --noise seeds=2 --out a")).stderr;
-    assert!(ask.contains("--noise seeds") && ask.contains("leave seeds out"), "{ask}");
+    fs::create_dir(bench.path("photos")).unwrap();
+    image::RgbImage::from_pixel(64, 48, image::Rgb([90, 120, 60])).save(bench.path("photos/a.png")).unwrap();
+    let ask = "--data photos --ask home --model random --levels L0,L5 --variant noise --out a";
+    let refused = bench.call(&words(&format!("{ask} --noise seeds=2")));
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    let said = refused.stderr;
+    assert!(said.contains("--noise seeds") && said.contains("leave seeds out"), "{said}");
+    assert_eq!(bench.call(&words(ask)).code, Some(0));
     let idle =
         bench.call(&words("--data set.jsonl --levels L0,L5 --variant ev --model random --noise seeds=2 --out b"));
     assert!(idle.stderr.contains("--noise seeds: no effect: no image has noise"), "{}", idle.stderr);

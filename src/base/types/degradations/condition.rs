@@ -58,9 +58,10 @@ impl fmt::Display for EnhancerName {
 
 /// A treatment with or without an enhancer: the state in which a frame is shown.
 ///
-/// It is written `LABEL-KIND[@READING][~DRAW][+ENHANCER]` or `L0[+ENHANCER]`; a photograph in the dark is `NAME[+ENHANCER]`,
-/// and a synthetic image that is as dark as it is `match-KIND[@READING][+ENHANCER]`. READING is a noise profile, DRAW the number
-/// of a draw of the noise after the first. `&` is reserved for several degradations in sequence.
+/// It is written `LABEL-KIND[@READING][~DRAW][+ENHANCER]` or `L0[+ENHANCER]`; a photograph in the dark is
+/// `NAME[+ENHANCER]`, and a synthetic image that is as dark as it is `match-KIND[@READING][+ENHANCER]`. READING is a
+/// noise profile, DRAW the number of a draw of the noise after the first. `&` is reserved for several degradations in
+/// sequence.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Condition {
     /// Treatment of the frame before it is enhanced.

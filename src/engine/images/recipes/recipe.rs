@@ -84,7 +84,7 @@ impl Recipe {
         Self { scaling: walk.side, degraded_at: walk.degraded_at, camera_scope: walk.camera, ..self }
     }
 
-    /// The seed of a draw of the noise: draw `n` has the images that a run with the next but `n` seed would have.
+    /// The seed of a draw of the noise, so that draw `n` has the images of a run whose seed is larger by `n`.
     pub(crate) fn seed(&self, draw: u16) -> u64 {
         self.seed.wrapping_add(u64::from(draw))
     }
