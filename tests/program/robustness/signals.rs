@@ -17,7 +17,7 @@ const PROMPT: Duration = Duration::from_secs(20);
 /// Commands that run for many seconds, and the folder that they write into from the start.
 const LONG: [(&str, Option<&str>); 3] = [
     ("rooms --out rooms --frames 3000 --size 640x480", Some("rooms")),
-    ("synthesize frames --levels L1,L2,L3,L4,L5 --out dark", Some("dark")),
+    ("synthesize frames --levels 0..16:0.1 --out dark", Some("dark")),
     // It draws the rooms before it makes the folder of the run.
     ("--model observer --data rooms:frames=3000,size=640x480 --levels L0 --out run", None),
 ];
