@@ -1,10 +1,8 @@
 //! Intersection of rays with triangles: [`Bvh`], a tree of boxes (bounding volume hierarchy).
 //!
-//! A node has four boxes, which are tested at once (Wald, Benthin and Boulos, 2008). The tree is a binary tree without
-//! every second level. Boxes are visited in the order of that binary tree, because the order decides between equally
-//! near triangles.
-
-use std::ops::Range;
+//! A node has four boxes and a leaf four triangles, which are tested at once (Wald, Benthin and Boulos, 2008). The tree
+//! is a binary tree without every second level. Boxes are visited in the order of that binary tree, because the order
+//! decides between equally near triangles.
 
 use glam::{Vec3, Vec4};
 
@@ -69,18 +67,30 @@ struct Node {
     axes: [u8; 3],
 }
 
-/// Content of a box: `count` triangles starting at `index`, or the node at `index` if `count` is 0.
+/// Up to four triangles, with their coordinates by axis. A triangle that is not there has no area.
 #[derive(Debug, Clone, Copy)]
-struct Child {
-    index: u32,
-    count: u32,
+struct Leaf {
+    corner: [Vec4; 3],
+    edges: [[Vec4; 3]; 2],
+    faces: [u32; LEAF_SIZE],
+    /// A bit for each triangle through which no light passes.
+    casts_shadow: u32,
+}
+
+/// Content of a box.
+#[derive(Debug, Clone, Copy)]
+enum Child {
+    /// Index of the node.
+    Node(u32),
+    /// Index of the leaf.
+    Leaf(u32),
 }
 
 /// A tree of boxes over all triangles of a scene.
 #[derive(Debug)]
 pub(super) struct Bvh {
     nodes: Vec<Node>,
-    triangles: Vec<Triangle>,
+    leaves: Vec<Leaf>,
 }
 
 /// Maximum number of triangles in a leaf (chosen).
@@ -116,7 +126,7 @@ impl Bvh {
                 }
             })
             .collect();
-        let mut tree = Self { nodes: Vec::with_capacity(items.len()), triangles: Vec::with_capacity(items.len()) };
+        let mut tree = Self { nodes: Vec::with_capacity(items.len()), leaves: Vec::with_capacity(items.len()) };
         tree.build(&mut items);
         tree
     }
@@ -142,17 +152,15 @@ impl Bvh {
     /// Adds the triangles or the node of a box.
     fn child(&mut self, items: &mut [BuildItem]) -> Child {
         if items.len() > LEAF_SIZE {
-            let index = self.build(items);
-            return Child { index, count: 0 };
+            return Child::Node(self.build(items));
         }
-        let index = self.triangles.len() as u32;
-        self.triangles.extend(items.iter().map(|item| item.triangle));
-        Child { index, count: items.len() as u32 }
+        self.leaves.push(Leaf::new(items));
+        Child::Leaf(self.leaves.len() as u32 - 1)
     }
 
     /// Returns the first triangle that a ray hits within a distance.
     pub(super) fn closest_hit(&self, ray: &Ray, max_distance: f32) -> Option<Hit> {
-        let tester = BoxTester::new(ray);
+        let tester = RayTester::new(ray);
         let mut found: Option<Hit> = None;
         let mut distance = max_distance;
         let mut stack = [(0.0, Child::ROOT); STACK_SIZE];
@@ -163,17 +171,18 @@ impl Bvh {
             if near > distance {
                 continue;
             }
-            let Some(index) = child.node() else {
-                for triangle in &self.triangles[child.triangles()] {
-                    if let Some((hit_distance, weights)) = triangle.intersect(ray, distance) {
-                        distance = hit_distance;
-                        found = Some(Hit { distance, face: triangle.face as usize, weights });
+            let node = match child {
+                Child::Node(index) => &self.nodes[index as usize],
+                Child::Leaf(index) => {
+                    let leaf = &self.leaves[index as usize];
+                    if let Some(hit) = tester.hits(leaf, distance).nearest(leaf) {
+                        distance = hit.distance;
+                        found = Some(hit);
                     }
+                    continue;
                 }
-                continue;
             };
-            let node = &self.nodes[index];
-            let (near, hit) = tester.test(node, distance);
+            let (near, hit) = tester.boxes(node, distance);
             if hit == 0 {
                 continue;
             }
@@ -190,25 +199,28 @@ impl Bvh {
 
     /// True if a ray hits anything that casts a shadow within a distance.
     pub(super) fn is_occluded(&self, ray: &Ray, max_distance: f32) -> bool {
-        let tester = BoxTester::new(ray);
+        let tester = RayTester::new(ray);
         let mut stack = [0; STACK_SIZE];
         let mut count = 1;
         while count > 0 {
             count -= 1;
-            let node = &self.nodes[stack[count]];
-            let (_, hit) = tester.test(node, max_distance);
+            let node = &self.nodes[stack[count] as usize];
+            let (_, hit) = tester.boxes(node, max_distance);
             for (slot, child) in node.children.iter().enumerate() {
                 if hit >> slot & 1 == 0 {
                     continue;
                 }
-                if let Some(index) = child.node() {
-                    stack[count] = index;
-                    count += 1;
-                } else if self.triangles[child.triangles()]
-                    .iter()
-                    .any(|triangle| !triangle.passes_light && triangle.intersect(ray, max_distance).is_some())
-                {
-                    return true;
+                match *child {
+                    Child::Node(index) => {
+                        stack[count] = index;
+                        count += 1;
+                    }
+                    Child::Leaf(index) => {
+                        let leaf = &self.leaves[index as usize];
+                        if tester.hits(leaf, max_distance).mask & leaf.casts_shadow != 0 {
+                            return true;
+                        }
+                    }
                 }
             }
         }
@@ -223,8 +235,12 @@ impl Bvh {
         // A node comes after its parent.
         let mut depths = vec![1; self.nodes.len()];
         for (index, node) in self.nodes.iter().enumerate() {
-            for child in node.children.iter().filter_map(|child| child.node()).filter(|child| *child > index) {
-                depths[child] = depths[index] + 1;
+            for child in &node.children {
+                if let Child::Node(child) = child
+                    && *child as usize > index
+                {
+                    depths[*child as usize] = depths[index] + 1;
+                }
             }
         }
         depths.into_iter().max().unwrap_or(0)
@@ -235,41 +251,99 @@ impl Bvh {
 }
 
 impl Child {
-    const ROOT: Self = Self { index: 0, count: 0 };
+    const ROOT: Self = Self::Node(0);
+}
 
-    /// Index of the node; `None` if the box contains triangles.
-    fn node(self) -> Option<usize> {
-        (self.count == 0).then_some(self.index as usize)
-    }
-
-    /// Indices of the triangles.
-    fn triangles(self) -> Range<usize> {
-        let start = self.index as usize;
-        start..start + self.count as usize
+impl Leaf {
+    fn new(items: &[BuildItem]) -> Self {
+        let lanes = |coordinate: &dyn Fn(&Triangle) -> f32| {
+            let mut lanes = Vec4::ZERO;
+            for (lane, item) in items.iter().enumerate() {
+                lanes[lane] = coordinate(&item.triangle);
+            }
+            lanes
+        };
+        let mut faces = [0; LEAF_SIZE];
+        let mut casts_shadow = 0;
+        for (lane, BuildItem { triangle, .. }) in items.iter().enumerate() {
+            faces[lane] = triangle.face;
+            casts_shadow |= u32::from(!triangle.passes_light) << lane;
+        }
+        Self {
+            corner: [0, 1, 2].map(|axis| lanes(&|triangle| triangle.corner[axis])),
+            edges: [0, 1].map(|edge| [0, 1, 2].map(|axis| lanes(&|triangle| triangle.edges[edge][axis]))),
+            faces,
+            casts_shadow,
+        }
     }
 }
 
-/// A ray, prepared for testing four boxes at once.
-struct BoxTester {
+/// Where a ray hits the triangles of a leaf.
+struct LeafHits {
+    /// A bit for each triangle that is hit.
+    mask: u32,
+    distances: Vec4,
+    /// Barycentric weights of the second and the third corners.
+    weights: [Vec4; 2],
+}
+
+impl LeafHits {
+    /// The nearest hit; of equally near ones, that of the first triangle.
+    fn nearest(&self, leaf: &Leaf) -> Option<Hit> {
+        let distances = self.distances.to_array();
+        let hit = (0..LEAF_SIZE).filter(|lane| self.mask >> lane & 1 == 1);
+        let lane = hit.reduce(|first, next| if distances[next] < distances[first] { next } else { first })?;
+        Some(Hit {
+            distance: distances[lane],
+            face: leaf.faces[lane] as usize,
+            weights: self.weights.map(|weights| weights[lane]),
+        })
+    }
+}
+
+/// A ray, prepared for testing four boxes or four triangles at once.
+struct RayTester {
     origin: [Vec4; 3],
+    direction: [Vec4; 3],
     inverse: [Vec4; 3],
     /// A bit for each axis along which the ray runs backwards.
     backwards: u8,
 }
 
-impl BoxTester {
+impl RayTester {
     fn new(ray: &Ray) -> Self {
         let [x, y, z] = [0, 1, 2].map(|axis| u8::from(ray.inverse[axis] < 0.0) << axis);
         Self {
             origin: ray.origin.to_array().map(Vec4::splat),
+            direction: ray.direction.to_array().map(Vec4::splat),
             inverse: ray.inverse.to_array().map(Vec4::splat),
             backwards: x | y | z,
         }
     }
 
+    /// Returns where the ray hits the triangles of a leaf within a distance, from either side (Möller and Trumbore,
+    /// 1997).
+    fn hits(&self, leaf: &Leaf, distance: f32) -> LeafHits {
+        let [first, second] = &leaf.edges;
+        let p = cross(&self.direction, second);
+        let determinant = dot(first, &p);
+        let inverse = Vec4::ONE / determinant;
+        let t = [0, 1, 2].map(|axis| self.origin[axis] - leaf.corner[axis]);
+        let u = dot(&t, &p) * inverse;
+        let q = cross(&t, first);
+        let v = dot(&self.direction, &q) * inverse;
+        let distances = dot(second, &q) * inverse;
+        let is_flat = determinant.abs().cmplt(Vec4::splat(1e-12));
+        let is_beside = v.cmplt(Vec4::ZERO) | (u + v).cmpgt(Vec4::ONE);
+        let is_within = u.cmpge(Vec4::ZERO) & u.cmple(Vec4::ONE);
+        let is_near = distances.cmpgt(Vec4::splat(1e-5)) & distances.cmplt(Vec4::splat(distance));
+        let hit = is_within & is_near & !(is_flat | is_beside);
+        LeafHits { mask: hit.bitmask(), distances, weights: [u, v] }
+    }
+
     /// Returns the distances to the boxes, and a bit for each box that the ray hits within a distance (Kay and Kajiya,
     /// SIGGRAPH 1986).
-    fn test(&self, node: &Node, distance: f32) -> ([f32; BOXES], u32) {
+    fn boxes(&self, node: &Node, distance: f32) -> ([f32; BOXES], u32) {
         let (mut near, mut far) = (Vec4::ZERO, Vec4::splat(distance));
         for axis in 0..3 {
             let a = (node.low[axis] - self.origin[axis]) * self.inverse[axis];
@@ -304,30 +378,14 @@ impl Node {
     }
 }
 
-impl Triangle {
-    /// Returns the distance and barycentric weights at which a ray hits the triangle, from either side (Möller and
-    /// Trumbore, 1997).
-    fn intersect(&self, ray: &Ray, max_distance: f32) -> Option<(f32, [f32; 2])> {
-        let [first, second] = self.edges;
-        let p = ray.direction.cross(second);
-        let determinant = first.dot(p);
-        if determinant.abs() < 1e-12 {
-            return None;
-        }
-        let inverse = 1.0 / determinant;
-        let t = ray.origin - self.corner;
-        let u = t.dot(p) * inverse;
-        if !(0.0..=1.0).contains(&u) {
-            return None;
-        }
-        let q = t.cross(first);
-        let v = ray.direction.dot(q) * inverse;
-        if v < 0.0 || u + v > 1.0 {
-            return None;
-        }
-        let distance = second.dot(q) * inverse;
-        (distance > 1e-5 && distance < max_distance).then_some((distance, [u, v]))
-    }
+/// Cross products, with the operations of `Vec3::cross`.
+fn cross(a: &[Vec4; 3], b: &[Vec4; 3]) -> [Vec4; 3] {
+    [a[1] * b[2] - b[1] * a[2], a[2] * b[0] - b[2] * a[0], a[0] * b[1] - b[0] * a[1]]
+}
+
+/// Dot products, with the operations of `Vec3::dot`.
+fn dot(a: &[Vec4; 3], b: &[Vec4; 3]) -> Vec4 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 fn bounds(items: &[BuildItem]) -> (Vec3, Vec3) {
@@ -424,6 +482,31 @@ mod tests {
     use super::super::seeded_rng::SeededRng;
     use super::*;
 
+    impl Triangle {
+        /// The same as [`RayTester::hits`], for one triangle.
+        fn intersect(&self, ray: &Ray, max_distance: f32) -> Option<(f32, [f32; 2])> {
+            let [first, second] = self.edges;
+            let p = ray.direction.cross(second);
+            let determinant = first.dot(p);
+            if determinant.abs() < 1e-12 {
+                return None;
+            }
+            let inverse = 1.0 / determinant;
+            let t = ray.origin - self.corner;
+            let u = t.dot(p) * inverse;
+            if !(0.0..=1.0).contains(&u) {
+                return None;
+            }
+            let q = t.cross(first);
+            let v = ray.direction.dot(q) * inverse;
+            if v < 0.0 || u + v > 1.0 {
+                return None;
+            }
+            let distance = second.dot(q) * inverse;
+            (distance > 1e-5 && distance < max_distance).then_some((distance, [u, v]))
+        }
+    }
+
     #[test]
     fn tree_agrees_with_exhaustive_search() {
         let mut rng = SeededRng::new(3, &["bvh"]);
@@ -438,13 +521,17 @@ mod tests {
         let mut hit_count = 0;
         for _ in 0..2000 {
             let ray = Ray::new(point(6.0), point(1.0).normalize());
-            let nearest = tree
-                .triangles
+            let nearest = faces
                 .iter()
-                .filter_map(|triangle| triangle.intersect(&ray, 5.0))
-                .map(|(distance, _)| distance)
-                .reduce(f32::min);
-            assert_eq!(tree.closest_hit(&ray, 5.0).map(|hit| hit.distance), nearest);
+                .enumerate()
+                .filter_map(|(face, [a, b, c])| {
+                    let triangle =
+                        Triangle { corner: *a, edges: [*b - *a, *c - *a], face: face as u32, passes_light: false };
+                    triangle.intersect(&ray, 5.0).map(|(distance, weights)| (distance, face, weights))
+                })
+                .min_by(|(a, ..), (b, ..)| a.total_cmp(b));
+            let hit = tree.closest_hit(&ray, 5.0);
+            assert_eq!(hit.map(|hit| (hit.distance, hit.face, hit.weights)), nearest);
             assert_eq!(tree.is_occluded(&ray, 5.0), nearest.is_some());
             hit_count += usize::from(nearest.is_some());
         }
